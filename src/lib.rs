@@ -5,8 +5,9 @@
 //! processes, applied to missions by [`comparison`]). `metaplan-mission` joins OWL and PDDL,
 //! [`mission`] plans with both, and `metaplan-verify` checks the certificates of plans.
 //!
-//! The facade also contains the adaptation loop ([`mapek`]), the choice of designs without a plan
-//! ([`configure`]), explanations of plans ([`explain`]) and simulation ([`simulate`]).
+//! The facade also contains the adaptation loop ([`mapek`]) with its [`journal`] and web page ([`live`]), the choice of
+//! designs without a plan ([`configure`]), explanations of plans ([`explain`]), simulation ([`simulate`]), pictures
+//! ([`report`]), studies ([`sweep`]), and the command line ([`cli`]).
 
 pub use ::{probabilistic, verify};
 pub use ::mission::{Errors, Message, file, knowledge, message, visible};

@@ -12,7 +12,8 @@ use crate::setup::Setup;
 /// Time limit for grounding, which detects constructs that the planner does not support.
 const TIME_LIMIT: Duration = Duration::from_secs(20);
 
-/// Returns all errors and warnings about a mission, errors first.
+/// Returns the errors and warnings about a mission: errors first, without duplicates. Constructs that the planner does
+/// not support are found by grounding, which stops after 20 seconds.
 ///
 /// ```
 /// use std::path::Path;

@@ -59,7 +59,7 @@ pub struct ManifestPath {
 /// relative to the current directory.
 ///
 /// # Errors
-/// The file cannot be read or is not a manifest; otherwise all faults of its sections and keys.
+/// The file cannot be read or is not a manifest; otherwise the faults of its sections and keys.
 pub fn read<S: DeserializeOwned>(file: &Path) -> Result<(S, ManifestPath), Errors> {
     let source = source(file)?;
     parse(source.name(), source.text(), &file.parent().map(Path::to_owned).unwrap_or_default())
@@ -69,7 +69,7 @@ pub fn read<S: DeserializeOwned>(file: &Path) -> Result<(S, ManifestPath), Error
 /// the file name.
 ///
 /// # Errors
-/// The text is not a manifest; otherwise all faults of its sections and keys.
+/// The text is not a manifest; otherwise the faults of its sections and keys.
 pub fn parse<S: DeserializeOwned>(
     name: &str,
     text: &str,
@@ -190,8 +190,9 @@ fn shortened(path: &Path) -> PathBuf {
     parts.into_iter().collect()
 }
 
-/// Returns all faults of a manifest, sorted by position. The parser reports only the first fault,
-/// so each faulty entry is overwritten with blanks and the text is parsed again.
+/// Returns the faults of a manifest, sorted by position. The parser reports only the first fault, so each faulty entry
+/// is overwritten with blanks and the text is parsed again. If the text is not TOML, only the first fault is returned.
+/// A description occurs at most once, and a missing field counts only as the first fault.
 fn mistakes<S: DeserializeOwned>(text: &str, first: toml::de::Error, name: &str) -> Vec<Message> {
     let mut messages: Vec<(Option<(usize, usize)>, Message)> = Vec::new();
     let (mut remaining, mut error) = (text.to_owned(), first);
@@ -221,8 +222,8 @@ fn mistakes<S: DeserializeOwned>(text: &str, first: toml::de::Error, name: &str)
     messages.into_iter().map(|(_, message)| message).collect()
 }
 
-/// Overwrites the entry at a byte range, or its section if it is a section heading, with blanks.
-/// Line numbers do not change. Returns `None` if the text does not change.
+/// Overwrites the lines of a byte range with blanks, or the whole section if the first line is a section heading. Line
+/// numbers do not change. Returns `None` if the text does not change.
 fn without(text: &str, place: std::ops::Range<usize>) -> Option<String> {
     let begin = text.get(..place.start)?.rfind('\n').map_or(0, |at| at + 1);
     let line_end =

@@ -1,5 +1,5 @@
-//! Reads a manifest with all its sections: the mission and the settings for adaptation, comparison
-//! and simulation.
+//! Reads a manifest with all its sections: the mission, its scenarios, and the settings for adaptation, comparison,
+//! simulation and pictures.
 //!
 //! Each module defines its own section. `Sections` joins the sections, so that a key which no
 //! section defines is rejected.
@@ -63,7 +63,8 @@ pub struct Setup {
     pub settings: Settings,
     /// Unit of the times in the domain, e.g. of durations.
     pub time_unit: TimeUnit,
-    /// Names of the PDDL symbols from which the co-adaptation process is built.
+    /// Names of the PDDL symbols from which the co-adaptation process (Markov decision process of the mission) is
+    /// built.
     pub roles: Roles,
     /// Scenarios by name.
     pub scenarios: BTreeMap<String, Scenario<Simulation>>,
@@ -149,8 +150,8 @@ impl Setup {
     /// environment of the simulated robot.
     ///
     /// # Errors
-    /// M108 if the scenario does not exist or has no section `simulation`; otherwise all its
-    /// faults.
+    /// M108 if the scenario does not exist or has no section `simulation`; otherwise faults of the mission's problem;
+    /// otherwise all faults of the scenario and its simulation.
     pub fn experiment(&self, scenario: &str) -> Result<Experiment, Errors> {
         let Some(found) = self.scenarios.get(scenario) else {
             return Err(self.not_simulated(scenario, "there is none of that name").into());
@@ -169,8 +170,8 @@ impl Setup {
         self.scenarios.iter().flat_map(|(name, scenario)| self.situation(name, scenario).1).collect()
     }
 
-    /// Returns the mission in the situation of a scenario. Also returns all faults of the scenario
-    /// and its simulation.
+    /// Returns the mission in the situation of a scenario. Also returns all faults of the scenario and its simulation;
+    /// if the mission's problem is faulty itself, PDDL faults of the simulation are omitted.
     fn situation(&self, name: &str, scenario: &Scenario<Simulation>) -> (Mission, Vec<Message>) {
         let mut mission = self.mission.clone();
         let is_sound = mission.filled().is_ok();

@@ -1,4 +1,4 @@
-//! JSON answer of `metaplan check`.
+//! JSON answers of `metaplan check`: for one property, and for several properties or values of constants.
 
 use std::collections::BTreeMap;
 

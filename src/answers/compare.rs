@@ -10,7 +10,7 @@ use crate::message::Message;
 
 const FORMAT: &str = "metaplan-compare/1";
 
-/// Names of the start and the goal of a mission, if several pairs of start and goal are compared.
+/// Names of the start and the goal of a comparison, if it is not for the mission's own start and goal.
 pub type Pair = (String, String);
 
 /// Names of the measures of a candidate, in the order of the table's columns.
@@ -76,7 +76,8 @@ fn values(measures: &Measures) -> [Option<f64>; 12] {
     ]
 }
 
-/// Returns one table row for each given candidate, without rows for the bounds.
+/// Returns one table row for each given candidate, without a row for the hindsight bounds (lower bounds for a
+/// clairvoyant controller).
 pub fn begun_rows(pair: Option<&Pair>, candidates: &[Candidate]) -> Vec<Row> {
     let measured = candidates
         .iter()
@@ -84,7 +85,8 @@ pub fn begun_rows(pair: Option<&Pair>, candidates: &[Candidate]) -> Vec<Row> {
     measured.collect()
 }
 
-/// Returns the table rows of a complete comparison: its candidates and the hindsight bounds.
+/// Returns the table rows of a complete comparison: one for each candidate, and one for the hindsight bounds (lower
+/// bounds for a clairvoyant controller).
 pub fn rows(pair: Option<&Pair>, comparison: &Comparison) -> Vec<Row> {
     let mut rows = begun_rows(pair, &comparison.candidates);
     let [time, energy] = comparison.hindsight;

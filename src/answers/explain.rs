@@ -116,7 +116,7 @@ struct CausePart<'a> {
 /// Changes that are necessary together.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct RepairPart<'a> {
-    /// The changes of the set.
+    /// The changes. All of them are necessary, and together they suffice.
     changes: Vec<AlterationPart<'a>>,
     /// Best plan after these changes.
     then: BestPart<'a>,

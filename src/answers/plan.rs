@@ -224,7 +224,7 @@ struct ForcedPart {
     functions: Vec<String>,
 }
 
-/// Times of the stages before the optimizer.
+/// Running times of the stages before optimisation.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Preparation {
     /// Time of reading the files and of reasoning.
@@ -269,7 +269,7 @@ impl PlanAnswer {
         self
     }
 
-    /// Adds further optimal plans.
+    /// Adds the other optimal plans; `None` if they were not searched for.
     #[must_use]
     pub fn with_alternatives(mut self, found: Option<&Alternatives>) -> Self {
         self.alternatives = found.map(AlternativesPart::of);
@@ -283,8 +283,7 @@ impl PlanAnswer {
         self
     }
 
-    /// Adds the unavailable designs that prevent every plan; `None` if the designs are not the
-    /// reason.
+    /// Adds the set of unavailable designs that prevents every plan. Adds nothing if `blocking` contains no designs.
     #[must_use]
     pub fn with_blocking(mut self, blocking: Option<&Blocking>) -> Self {
         self.blocking = match blocking {
@@ -294,7 +293,7 @@ impl PlanAnswer {
         self
     }
 
-    /// Adds the missing numbers.
+    /// Adds the numeric functions without a value that actions need. Adds nothing if `missing` is empty.
     #[must_use]
     pub fn with_missing_values(mut self, missing: &[MissingValue]) -> Self {
         let part = |value: &MissingValue| MissingValuePart {

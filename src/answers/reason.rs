@@ -1,4 +1,5 @@
-//! JSON answers of `metaplan reason`: inferred facts and their derivations.
+//! JSON answers of `metaplan reason`: inferred facts, entailed statements, explanations why assertions hold or do not
+//! hold, and the hierarchy of classes and properties.
 
 use ontology::entail::{Answer, Entailment, Schema, SchemaEntity};
 use ontology::tomasys::{FunctionDesign, Individual};

@@ -190,8 +190,9 @@ pub fn runs_of(runs: &[Run], strategy: Strategy) -> impl Iterator<Item = &Run> +
     runs.iter().filter(move |run| run.strategy == strategy)
 }
 
-/// Returns the number of missions in which `strategy` did better than the loop, and the number in
-/// which it did worse. `None` if the loop has no runs.
+/// Compares each run of `strategy` with the run of the loop (strategy `Joint`) at the same position. Returns the number
+/// of runs in which `strategy` did better, and the number in which it did worse. Returns `None` if the loop has no
+/// runs.
 pub fn beside_joint(runs: &[Run], strategy: Strategy) -> Option<(usize, usize)> {
     let mut joint = runs_of(runs, Strategy::Joint).peekable();
     joint.peek()?;
@@ -201,8 +202,8 @@ pub fn beside_joint(runs: &[Run], strategy: Strategy) -> Option<(usize, usize)> 
     }))
 }
 
-/// Returns the statistics of `figure` over the runs of a strategy. Runs for which `figure` is
-/// `None` are ignored.
+/// Returns the statistics of `figure` over the runs of a strategy. Runs for which `figure` is `None` are ignored.
+/// Returns `None` if no run has a value.
 pub fn sample(runs: &[Run], strategy: Strategy, figure: impl Fn(&Run) -> Option<f64>) -> Option<Sample> {
     Sample::of(&runs_of(runs, strategy).filter_map(figure).collect::<Vec<_>>())
 }

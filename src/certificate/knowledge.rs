@@ -1,5 +1,5 @@
-//! Exports the part of a certificate about the knowledge base: its document, the changes since it
-//! was read, and the derivations of all facts.
+//! Exports the part of a certificate about the knowledge base: its document, its origin (domain, problem, bindings,
+//! rules, and the changes since the knowledge base was read), and the derivations of all facts.
 
 use ontology::OutputSyntax;
 use pddl::print_problem;
@@ -14,8 +14,8 @@ use crate::knowledge::{Stated, rule_text};
 use crate::message::Message;
 use crate::mission::Mission;
 
-/// Returns names and texts of the certificate's files about the knowledge base: document, origin
-/// and derivations. `None` if the mission has no knowledge base.
+/// Returns names and texts of the certificate's files about the knowledge base: document, origin and derivations.
+/// Returns `None` if the mission has no knowledge base.
 pub(super) fn files(mission: &Mission) -> Result<Option<[(&'static str, String); 3]>, Message> {
     let Some(knowledge) = mission.knowledge() else { return Ok(None) };
     let sources = knowledge.sources();

@@ -75,7 +75,8 @@ pub struct Contents<'c> {
 }
 
 impl Contents<'_> {
-    /// Executes the plan with the validator and returns its cost, or `None` without a plan.
+    /// Executes the plan with the validator and returns its cost, or `None` without a plan. Returns an error if the
+    /// plan is invalid or its cost differs from that of the solution.
     fn metric(&self, limits: &Limits) -> Result<Option<BigRational>, String> {
         let Some(found) = &self.solution.plan else { return Ok(None) };
         let (domain, cost) = (self.mission.domain(), found.cost.to_string());
@@ -87,7 +88,8 @@ impl Contents<'_> {
 /// Writes the certificate of a solution into a new directory.
 ///
 /// # Errors
-/// The solution has no certificate, or the directory cannot be written.
+/// The solution has no certificate or one that is too large or would be rejected (M120), or the directory cannot be
+/// written (M109).
 pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Result<(), Message> {
     let Contents { mission, problem, task, solution, plan } = *contents;
     let wrong = |error: &dyn std::fmt::Display| Message::error("M120", format!("no certificate: {error}"));

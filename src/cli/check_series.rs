@@ -13,7 +13,7 @@ use crate::cli::check_text::{number, shown};
 use crate::cli::common::Failure;
 use crate::cli::output;
 
-/// Upper limit on the number of values in a series, and on the number of combinations.
+/// Upper limit on the number of values in a series, and on the number of combinations of the values of all constants.
 const MOST: usize = 100_000;
 
 /// One combination of values of the given constants.

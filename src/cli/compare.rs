@@ -153,7 +153,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     so_far.end(common)
 }
 
-/// Returns the missions to compare, with their processes: the mission itself, or variants with other starts and goals.
+/// Returns the missions to compare, with their processes (Markov decision processes): the mission itself, or variants
+/// with other starts and goals.
 fn missions(
     arguments: &Arguments,
     mission: &Mission,

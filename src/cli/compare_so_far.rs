@@ -1,4 +1,4 @@
-//! Results of `metaplan compare`: all of them, or those that are available at the time limit.
+//! Results of `metaplan compare`: all of them, or those that are available at the time limit or at Ctrl-C.
 //!
 //! The comparison does not check the clock. So a separate thread waits for the time limit or for
 //! Ctrl-C, shows the results that are available then, and ends the program.
@@ -57,7 +57,7 @@ impl Shared {
         Self(Arc::new(Mutex::new(Some(SoFar::default()))))
     }
 
-    /// Applies `change` to the results. Does nothing once the time is over, because the program ends.
+    /// Applies `change` to the results. Does nothing once the results are being shown, because the program then ends.
     pub fn change(&self, change: impl FnOnce(&mut SoFar)) {
         if let Some(so_far) = &mut *self.0.lock().unwrap_or_else(PoisonError::into_inner) {
             change(so_far);
@@ -68,7 +68,7 @@ impl Shared {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
-    /// Shows the available results at the time limit or at Ctrl-C, with a message, and ends the
+    /// Starts a thread that shows the available results at the time limit or at Ctrl-C, with a message, and ends the
     /// program. A second Ctrl-C ends it at once.
     pub fn show_after(&self, time: Option<Duration>, common: &Common) {
         let limits = time.map_or_else(Limits::none, |time| Limits::none().with_time(time));
@@ -95,7 +95,8 @@ impl Shared {
         });
     }
 
-    /// Shows all results, and returns the exit status.
+    /// Shows all results, and returns the exit status. Does not return if the time limit or Ctrl-C came first: then the
+    /// other thread ends the program.
     ///
     /// # Errors
     /// The table cannot be written.

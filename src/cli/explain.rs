@@ -61,8 +61,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     Ok(if complete { Exit::Done } else { Exit::NotProved })
 }
 
-/// Explains a design: the reasons for its availability at once, the comparison with the best plan
-/// after planning. Returns `true` if everything is proved.
+/// Explains a design. Text output shows the reasons for its availability before planning, and the comparison with the
+/// best plan after planning; JSON is written at the end. Returns `true` if all plans in the answer are proved optimal.
 fn explain_design(
     mission: &Mission,
     why: Availability,
@@ -82,7 +82,8 @@ fn explain_design(
     Ok(explanation.complete)
 }
 
-/// Explains which changes lead to another plan. Returns `true` if everything is proved.
+/// Explains which changes of the situation lead to another plan. Returns `true` if the answer is complete, i.e. no
+/// limit was reached.
 fn explain_plan(mission: &Mission, limits: &Limits, common: &Common) -> Result<bool, Failure> {
     let changes = planning(common, limits, |hear| smallest_changes(mission, limits, hear))?;
     match common.format {
@@ -191,7 +192,8 @@ fn why_text(why: &Availability) -> String {
 }
 
 /// Formats the plans that explain a design: the best plan, the best plan with this design as the only one of its
-/// functions, and the best plan without the design. Changes of the design's availability follow.
+/// functions, and, if the best plan uses the design, the best plan without it. Changes of the design's availability
+/// follow.
 fn design_text(found: &DesignExplanation) -> String {
     let DesignExplanation { availability, best, .. } = found;
     let mut text = String::new();

@@ -117,7 +117,7 @@ fn nothing_to_show() -> Message {
     Message::error("M130", "a limit was reached before there was anything to show")
 }
 
-/// Deadline of a command that has read its input and has no answer.
+/// Limits, with a margin, at which a command is ended that has read its input and shows no answer.
 struct Deadline {
     started: Instant,
     time: Option<Duration>,
@@ -138,8 +138,8 @@ impl Deadline {
     }
 }
 
-/// Returns the processor time of this process, in steps of 10 ms. `None` where the platform does
-/// not report it in this way.
+/// Returns the processor time of this process since its start, in steps of 10 ms. Returns `None` on platforms without
+/// `/proc/self/stat`, i.e. other than Linux.
 fn processor_time() -> Option<Duration> {
     let text = std::fs::read_to_string("/proc/self/stat").ok()?;
     // The name of the program is in parentheses and may contain any characters.

@@ -1,4 +1,4 @@
-//! Output of answers, messages and tables, and atomic writing of files.
+//! Output of answers, messages and tables, and writing of files.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -35,7 +35,8 @@ pub fn answer(text: &str) {
     document(&visible(text));
 }
 
-/// Writes a document unchanged to standard output. A closed pipe is not an error; a full disk is.
+/// Writes a document unchanged to standard output. A closed pipe is not an error. Any other error is reported on
+/// standard error, and [`answer_lost`] then returns `true`.
 pub fn document(text: &str) {
     let mut stdout = std::io::stdout().lock();
     HAS_BEGUN.store(true, Ordering::Relaxed);
@@ -80,7 +81,8 @@ pub fn shown(message: &Message, colors: bool) -> Cow<'_, str> {
     if colors { message.colored().into() } else { visible(message.text()) }
 }
 
-/// Writes messages to standard error. `--quiet` suppresses warnings.
+/// Writes messages to standard error. `--quiet` suppresses warnings. At most [`KIND_LIMIT`] warnings per code are
+/// written; further ones are counted.
 pub fn warnings<'a>(common: &Common, messages: impl IntoIterator<Item = &'a Message>) {
     let mut stderr = std::io::stderr().lock();
     let colors = common.colors(&stderr);
@@ -98,7 +100,8 @@ pub fn warnings<'a>(common: &Common, messages: impl IntoIterator<Item = &'a Mess
     }
 }
 
-/// Reports errors: text on standard error, or a JSON object as the answer.
+/// Reports errors: text on standard error, or a JSON object as the answer. As text, at most [`MESSAGE_LIMIT`] messages
+/// are written; further ones are counted.
 pub fn failure(common: &Common, messages: &[Message]) {
     if common.format == Format::Json {
         json_answer(&ErrorAnswer::new(messages));
@@ -116,7 +119,8 @@ pub fn failure(common: &Common, messages: &[Message]) {
     }
 }
 
-/// Writes a file atomically, see [`file::write`].
+/// Writes a file, atomically where possible (see [`file::write`]). From then on, the time limit does not end the
+/// program.
 pub fn write_file(path: &Path, text: &str) -> Result<(), Failure> {
     {
         // The thread of the time limit holds this lock while it decides whether to end the program.
@@ -150,8 +154,8 @@ pub fn require_directory(path: &Path) -> Result<(), Failure> {
     Err(Failure::usage(Message::error("M107", text)))
 }
 
-/// Returns the number of columns for answers: `COLUMNS`, or the width of the terminal. `None` if
-/// neither is known, or if it is 0.
+/// Returns the number of columns for answers: the environment variable `COLUMNS`, or the width of the terminal. Returns
+/// `None` if neither is known, or if the number is 0.
 pub fn columns() -> Option<u16> {
     let requested = std::env::var("COLUMNS").ok().and_then(|columns| columns.trim().parse().ok());
     let of_terminal = || {
@@ -167,7 +171,7 @@ pub fn table(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> St
     table_within(columns(), header, rows)
 }
 
-/// Formats a table without borders, at most `columns` columns wide.
+/// Formats a table without borders, at most `columns` columns wide unless words are longer; `None` is no limit.
 pub fn table_within(
     columns: Option<u16>,
     header: &[&str],

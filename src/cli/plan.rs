@@ -305,14 +305,15 @@ fn finish(
             output::note(&beside(planned, arguments, common));
         }
         (Some(text), None) => output::answer(&(drawn + &text)),
-        // Readers of plans expect either a plan or an empty file.
+        // Programs that read plans accept nothing else, so without a plan, neither the file nor standard output is
+        // written.
         (None, _) => output::note(&beside(planned, arguments, common)),
     }
     Ok(())
 }
 
-/// Returns the text for standard error if the plan goes to a file: the verdict, and the parts of the answer that the
-/// file's format lacks.
+/// Returns the text for standard error if the plan goes to a file or does not exist: the verdict, and the parts of the
+/// answer that the plan's format lacks.
 fn beside(planned: &Planned<'_>, arguments: &Arguments, common: &Common) -> String {
     let verdict = format!("{}\n", planned.solution.verdict());
     match arguments.form(common) {
@@ -323,8 +324,8 @@ fn beside(planned: &Planned<'_>, arguments: &Arguments, common: &Common) -> Stri
     }
 }
 
-/// Returns the text below the verdict: statistics, values of objectives, makespan, and alternatives or blocking
-/// designs.
+/// Returns the text below the verdict: statistics (with `--verbose`), values of objectives, makespan, and alternatives,
+/// or else blocking designs and missing values.
 fn further(planned: &Planned<'_>, solution: &Solution, (arguments, common): (&Arguments, &Common)) -> String {
     let statistics =
         if common.verbose { statistics_text(solution, &planned.preparation) } else { String::new() };
@@ -340,7 +341,8 @@ fn further(planned: &Planned<'_>, solution: &Solution, (arguments, common): (&Ar
     statistics + &values + &makespan + &alternatives_text.or(blocking).unwrap_or_default()
 }
 
-/// Formats the answer as requested. `None` if the requested plan does not exist.
+/// Formats the answer in the requested format. Returns `None` if the format can express only a plan, and there is no
+/// plan.
 fn show(
     planned: &Planned<'_>,
     mission: &Mission,
@@ -365,7 +367,7 @@ fn show(
 /// Maximum number of listed missing values; further ones are only counted.
 const MISSING_SHOWN: usize = 10;
 
-/// Lists values of numeric functions that are missing in the mission, one per line.
+/// Lists values of numeric functions that are missing in the mission, one per line and at most [`MISSING_SHOWN`].
 fn missing_text(missing: &[MissingValue]) -> String {
     let line = |value: &MissingValue| {
         let (function, actions, file) = (&value.function, value.needed_by.join(", "), &value.file);

@@ -1,5 +1,5 @@
-//! Progress of a command on standard error: a changing line on a terminal, otherwise a line every
-//! few seconds.
+//! Progress of a command on standard error: a changing line on a terminal, otherwise a line every few seconds.
+//! `--quiet` suppresses it.
 
 use std::io::IsTerminal as _;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};

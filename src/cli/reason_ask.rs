@@ -211,8 +211,8 @@ fn names(engine: &Engine) -> BTreeSet<String> {
     symbols.into_iter().filter_map(text).collect()
 }
 
-/// Resolves a name to an IRI: in brackets, in full, or the only IRI with this local name, with any
-/// prefix.
+/// Resolves a word to an IRI: an IRI in brackets, a full IRI in `names`, or a local name with any prefix. Returns an
+/// error unless exactly one IRI in `names` has the local name.
 fn name(word: &str, names: &BTreeSet<String>) -> Result<String, Message> {
     if let Some(iri) = word.strip_prefix('<').and_then(|rest| rest.strip_suffix('>')) {
         return Ok(iri.to_owned());

@@ -128,8 +128,8 @@ struct Answer {
 }
 
 impl Answer {
-    /// Plans a mission. Actions may overlap if `separation`, the minimum time between interfering happenings, is given.
-    /// The validator has executed the plan.
+    /// Plans a mission. Actions may overlap if `separation`, the minimum time between interfering starts and ends of
+    /// actions, is given. The validator has executed the plan.
     fn of(
         mission: &Mission,
         positions: &Positions,

@@ -120,7 +120,8 @@ fn ended(result: Result<(), Failure>, outlet: &Outlet) -> Result<Exit, Failure> 
     Ok(Exit::Done)
 }
 
-/// Runs the planning loop from its first line to its last.
+/// Prints the ready line, and then runs the loop on all events until the input ends or the reader of the answers has
+/// closed the pipe.
 fn drive(
     common: &Common,
     control: Loop,
@@ -139,7 +140,7 @@ fn drive(
     if events.is_file() { session.replay(events) } else { session.live(events) }
 }
 
-/// Runs the configuration loop, which has no task plan.
+/// Runs the configuration loop, which chooses designs without a task plan.
 fn keep(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let knowledge = arguments.situation.knowledge(&arguments.inputs, common)?;
     output::warnings(common, knowledge.warnings());
@@ -161,7 +162,8 @@ fn adaptation(file: Option<&Path>, knowledge: &Knowledge) -> Result<Settings, Fa
     Ok(Settings::read(file, Some(knowledge))?)
 }
 
-/// Runs the configuration loop from its first line to its last.
+/// Prints the ready line, and then runs the configuration loop on all events until the input ends or the reader of the
+/// answers has closed the pipe.
 fn keep_going(
     common: &Common,
     keeper: Keeper,
@@ -180,7 +182,8 @@ fn keep_going(
 /// Time of planning before the first heartbeat, and between two heartbeats.
 const HEARTBEAT: Duration = Duration::from_secs(1);
 
-/// Starts a thread that reports the progress of planning every second until the program ends.
+/// Starts a thread that reports the progress every second while a plan is being computed. It runs until the program
+/// ends.
 fn heartbeat(watch: Watch, line: Arc<AtomicU64>, outlet: Outlet) {
     std::thread::spawn(move || {
         let mut reported: Option<(u64, Instant, Instant)> = None;

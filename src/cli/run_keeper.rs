@@ -1,5 +1,5 @@
-//! Session of the configuration loop between input and output, in the two modes of `run_session`.
-//! A choice needs no search, so each line is answered completely in both modes.
+//! Session of the configuration loop: connects it with its input and output, in two modes, for lines of a file and for
+//! lines as they arrive. A choice of designs needs no search, so each line is answered completely in both modes.
 
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::time::{Duration, Instant};
@@ -37,7 +37,7 @@ impl<'a> KeeperSession<'a> {
         Self { common, keeper, journal, outlet, clock, begun, has_times: false }
     }
 
-    /// Answers lines without reacting to the passing of time in between.
+    /// Answers all lines of a file, without reacting to the passing of time between them.
     pub(super) fn replay(mut self, mut events: Lines) -> Result<(), Failure> {
         let mut flow = self.begin()?;
         while flow == Flow::GoesOn {

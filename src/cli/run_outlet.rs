@@ -109,7 +109,8 @@ impl Outlet {
         }
     }
 
-    /// Writes several lines at once, so that lines of other threads do not interleave.
+    /// Writes lines to standard output at once, so that lines of other threads do not interleave. Also adds the lines
+    /// to the recording and the web page, if requested.
     pub(super) fn say(&self, lines: &str) -> io::Result<()> {
         let lines = visible_json(lines);
         let mut stdout = io::stdout().lock();
@@ -129,7 +130,7 @@ impl Outlet {
         Ok(())
     }
 
-    /// Writes answers to a line, each with the line's number; more may follow.
+    /// Writes answers to a line, each with the line's number; more may follow. Writes nothing if there are no answers.
     pub(super) fn answer_so_far(&self, line: u64, answers: &[impl Serialize]) -> io::Result<()> {
         if answers.is_empty() {
             return Ok(());

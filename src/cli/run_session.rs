@@ -20,7 +20,8 @@ use crate::cli::common::{Common, Failure};
 use crate::cli::run_lines::{Line, Lines};
 use crate::cli::run_outlet::{Outlet, is_over, unwritten, warn_if_unrecorded};
 
-/// Maximum number of lines that are read in advance.
+/// Capacity of the channel of read lines, and maximum number of inputs that are moved from it to the queue of waiting
+/// inputs.
 pub(super) const MAX_WAITING: usize = 1024;
 
 /// Maximum number of consecutive cancelled searches. The next search runs to its end; otherwise
@@ -213,7 +214,8 @@ impl<'a> Session<'a> {
         };
         self.open = Some((self.control.beliefs().lines(), read));
         self.stop_thinking();
-        // Safe effects are written at once; otherwise a single decision is written, not two.
+        // A reaction with effects is written at once. A reaction without effects is joined with the deliberation, so
+        // that one decision is written instead of two.
         let is_safe = answers.iter().all(|answer| answer.effect().is_none());
         if is_last
             && is_safe

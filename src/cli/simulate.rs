@@ -152,7 +152,7 @@ struct SimulationResults {
     log: String,
 }
 
-/// Simulates until a limit is reached. Each seed is simulated with all strategies before the next
+/// Simulates all runs, or those until a limit is reached. Each seed is simulated with all strategies before the next
 /// seed, so that partial results are comparable.
 fn play(
     experiment: &Experiment,

@@ -93,8 +93,8 @@ fn sweep(arguments: &Arguments, study: &Study, guard: Guard, common: &Common) ->
     Ok(exit)
 }
 
-/// Checks that all commands of a study are valid: their options, and the scenarios that they
-/// simulate.
+/// Checks the commands of a sample of a study's runs (see [`Study::samples`]): their options, and the scenarios that
+/// they simulate. Scenarios of a study that generates files are not checked.
 ///
 /// # Errors
 /// All mistakes in the commands, without duplicates.

@@ -34,7 +34,8 @@ pub(super) fn time(text: &str) -> Result<BigRational, String> {
         .ok_or_else(|| format!("`{text}` is not a time such as 0.001"))
 }
 
-/// Converts a JSON number to an exact rational number. Returns `None` for other JSON values.
+/// Converts a JSON number to an exact rational number. Returns `None` for other JSON values, and for numbers that are
+/// displayed with an exponent.
 pub(super) fn decimal(value: &Value) -> Option<BigRational> {
     let text = value.as_number()?.to_string();
     let (whole, fraction) = text.split_once('.').unwrap_or((&text, ""));

@@ -179,7 +179,7 @@ impl Coadaptation {
     /// Extracts the data from `problem`, which [`Mission::filled`] returned.
     ///
     /// # Errors
-    /// Everything that is missing in the problem, and all numbers out of range.
+    /// Facts or values that are missing in the problem, too many places or configurations, or numbers out of range.
     pub fn new(mission: &Mission, problem: &Problem, roles: &Roles) -> Result<Self, Errors> {
         let facts = Facts::new(problem);
         let mut problems = Vec::new();
@@ -264,9 +264,9 @@ impl Coadaptation {
         .checked()
     }
 
-    /// Returns `true` if the problem declares places and configurations in the form that
-    /// [`Coadaptation::new`] reads. Otherwise the states of the task have to be used as places
-    /// ([`Tasked`](crate::comparison::Tasked)).
+    /// Returns `true` if the problem declares places and configurations by initial facts of the roles (names of PDDL
+    /// symbols) `configured` or `suits`, which [`Coadaptation::new`] reads. Otherwise the states of the task have to be
+    /// used as places ([`Tasked`](crate::comparison::Tasked)).
     pub fn is_spelt_out(problem: &Problem, roles: &Roles) -> bool {
         let facts = Facts::new(problem);
         [&roles.configured, &roles.suits].iter().any(|role| !facts.of(role).is_empty())

@@ -17,7 +17,7 @@ use crate::message::Errors;
 /// A plan from a state of the process, and the effort of computing the plan.
 #[derive(Debug, Clone, Default)]
 pub struct Planned {
-    /// Actions of the plan. `None` if there is no plan.
+    /// Actions of the plan. `None` if there is no plan, or none that the process can express.
     pub actions: Option<Vec<Action>>,
     /// Number of variables of the largest formula.
     pub variables: u64,
@@ -45,7 +45,8 @@ impl Stages {
     }
 }
 
-/// Callback that computes a plan from a state; called once for each state.
+/// Callback that computes a plan from a state of the process. It is called at most once for each state; the collision
+/// flag of a state is ignored.
 pub type PlanFinder<'a> = dyn FnMut(&Valuation) -> Result<Planned, Errors> + 'a;
 
 /// Computational costs of model checking and of planning.
@@ -127,8 +128,7 @@ impl PlanTable<'_, '_> {
         Ok(planned.actions)
     }
 
-    /// Evaluates the decision rule that follows plans and plans again in every state that the last
-    /// plan does not expect.
+    /// Evaluates the decision rule that follows plans and plans again in every state that no earlier plan expects.
     pub(super) fn play(&mut self, referee: &Referee<'_>) -> Result<Measures, NoResult> {
         // Next action of a computed plan, by the state in which the plan expects to execute it.
         let mut expected: BTreeMap<Valuation, Action> = BTreeMap::new();

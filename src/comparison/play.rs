@@ -85,10 +85,10 @@ pub struct Measures {
     pub states: usize,
 }
 
-/// Evaluates a decision rule. `process` must have all rewards. With `counts`, decisions depend on
-/// the number of steps. `penalty` is the time added for a failed mission. `reserve` is the battery
-/// level for [`Measures::goal_with_reserve`]. After all decisions are made, `replans` returns
-/// `true` for states in which a new plan was needed.
+/// Evaluates a decision rule. `process` must have all rewards of `REWARDS`. With `counts`, decisions depend on the
+/// number of executed steps. `penalty` is the time added for a failed mission. `reserve` is the battery level for
+/// [`Measures::goal_with_reserve`]. After all decisions are made, `replans` returns `true` for states in which a new
+/// plan was needed.
 ///
 /// # Errors
 /// There are too many states.

@@ -1,8 +1,8 @@
 //! Converts a co-adaptation mission to a Markov decision process whose successors are computed on
 //! demand.
 //!
-//! The process corrects the published procedure: it has every route, reconfigurations at every
-//! place, a permanent collision flag, and moves only while the battery stays above the reserve.
+//! The process corrects the published procedure: it has every route, reconfigurations at every place, a permanent
+//! collision flag, and only actions after which the battery is not below the reserve.
 
 use fixedbitset::FixedBitSet;
 use num_rational::BigRational;
@@ -30,7 +30,7 @@ pub struct Risk {
 }
 
 impl Risk {
-    /// Returns the risks for which the mission has data.
+    /// Returns collisions and failures, and the loss of a component and the battery if the mission has data about them.
     pub fn all(mission: &Coadaptation) -> Self {
         Self {
             collisions: true,
@@ -135,7 +135,8 @@ pub struct Process<N> {
 }
 
 impl<N: Number> Process<N> {
-    /// Builds the process with the given risks. `rewards` selects some of the [`REWARDS`] by name.
+    /// Builds the process with the given risks. `rewards` selects some of the [`REWARDS`] by name; other names are
+    /// ignored.
     pub fn new(mission: &Coadaptation, risk: Risk, rewards: &[&str]) -> Self {
         let number = |value: &BigRational| N::from_rational(value);
         let indices: Vec<usize> =

@@ -16,8 +16,8 @@ use probabilistic::prism::identifier;
 use crate::comparison::coadaptation::{Battery, Coadaptation, Traversal};
 use crate::comparison::process::{REWARDS, Risk};
 
-/// Returns the PRISM model of a mission. Its variables are the place `l`, the configuration `c`,
-/// the battery `b`, and the flags `hit`, `failed` and `lost`.
+/// Returns the PRISM model of a mission. Its variables are the place `l`, the configuration `c` and, as far as `risk`
+/// includes them, the battery `b` and the flags `hit`, `failed` and `lost`.
 pub fn program(mission: &Coadaptation, risk: Risk) -> Model {
     let writer = ProcessWriter { mission, risk };
     model(
@@ -129,8 +129,8 @@ impl ProcessWriter<'_> {
         all(std::iter::once(away).chain(self.risk.failures.then(|| not(Expr::name("failed")))))
     }
 
-    /// Returns the guard that the battery suffices for an energy, and the assignment that subtracts
-    /// the energy.
+    /// Returns the guard that the battery suffices for an energy without going below the reserve, and the assignment
+    /// that subtracts the energy. Both are missing without a battery, or for an energy of 0 levels.
     fn spend(&self, energy: &BigRational) -> (Option<Expr>, Assignments) {
         let Some(battery) = self.battery() else { return (None, Vec::new()) };
         let levels = i64::from(self.mission.levels(energy));

@@ -47,8 +47,8 @@ impl Published {
     }
 }
 
-/// Returns at most `wanted` simple routes from start to goal, in ascending length. The length of an
-/// arc is its least time over all configurations.
+/// Returns at most `wanted` simple routes from start to goal, in ascending length. The length of an arc is its least
+/// time over all configurations. The search stops after 2,000,000 partial routes with the routes found until then.
 pub fn shortest_routes(mission: &Coadaptation, wanted: usize) -> Vec<Vec<usize>> {
     let length = |arc: usize| {
         let by = mission.arcs[arc].by.iter().flatten().map(|traversal| traversal.time.to_f64());

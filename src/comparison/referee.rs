@@ -52,7 +52,8 @@ impl Referee<'_> {
         Problem::new(&self.explored.mdp, direction, rewards, terminal)
     }
 
-    /// Returns an optimal policy for each single objective. The first one minimises penalised time.
+    /// Returns an optimal policy for each single objective, unless none is found. The first one minimises penalised
+    /// time.
     pub fn policies(&self) -> Vec<NamedPolicy> {
         let (goal, safe) = (self.goal(), self.safe_goal());
         let mut policies = Vec::new();
@@ -98,8 +99,8 @@ impl Referee<'_> {
         solve(problem, None)
     }
 
-    /// Returns the vertices of the Pareto front of time and probability of success without
-    /// collision, and a policy for each vertex.
+    /// Returns the vertices of the Pareto front of expected time and probability of success without collision, and a
+    /// policy for each vertex. Both lists are empty if the front cannot be computed.
     pub fn front(&self) -> (Vec<[f64; 2]>, Vec<NamedPolicy>) {
         let objectives = [
             Objective { rewards: Some(self.explored.rewards[0].clone()), target: self.goal() },

@@ -22,9 +22,9 @@ use crate::comparison::program::{
 };
 use crate::comparison::published::{ROUTES, shortest_routes};
 
-/// Returns the model of the published setting. Its variables are the route `r` (0 before it is
-/// chosen), the number `p` of arcs that the robot has traversed, the configuration `c` and the
-/// battery `b`. The flag `rd` is set after a reconfiguration.
+/// Returns the model of the published setting. Its variables are the route `r` (0 before it is chosen), the number `p`
+/// of arcs that the robot has traversed, the configuration `c` and, if the mission has a battery, its level `b`. The
+/// flag `rd` is set after a reconfiguration; the flag `collided` says whether the last risky move has collided.
 pub fn published_program(mission: &Coadaptation) -> Model {
     let routes = shortest_routes(mission, ROUTES);
     let writer = RouteWriter { mission, routes };

@@ -44,7 +44,8 @@ impl Tasked {
     /// [`Mission::filled`].
     ///
     /// # Errors
-    /// Constructs that the planner does not support, timed initial literals, or too many states.
+    /// Constructs that the planner does not support, timed initial literals, too many states or configurations, or
+    /// numbers that are too large or out of range.
     pub fn new(mission: &Mission, problem: &Problem, roles: &Roles) -> Result<Self, Errors> {
         let timed = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
         if timed {
@@ -119,8 +120,8 @@ impl Tasked {
         Ok(left)
     }
 
-    /// Converts the steps of a plan to actions of the process, beginning in a given state. `None`
-    /// if a step is not an action of the process.
+    /// Converts the steps of a plan to actions of the process, beginning in a given state and ending at the goal.
+    /// Returns `None` if a step before the goal is not an action of the process.
     pub fn actions(&self, situation: &Valuation, steps: &[Step]) -> Option<Vec<Action>> {
         let (mut place, mut configuration) = (situation.place, situation.configuration);
         let mut actions = Vec::new();

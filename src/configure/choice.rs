@@ -124,7 +124,8 @@ pub(super) fn current(objective: &Objective) -> Option<&str> {
     designs.map(|design| design.name.as_str()).next()
 }
 
-/// Chooses designs for the objectives in need; the other objectives keep their designs.
+/// Chooses designs for the objectives for which `is_in_need` returns `true`; the other objectives keep their designs.
+/// At a limit, returns the best choice found.
 ///
 /// # Errors
 /// The rules do not terminate.

@@ -13,7 +13,7 @@ use crate::knowledge::Knowledge;
 use crate::message::{Errors, Message, did_you_mean};
 use crate::number::decimal;
 
-/// Limit on inference steps after a report; see [`rules::Limits`].
+/// Maximum number of inference steps after a report of the robot; see [`rules::Limits`].
 const STEPS: u64 = 100_000_000;
 
 /// An objective to pursue: a function to provide, with requirements.
@@ -143,7 +143,9 @@ impl Configurator {
         Ok(())
     }
 
-    /// Chooses designs for the objectives in need.
+    /// Chooses designs for the objectives in need: those that want a design because of their status or properties, that
+    /// have no design, or for which the last choice or change of design failed. At a limit, returns the best choice
+    /// found.
     ///
     /// # Errors
     /// The rules do not terminate.
@@ -155,9 +157,9 @@ impl Configurator {
         choose(&self.knowledge, &self.wishes, &is_in_need, limits)
     }
 
-    /// Grounds the objective by the chosen design. Statuses and recoveries that made the objective
-    /// updatable are retracted; failures of designs are kept. An objective that no design can serve
-    /// keeps its design and stays in need.
+    /// Grounds the objective by the chosen design, i.e. makes it the design of the objective. Statuses and recoveries
+    /// that made the objective updatable are retracted; failures of designs are kept. An objective that no design can
+    /// serve keeps its design and stays in need.
     ///
     /// # Errors
     /// The objective or the design does not exist, or the rules do not terminate.
@@ -183,7 +185,7 @@ impl Configurator {
     /// objective stays in need.
     ///
     /// # Errors
-    /// Errors of [`Configurator::adopt`].
+    /// The objective or the design does not exist, or the rules do not terminate.
     pub fn revert(&mut self, objective: &str, before: Option<&str>) -> Result<(), Message> {
         match before {
             Some(design) => self.change(|runtime| runtime.ground(objective, design)),

@@ -170,7 +170,7 @@ impl Keeper {
         self.filters.due(&self.states)
     }
 
-    /// Returns the time of the last line, since the start.
+    /// Returns the time of the last line or timer event, since the start.
     pub fn now(&self) -> Duration {
         self.now
     }
@@ -180,7 +180,7 @@ impl Keeper {
         self.lines
     }
 
-    /// Returns the greatest sequence number of a line.
+    /// Returns the greatest sequence number of the received lines; `None` if no line has one.
     pub fn sequence(&self) -> Option<u64> {
         self.numbers.greatest()
     }
@@ -369,7 +369,8 @@ impl Keeper {
         Ok(())
     }
 
-    /// Reports new conclusions, then chooses and requests designs for the objectives in need.
+    /// Reports new conclusions, then chooses and requests designs for the objectives in need. Chooses nothing if
+    /// reasoning itself failed.
     fn adapt(&mut self, answers: &mut Vec<KeeperAnswer>) {
         self.infer(answers);
         let knowledge = self.configurator.knowledge();
@@ -438,7 +439,8 @@ impl Keeper {
         }
     }
 
-    /// Stores a change as the outstanding change of its objective, in place of earlier changes.
+    /// Stores a requested change as the outstanding change of its objective, in place of earlier changes, and returns
+    /// it as an answer.
     fn request(&mut self, name: &str, reconfigure: Service) -> KeeperAnswer {
         self.outstanding.retain(
             |_, earlier| !matches!(earlier, Service::Reconfigure { objective, .. } if objective == name),

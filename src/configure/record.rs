@@ -1,4 +1,4 @@
-//! Serialization of the configuration loop ([`Keeper`]) for its journal: decisions, and snapshots of the state.
+//! Serialisation of the configuration loop ([`Keeper`]) for its journal: decisions, and snapshots of the state.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -54,7 +54,7 @@ impl Recoverable for Keeper {
     }
 
     fn decision(&mut self, answers: &[KeeperAnswer]) -> Decision {
-        // Serialization cannot fail: answers consist of texts, numbers and lists.
+        // Serialisation cannot fail: answers consist of texts, numbers and lists.
         let object = |answer: &KeeperAnswer| serde_json::to_value(answer).unwrap_or_default();
         Decision { answers: answers.iter().map(object).collect(), plans: Vec::new() }
     }

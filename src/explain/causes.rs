@@ -1,11 +1,10 @@
-//! Causes that rule a design out, and the smallest sets of alterations that make the design
-//! available. An alteration is a recovery of a component or a change of a measurement.
+//! Causes that rule a design out, and minimal sets of alterations that make the design available. An alteration is a
+//! recovery of a component or a change of a measurement.
 //!
-//! Sets of alterations are tried in ascending order of size, by reasoning with a copy of the
-//! knowledge base. So each listed set is known to suffice, and contains no other listed set. These
-//! sets are the diagnoses of \[1\]. Each alteration of a set removes one cause. To explain a cause,
-//! all other alterations of its set are applied: whatever still rules the design out is due to this
-//! cause.
+//! Sets of alterations are tried in ascending order of size, up to a maximum number, by reasoning with a copy of the
+//! knowledge base. So each listed set is known to suffice, but some sets may be missing. These sets are the diagnoses
+//! of \[1\]. Each alteration of a set removes one cause. To explain a cause, all other alterations of its set are
+//! applied: whatever still rules the design out is due to this cause.
 //!
 //! \[1\] R. Reiter: A theory of diagnosis from first principles, Artificial Intelligence 32, 1987.
 
@@ -24,7 +23,7 @@ use crate::message::Errors;
 use crate::mission::Mission;
 use crate::mission::numbers::against;
 
-/// Upper limit on the number of sets of alterations that are tried.
+/// Maximum number of sets of alterations that are tried in order of size.
 const MAX_TRIED: usize = 2_000;
 
 /// Availability of one design and its causes, derived without planning.
@@ -42,9 +41,9 @@ pub struct Availability {
     pub because: Vec<String>,
     /// Failed components and measurements that contribute to ruling the design out.
     pub causes: Vec<Cause>,
-    /// If the design is unavailable: the smallest sets of alterations that make it available. All
-    /// alterations of a set together suffice, and no proper subset suffices. If the design is
-    /// available: sets of one alteration, each of which makes it unavailable.
+    /// If the design is unavailable: minimal sets of alterations that make it available; some may be missing if there
+    /// are many. All alterations of a set together suffice, and no proper subset suffices. If the design is available:
+    /// sets of one alteration, each of which makes it unavailable.
     pub ways: Vec<Vec<Alteration>>,
 }
 
@@ -53,8 +52,8 @@ pub struct Availability {
 pub struct Cause {
     /// The alteration that removes this cause; other causes may remain.
     pub alteration: Alteration,
-    /// The rules and facts by which this cause alone rules the design out, i.e. after the other
-    /// alterations of a smallest set.
+    /// The rules and facts by which this cause alone rules the design out, i.e. after the other alterations of a
+    /// minimal set.
     pub because: Vec<String>,
     /// The knowledge base after the other alterations of that set, for further analysis.
     pub knowledge: Knowledge,
@@ -66,18 +65,19 @@ impl PartialEq for Cause {
     }
 }
 
-/// All causes that rule a design out.
+/// The causes found that rule a design out.
 #[derive(Debug, Clone)]
 pub struct Causes {
     /// The causes. Empty if the design is available, or if neither a component nor a measurement is
     /// a cause.
     pub causes: Vec<Cause>,
-    /// `true` if the design becomes available only after all causes are removed; `false` if
-    /// removing some of them can suffice.
+    /// `true` if exactly one minimal set of alterations was found: the design becomes available only after all causes
+    /// are removed. `false` if removing some of them can suffice, or if no set was found.
     pub are_all_needed: bool,
 }
 
-/// Returns all failed components and measurements that contribute to ruling a design out.
+/// Returns the failed components and measurements that are found to contribute to ruling a design out. Some may be
+/// missing, since the number of sets of alterations that are tried is limited.
 pub fn causes(knowledge: &Knowledge, design: &FunctionDesign) -> Causes {
     if design.available {
         return Causes { causes: Vec::new(), are_all_needed: false };
@@ -86,8 +86,8 @@ pub fn causes(knowledge: &Knowledge, design: &FunctionDesign) -> Causes {
     Causes { causes: causes_of(knowledge, design, &ways), are_all_needed: ways.len() == 1 }
 }
 
-/// Returns a cause for each alteration in `ways`. Its reasons are the conclusions that remain after
-/// all other alterations of the set.
+/// Returns a cause for each different alteration in `ways`. Its reasons are the conclusions that remain after all other
+/// alterations of the set.
 fn causes_of(knowledge: &Knowledge, design: &FunctionDesign, ways: &[Vec<Alteration>]) -> Vec<Cause> {
     let mut causes: Vec<Cause> = Vec::new();
     for (way, alteration) in ways.iter().flat_map(|way| way.iter().map(move |alteration| (way, alteration))) {
@@ -101,8 +101,9 @@ fn causes_of(knowledge: &Knowledge, design: &FunctionDesign, ways: &[Vec<Alterat
     causes
 }
 
-/// Returns the smallest sets of alterations that make a design available. Considers the design's
-/// own components and measurements first, then all of them.
+/// Returns minimal sets of alterations that make a design available (see [`repairs`]). The alterations of all
+/// components and measurements are considered only if those of the design's own components and measurements do not
+/// suffice.
 fn ways(knowledge: &Knowledge, design: &FunctionDesign) -> Vec<Vec<Alteration>> {
     let candidates = candidates(knowledge, design);
     let ways = repairs(knowledge, design, &candidates);
@@ -127,7 +128,7 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
             altered(knowledge, [alteration]).is_some_and(|knowledge| !is_available(&knowledge, design))
         };
         let candidates = candidates(knowledge, design).into_iter();
-        // For an available design, each alteration alone that makes it unavailable is listed.
+        // For an available design, each of its own alterations that makes it unavailable on its own is listed.
         availability.ways = candidates.filter(loses).map(|alteration| vec![alteration]).collect();
         return availability;
     }
@@ -142,8 +143,8 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
     availability
 }
 
-/// Returns the smallest sets of `candidates` that make a design available, in ascending order of
-/// size.
+/// Returns minimal sets of `candidates` that make a design available (see [`minimal`]). Small sets are tried first. At
+/// most [`MAX_TRIED`] sets are tried, so some minimal sets may be missing.
 fn repairs(
     knowledge: &Knowledge,
     design: &FunctionDesign,
@@ -205,8 +206,8 @@ fn subsets(count: usize) -> impl Iterator<Item = Vec<usize>> {
     })
 }
 
-/// Returns a subset of `set` that still suffices, although none of its proper subsets does. Removes
-/// alterations one by one.
+/// Returns a subset of `set` that still suffices, after trying once to remove each alteration. No proper subset
+/// suffices if availability is monotone in the alterations.
 fn minimal<'a>(
     mut set: Vec<&'a Alteration>,
     suffice: &dyn Fn(&[&'a Alteration]) -> bool,
@@ -245,8 +246,8 @@ fn is_available(knowledge: &Knowledge, design: &FunctionDesign) -> bool {
     designs.iter().any(|candidate| candidate.individual == design.individual && candidate.available)
 }
 
-/// Computes the best plan after alterations of the situation. At a limit, returns the best plan
-/// found until then.
+/// Computes the best plan after alterations of the situation. At a limit, returns the best plan found until then.
+/// Alterations with which reasoning fails are ignored.
 pub(super) fn in_situation(
     mission: &Mission,
     alterations: &[Alteration],
@@ -350,7 +351,7 @@ fn targets<'a>(bounds: impl Iterator<Item = &'a Requirement>, from: &BigRational
     least.into_iter().chain(most).collect()
 }
 
-/// Returns targets at a bound and just beyond it, as seen from the current value `from`.
+/// Returns targets (bounds for the value) at a bound and just beyond it, as seen from the current value `from`.
 fn around(bound: &BigRational, from: &BigRational) -> Vec<Target> {
     let bound = bound.clone();
     match from.cmp(&bound) {

@@ -108,8 +108,9 @@ pub fn design(mission: &Mission, name: &str, limits: &Limits) -> Result<DesignEx
 }
 
 impl Availability {
-    /// Adds the best plans with and without the design, and after changes. `hear` is called with a
-    /// short description of each planning query before the query starts.
+    /// Extends the explanation of the availability by plans: the best plan now, with the design as the only one for its
+    /// functions, without the design, after each set of alterations in [`Availability::ways`], and after each single
+    /// alteration. `hear` is called with a short description of the next plan or plans before they are searched for.
     ///
     /// # Errors
     /// The mission cannot be planned for.

@@ -8,8 +8,8 @@ use crate::message::Errors;
 use crate::mission::{Mission, ground_with};
 use crate::number;
 
-/// Computes the best plan for a mission in its current situation. At a limit, returns the best plan
-/// found until then.
+/// Computes the best plan for a mission in its current situation, in at most half of the remaining time. At a limit,
+/// returns the best plan found until then.
 ///
 /// # Errors
 /// The mission cannot be planned for.
@@ -17,8 +17,8 @@ pub fn best(mission: &Mission, limits: &Limits) -> Result<BestPlan, Errors> {
     solve(mission, limits, &|_, available| available)
 }
 
-/// Computes the best plan with only the designs for which `allowed` returns `true`. The arguments
-/// of `allowed` are the name of a design, and `true` if the design is available.
+/// Computes the best plan with only the designs for which `allowed` returns `true`, in at most half of the remaining
+/// time. The arguments of `allowed` are the name of a design, and `true` if the design is available.
 pub(super) fn solve(
     mission: &Mission,
     limits: &Limits,

@@ -27,9 +27,10 @@ pub struct SmallestChanges {
     pub complete: bool,
 }
 
-/// Searches for the smallest changes of single values that lead to another plan. Each measured
-/// attribute and each numeric value of the problem is changed upwards and downwards. At a limit,
-/// returns the partial results. `hear` is called with the name of each value before it is varied.
+/// Searches for the smallest changes of single values that lead to another plan. Each measured attribute is set to the
+/// values, below and above the current one, at which a requirement of a design begins or ceases to hold. Each positive
+/// numeric value of the problem is changed downwards and upwards by at most 100 %. At a limit, returns the partial
+/// results. `hear` is called with the name of each value before it is varied.
 ///
 /// # Errors
 /// The mission cannot be planned for.
@@ -129,8 +130,9 @@ impl VariedMission<'_> {
         Ok(Outcome::None)
     }
 
-    /// Searches upwards or downwards for the nearest value of a numeric function at which the best
-    /// plan changes: first in growing relative steps, then by bisection.
+    /// Searches upwards or downwards for the nearest value of a numeric function at which the best plan changes: first
+    /// in growing relative steps of up to 100 %, then by bisection. Returns [`Outcome::None`] if the current value
+    /// `from` is not positive.
     fn bisected(&self, function: &str, from: &BigRational, upwards: bool) -> Result<Outcome, Errors> {
         // Relative steps need a positive start value.
         if *from <= BigRational::default() {

@@ -165,8 +165,8 @@ impl JournalFiles {
     }
 }
 
-/// Returns `true` if `after` begins at the link where `before` ends. If a crash has prevented the
-/// `end` record of `before`, the check assumes this record.
+/// Returns `true` if `after` begins at the link (position in the chain of records) where `before` ends. If a crash has
+/// prevented the `end` record of `before`, the check assumes this record.
 pub(super) fn follows(before: &Segment, after: &Segment) -> bool {
     if before.is_closed() {
         return before.end == End::Whole && before.after == after.before;

@@ -1,5 +1,5 @@
-//! Write-ahead journal: every observation and every decision of a loop is on disk before its
-//! answers leave the program.
+//! Write-ahead journal: every observation and every decision of a loop is written before its answers leave the program.
+//! [`Sync`] says when the written data is flushed to the disk.
 //!
 //! A directory contains segments `journal-N` and snapshots `snapshot-N`. Each segment except the
 //! first begins at the snapshot with its number. Two generations are kept. Records are numbered and
@@ -68,7 +68,8 @@ pub enum Sync {
 pub struct Policy {
     /// Policy for flushing writes to the disk.
     pub sync: Sync,
-    /// Number of observations after which a snapshot is written and a new segment begins.
+    /// Number of observations after which a snapshot is written and a new segment begins, as soon as no deliberation is
+    /// pending.
     pub snapshot_every: u64,
 }
 
@@ -358,7 +359,8 @@ impl Journal {
         }
     }
 
-    /// Flushes the file as far as the policy requires before these answers leave the program.
+    /// Flushes the file as far as the policy requires before these answers leave the program, and stores the number of
+    /// records in the lock file.
     fn keep<C: Recoverable>(&mut self, answers: &[C::Answer]) -> io::Result<()> {
         // `Effects` is sufficient, because only effects change the world.
         let must = match self.policy.sync {
@@ -383,8 +385,8 @@ impl Journal {
         Ok(())
     }
 
-    /// Creates the next segment, writes the `end` record of the current one, and writes a snapshot,
-    /// in this order. Removes segments and snapshots before the current one.
+    /// Creates the next segment, writes the `end` record of the current one, and writes a snapshot, in this order.
+    /// Removes segments and snapshots with smaller numbers than the segment that ends here.
     fn checkpoint<C: Recoverable>(&mut self, control: &mut C) -> io::Result<()> {
         let next = self.segment + 1;
         let (end, at) = closing(&self.link, self.segment);
@@ -460,8 +462,8 @@ fn resume<'c, C: Recoverable>(
     Ok(Resumed { from, segments, observations, unfinished, missing_snapshots })
 }
 
-/// Atomically creates a segment file that contains only its header. Returns the file and the link
-/// after the header.
+/// Atomically creates a segment file that contains only its header. Returns the file and the link (position in the
+/// chain of records) after the header.
 fn create_segment(directory: &Path, after: &Link, digest: &str, number: u64) -> io::Result<(File, Link)> {
     let (line, link) = header(after, digest, number);
     let mut file = tempfile::NamedTempFile::new_in(directory)?;

@@ -71,8 +71,8 @@ impl Record {
     }
 }
 
-/// Returns the first line of a segment, and the link after this line. The line repeats the link to
-/// the previous segment.
+/// Returns the first line of a segment (file of records), and the link (position in the chain of records) after this
+/// line. The line repeats the link to the previous segment.
 pub(super) fn header(after: &Link, digest: &str, segment: u64) -> (String, Link) {
     after.line("segment", &[json!(FORMAT), json!(digest), json!(segment), json!(after.digits)])
 }

@@ -73,7 +73,8 @@ impl Hub {
         (words.into_iter().map(|(_, line)| line).collect(), state.first)
     }
 
-    /// Returns the retained lines from number `from` on. If there are none yet, waits up to `wait`.
+    /// Returns the retained lines from number `from` on, at most [`MAX_BATCH`]. If there are none yet, waits up to
+    /// `wait`.
     pub(super) fn news(&self, from: u64, wait: Duration) -> News {
         let is_waiting = |state: &mut RetainedLines| !state.ended && from == state.end();
         let state = self.more.wait_timeout_while(self.lock(), wait, is_waiting);
@@ -90,7 +91,8 @@ impl Hub {
         }
     }
 
-    /// Appends a line, and stores it as the current state of `keys`.
+    /// Appends a line, and stores it as the current state of `keys`. Above the limits, drops the oldest lines, and the
+    /// keys that changed longest ago.
     fn take(&self, line: Arc<str>, keys: Vec<String>) {
         let mut state = self.lock();
         let number = state.end();

@@ -1,5 +1,5 @@
-//! Assigns answers to keys of the current state. The last line of each key is kept for clients that
-//! connect later.
+//! Assigns answers to keys of the current state. A key denotes a part of this state, for example the availability of
+//! one design. The last line of each key is kept for clients that connect later.
 
 use std::borrow::Cow;
 

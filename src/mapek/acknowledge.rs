@@ -37,8 +37,8 @@ pub(super) enum Failure {
 }
 
 impl Beliefs {
-    /// Records that the managed system has acknowledged the effect with this number. The effect is then no longer
-    /// outstanding.
+    /// Records that the robot has acknowledged the effect (a request of the loop) with this number. The effect is then
+    /// no longer outstanding, i.e. waiting for its acknowledgement.
     pub(super) fn acknowledge(&mut self, effect: u64) -> Receipt {
         if effect == 0 || effect > self.effects {
             return Receipt::Unknown;
@@ -57,8 +57,9 @@ impl Beliefs {
         Receipt::Recorded
     }
 
-    /// Records the arrival of a request, implied by a report of its action. If the robot has never acknowledged a
-    /// reconfiguration by its number, the report also implies the reconfigurations that precede the request.
+    /// Records that the request of an action has arrived, as implied by a report of the action. If the robot has never
+    /// acknowledged an effect by its number, the report also implies that the reconfigurations before the request have
+    /// arrived.
     pub(super) fn confirm_request(&mut self, request: u64) {
         self.outstanding.remove(&request);
         self.waits.remove(&request);
@@ -136,9 +137,9 @@ impl Beliefs {
         Failure::Design(design)
     }
 
-    /// Records that a reconfiguration has arrived, unless a later one is acknowledged. If the function was observed
-    /// with another design while the reconfiguration was pending, the order of observation and reconfiguration is
-    /// unknown, and so is the design.
+    /// Records that a reconfiguration has arrived, unless a later one of the function is acknowledged. If the function
+    /// was observed with another design while the reconfiguration was pending, the order of observation and
+    /// reconfiguration is unknown, and so is the design.
     fn configured(&mut self, effect: u64, function: String, design: String) -> Receipt {
         let history = self.receipts.functions.entry(function.clone()).or_default();
         // A superseded reconfiguration without an answer may have been carried out in between.

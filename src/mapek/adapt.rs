@@ -1,4 +1,5 @@
-//! Decides after changes whether a new plan is needed, and adopts it (Algorithm 1 of the paper, see [`crate::mapek`]).
+//! Decides after changes whether a new plan is needed, has it computed, and adopts it (Algorithm 1 of the paper, see
+//! [`crate::mapek`]).
 //!
 //! The paper plans whenever the available designs have changed or an objective is in error. Here, a plan that is still
 //! valid and uses none of the lost designs is kept. Such a plan is still optimal, because losing alternatives cannot
@@ -127,8 +128,8 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Drops the plan and returns `true` if one step has failed [`MAX_FAILURES`] times in a row. Planning then pauses until
-    /// something else changes.
+    /// If one step has failed [`MAX_FAILURES`] times in a row and there is a reason to plan, drops the plan and returns
+    /// `true`. Planning then pauses until something else changes.
     fn stop_after_failures(&mut self, changes: &Changes, answers: &mut Vec<Answer>) -> bool {
         match &self.beliefs.failures {
             Some((step, count)) if *count >= MAX_FAILURES && !changes.reasons.is_empty() => {
@@ -143,7 +144,8 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Updates the reasons why a better plan may exist: designs that have become available, and changed facts.
+    /// Updates the reasons why a better plan may exist: designs that have become available and are not lost again, and
+    /// changed facts. If the current plan is not proved optimal, lost designs are a reason, too.
     fn record_improvement_causes(&mut self, findings: &Findings, changes: &Changes) {
         let improvement_causes = &mut self.beliefs.improvement_causes;
         improvement_causes.retain(|design| !findings.lost.contains(design));
@@ -196,8 +198,8 @@ impl Adaptation<'_> {
         self.beliefs.retry.is_some_and(|scheduled| scheduled.at <= self.beliefs.now)
     }
 
-    /// Schedules another search after a search without a proved outcome. The pause doubles with each attempt. Nothing
-    /// is scheduled while conclusions are missing.
+    /// Schedules another search after a search without a proved outcome. The pause doubles with each attempt, up to
+    /// [`MAX_RETRY`]. Nothing is scheduled while conclusions are missing because of a fault of the reasoner.
     fn schedule_retry(&mut self, attempt: u32, outcome: &Outcome) {
         if outcome.proved || self.beliefs.fault.is_some() {
             return;
@@ -208,8 +210,9 @@ impl Adaptation<'_> {
         self.beliefs.retry = Some(Retry { at, attempt: attempt + 1 });
     }
 
-    /// Searches for a plan for the reasons `because`, and adopts it. With [`Need::Better`], the plan is adopted only if
-    /// its benefit is sufficient.
+    /// Searches for a plan for the reasons `because`, and adopts it unless it is the current plan. With
+    /// [`Need::Better`], the plan is adopted only if its benefit is sufficient. Otherwise, the action under way may be
+    /// cancelled or suspended instead. Decides nothing if a search is forbidden.
     pub(super) fn replan(&mut self, because: Vec<String>, need: Need, answers: &mut Vec<Answer>) {
         let is_necessary = need != Need::Better;
         let reason = because.first().cloned().unwrap_or_default();
@@ -245,7 +248,8 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Requests designs of the action under way again if their functions are expected to have other designs.
+    /// Requests the designs of the action under way again if one of them must be sent (see [`must_be_sent`]). Does
+    /// nothing if the action is suspended or being cancelled.
     fn configure_again(&mut self, answers: &mut Vec<Answer>) {
         let Some(mut running) = self.beliefs.running.take() else { return };
         let is_active = !running.suspended && !running.cancelling;
@@ -294,7 +298,8 @@ impl Adaptation<'_> {
     }
 
     /// Plans from the believed situation. With `goes_on`, the first step is the remainder of the action under way;
-    /// otherwise, the action is treated as cancelled.
+    /// otherwise, the action is treated as cancelled. The outcome has no plan if conclusions are missing, or if the
+    /// plan found uses an unavailable design.
     pub(super) fn plan(&mut self, goes_on: bool) -> Outcome {
         if let Some(fault) = &self.beliefs.fault {
             let (because, cost) = (missing_conclusions(fault), BigRational::default());
@@ -340,7 +345,8 @@ impl Adaptation<'_> {
         running.chain(plan).map(key).eq(steps.iter().map(key))
     }
 
-    /// Returns the reason to keep the current plan if the benefit of `outcome` is too small, and `None` otherwise.
+    /// Returns the reason to keep the current plan if the benefit of `outcome` is too small. Returns `None` if it is
+    /// sufficient, or if the metric of the current plan is undefined.
     fn insufficient_benefit(&self, outcome: &Outcome) -> Option<String> {
         let current_metric = self.beliefs.verdict().metric?;
         if benefit(self.beliefs, self.settings, &current_metric, &outcome.cost).is_some() {
@@ -351,7 +357,8 @@ impl Adaptation<'_> {
         Some(format!("the benefit of another plan is {benefit}, the minimum is {minimum}"))
     }
 
-    /// Adopts a plan. The action under way is reconfigured to the designs of the plan's first step.
+    /// Adopts a plan. The action under way gets the designs of the plan's first step, and is resumed if it was
+    /// suspended.
     fn adopt(&mut self, outcome: Outcome, answers: &mut Vec<Answer>) {
         let Outcome { steps, proved, .. } = outcome;
         self.beliefs.unproved = !proved;

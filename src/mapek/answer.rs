@@ -245,7 +245,7 @@ impl Command {
     }
 }
 
-/// Serializes the answer as a JSON object of the output format.
+/// Serialises the answer as a JSON object of the output format.
 impl Serialize for Answer {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut object = serializer.serialize_map(None)?;
@@ -262,7 +262,7 @@ impl Serialize for Answer {
 impl Answer {
     /// Converts the answer to a JSON object of the output format.
     pub fn to_json(&self) -> Value {
-        // The serialization cannot fail: all map keys are strings.
+        // The serialisation cannot fail: all map keys are strings.
         serde_json::to_value(self).unwrap_or_default()
     }
 

@@ -13,7 +13,7 @@ use crate::mission::Mission;
 pub(crate) struct Outcome {
     /// Steps of the plan, if there is one.
     pub steps: Option<Vec<PlannedStep>>,
-    /// Metric of the plan.
+    /// Metric of the plan; 0 without a plan.
     pub cost: BigRational,
     /// Whether the plan is proved optimal, or its absence is proved.
     pub proved: bool,
@@ -54,7 +54,7 @@ impl Outcome {
         Self { steps: None, cost: BigRational::default(), proved, because, blocking: Vec::new() }
     }
 
-    /// Serializes the outcome for the journal.
+    /// Serialises the outcome for the journal.
     pub fn to_record(&self) -> Value {
         let steps: Option<Vec<Value>> =
             self.steps.as_ref().map(|steps| steps.iter().map(PlannedStep::to_record).collect());

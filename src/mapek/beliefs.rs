@@ -62,7 +62,7 @@ pub struct Beliefs {
     pub(super) actions: u64,
     /// Number of effects requested since the start.
     pub(super) effects: u64,
-    /// Unacknowledged effects by number.
+    /// Unacknowledged effects (requests to the robot) by number.
     pub(super) outstanding: BTreeMap<u64, Effect>,
     /// History of acknowledged and superseded reconfigurations, by function.
     pub(super) receipts: Receipts,
@@ -296,7 +296,8 @@ impl Beliefs {
         self.reached
     }
 
-    /// Returns `true` if a design is believed to be available. Without a knowledge base, all designs are.
+    /// Returns `true` if a design is believed to be available, or if the problem itself states that it is. Without a
+    /// knowledge base, all designs are.
     pub(super) fn is_available(&self, design: &str) -> bool {
         self.mission.knowledge().is_none() || self.available.contains(design) || self.mission.provides(design)
     }

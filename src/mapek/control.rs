@@ -178,9 +178,9 @@ impl Loop {
         answers
     }
 
-    /// Applies an observation to the beliefs. If the action under way cannot continue unchanged, requests a safe
-    /// effect: other designs for its remainder, or suspension. Does not search for a plan, so that the reaction is not
-    /// delayed.
+    /// Applies an observation to the beliefs, unless it is refused. If the action under way cannot continue unchanged,
+    /// requests a safe effect: other designs for its remainder, or suspension. Also handles effects and actions whose
+    /// deadline has passed. Does not search for a plan, so that the reaction is not delayed.
     ///
     /// Call [`deliberate`](Self::deliberate) after one or several observations.
     pub fn react(&mut self, observation: &Observation, now: Duration) -> Vec<Answer> {

@@ -17,8 +17,8 @@ use crate::number;
 /// acknowledged in time.
 pub(super) type Expired = Vec<u64>;
 
-/// Repeats overdue effects, and cancels an overdue action if a report was to be expected. Returns the reconfigurations
-/// that count as failed.
+/// Repeats overdue effects, and repeats or cancels an overdue action. Returns the reconfigurations that count as
+/// failed. Does nothing if deadlines are disabled.
 pub(super) fn handle_overdue(
     beliefs: &mut Beliefs,
     settings: &Settings,

@@ -43,8 +43,8 @@ pub(super) fn request(beliefs: &mut Beliefs, step: PlannedStep, answers: &mut Ve
     beliefs.running = Some(running);
 }
 
-/// Requests each design of an action whose function has another design. Then makes the action's functions the
-/// objectives of the knowledge base.
+/// Requests those designs of an action that must be sent (see [`must_be_sent`]), i.e. mainly for functions that are
+/// expected to have another design. Then makes the action's functions the objectives of the knowledge base.
 ///
 /// A requested action can still be waiting for designs that were requested before. Therefore, changed designs of the
 /// action are requested even if the functions already have them.
@@ -70,7 +70,8 @@ pub(super) fn must_be_sent(beliefs: &Beliefs, running: &Running, pair: &(String,
     beliefs.expected(function) != Some(design) || may_wait && !running.sent_configuration.contains(pair)
 }
 
-/// Creates the effect with `command`, and removes the outstanding effects that the new effect supersedes.
+/// Creates the effect (request to the robot) with `command` and adds it to the answers. Removes the outstanding effects
+/// that it supersedes, and lists their numbers in the new effect.
 pub(super) fn effect(beliefs: &mut Beliefs, action: u64, command: Command, answers: &mut Vec<Answer>) {
     beliefs.effects += 1;
     let number = beliefs.effects;
@@ -114,7 +115,8 @@ pub(super) fn effect(beliefs: &mut Beliefs, action: u64, command: Command, answe
 }
 
 /// Makes the functions of a step, and no others, the objectives of the knowledge base, grounded by the step's designs.
-/// Without a step, removes all objectives.
+/// Designs on whose availability the problem itself decides are omitted with their functions. Without a step, removes
+/// all objectives.
 pub(super) fn objectives(beliefs: &mut Beliefs, step: Option<&PlannedStep>, answers: &mut Vec<Answer>) {
     let mission = &beliefs.mission;
     let mut objectives_with_designs = step.map_or_else(Vec::new, |step| step.configuration.clone());
@@ -134,7 +136,8 @@ pub(super) fn cancel(beliefs: &mut Beliefs, running: Running, because: String, a
     beliefs.running = Some(Running { cancelling: true, ..running });
 }
 
-/// Suspends the action under way, drops the plan, and stops planning until the situation changes.
+/// Requests the suspension of the action under way unless it is suspended, drops the plan, and stops planning until the
+/// situation changes.
 pub(super) fn suspend(beliefs: &mut Beliefs, running: Running, reason: &str, answers: &mut Vec<Answer>) {
     beliefs.plan = None;
     beliefs.stuck = true;

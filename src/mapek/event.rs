@@ -439,7 +439,7 @@ fn as_numbers<S: Serializer>(values: &[(String, BigRational)], serializer: S) ->
     serializer.collect_map(values.iter().map(|(name, value)| (name, number::to_json(value))))
 }
 
-/// Serializes a status in the spelling of MROS.
+/// Serialises a status in the spelling of MROS.
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
 fn as_word<S: Serializer>(status: &Status, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(match status {
@@ -452,7 +452,7 @@ fn as_word<S: Serializer>(status: &Status, serializer: S) -> Result<S::Ok, S::Er
 impl Event {
     /// Converts the event to a JSON object of the format.
     pub fn to_json(&self) -> Value {
-        // The serialization cannot fail: all map keys are strings.
+        // The serialisation cannot fail: all map keys are strings.
         serde_json::to_value(self).unwrap_or_default()
     }
 
@@ -462,7 +462,7 @@ impl Event {
     }
 }
 
-/// An event with the optional fields of its line, for serialization.
+/// An event with the optional fields of its line, for serialisation.
 #[derive(Serialize)]
 struct Line<'a> {
     #[serde(flatten)]

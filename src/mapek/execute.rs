@@ -9,8 +9,10 @@ use crate::mapek::adapt::{Adaptation, Need};
 use crate::mapek::answer::Answer;
 use crate::mapek::effects::{finish, request};
 
-/// Requests the next action if none is under way. A plan that is not executable in the believed situation is replaced
-/// once. If the second plan is not executable either, planning pauses until the situation changes.
+/// Requests the next action if none is under way, or ends the mission if no step remains and the goal holds. A plan
+/// that is not executable in the believed situation is replaced once. If the second plan is not executable either,
+/// planning pauses until the situation changes. Does nothing during such a pause, while conclusions are missing, or if
+/// a search is needed but forbidden.
 pub(super) fn execute(adaptation: &mut Adaptation<'_>, answers: &mut Vec<Answer>) {
     for attempt in 0..2 {
         let beliefs = &mut *adaptation.beliefs;

@@ -1,10 +1,11 @@
 //! Decides whether the action under way continues, is suspended, or is cancelled, if it cannot continue unchanged.
 //!
-//! Cancelling an action loses its progress. Therefore, the remaining mission is planned twice: with the remainder of
-//! the action as the first step, and as if the action were cancelled. The action is cancelled if only the second plan
-//! exists, or if it is better by more than the minimum benefit. If neither plan exists, cancelling would lose the
-//! progress without any benefit: the action is suspended until suitable designs are available again. Robots that cannot
-//! suspend an action report that it was cancelled.
+//! Cancelling an action loses its progress. Therefore, if the action cannot continue unchanged, the mission is planned
+//! twice: beginning with the remaining part of the action, and as if the action had been cancelled. The action is
+//! cancelled if only the second plan exists, or if the second plan is better by at least the minimum benefit; otherwise
+//! the first plan is adopted. If neither plan exists, the action is suspended until suitable designs are available
+//! again, unless it can continue with its current designs. Robots that cannot suspend an action report that it was
+//! cancelled.
 
 use num_rational::BigRational;
 

@@ -117,7 +117,8 @@ fn none(blocking: Vec<String>) -> Outcome {
 }
 
 /// Returns the remainders of the action under way with their simulated effects, one per executable configuration.
-/// Returns `None` if no action is under way, or its configurations are too many or unknown.
+/// Returns `None` if no action is under way, if its configurations are unknown or more than [`MAX_CONFIGURATIONS`], or
+/// if the metric is undefined.
 pub(super) fn first_steps(question: &Question<'_>) -> Option<Vec<(PlannedStep, FirstStep)>> {
     let running = question.running?;
     let mut steps = vec![running.step.clone()];

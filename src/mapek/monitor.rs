@@ -269,8 +269,8 @@ impl BeliefUpdate<'_> {
         Ok(running)
     }
 
-    /// Removes and returns the action under way. Its effects are no longer outstanding, except reconfigurations, which
-    /// belong to functions.
+    /// Removes and returns the action under way, or returns a refusal if it has another number. The effects of this
+    /// action and of earlier ones are no longer outstanding, except reconfigurations, which belong to functions.
     fn end(&mut self, action: u64) -> Result<Running, Refusal> {
         self.running(action)?;
         let is_moot = |effect: &Effect| {

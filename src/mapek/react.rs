@@ -61,7 +61,8 @@ pub(super) fn trouble(beliefs: &Beliefs, running: &Running, facts: bool) -> Opti
 }
 
 /// Returns the action under way with the available designs that make its remainder executable with the best metric.
-/// Ties are broken by the order of designs. Returns `None` if no designs make the remainder executable.
+/// Ties are broken by the order of designs. Returns `None` if no designs make the remainder executable, or if the
+/// combinations of designs are too many to simulate.
 fn other_designs(beliefs: &Beliefs, running: &Running) -> Option<PlannedStep> {
     let problem = beliefs.filled();
     let question = Question {

@@ -8,7 +8,8 @@ use serde_json::{Value, json};
 /// Upper limit on the number of superseded reconfigurations recorded per function.
 const MAX_SUPERSEDED: usize = 16;
 
-/// History of acknowledged and superseded reconfigurations, by function.
+/// History of acknowledged and superseded reconfigurations, by function. A reconfiguration is superseded if a later
+/// request replaces it before the robot has acknowledged it.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct Receipts {
     /// Whether any reconfiguration was acknowledged explicitly, by its effect number.
@@ -103,7 +104,7 @@ impl Receipts {
         self.functions.iter().find_map(design)
     }
 
-    /// Serializes the history for a snapshot.
+    /// Serialises the history for a snapshot.
     pub(super) fn to_record(&self) -> Value {
         let function = |(name, history): (&String, &Received)| {
             let last = history.last.as_ref().map(|last| {

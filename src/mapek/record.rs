@@ -1,4 +1,4 @@
-//! Serialization of the loop: decisions for the journal, and snapshots of the beliefs.
+//! Serialisation of the loop: decisions for the journal, and snapshots of the beliefs.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
@@ -65,7 +65,7 @@ fn essence(mut answer: Value) -> Value {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Snapshot(pub Value);
 
-/// Serializes the beliefs.
+/// Serialises the beliefs.
 pub(super) fn snapshot(beliefs: &Beliefs) -> Snapshot {
     let statements = beliefs.mission.knowledge().map(Knowledge::statements).unwrap_or_default();
     let steps = |steps: &VecDeque<PlannedStep>| steps.iter().map(PlannedStep::to_record).collect::<Vec<_>>();
@@ -285,7 +285,7 @@ pub(crate) fn statement_from_record(record: &Value) -> Option<Statement> {
     Some(Statement { predicate: text(record.get(0)?)?, arguments })
 }
 
-/// Serializes an element of `:init`. Returns `None` for timed initial literals, which never change.
+/// Serialises an element of `:init`. Returns `None` for timed initial literals, which never change.
 fn element_to_record(element: &InitialElement) -> Option<Value> {
     let words = |atom: &Atom| -> Vec<String> {
         let arguments = atom.arguments.iter().map(|term| match term {

@@ -72,7 +72,8 @@ impl Numbers {
         }
     }
 
-    /// Adds a number that was not seen before.
+    /// Adds a number that was not seen before. Drops the lowest range if there are then more than [`MAX_RANGES`]
+    /// ranges.
     pub(crate) fn insert(&mut self, number: u64) {
         // The number may close the gap to the next range, to the previous range, or both.
         let last = number.checked_add(1).and_then(|next| self.ranges.remove(&next)).unwrap_or(number);
@@ -102,7 +103,7 @@ impl Numbers {
         ends.zip(starts).map(|(from, to)| [from, to]).collect()
     }
 
-    /// Serializes the set for a snapshot.
+    /// Serialises the set for a snapshot.
     pub(crate) fn to_record(&self) -> Value {
         json!([self.mark, self.ranges.iter().collect::<Vec<_>>()])
     }

@@ -191,7 +191,8 @@ impl Settings {
     /// in the file must occur in `knowledge`.
     ///
     /// # Errors
-    /// The file cannot be read, or contains errors; all of them are returned.
+    /// The file cannot be read or contains errors. Unknown keys and unknown names are all returned; of the wrong
+    /// numbers, only the first.
     pub fn read(file: &Path, knowledge: Option<&Knowledge>) -> Result<Self, Errors> {
         let (section, origin) = manifest::read::<Section>(file)?;
         let settings = section.adaptation.settings(&origin)?;

@@ -1,4 +1,4 @@
-//! Plan steps with rational durations and costs, and their serialization as JSON and for the journal.
+//! Plan steps with rational durations and costs, and their serialisation as JSON and for the journal.
 
 use std::borrow::Cow;
 
@@ -30,7 +30,7 @@ pub struct PlannedStep {
     pub cost: BigRational,
 }
 
-/// Serializes the step as an object of the JSON output.
+/// Serialises the step as an object of the JSON output.
 impl Serialize for PlannedStep {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut object = serializer.serialize_map(None)?;
@@ -153,7 +153,7 @@ impl PlannedStep {
         object.serialize_entry("cost", &number::to_json(&self.cost))
     }
 
-    /// Serializes all fields for the journal.
+    /// Serialises all fields for the journal.
     pub(crate) fn to_record(&self) -> Value {
         json!([
             self.action,

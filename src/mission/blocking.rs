@@ -45,8 +45,8 @@ impl fmt::Display for Blocking {
     }
 }
 
-/// Explains why an unsolvable problem has no plan. The problem was returned by [`Mission::filled`].
-/// Returns `None` if the mission has no knowledge base, or if a limit is reached.
+/// Explains why an unsolvable problem has no plan. The problem was returned by [`Mission::filled`]. Returns `None` if
+/// the mission has no knowledge base, or if planning cannot decide within the limits.
 pub fn blocking(mission: &Mission, problem: &Problem, config: &Config) -> Option<Blocking> {
     let mut config = config.clone();
     // A limit on the number of steps would hide longer plans.
@@ -71,8 +71,8 @@ pub fn blocking(mission: &Mission, problem: &Problem, config: &Config) -> Option
     Some(Blocking::Other)
 }
 
-/// Returns `true` if there is a plan when the designs in `available` are available in addition to
-/// the present ones. `None` if a limit is reached.
+/// Returns `true` if there is a plan when the designs in `available` are available in addition to the present ones.
+/// `None` if the planner cannot decide this within the limits.
 fn solvable_with(
     mission: &Mission,
     problem: &Problem,

@@ -31,8 +31,8 @@ impl Reading {
         Self { options: Options::default(), timed }
     }
 
-    /// Semantics for overlapping actions. Interfering happenings are at least `separation` apart,
-    /// in the domain's time unit.
+    /// Semantics for overlapping actions. Interfering happenings (starts and ends of actions) are at least `separation`
+    /// apart, in the domain's time unit.
     pub fn concurrent(separation: &BigRational) -> Self {
         Self {
             options: Options::default().with_concurrent(true).with_tolerance(separation.clone()),
@@ -40,8 +40,8 @@ impl Reading {
         }
     }
 
-    /// Executes the plan with the validator and returns its value by the problem's metric. `None`
-    /// if the plan is invalid, or if a limit is reached.
+    /// Executes the plan with the validator and returns its value by the problem's metric. Returns `None` if the plan
+    /// is invalid, if the value is undefined, or if a limit is reached.
     pub(super) fn value(
         &self,
         mission: &Mission,

@@ -16,8 +16,8 @@ use crate::mission::confirm::Reading;
 /// grows with the square of the number of actions.
 const MAX_ACTIONS: usize = 200;
 
-/// Removes superfluous actions of cost 0 from a plan. Returns the plan as reduced until a limit is
-/// reached.
+/// Removes superfluous actions of cost 0 from a plan. If a limit is reached, returns the plan as reduced until then. A
+/// plan of more than 200 actions is returned unchanged.
 pub fn lean(
     mission: &Mission,
     problem: &Problem,

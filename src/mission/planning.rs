@@ -38,8 +38,8 @@ pub trait Planning {
         limits: &Limits,
     ) -> Result<ExactTask, Errors>;
 
-    /// Grounds a problem that [`Mission::filled`] returned, for plans with overlapping actions.
-    /// Interfering happenings are at least `separation` apart, in the domain's time unit.
+    /// Grounds a problem that [`Mission::filled`] returned, for plans with overlapping actions. Interfering happenings
+    /// (starts and ends of actions) are at least `separation` apart, in the domain's time unit.
     ///
     /// # Errors
     /// All constructs that the planner does not support, with their places.
@@ -160,8 +160,8 @@ mod tests {
 
     use super::{GroundConfig, Name};
 
-    /// The checker does not link the planner, so the default names are defined in both and must be
-    /// equal.
+    /// The certificate checker does not link the planner. So the default names of the predicate `solves` are defined
+    /// both in the crate `mission` and in the planner, and must be equal.
     #[test]
     fn default_names_equal_those_of_the_planner() {
         let sorted = |mut names: Vec<Name>| {

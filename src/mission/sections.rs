@@ -276,8 +276,8 @@ impl<S> Scenario<S> {
         Errors::unless_empty(self.mistakes(mission).into_iter().map(|mistake| mistake.message))
     }
 
-    /// Applies the scenario as [`Scenario::apply`] does. Returns a mistake, with its position, for
-    /// each setting that does not fit the mission.
+    /// Applies the scenario as [`Scenario::apply`] does. Returns a mistake, with its position, for each setting that
+    /// does not fit the mission. If the mission's own files are faulty, PDDL mistakes are omitted.
     pub fn mistakes(&self, mission: &mut Mission) -> Vec<Mistake> {
         let mut mistakes = Vec::new();
         // If the mission's own files are faulty, errors of PDDL may not be caused by the settings.

@@ -65,7 +65,7 @@ fn json_plan(source: &Source, mission: &Mission) -> Result<PlanText, Errors> {
     Ok(plan)
 }
 
-/// Converts a JSON decimal to an exact number.
+/// Converts a JSON decimal to an exact number. Returns `None` for other values and for numbers with an exponent.
 fn decimal(value: &Value) -> Option<BigRational> {
     let text = value.as_number()?.to_string();
     let (whole, fraction) = text.split_once('.').unwrap_or((&text, ""));

@@ -22,10 +22,10 @@ pub(super) struct Folded {
 }
 
 impl Folded {
-    /// Settles as many predicates as possible. Candidates are the predicates in
-    /// `vocabulary_of_base`, and predicates whose axioms mention only candidates and bind all their
-    /// variables. `changed` contains the predicates that actions or timed initial literals change,
-    /// `timed` those that timed initial literals change.
+    /// Settles as many predicates as possible, i.e. determines their facts, which no action can change. Candidates are
+    /// the predicates in `vocabulary_of_base`, and predicates whose axioms mention only candidates and bind all their
+    /// variables. `changed` contains the predicates that actions or timed initial literals change, `timed` those that
+    /// timed initial literals change.
     pub fn new(
         domain: &Domain,
         (changed, timed): (&BTreeSet<Name>, &BTreeSet<Name>),

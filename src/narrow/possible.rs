@@ -42,9 +42,9 @@ pub(super) struct Possible {
 }
 
 impl Possible {
-    /// Determines which open predicates get a bound. A predicate has no bound if it depends on a
-    /// changed predicate with an unrestricted argument, i.e. an argument that actions do not
-    /// require to be a member of a class of the knowledge base.
+    /// Determines which open predicates (predicates that actions can change) get a bound. A predicate has no bound if
+    /// it depends on a changed predicate with an unrestricted argument, i.e. an argument that actions do not require to
+    /// be a member of a class of the knowledge base.
     pub fn new(
         domain: &Domain,
         open: &BTreeMap<Name, Option<Vec<Clause>>>,
@@ -198,7 +198,7 @@ impl Possible {
     }
 }
 
-/// Returns the name of the companion of a predicate.
+/// Returns the name of the companion of a predicate, i.e. of the static predicate that bounds it.
 pub(super) fn possible(name: &Name) -> Name {
     Name::new(&format!("possible-{name}"))
 }

@@ -230,8 +230,8 @@ impl Unfold<'_> {
         Some(done.into_iter().collect())
     }
 
-    /// Returns `true` if the clause is redundant: its body contains its head, or an atom whose
-    /// guard already implies the head.
+    /// Returns `true` if the clause is redundant: its body contains its head, or an atom whose guard (class that its
+    /// argument must belong to) already implies the head.
     fn says_nothing(&self, clause: &Clause) -> bool {
         clause.body.iter().any(|part| {
             let Literal::Holds(name, operands) = part else { return false };
@@ -257,8 +257,8 @@ impl Unfold<'_> {
     }
 }
 
-/// Returns `true` if the fact complies with the guard: it has another predicate, or its argument is
-/// a stated member of the guard's class.
+/// Returns `true` if the fact complies with the guard, which restricts an argument of a predicate to a class: the fact
+/// has another predicate, or its argument is a stated member of the class.
 pub(super) fn keeps(
     (predicate, arguments): &Fact,
     (guarded, position, class): &(Name, usize, Name),

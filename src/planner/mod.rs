@@ -125,8 +125,8 @@ impl<'m, 'r> Planner<'m, 'r> {
         self
     }
 
-    /// Sets the least time between interfering happenings, in the domain's time unit, and allows
-    /// actions to overlap as in PDDL 2.1. `None` keeps actions sequential.
+    /// Sets the least time between interfering happenings (starts and ends of actions), in the domain's time unit, and
+    /// allows actions to overlap as in PDDL 2.1. `None` keeps actions sequential.
     #[must_use]
     pub fn concurrent(mut self, separation: impl Into<Option<BigRational>>) -> Self {
         self.separation = separation.into();
@@ -273,8 +273,8 @@ impl<'m, 'r> Planner<'m, 'r> {
         Ok(planned)
     }
 
-    /// Computes further optimal plans, and executes each of them with the validator. Returns `None`
-    /// if the solution has no proved optimal plan.
+    /// Computes further optimal plans, and executes each of them with the validator. Plans that are not validated
+    /// within the limits are omitted. Returns `None` if the solution has no proved optimal plan.
     fn further_plans(
         &self,
         task: &Task,
@@ -335,8 +335,8 @@ impl<'m, 'r> Planner<'m, 'r> {
         })
     }
 
-    /// Returns a callback that forwards improvements to the caller's callback, and sets the
-    /// interruption flag if that returns `Break`.
+    /// Returns a callback that forwards improvements to the caller's callback, and sets the interruption flag if the
+    /// caller's callback returns `Break`.
     fn improvement_listener(&mut self) -> impl FnMut(Improvement) {
         let flag = self.config.limits.interrupt();
         let report = &mut self.report;

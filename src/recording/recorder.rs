@@ -50,13 +50,14 @@ impl Recorder {
         Ok(Self { entries, thread: Arc::new(Mutex::new(Some(thread))), begun })
     }
 
-    /// Records an input line before the loop handles it. `line` is the number of the line, `now`
-    /// the time since the start of the mission.
+    /// Records an input line before the loop handles it. `line` is the number of the line, `now` the time since the
+    /// start of the mission. Blocks while the queue to the writer thread is full.
     pub fn event(&self, line: u64, now: Duration, text: &str) {
         self.send(Entry::Event { time: self.time(), line, now, text: text.to_owned() });
     }
 
-    /// Records an answer of the loop, given as the text of a JSON object.
+    /// Records an answer of the loop, given as the text of a JSON object. Blocks while the queue to the writer thread
+    /// is full.
     pub fn answer(&self, text: &str) {
         self.send(Entry::Answer { time: self.time(), text: text.to_owned() });
     }

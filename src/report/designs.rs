@@ -68,8 +68,8 @@ fn required(requirement: &Requirement, measurements: &[Measurement]) -> String {
     }
 }
 
-/// Returns the reasons for the availability of a design. For an unavailable design, these are all
-/// causes that rule it out, with derivations.
+/// Returns the reasons for the availability of a design. For an unavailable design, these are the causes found that
+/// rule it out, with derivations.
 pub(super) fn because(knowledge: &Knowledge, design: &str, available: bool) -> Vec<Reason> {
     if available {
         let text = "nothing says that it is not realisable, and nothing that it is not available".to_owned();

@@ -63,8 +63,8 @@ struct Moving<'d> {
     places: Vec<Name>,
 }
 
-/// Selects the places between which the plan moves most often; of equal candidates, those with more
-/// movements in the domain. Types with designs are excluded.
+/// Selects the places between which the plan moves most often; of equal candidates, those with more movements in the
+/// domain. Types with designs or with fewer than two objects are excluded. Returns `None` if no type remains.
 fn places_of_most<'d>(scene: Scene<'_>, plan: &Plan, movements: &'d [Movement<'d>]) -> Option<Moving<'d>> {
     let designs: BTreeSet<Name> = scene.designs.keys().map(|design| Name::new(design)).collect();
     let mut kinds: BTreeMap<Vec<Name>, Vec<&'d Movement<'d>>> = BTreeMap::new();
@@ -83,7 +83,7 @@ fn places_of_most<'d>(scene: Scene<'_>, plan: &Plan, movements: &'d [Movement<'d
     most_used.map(|(places, movements)| Moving { movements, places })
 }
 
-/// Returns all movements that an action describes.
+/// Returns all movements that the unconditional effects of an action describe.
 fn moves(action: &Action) -> Vec<Movement<'_>> {
     let (mut added, mut deleted) = (Vec::new(), Vec::new());
     let mut parts: Vec<&Effect> = match &action.body {
@@ -183,8 +183,9 @@ fn goals(goal: &Condition) -> impl Iterator<Item = &Atom> {
     })
 }
 
-/// Returns pairs of neighbouring places by number. Neighbours are given by facts or, if there are
-/// no such facts, by numeric values. Facts of `moving` predicates are ignored.
+/// Returns the pairs of neighbouring places, as numbers of places. Two places are neighbours if an initial fact has
+/// exactly these two places among its arguments; if there is no such fact, initial numeric values are used instead.
+/// `moving` are the predicates that movements change, such as `robot_at`; they are ignored.
 fn ways(problem: &Problem, number: &BTreeMap<&Name, usize>, moving: &BTreeSet<&Name>) -> Vec<(usize, usize)> {
     let (mut facts, mut values) = (BTreeSet::new(), BTreeSet::new());
     for element in &problem.init {

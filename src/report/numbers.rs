@@ -12,8 +12,8 @@ use planner::Plan;
 use crate::number;
 use crate::report::seen::Scene;
 
-/// Returns a curve for the cost of a plan, and a curve for each number that the plan changes or a
-/// condition limits.
+/// Returns a curve for the cost of a plan, and a curve for each number that the plan changes or a condition limits.
+/// Returns no curves for a plan without steps.
 pub(super) fn curves(scene: Scene<'_>, plan: &Plan, steps: &[Step], axis: Axis) -> Vec<Curve> {
     if steps.is_empty() {
         return Vec::new();
@@ -110,8 +110,8 @@ fn add<'c>(curves: &mut BTreeMap<&'c str, Curve>, bound: &'c NumberBound, (from,
     curve.bounds.push(Bound { from, to, value: number::to_f64(&bound.bound), text });
 }
 
-/// Returns the position of a moment on the axis: its time, or the number of the step's start or
-/// end.
+/// Returns the position of a moment (start or end of a step) on the axis: its time, or the number of steps that have
+/// ended if the steps are executed in order.
 fn place(moment: &CourseMoment, axis: Axis) -> f64 {
     match axis {
         Axis::Time => number::to_f64(&moment.time),

@@ -27,8 +27,8 @@ impl Painter {
         Self { designs: known_designs(mission), positions }
     }
 
-    /// Returns HTML for the remaining plan: timeline, curves and map. The page needs the style
-    /// sheet [`picture::STYLE`].
+    /// Returns HTML for the remaining plan, or for its first 500 steps: timeline, curves and map. The page needs the
+    /// style sheet [`picture::STYLE`].
     pub fn part(&self, outlook: &Outlook) -> String {
         let later = outlook.steps.len().saturating_sub(MAX_STEPS);
         let mut problem = outlook.problem.clone();

@@ -12,7 +12,7 @@ use crate::file::source;
 use crate::manifest::ManifestPath;
 use crate::message::{Errors, Message};
 
-/// The section `report`.
+/// The section `report` of a manifest: where the coordinates of places come from.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ReportSection {

@@ -97,7 +97,7 @@ impl Controller {
         }
     }
 
-    /// Returns `true` if the strategy will make no further request.
+    /// Returns `true` if the strategy has given up, so that it will make no further request.
     pub(super) fn is_done(&self) -> bool {
         self.gave_up
     }
@@ -147,8 +147,8 @@ impl Controller {
         self.plan = self.control.plan_anew().unwrap_or_default().into();
     }
 
-    /// Requests the next action of the plan if no action is running. If the plan is empty and the
-    /// available designs have changed, plans again first.
+    /// Requests the next action of the plan if no action is running. If the plan is empty, the goal is not reached and
+    /// the available designs have changed, plans again first, except with [`Strategy::None`].
     fn go_on(&mut self, answers: &mut Vec<Answer>) {
         if self.gave_up || self.control.beliefs().running().is_some() {
             return;
@@ -235,8 +235,8 @@ impl Controller {
     }
 }
 
-/// Returns the design with which the action alone has the lowest cost, even if the action is not
-/// possible with it. Of equal designs, returns the first.
+/// Returns the design with which the action alone has the lowest cost, even if the action is not possible with it. Of
+/// equal designs, returns the first. Returns `None` if no cost is defined.
 fn cheapest(
     mission: &Mission,
     problem: &Problem,

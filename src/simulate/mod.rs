@@ -94,7 +94,7 @@ impl Experiment {
     /// before the end of the mission.
     ///
     /// # Errors
-    /// The mission cannot be planned for.
+    /// The problem or a disturbance of the scenario does not fit the mission, or the knowledge is inconsistent.
     pub fn run(
         &self,
         strategy: Strategy,
@@ -201,7 +201,7 @@ impl Stage {
         }
     }
 
-    /// Records the current time if the running action stalls and no earlier stall is pending.
+    /// Records the current time if the running action stalls (cannot proceed) and no earlier stall is pending.
     fn record_stall(&mut self) {
         if self.stalled_since.is_none() && !self.world.goes_on() {
             self.stalled_since = Some(self.world.time);

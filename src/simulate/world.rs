@@ -348,7 +348,7 @@ impl World {
     /// signals.
     ///
     /// # Errors
-    /// Errors of [`World::pass`].
+    /// A disturbance or a signal does not fit the mission.
     pub fn first_look(&mut self) -> Result<Vec<Event>, Message> {
         let mut events = Vec::new();
         self.watch();

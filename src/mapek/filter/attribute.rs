@@ -214,7 +214,8 @@ impl AttributeFilter {
             && !state.suspect.as_ref().is_some_and(is_near)
     }
 
-    /// Returns `true` if a crossing has lasted for the debounce time and enough samples agree.
+    /// Returns `true` if a crossing, i.e. a change of a bound between satisfied and violated, has lasted for the
+    /// debounce time and enough samples agree.
     fn is_confirmed(&self, state: &AttributeState, now: Micros) -> bool {
         let agreeing = state.recent.iter().filter(|crosses| **crosses).count();
         let lasted =
@@ -319,7 +320,9 @@ impl AttributeFilter {
         }
     }
 
-    /// Returns a value that satisfies the fewest bounds, the lowest one if several do. Returns `None` without bounds.
+    /// Returns a value that satisfies the fewest bounds, the lowest one if several do. Values between two bounds are
+    /// considered only if they are plausible; a value below all bounds may be less than the minimum, and a value above
+    /// all bounds greater than the maximum. Returns `None` without bounds.
     pub(crate) fn worst(&self) -> Option<BigRational> {
         let unit = BigRational::from_integer(1.into());
         let two = BigRational::from_integer(2.into());
@@ -349,7 +352,7 @@ impl Bound {
         }
     }
 
-    /// Returns `true` if a value satisfies the bound by at least its band.
+    /// Returns `true` if a value satisfies the bound by at least its band (hysteresis).
     pub(crate) fn keeps_clearly(&self, value: &BigRational) -> bool {
         match self.side {
             Side::Least => *value >= &self.value + &self.band,
@@ -364,7 +367,7 @@ impl AttributeState {
         Self { believed: value, ..Self::default() }
     }
 
-    /// Serializes the state for a snapshot.
+    /// Serialises the state for a snapshot.
     pub(crate) fn to_record(&self) -> Value {
         let text = |value: &Option<BigRational>| value.as_ref().map(ToString::to_string);
         json!([

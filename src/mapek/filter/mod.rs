@@ -31,8 +31,8 @@ use crate::message::Message;
 use crate::number;
 
 impl FilterSettings {
-    /// Returns warnings, for `lint`, about attributes and components whose noise causes reconfigurations: attributes
-    /// without hysteresis and debounce, and components without `heal_time`.
+    /// Returns warnings, for `lint`, about settings with which noise causes reconfigurations: attributes without
+    /// hysteresis and debounce, and a default `heal_time` of 0 if the knowledge base has components.
     pub(crate) fn doubts(&self, knowledge: Option<&Knowledge>) -> Vec<Message> {
         let filters = Filters::new(self, knowledge);
         let is_noisy = |(_, filter): &(&String, &AttributeFilter)| {
@@ -94,7 +94,8 @@ impl Filters {
         let nothing = MeasuredSettings::default();
         let measured = bounds.into_iter().map(|(name, mut bounds)| {
             let entry = settings.measured.get(&name).unwrap_or(&nothing);
-            // The side on which a design can be used is unknown for bounds from the manifest.
+            // A bound in the manifest is only a number. It is unknown whether designs require at least or at most this
+            // value, so both are added.
             bounds.extend(
                 entry
                     .bounds
@@ -144,8 +145,8 @@ impl Filters {
         }
     }
 
-    /// Filters a sample of an attribute. Returns the newly believed value, or `None` if the sample is held back. Some
-    /// of the held samples are reported in `answers`.
+    /// Filters a sample of an attribute. Returns the newly believed value, or `None` if the sample is held back. A
+    /// sample of an attribute without a filter is believed. Some of the held samples are reported in `answers`.
     pub(crate) fn sample(
         &self,
         states: &mut FilterStates,
@@ -215,7 +216,7 @@ impl Filters {
     }
 
     /// Applies and returns the changes of belief that are due at `now` without a further report: first changes of
-    /// attributes, then changes of components.
+    /// attributes, then changes of components. Sensors that have become silent are reported in `answers`.
     pub(crate) fn elapse(
         &self,
         states: &mut FilterStates,
@@ -263,7 +264,7 @@ impl Accepted {
 }
 
 impl FilterStates {
-    /// Serializes the states for a snapshot.
+    /// Serialises the states for a snapshot.
     pub(crate) fn to_record(&self) -> Value {
         let measured = self.measured.iter().map(|(name, state)| (name.clone(), state.to_record()));
         let components = self.components.iter().map(|(name, state)| (name.clone(), state.to_record()));

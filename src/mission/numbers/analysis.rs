@@ -186,7 +186,8 @@ impl<'m> Numbers<'m> {
         attribute.strip_prefix("fd_").unwrap_or(attribute).to_owned()
     }
 
-    /// Adds to `missing` the functions that an action needs and that have no value.
+    /// Adds to `missing` the functions, with their arguments, that an action needs and that have no value, as far as
+    /// the action may be possible. Omits `total-cost` and functions that actions set only by assignments.
     fn missing(&self, action: &Action, missing: &mut Needed) {
         let conditions = conditions(&action.body);
         let mut checked = HashSet::new();
@@ -287,7 +288,8 @@ impl<'m> Numbers<'m> {
         }
     }
 
-    /// Calls `visit` for each binding of the variables for which the conditions may hold.
+    /// Calls `visit` for each binding of the variables for which the conditions may hold, until the budget ([`BUDGET`])
+    /// is spent.
     fn each<'a>(
         &self,
         variables: &[(&'a Name, &'a TypeExpression)],

@@ -45,8 +45,8 @@ pub fn doubts(mission: &Mission) -> Vec<Message> {
     doubts
 }
 
-/// Returns the numeric functions without a value that actions need. If some of them are probable
-/// mistakes, returns only these.
+/// Returns the numeric functions without a value that actions need. If some of them are probable mistakes or have no
+/// value for any arguments, returns only these.
 pub fn missing_values(mission: &Mission) -> Vec<MissingValue> {
     let values = Numbers::new(mission).check().0;
     let is_told = |value: &MissingValue| value.is_likely || value.is_silent;
