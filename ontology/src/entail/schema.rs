@@ -35,8 +35,9 @@ pub struct Schema {
     pub data_properties: Vec<SchemaEntity>,
 }
 
-/// Computes the class and property hierarchy from the consequences for a fresh instance of each class,
-/// and for a fresh pair of each property. If the knowledge is inconsistent, `empty` is always `None`.
+/// Computes the hierarchy of the classes and properties in `named`, without OWL's own ones, from the
+/// consequences for a fresh instance of each class, and for a fresh pair of each property. If the knowledge
+/// is inconsistent, `empty` is always `None`.
 ///
 /// # Errors
 /// Returns an error if a rule exceeds its budget.

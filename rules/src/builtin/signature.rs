@@ -1,6 +1,5 @@
-//! Signatures of the built-ins: names, numbers of arguments, and computed arguments.
-//!
-//! [3] RFC 3986: Uniform Resource Identifier, 2005.
+//! Signatures of the built-ins: names, numbers of arguments, and which arguments are computed from the
+//! others.
 
 use super::custom::{CustomBuiltIn, Definition};
 
@@ -160,7 +159,8 @@ built_ins! {
     Tokenize "tokenize" 3..=4 Choice,
     /// URI composed of scheme, host, port, path, query and fragment. Absent parts are empty.
     AnyUri "anyURI" 7..=7 Parts,
-    /// Resolves the reference in the second argument against the base URI in the third (\[3\], section 5.2).
+    /// Resolves the reference in the second argument against the base URI in the third (RFC 3986, section
+    /// 5.2).
     ResolveUri "resolveURI" 3..=3 Function,
     /// Duration composed of years and months.
     YearMonthDuration "yearMonthDuration" 3..=3 Parts,
@@ -246,7 +246,7 @@ impl BuiltIn {
         Self::Custom(CustomBuiltIn(definition))
     }
 
-    /// Returns the built-in of `swrlb` with this local name.
+    /// Returns the built-in of `swrlb` with this local name, if there is one.
     pub fn from_name(local: &str) -> Option<Self> {
         let is_swrl = |built_in: &Self| !matches!(built_in, Self::DataRange | Self::OutsideDataRange);
         Self::ALL.iter().copied().find(|built_in| built_in.name() == local && is_swrl(built_in))
@@ -261,7 +261,8 @@ impl BuiltIn {
         }
     }
 
-    /// Returns `true` if the first argument is computed from the others, so that it may be unbound.
+    /// Returns `true` if the first argument is the one value that is computed from the others, so that it may
+    /// be unbound. `false` for `tokenize`, whose first argument is one of several values.
     pub fn is_function(self) -> bool {
         match self {
             Self::Custom(custom) => custom.definition().is_function(),
