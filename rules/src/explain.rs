@@ -1,4 +1,4 @@
-//! Explanations of facts by recorded derivations, and the list of violated integrity constraints.
+//! Explanations of facts by recorded derivations, and the list of violations.
 
 use rustc_hash::FxHashMap;
 

@@ -32,8 +32,8 @@ pub struct Limits {
     /// that a recursive rule computes for the first time costs 25,000 steps, and 25,000 more for every 8
     /// bytes of its digits or text.
     pub steps: u64,
-    /// Function that can stop an update. It is called after about every 16,000 visited rows, i.e. every
-    /// few microseconds to a millisecond.
+    /// Function that can stop an update. It is called after about every 16,000 visited rows and charged
+    /// steps, i.e. every few microseconds to a millisecond.
     pub interrupt: Option<Interrupt>,
 }
 

@@ -73,8 +73,8 @@ impl Engine {
         change
     }
 
-    /// Changes the stated facts and the rules of an engine without equality; the new rules may have it. Deletes facts first, so
-    /// that new rules do not match deleted facts.
+    /// Changes the stated facts and the rules of an engine without equality; the new rules may have it.
+    /// Deletes facts first, so that new rules do not match deleted facts.
     fn change_plainly(&mut self, delta: Delta, program: Program) -> Result<Delta, Errors> {
         let inserted: FxHashSet<&Fact> = delta.insert.iter().collect();
         let delete = delta.delete.iter().filter(|fact| !inserted.contains(fact)).cloned().collect();

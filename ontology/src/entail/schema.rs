@@ -84,8 +84,8 @@ fn entities(
     let name = |symbol: &Symbol| engine.symbols().value(*symbol).as_name().unwrap_or_default().to_owned();
     let entity = |(iri, symbol, empty): (String, Symbol, Option<String>)| {
         let supers = &above[&symbol];
-        // Returns `true` if a third entity lies strictly between the current entity and `candidate`. Equivalent entities
-        // are above each other.
+        // Returns `true` if a third entity lies strictly between the current entity and `candidate`.
+        // Equivalent entities are above each other.
         let between = |candidate: &Symbol| {
             supers.iter().any(|middle| {
                 middle != candidate

@@ -173,7 +173,7 @@ built_ins! {
     Date "date" 4..=5 Parts,
     /// Time composed of hour, minute, second and an optional time zone.
     Time "time" 4..=5 Parts,
-    /// Sum of two durations in months.
+    /// Sum of the second and third argument, both durations in months.
     AddYearMonthDurations "addYearMonthDurations" 3..=3 Function,
     /// Second argument minus the third, both durations in months.
     SubtractYearMonthDurations "subtractYearMonthDurations" 3..=3 Function,
@@ -181,7 +181,7 @@ built_ins! {
     MultiplyYearMonthDuration "multiplyYearMonthDuration" 3..=3 Function,
     /// Second argument, a duration in months, divided by the number in the third; rounded to months.
     DivideYearMonthDuration "divideYearMonthDurations" 3..=3 Function,
-    /// Sum of two durations in seconds.
+    /// Sum of the second and third argument, both durations in seconds.
     AddDayTimeDurations "addDayTimeDurations" 3..=3 Function,
     /// Second argument minus the third, both durations in seconds.
     SubtractDayTimeDurations "subtractDayTimeDurations" 3..=3 Function,

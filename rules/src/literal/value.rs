@@ -45,7 +45,7 @@ pub enum Literal {
     /// A literal of an unsupported datatype, a rational number that is not a decimal (in lowest terms), or
     /// an XML literal.
     Opaque {
-        /// Lexical form as written.
+        /// Lexical form as written; for a rational number, in lowest terms.
         lexical: Box<str>,
         /// IRI of the datatype.
         datatype: Box<str>,
