@@ -30,7 +30,8 @@ fn engine(ontology: &Ontology) -> Engine {
     Engine::new(symbols, lowered.program, lowered.facts).expect("safe rules")
 }
 
-/// A robot with an objective that is grounded in its most demanding design.
+/// Creates a robot with an objective that is grounded in the first available design by IRI, which has the
+/// highest requirements.
 fn mission(ontology: &Ontology) -> Runtime {
     let mut runtime = Runtime::new(engine(ontology), Mode::Retract);
     let (name, function) = ("search", "f_generate_search_path");
@@ -45,7 +46,7 @@ fn decimal(text: &str) -> Literal {
     Literal::parse(text, Some(vocab::xsd::DECIMAL), None)
 }
 
-/// Functions with ten designs each.
+/// Returns a Turtle document with `count` designs, ten for each function.
 fn designs(count: usize) -> String {
     let mut text = String::from(
         "@prefix t: <http://metacontrol.org/tomasys#> .\n@prefix owl: <http://www.w3.org/2002/07/owl#> .\n\

@@ -13,11 +13,11 @@ pub(crate) struct Graph {
     fresh: usize,
 }
 
-/// Items of a complete `rdf:List`, and the triples that form the list.
+/// Items of a complete `rdf:List`, and the triples of its nodes.
 #[derive(Debug)]
 pub(crate) struct List {
     pub items: Vec<Term>,
-    /// Indices of the triples that form the list.
+    /// Indices of all triples whose subject is a node of the list.
     pub spine: Vec<usize>,
 }
 

@@ -237,7 +237,7 @@ pub enum Atom {
 pub struct Rule {
     /// IRI of the ontology that states the rule; the document's name if the ontology has no IRI.
     pub ontology: Iri,
-    /// Index of the rule in its ontology, from 0.
+    /// Index of the rule in its document, from 0. Unreadable rules are counted, too.
     pub position: u32,
     /// The rule's own IRI, if it has one.
     pub iri: Option<Iri>,
@@ -269,7 +269,7 @@ pub struct Source {
 /// One or more documents and their imports, merged.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Ontology {
-    /// Documents in reading order: each root, then its imports.
+    /// Documents in reading order: the roots, then their imports, breadth-first.
     pub sources: Vec<Source>,
     /// Declared entities, and entities whose kind was inferred from their use; sorted.
     pub entities: Vec<(EntityKind, Iri)>,

@@ -164,8 +164,8 @@ impl Stated {
         self.ontology.sources.extend_from_slice(&assertions.sources);
     }
 
-    /// Removes the statements of `retractions`, and adds a warning for each statement that was not
-    /// stated. Returns the removed axioms.
+    /// Removes the statements of `retractions`, and adds a warning for each axiom and rule that was not
+    /// stated. Declarations remain. Returns the removed axioms.
     fn remove(
         &mut self,
         retractions: &Ontology,

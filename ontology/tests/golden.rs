@@ -110,7 +110,8 @@ fn check_all(directory: &str, compare: impl Fn(&Value) -> Result<(), String>) {
     );
 }
 
-/// Returns a description of the differences to the reference as an error.
+/// Compares consistency and conclusions with the reference. The error describes the differences. The
+/// conclusions of inconsistent knowledge are not compared.
 fn compare(engine: &Engine, consistent: &Value, expected: &Value) -> Result<(), String> {
     let violations = engine.violations();
     if consistent != violations.is_empty() {
@@ -161,7 +162,7 @@ fn evaluate(ontology: &Ontology, removed: &[Triple], equality: Equality) -> Engi
     Engine::new(symbols, lowered.program, facts).expect("the rules are safe")
 }
 
-/// The derived types and property values of named individuals.
+/// Returns the derived types and property values of named individuals, without equalities and differences.
 fn inferred(engine: &Engine) -> BTreeSet<String> {
     let symbols = engine.symbols();
     let shown = |fact: &Fact| {

@@ -39,7 +39,8 @@ fn derived(engine: &Engine) -> BTreeSet<String> {
     short.lines().map(|line| line.trim_end_matches(" .").replace(['<', '>'], "")).collect()
 }
 
-/// Each text has exactly these conclusions. The text is consistent and causes no warnings.
+/// The derived facts of each text are exactly the expected ones. The text is consistent and causes no
+/// warnings.
 #[test]
 fn axioms_have_their_conclusions() {
     for (text, expected) in [
@@ -272,7 +273,8 @@ fn axioms_are_used_in_part() {
     }
 }
 
-/// A restriction without a named witness is contained in each restriction that includes it (scm-svf1, -svf2,
+/// An axiom concludes a restriction, whose value has no name, and another axiom has a restriction as a
+/// condition. The condition holds exactly if it includes the concluded restriction (rules scm-svf1, -svf2,
 /// -avf1, -avf2).
 #[test]
 fn restrictions_include_restrictions() {

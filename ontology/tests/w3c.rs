@@ -60,7 +60,8 @@ impl Suite {
         self.0.get(case).and_then(|properties| properties.get(predicate)).map_or(&[], Vec::as_slice)
     }
 
-    /// Returns a document of a case in RDF/XML, otherwise in functional-style syntax.
+    /// Returns the document of a kind (such as `Premise`) that belongs to a case: in RDF/XML, otherwise in
+    /// functional-style syntax; `None` without both.
     fn text(&self, case: &str, kind: &str) -> Option<&String> {
         let forms = [format!("rdfXml{kind}Ontology"), format!("fs{kind}Ontology")];
         forms.iter().find_map(|form| self.all(case, form).first())

@@ -12,7 +12,7 @@ use crate::rule::Aggregate;
 use crate::source::Source;
 use crate::symbol::{Symbol, Symbols};
 
-/// An aggregate over the rows of a relation.
+/// Aggregate function (count, sum, minimum or maximum) over the rows of a relation.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Function {
     pub aggregate: Aggregate,
@@ -21,7 +21,8 @@ pub(crate) struct Function {
 }
 
 impl Function {
-    /// Returns the aggregate of rows; `None` if the aggregate has no value.
+    /// Returns the aggregate of the rows. `None` if it has no value, for example the minimum of no rows, or
+    /// if an operand other than that of `count` is not a literal.
     pub fn evaluate<'r>(
         &self,
         rows: impl Iterator<Item = &'r [Symbol]>,
@@ -71,8 +72,9 @@ fn as_decimal(value: &Literal) -> Option<&Decimal> {
     }
 }
 
-/// Returns the minimum (for `Ordering::Less`) or maximum of the values; `None` if there is none. Among
-/// equal values, a decimal is preferred, and then the first by datatype and lexical form.
+/// Returns the minimum (for `Ordering::Less`) or maximum of the values; `None` if there are no values, or if
+/// a value is incomparable with the extreme one. Among equal values, a decimal is preferred, and then the
+/// first by datatype and lexical form.
 fn extreme(values: &[&Literal], direction: Ordering) -> Option<Literal> {
     let mut best: Option<&Literal> = None;
     for &value in values {
@@ -87,7 +89,7 @@ fn extreme(values: &[&Literal], direction: Ordering) -> Option<Literal> {
             best = Some(value);
         }
     }
-    // NaN and values of other kinds are incomparable, so there is no extreme value.
+    // If a value is incomparable with `best` (NaN, or a value of another kind), there is no extreme value.
     let best = best?;
     let is_extreme = |value: &&Literal| compare(value, best).is_some_and(|order| order != direction);
     values.iter().all(is_extreme).then(|| best.clone())

@@ -1,10 +1,10 @@
 //! Evaluation of a program, and its incremental maintenance under insertion and deletion of facts.
 //!
 //! Every derived row records its first derivation, and these derivations never support each other in a
-//! circle. Deletion is delete-and-rederive [1], restricted to the recorded derivations: a row loses its
-//! support only if its recorded derivation loses an atom. The original algorithm over-deletes a row if
-//! *any* derivation loses an atom. Over-deleted rows are rederived stratum by stratum, so that a deletion
-//! seldom propagates far.
+//! circle. Deletion is delete-and-rederive [1], restricted to the recorded derivations: a row is over-deleted
+//! only if a body atom of its recorded derivation ceases to hold. The original algorithm over-deletes a row
+//! if this happens to *any* of its derivations. Over-deleted rows are rederived stratum by stratum, so that a
+//! deletion seldom propagates far.
 //!
 //! [1] Gupta, Mumick, Subrahmanian, "Maintaining views incrementally", SIGMOD 1993.
 
@@ -38,8 +38,9 @@ impl Engine {
     /// Creates an engine and derives all facts that follow from stated facts.
     ///
     /// # Errors
-    /// Returns all errors of all rules (R2xx, R302, R303), or R301 if the derivation exceeds the step
-    /// budget.
+    /// Returns the first invalid fact (R302, R303); otherwise the errors of all rules (R2xx, R302), where a
+    /// missing stratification (R206, R208) is reported only if there is no other error; otherwise R301 if the
+    /// derivation exceeds the step budget.
     pub fn new(
         symbols: Symbols,
         program: Program,

@@ -72,7 +72,7 @@ impl EngineBuilder {
         self
     }
 
-    /// Adds rules as data, before those of the texts.
+    /// Adds rules as data, before those of the texts. If the program has equality, so has the engine.
     #[must_use]
     pub fn program(mut self, program: Program) -> Self {
         self.program.rules.extend(program.rules);

@@ -1,8 +1,9 @@
 //! Join-order statistics: expected sizes of look-ups, from samples of the relations.
 //!
-//! A look-up in `n` rows by columns with `d1, d2, …` distinct values is expected to match `n / min(n, d1·d2·…)` rows.
-//! A relation that is still empty, or whose rows are yet to be derived, counts as a cube with sides of
-//! `n^(1/arity)` distinct values.
+//! A look-up in `n` rows by columns with `d1, d2, …` distinct values is expected to match `n / min(n,
+//! d1·d2·…)` rows. An empty relation is assumed to have 64 rows, and a relation whose rows are yet to be
+//! derived as many rows as the largest relation (at least 64). Each column of such a relation of `n` rows is
+//! assumed to have `n^(1/arity)` distinct values.
 
 use rustc_hash::FxHashSet;
 
@@ -10,10 +11,11 @@ use crate::store::{Relation, RelationId, Row, Store, state};
 
 /// Number of sampled rows per relation.
 const SAMPLE: usize = 1024;
-/// Assumed number of rows of a relation without statistics.
+/// Assumed number of rows of an empty relation, and minimum of the assumed number for a relation that rules
+/// have yet to fill.
 const UNKNOWN_ROWS: usize = 64;
 
-/// Number of rows of each relation, and number of distinct values of each column.
+/// Known or assumed number of rows of each relation, and estimated number of distinct values of each column.
 pub(crate) struct Costs {
     relations: Vec<(f64, Vec<f64>)>,
 }

@@ -62,7 +62,7 @@ pub struct Aggregated {
     pub matches: Vec<Vec<usize>>,
 }
 
-/// A violation of an integrity constraint or of a datatype.
+/// A violation of an integrity constraint, of a datatype, or of the distinctness of literals.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub struct Violation {
     /// Cause of the violation.

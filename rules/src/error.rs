@@ -60,7 +60,7 @@ pub enum Error {
         /// Name as written.
         name: String,
     },
-    /// An unsupported built-in of a known library.
+    /// A predicate in the namespace of a known built-in library, which denotes no supported built-in.
     #[error(
         "{file}:{line}:{column}: R104 built-in <{name}> belongs to a library that the engine does not have{}",
         did_you_mean(name)
@@ -92,7 +92,7 @@ pub enum Error {
         /// Number of arguments.
         count: usize,
     },
-    /// An atom outside plain SWRL, although the options require plain SWRL.
+    /// An atom outside plain SWRL, although [`crate::Syntax::swrl_only`] is set.
     #[error("{file}:{line}:{column}: R105 {what} is not SWRL")]
     NotSwrl {
         /// The source as named by the caller.
@@ -112,7 +112,7 @@ pub enum Error {
         /// Name of the variable, without question mark.
         variable: String,
     },
-    /// A variable that occurs only in negated, comparison or equality atoms.
+    /// A variable of the body that no atom binds: it occurs only in negated atoms, comparisons or built-ins.
     #[error("R203 rule {rule}: variable ?{variable} is only tested, never bound")]
     UnsafeBody {
         /// The rule.
@@ -239,7 +239,7 @@ impl Error {
         }
     }
 
-    /// Returns the file, line and column (counted from 1) of an error in a text.
+    /// Returns the file, line and column (counted from 1) of an error in a text; `None` for other errors.
     pub fn place(&self) -> Option<(&str, usize, usize)> {
         match self {
             Self::Syntax { file, line, column, .. }

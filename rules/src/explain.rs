@@ -1,4 +1,4 @@
-//! Explanations of facts by recorded derivations, and the list of violated integrity constraints.
+//! Explanations of facts by recorded derivations, and the list of violations.
 
 use rustc_hash::FxHashMap;
 
@@ -47,10 +47,10 @@ impl Engine {
         Some(Derivation { steps })
     }
 
-    /// Returns all violations, sorted: the matches of integrity constraints (rules with an empty head) and
-    /// the facts with ill-typed literals. A knowledge base is consistent if there are no violations. Under
-    /// equality, a match binds individuals rather than names, and its supports are stated facts where
-    /// possible.
+    /// Returns all violations, sorted: the matches of integrity constraints (rules with an empty head), the
+    /// facts with ill-typed literals and, under equality, the `owl:sameAs` pairs of a literal with a
+    /// different symbol. A knowledge base is consistent if there are no violations. Under equality, a match
+    /// binds individuals rather than names, and its supports are stated facts where possible.
     pub fn violations(&self) -> Vec<Violation> {
         let mut violations = Vec::new();
         for &(relation, position) in &self.network.constraints {
@@ -100,7 +100,8 @@ impl Engine {
             .collect()
     }
 
-    /// Returns the fact that a head atom derives if the variables have the values `bound`.
+    /// Returns the fact that a head atom derives if the variables have the values `bound`; `None` for an atom
+    /// that no rule can derive.
     pub(crate) fn concluded(&self, head: &Atom, bound: &[Symbol]) -> Option<Fact> {
         let predicate = match head {
             Atom::Relation { predicate, .. } => *predicate,

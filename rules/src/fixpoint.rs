@@ -1,4 +1,5 @@
-//! Evaluates one semi-naive round with a fixed crepe program that interprets join plans.
+//! Evaluates one semi-naive round with a fixed program of crepe (a Datalog compiler) that interprets join
+//! plans.
 //!
 //! The tuples of the program contain block numbers, so evaluation is set-at-a-time: crepe's bookkeeping
 //! costs nothing per match, and the store is never copied. `Delta` is a seed of a plan, usually a range
@@ -43,7 +44,7 @@ pub(crate) enum Start {
     Nothing,
     /// Changed rows of a relation: a range of [`Round::rows`].
     Rows { relation: RelationId, from: u32, to: u32 },
-    /// Partial matches deferred by an earlier run.
+    /// Partial matches deferred by an earlier run; `step` is the next step of the plan.
     Matches { step: u32, bindings: Vec<Symbol> },
 }
 
@@ -114,7 +115,8 @@ mod program {
 pub(crate) struct Handle<'a>(&'a dyn Evaluate);
 
 /// Operations of a round that the crepe program calls. `seed` and `extend` return the next step and the
-/// number of the extended block, or `None` if no match remains.
+/// number of the extended block, or `None` if no match remains, the plan is complete, or the budget is
+/// exhausted.
 trait Evaluate {
     fn seed(&self, seed: u32) -> Option<(u32, BlockId)>;
     fn extend(&self, plan: PlanId, step: u32, block: BlockId) -> Option<(u32, BlockId)>;
@@ -154,6 +156,8 @@ impl Hash for Handle<'_> {
 }
 
 /// Evaluates the plans from their seeds. Returns the complete matches, ordered by plan and block number.
+/// Partial matches that are postponed to bound the memory are added to [`Round::deferred`]. If the budget is
+/// exhausted, matches are missing.
 pub(crate) fn run(round: &Round, seeds: &[Seed]) -> Vec<Matches> {
     let seeded = Seeded { round, seeds };
     let mut runtime = program::Crepe::new();
@@ -199,9 +203,9 @@ impl Round<'_> {
         std::mem::take(&mut self.blocks.borrow_mut()[block as usize])
     }
 
-    /// Stores a block that has reached `step` of its plan. Returns the step reached and the block
-    /// number, or `None` if no match remains. A small block first passes as many steps as possible,
-    /// since the program's bookkeeping would take longer than these steps.
+    /// Stores a block that has reached `step` of its plan. Returns the step reached and the block number, or
+    /// `None` if no match remains or the budget is exhausted. A small block first passes as many steps as
+    /// possible, since the program's bookkeeping would take longer than these steps.
     fn pass(&self, plan: PlanId, mut step: u32, mut block: Vec<Symbol>) -> Option<(u32, BlockId)> {
         let (steps, width) = (self.plans[plan as usize].steps.len(), self.width(&self.plans[plan as usize]));
         while (step as usize) < steps && !block.is_empty() && block.len() <= SMALL_MATCHES * width {
@@ -243,7 +247,8 @@ impl Round<'_> {
     }
 
     /// Applies a step of a plan to a block, and returns the matches that pass, extended by their new
-    /// bindings. Returns `None` if the plan has no such step, or if the budget is exhausted.
+    /// bindings. A join with too many results defers the remaining matches of the block. Returns `None` if
+    /// the plan has no such step, or if the budget is exhausted.
     fn extend(&self, plan: PlanId, step: u32, block: Vec<Symbol>) -> Option<Vec<Symbol>> {
         let (id, number) = (plan, step);
         let plan = &self.plans[id as usize];
@@ -319,8 +324,9 @@ impl Round<'_> {
         if self.retracting { state::FREE } else { skip }
     }
 
-    /// Extends each match of a block by the rows that fit, until there are about [`BLOCK_MATCHES`]
-    /// matches. Returns the extended matches and the length of the processed part of the block.
+    /// Extends each match of a block by the rows that fit, until there are about [`BLOCK_MATCHES`] matches.
+    /// Returns the extended matches and the length of the processed part of the block. If the budget is
+    /// exhausted, returns no match, and the whole block counts as processed.
     fn join(&self, lookup: &Lookup, block: &[Symbol], width: usize, rule: u32) -> (Vec<Symbol>, usize) {
         let (relation, skip) = (lookup.relation, self.visibility(lookup.skip));
         let mut extended = Vec::with_capacity(block.len());
@@ -354,8 +360,9 @@ impl Round<'_> {
         (extended, block.len())
     }
 
-    /// Computes an aggregate for each match, and binds its result (if `binds`) or keeps only the matches
-    /// with an equal result. While retracting, the aggregate ranges over the rows before the update.
+    /// Computes an aggregate for each match, and binds its result (if `binds`) or keeps only the matches with
+    /// an equal result. Drops the matches for which the aggregate has no value. While retracting, the
+    /// aggregate ranges over the rows before the update.
     fn aggregate(
         &self,
         mut block: Vec<Symbol>,
@@ -398,8 +405,8 @@ impl Round<'_> {
         block
     }
 
-    /// Binds the variable `result` of each match to the value of `function`. Drops the matches for which
-    /// the function is undefined.
+    /// Binds the variable `result` of each match to the value of `function`. Drops the matches for which the
+    /// function is undefined. Returns no match if the budget is exhausted.
     fn compute(
         &self,
         mut block: Vec<Symbol>,

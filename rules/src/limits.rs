@@ -22,7 +22,7 @@ const BYTES_PER_CHARGE: u64 = 8;
 /// Maximum length of a value in an error message, in characters.
 const MAX_SHOWN_CHARACTERS: usize = 40;
 
-/// Number of visited rows between two calls of the interrupt function.
+/// Number of visited rows and charged steps between two calls of the interrupt function.
 const ROWS_PER_INTERRUPT_CHECK: u64 = 1 << 14;
 
 /// Limits of one derivation or update.
@@ -32,8 +32,8 @@ pub struct Limits {
     /// that a recursive rule computes for the first time costs 25,000 steps, and 25,000 more for every 8
     /// bytes of its digits or text.
     pub steps: u64,
-    /// Function that can stop an update. It is called after about every 16,000 visited rows, i.e. every
-    /// few microseconds to a millisecond.
+    /// Function that can stop an update. It is called after about every 16,000 visited rows and charged
+    /// steps, i.e. every few microseconds to a millisecond.
     pub interrupt: Option<Interrupt>,
 }
 
@@ -48,8 +48,8 @@ impl Default for Limits {
 pub struct Interrupt(Arc<dyn Fn() -> bool + Send + Sync>);
 
 impl Interrupt {
-    /// Creates an interrupt that stops evaluation as soon as the function returns `true`. The function is
-    /// called often, so it has to be fast.
+    /// Creates an interrupt that stops evaluation at the next call for which the function returns `true`. The
+    /// function is called often, so it has to be fast.
     pub fn new(is_over: impl Fn() -> bool + Send + Sync + 'static) -> Self {
         Self(Arc::new(is_over))
     }
@@ -103,8 +103,8 @@ impl Budget {
         self.visit(steps, rule)
     }
 
-    /// Charges a value that a rule has computed for the first time. Returns `false` if evaluation has to
-    /// stop.
+    /// Charges a value that a rule has computed for the first time, if rules may use their own conclusions
+    /// ([`Budget::recursive`]). Returns `false` if evaluation has to stop.
     pub fn spend_on_value(&self, value: Option<&Literal>, rule: u32) -> bool {
         // Without recursion, a rule computes a bounded number of values.
         if !self.recursive.get() {

@@ -1,9 +1,9 @@
 //! Incremental maintenance: computes the change of all facts from a change of the stated facts, stratum by
 //! stratum.
 //!
-//! In each stratum: 1. over-delete the rows whose recorded derivation lost an atom; 2. rederive the
-//! over-deleted rows that have another derivation from the remaining facts; 3. insert semi-naively the
-//! consequences of new and rederived rows.
+//! In each stratum that the change affects: 1. over-delete the rows whose recorded derivation no longer
+//! holds; 2. rederive the over-deleted rows that have another derivation from the remaining facts; 3. insert
+//! semi-naively the consequences of new and rederived rows.
 
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -229,7 +229,8 @@ impl<'a> Maintenance<'a> {
     }
 
     /// Over-deletes rows, i.e. marks them as doomed: all rows whose recorded derivation depends on a doomed
-    /// row, on the absence of a new row, or on a changed group of an aggregate.
+    /// row, on the absence of a new row, or on a changed group of an aggregate. Stated rows only lose their
+    /// recorded derivation.
     fn over_delete(&mut self, stratum: &Stratum) -> Result<(), Error> {
         // A new row invalidates derivations that depend on its absence.
         let appeared = self.added.clone();
@@ -325,8 +326,9 @@ impl<'a> Maintenance<'a> {
         }
     }
 
-    /// Starts from each row the plans that `plans` returns for its relation, in chunks of [`CHUNK`]
-    /// starts. The matches derive their heads, or doom them if `retracting`.
+    /// Starts from each row the plans that `plans` returns for its relation, in chunks of [`CHUNK`] starts.
+    /// The matches derive their heads; if `retracting`, they mark as doomed (over-deleted) the heads that
+    /// they support.
     fn run<'p>(
         &mut self,
         rows: &[(RelationId, Row)],
@@ -398,7 +400,8 @@ impl<'a> Maintenance<'a> {
         Ok(deferred)
     }
 
-    /// Inserts or rederives the heads of complete matches, unless the heads already hold.
+    /// Inserts or rederives the heads of complete matches, unless the heads already hold. Under equality,
+    /// skips an `owl:sameAs` pair whose names are identical or already connected in this update.
     fn conclude(&mut self, matches: &Matches) {
         let network = Arc::clone(&self.network);
         let number = network.plans[matches.plan as usize].rule;
@@ -469,7 +472,7 @@ impl<'a> Maintenance<'a> {
     }
 }
 
-/// Marks the strata whose rules read a relation.
+/// Marks the strata whose rules read or derive a relation.
 fn touch(touched: &mut [bool], network: &Network, relation: RelationId) {
     for &stratum in network.readers.get(relation.0 as usize).into_iter().flatten() {
         touched[stratum as usize] = true;

@@ -30,7 +30,7 @@ pub(crate) struct Network {
     pub same_as: Option<RelationId>,
     /// Number of facts in the store when the plans were created.
     pub planned_for: usize,
-    /// Indexed by relation: the strata whose rules read the relation.
+    /// Indexed by relation: the strata whose rules read or derive the relation.
     pub readers: Vec<Vec<u32>>,
     /// Relation of the matches of each integrity constraint, with the position of the constraint in the
     /// program.
@@ -56,7 +56,8 @@ pub(crate) struct Stratum {
     pub rederive: FxHashMap<RelationId, Vec<PlanId>>,
 }
 
-/// Compiles a program. On failure, returns the errors of all rules.
+/// Compiles a program. On failure, returns the errors of all rules; if the rules by themselves have none, the
+/// errors of the stratification; otherwise R304 if planning was interrupted.
 pub(crate) fn compile(
     program: &Program,
     symbols: &mut Symbols,
@@ -252,7 +253,7 @@ fn stratify(
     if errors.is_empty() { Ok(own_strata) } else { Err(errors.into()) }
 }
 
-/// Splits a rule whose heads lie in several strata into one rule per stratum.
+/// Splits a rule whose heads lie in several strata into one rule per stratum. Drops rules without heads.
 fn split_by_stratum(rules: Vec<Lowered>, strata: &[usize]) -> Vec<Lowered> {
     let mut split = Vec::with_capacity(rules.len());
     for rule in rules {
@@ -315,7 +316,8 @@ impl Network {
     }
 }
 
-/// Creates the plans of a rule: one per condition, one per head, and one for the first evaluation.
+/// Creates the plans of a rule: one per relation, negation or aggregate in the body, one per head, and one
+/// for the first evaluation.
 fn plan_rule(mut planner: Planner, plans: &mut Vec<Plan>, stratum: &mut Stratum) {
     let lowered = planner.lowered;
     let mut add = |plan: Option<Plan>| {

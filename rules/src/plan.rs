@@ -39,8 +39,9 @@ impl Pattern {
 /// One step of a plan, which extends or tests a partial match.
 #[derive(Clone, Debug)]
 pub(crate) enum Step {
-    /// Extends a match by the rows of a relation that fit `pattern`. `index` is the index on the columns
-    /// of `key`, which are in ascending order; without an index, all rows are visited.
+    /// Extends a match by the rows of a relation that fit `pattern`. `index` is the index on the columns of
+    /// `key`, which are in ascending order; without an index, all rows are visited. Ignores rows with a state
+    /// bit of `skip` and, if `is_link`, rows that the rule itself derived.
     Join {
         relation: RelationId,
         skip: u8,
@@ -49,7 +50,8 @@ pub(crate) enum Step {
         pattern: Pattern,
         is_link: bool,
     },
-    /// Tests that a relation contains a row; all columns are bound.
+    /// Tests that a relation contains a row; all columns are bound. `skip` and `is_link` exclude rows as for
+    /// [`Step::Join`].
     Contains { relation: RelationId, skip: u8, key: Vec<Source>, is_link: bool },
     /// Tests that a relation does not contain a row; all columns are bound.
     Absent { relation: RelationId, key: Vec<Source> },
@@ -82,7 +84,8 @@ pub(crate) struct Plan {
     /// Number of the compiled rule.
     pub rule: u32,
     pub seed: Pattern,
-    /// Whether only links can be seeds, see [`Lowered::is_closure`].
+    /// Whether only links (rows that the rule itself did not derive) can be seeds, see
+    /// [`Lowered::is_closure`].
     pub seed_is_link: bool,
     pub steps: Vec<Step>,
 }
@@ -274,7 +277,8 @@ impl Planner<'_> {
         self.lowered.is_closure && position == Some(1)
     }
 
-    /// Returns the index within `remaining` of the relation condition with the fewest expected matches.
+    /// Returns the index within `remaining` of the relation condition with the fewest expected matches;
+    /// `None` without a relation condition.
     fn cheapest(&self, remaining: &[usize], bound: &Bound) -> Option<usize> {
         let mut best: Option<(f64, usize)> = None;
         for (index, &position) in remaining.iter().enumerate() {

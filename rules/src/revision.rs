@@ -24,8 +24,9 @@ use crate::store::{RelationId, Store, state};
 use crate::vocabulary::SAME_AS;
 
 impl Engine {
-    /// Replaces the rules and returns the net change of all facts that hold, sorted. The cost depends on
-    /// the difference between the programs and its consequences.
+    /// Replaces the rules and returns the net change of all facts that hold, sorted. Unless equality is
+    /// switched on or off, the cost usually depends only on the difference between the programs and its
+    /// consequences.
     ///
     /// # Errors
     /// Returns the errors of [`Engine::new`]. After an error, the engine is in its previous state.
@@ -72,8 +73,8 @@ impl Engine {
         change
     }
 
-    /// Changes the stated facts and the rules of an engine without equality; the new rules may have it. Deletes facts first, so
-    /// that new rules do not match deleted facts.
+    /// Changes the stated facts and the rules of an engine without equality; the new rules may have it.
+    /// Deletes facts first, so that new rules do not match deleted facts.
     fn change_plainly(&mut self, delta: Delta, program: Program) -> Result<Delta, Errors> {
         let inserted: FxHashSet<&Fact> = delta.insert.iter().collect();
         let delete = delta.delete.iter().filter(|fact| !inserted.contains(fact)).cloned().collect();
@@ -95,7 +96,8 @@ impl Engine {
         Ok(net([switched, change]))
     }
 
-    /// Returns `true` if rules of an engine without equality have derived an `owl:sameAs` pair.
+    /// Returns `true` if rules of an engine without equality have derived an `owl:sameAs` pair that is not
+    /// stated.
     fn derives_pairs(&mut self) -> bool {
         let same_as = self.symbols_mut().name(SAME_AS);
         let mut pairs = self.matching_rows(same_as, &[None, None]);
@@ -135,8 +137,8 @@ impl Engine {
     /// Removes every rule with this identity and returns the net change of all facts that hold, sorted.
     ///
     /// # Errors
-    /// Returns R301 if the derivation exceeds the step budget. After an error, the engine is in its
-    /// previous state.
+    /// Returns R301 if the derivation exceeds the step budget, and R304 if the evaluation was interrupted.
+    /// After an error, the engine is in its previous state.
     pub fn remove_rule(&mut self, identity: &RuleIdentity) -> Result<Delta, Errors> {
         let mut program = Program::clone(&self.program);
         program.rules.retain(|rule| rule.identity != *identity);

@@ -166,7 +166,7 @@ impl Rule {
         terms.filter_map(Term::as_variable).map(|v| usize::from(v.0) + 1).max().unwrap_or(0)
     }
 
-    /// Returns the name of a variable, without question mark.
+    /// Returns the name of a variable, without question mark; `v3` for a variable with number 3 and no name.
     pub fn variable_name(&self, variable: Variable) -> String {
         self.variables
             .get(usize::from(variable.0))

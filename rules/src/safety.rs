@@ -145,7 +145,8 @@ pub(crate) fn bound_variables(rule: &Rule) -> Vec<bool> {
     binding(rule).bound.0
 }
 
-/// Returns the errors of one rule: arities of atoms, forbidden head atoms, unbound variables.
+/// Returns the errors of one rule: arities of atoms, forbidden head atoms and nested aggregates; if there are
+/// none, unbound variables.
 pub(crate) fn check(rule: &Rule) -> Vec<Error> {
     let mut errors = Vec::new();
     let identity = || rule.identity.clone();

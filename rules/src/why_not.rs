@@ -3,7 +3,7 @@
 //!
 //! A depth-first branch-and-bound search finds the binding with the lowest weight of unsatisfied atoms (a
 //! missing fact weighs more than a failed test). Ties are broken by the total gap of failed numeric
-//! comparisons. The search stops improving after a fixed number of nodes.
+//! comparisons. After a fixed number of nodes, the search ends with the best binding so far.
 
 use std::fmt;
 
@@ -21,7 +21,7 @@ use crate::source::Source;
 use crate::store::RelationId;
 use crate::symbol::{Symbol, Symbols};
 
-/// Maximum number of nodes visited per rule. The search then returns the best binding so far.
+/// Number of nodes after which the search for one rule head ends, as soon as it has found a binding.
 const SEARCH_LIMIT: usize = 20_000;
 
 /// A rule that could derive a fact, with the unsatisfied part of its body.
@@ -69,7 +69,8 @@ pub enum Obstacle {
         wanted: Option<Symbol>,
         /// Actual value; `None` if the aggregate has no value.
         found: Option<Literal>,
-        /// Exact absolute difference of the required and the actual number.
+        /// Exact absolute difference of the required and the actual number; `None` if one of them is not a
+        /// number.
         gap: Option<BigRational>,
     },
     /// Two terms are equal but must differ, or differ but must be equal.
@@ -142,8 +143,8 @@ impl fmt::Display for DisplayObstacle<'_> {
 
 impl Engine {
     /// Returns the nearest miss of each rule head that unifies with the fact, in the order of rules: the
-    /// binding of the rule body with the fewest unsatisfied atoms. Empty if the fact holds, or if no
-    /// rule could derive it.
+    /// binding of the rule body with the fewest unsatisfied atoms that a limited search finds. Empty if the
+    /// fact holds, or if no rule could derive it.
     pub fn why_not(&self, fact: &Fact) -> Vec<NearMiss> {
         let relation = self.store.find(fact.predicate, fact.arguments.len());
         let Some(relation) = relation.filter(|_| !self.holds(fact)) else { return Vec::new() };

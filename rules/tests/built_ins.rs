@@ -17,7 +17,8 @@ fn parse(texts: &[(&str, &str)], symbols: &mut Symbols) -> Result<Program, Vec<S
         .map_err(|errors| errors.iter().map(ToString::to_string).collect())
 }
 
-/// Returns the values of variables under all matches of a body of built-ins, as N-Triples.
+/// Returns the values of `variables` under all matches of a body of built-ins, one text for each match: the
+/// lexical forms, separated by `|`.
 fn solutions(body: &str, variables: &str) -> Vec<String> {
     let text = format!("-> start(0) . start(?start) ^ {body} -> r({variables}) .");
     let mut symbols = Symbols::new();

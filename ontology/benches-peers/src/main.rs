@@ -29,8 +29,8 @@ impl Random {
     }
 }
 
-/// Maximum number of equal names of which all equalities are listed. Of more names, only the pairs with
-/// the first name are listed.
+/// Maximum number of names of one individual for which all equalities are listed. Of more names, only the
+/// equalities with the first name are listed.
 const MANY_NAMES: usize = 32;
 
 fn metaplan(files: &[PathBuf], write: bool) -> usize {
@@ -61,7 +61,8 @@ fn reasonable(files: &[PathBuf], write: bool) -> usize {
     reasoner.view_output().len().saturating_sub(before)
 }
 
-/// Parses the files with the parsers of metaplan (oxttl). The remaining time of metaplan is reasoning.
+/// Parses the files with oxttl, the parser that metaplan uses, and returns the number of triples. The
+/// remaining time of metaplan is the construction of axioms and reasoning.
 fn parse(files: &[PathBuf]) -> usize {
     let parse = |file: &PathBuf| {
         let text = std::fs::read(file).expect("readable");

@@ -13,9 +13,9 @@ use crate::vocab::owl;
 const MAX_CASES: usize = 64;
 
 impl Prover {
-    /// Assumes that an individual is in a class: adds the facts to copies of the engine. Returns one
-    /// engine for each case, because a disjunction gives several cases. `next` is the number of the last
-    /// fresh name.
+    /// Assumes that an individual is in a class: adds the facts to copies of the engine. Returns one engine
+    /// for each case, because a disjunction gives several cases. `next` is the number of the last fresh name.
+    /// What rules cannot express of the class is not assumed, so that a proof remains sound.
     pub(super) fn assume(
         engine: &Engine,
         class: &ClassExpression,
@@ -225,7 +225,7 @@ pub(super) fn pairwise_different(engine: &mut Engine, names: &[Iri]) -> Vec<Fact
     pairs.map(|pair| Fact::new(different, pair)).collect()
 }
 
-/// Adds the rules and facts of the assertion that `individual` is in `class` to an engine.
+/// Lowers the assertion that `individual` is in `class`, and adds the resulting rules and facts to an engine.
 fn by_rules(mut engine: Engine, class: &ClassExpression, individual: &Iri) -> Result<Engine, Error> {
     let axiom = Axiom::ClassAssertion(class.clone(), individual.clone());
     let axioms = vec![AnnotatedAxiom { axiom, annotations: Vec::new() }];

@@ -32,8 +32,9 @@ pub struct Entailment {
     pub answer: Answer,
 }
 
-/// Tries to prove every axiom of `conclusions`. Its anonymous individuals are existential variables. Statements
-/// that could not be read are reported as not entailed. For annotations see [`annotations`].
+/// Tries to prove every axiom of `conclusions`. Axioms with anonymous individuals, which are existential
+/// variables, are proved together as one conjunctive query. Rules and unread statements are reported as not
+/// entailed. For annotations see [`annotations`].
 ///
 /// # Errors
 /// Returns an error if a rule exceeds its budget.

@@ -27,7 +27,8 @@ impl Prover {
     }
 
     /// Extends an assignment to all statements by backtracking; the statement with the fewest unassigned
-    /// individuals comes first. Returns the explanation of the first answer.
+    /// individuals comes first. Returns the explanation of the first answer; `None` if there is no answer or
+    /// the budget is exhausted.
     fn extend(
         &self,
         assignment: &Assignment,
@@ -65,7 +66,8 @@ impl Prover {
         Ok(None)
     }
 
-    /// Returns the individuals that a statement admits as values of the anonymous individual `name`.
+    /// Returns the individuals that a statement may admit as values of the anonymous individual `name`; the
+    /// statement is not proved for them.
     fn candidates(&self, assignment: &Assignment, axiom: &Axiom, name: &Iri) -> Vec<Iri> {
         let engine = &self.base;
         let symbol = |iri: &str| engine.symbols().find_name(iri);

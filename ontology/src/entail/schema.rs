@@ -35,8 +35,9 @@ pub struct Schema {
     pub data_properties: Vec<SchemaEntity>,
 }
 
-/// Computes the class and property hierarchy from the consequences for a fresh instance of each class,
-/// and for a fresh pair of each property. If the knowledge is inconsistent, `empty` is always `None`.
+/// Computes the hierarchy of the classes and properties in `named`, without OWL's own ones, from the
+/// consequences for a fresh instance of each class, and for a fresh pair of each property. If the knowledge
+/// is inconsistent, `empty` is always `None`.
 ///
 /// # Errors
 /// Returns an error if a rule exceeds its budget.
@@ -83,8 +84,8 @@ fn entities(
     let name = |symbol: &Symbol| engine.symbols().value(*symbol).as_name().unwrap_or_default().to_owned();
     let entity = |(iri, symbol, empty): (String, Symbol, Option<String>)| {
         let supers = &above[&symbol];
-        // Returns `true` if a third entity lies strictly between the current entity and `candidate`. Equivalent entities
-        // are above each other.
+        // Returns `true` if a third entity lies strictly between the current entity and `candidate`.
+        // Equivalent entities are above each other.
         let between = |candidate: &Symbol| {
             supers.iter().any(|middle| {
                 middle != candidate

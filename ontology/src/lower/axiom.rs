@@ -16,8 +16,8 @@ use crate::vocab::owl;
 /// Result of lowering an axiom. The error is the reason why the axiom, or a part of it, has no rule form.
 type LoweringResult = Result<(), &'static str>;
 
-/// Adds the rules of all axioms that are not plain assertions to `context`. Adds a warning for each
-/// axiom without a complete rule form, and one summary warning.
+/// Adds the rules of all axioms that are not plain assertions to `context`. Adds a warning for each axiom
+/// without a complete rule form and, if there are any, one summary warning.
 pub(crate) fn lower_rules(axioms: &[AnnotatedAxiom], context: &mut Context) {
     let mut outside = 0;
     for (position, annotated) in axioms.iter().enumerate() {
@@ -41,7 +41,8 @@ pub(crate) fn lower_rules(axioms: &[AnnotatedAxiom], context: &mut Context) {
     }
 }
 
-/// Adds the facts of the assertions about named classes and properties to `context`.
+/// Adds the facts of the assertions about named classes and properties, `sameAs` and `differentFrom` to
+/// `context`.
 pub(crate) fn lower_assertions(axioms: &[AnnotatedAxiom], context: &mut Context) {
     for annotated in axioms {
         assertion(context, &annotated.axiom);
@@ -61,7 +62,7 @@ fn is_assertion(axiom: &Axiom) -> bool {
 }
 
 /// Adds the facts of an assertion about named classes and properties, `sameAs` or `differentFrom`. Ignores
-/// other axioms.
+/// other axioms, and membership in `owl:Thing`.
 fn assertion(context: &mut Context, axiom: &Axiom) {
     match axiom {
         // `vocabulary` adds the facts of `owl:Thing` if something depends on them.
@@ -295,8 +296,8 @@ impl AxiomLowering<'_, '_> {
         Err("that the parts cover the class")
     }
 
-    /// Adds the rules of a key axiom: two members of the class with equal values of all key properties
-    /// are the same individual (rule prp-key).
+    /// Adds the rules of a key axiom: two members of the class with equal values of all key properties are
+    /// the same individual (rule prp-key). Adds no rules under the unique name assumption.
     fn key(&mut self, class: &ClassExpression, objects: &[Property], data: &[Iri]) {
         let mut variables = Variables::default();
         let (x, y) = (variables.fresh("x"), variables.fresh("y"));

@@ -51,7 +51,7 @@ pub(crate) struct Context<'a> {
     pub identity: RuleIdentity,
     /// Reasons why parts of the current axiom or rule have no rule form.
     gaps: Vec<&'static str>,
-    /// Inclusions between restrictions.
+    /// Inclusions (`⊑`) between existential or universal restrictions.
     pub inclusions: Inclusions,
     /// Names of the auxiliary relations whose rules have already been added.
     pub abbreviated: HashSet<String>,

@@ -2,8 +2,8 @@
 //!
 //! OWL makes no unique name assumption: two names can denote the same individual, and two values of a
 //! functional property imply that they do. The engine then treats `sameAs` as equality. `differentFrom` holds
-//! if it is stated, or follows from disjoint classes or from different values of functional properties. It is
-//! derived only if a rule depends on it.
+//! if it is stated, or follows from disjoint classes or from different values of functional or inverse
+//! functional properties. It is derived only if a rule depends on it.
 //!
 //! Under the unique name assumption ([`UniqueNames`](super::Equality::UniqueNames)) the rules of this file are
 //! not added: a functional object property has no consequences, and any two names differ.
@@ -18,8 +18,8 @@ use crate::error::Warning;
 use crate::owl::{AnnotatedAxiom, Axiom, Characteristic, ClassExpression, EntityKind};
 use crate::vocab::owl;
 
-/// Adds the rules of difference, if a rule depends on `differentFrom`, and rule eq-rep for punned entities.
-/// Returns `true` if a rule or fact can make two names equal.
+/// Adds the rules of difference, if a rule depends on `differentFrom`, and rule eq-rep for entities that are
+/// individuals, too, if names can become equal. Returns `true` if a rule or fact can make two names equal.
 pub(crate) fn lower(axioms: &[AnnotatedAxiom], context: &mut Context) -> bool {
     let (same_as, different) = (context.name(owl::SAME_AS), context.name(owl::DIFFERENT_FROM));
     let merges_names = |rule: &Rule| rule.head.iter().any(|atom| matches!(atom, Atom::Same(..)));
@@ -40,9 +40,9 @@ pub(crate) fn lower(axioms: &[AnnotatedAxiom], context: &mut Context) -> bool {
     merges
 }
 
-/// Adds rule eq-rep of OWL 2 RL for classes and properties that are individuals, too: names that become
-/// equal have the same members. If names are stated to be equal, the lowering of `SameIndividual` adds
-/// these rules instead.
+/// Adds rule eq-rep of OWL 2 RL for classes and properties that are individuals, too: names that become equal
+/// have the same members. If names are stated to be equal, the lowering of `SameIndividual` adds these rules
+/// instead. If a kind has more than [`MAX_PUNNED_NAMES`] such names, adds a warning instead.
 fn entities(context: &mut Context) {
     let identity = RuleIdentity { source: AXIOM_SOURCE.into(), label: Some("eq-rep".into()), position: 0 };
     let mut variables = Variables::default();

@@ -355,7 +355,7 @@ fn inverse(property: &Property) -> Property {
     }
 }
 
-/// Returns the properties that are reachable in a graph, the start included.
+/// Returns the properties that are reachable from `from` in a graph, including `from` itself.
 fn reachable(from: &Property, edges: &HashMap<Property, Vec<Property>>) -> BTreeSet<Property> {
     let mut visited = BTreeSet::from([from.clone()]);
     let mut open = vec![from];

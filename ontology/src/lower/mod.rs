@@ -35,7 +35,8 @@ pub use context::{AXIOM_SOURCE, Equality, INTERNAL};
 /// An ontology as rules and facts.
 #[derive(Clone, Debug)]
 pub struct Lowered {
-    /// SWRL rules of the knowledge base, then rules lowered from axioms, then additional rules.
+    /// SWRL rules of the knowledge base, then rules lowered from axioms, then the semantics of OWL's own
+    /// vocabulary, then additional rules.
     pub program: Program,
     /// Facts of the assertions.
     pub facts: Vec<Fact>,
@@ -87,7 +88,8 @@ pub fn lower_together(
     Lowered { program: Program { rules, equality }, facts, duplicates, warnings }
 }
 
-/// Lowers the plain assertions to facts, in the order of the axioms. Adds no rules.
+/// Lowers the assertions about named classes and properties, `sameAs` and `differentFrom` to facts, in the
+/// order of the axioms. Ignores other axioms, and adds no rules.
 pub(crate) fn lower_assertions(axioms: &[AnnotatedAxiom], symbols: &mut Symbols) -> Vec<Fact> {
     let mut context = Context::new(symbols, Equality::Owl, &Ontology::default());
     axiom::lower_assertions(axioms, &mut context);
@@ -109,9 +111,9 @@ impl Context<'_> {
         }
     }
 
-    /// Removes the rules that the engine rejects, for example because of unsafe variables, since one
-    /// such rule would make the engine reject the whole program. A rule lowered from an axiom is not
-    /// tested if a relation or a constant binds its variables.
+    /// Removes the rules that the engine rejects, for example because of unsafe variables, since one such
+    /// rule would make the engine reject the whole program. A rule lowered from an axiom is not tested if its
+    /// body has a relation atom, or an equality with a constant, because lowering then binds all variables.
     fn drop_unusable(&mut self) {
         let binds = |atom: &Atom| match atom {
             Atom::Relation { .. } => true,
@@ -137,7 +139,7 @@ impl Context<'_> {
     }
 }
 
-/// Returns the rule that an error refers to.
+/// Returns the rule that an error refers to; `None` for errors that lowered rules cannot cause.
 fn rejected_rule(error: &Error) -> Option<&RuleIdentity> {
     match error {
         Error::UnsafeHead { rule, .. }

@@ -10,7 +10,8 @@ use super::context::{Conjunction, Context, cross};
 use crate::owl::DataRange;
 use crate::vocab::{owl, rdf, rdfs, xsd};
 
-/// Limit on the nesting of datatype definitions. Deeper and cyclic definitions are rejected.
+/// Limit on the nesting of data ranges and datatype definitions. Deeper ranges and cyclic definitions are
+/// rejected.
 const MAX_DEFINITION_DEPTH: usize = 16;
 
 /// Limit on the number of alternatives to which an intersection of unions is expanded.
@@ -44,8 +45,9 @@ struct RangeLowering<'c, 'a> {
 }
 
 impl RangeLowering<'_, '_> {
-    /// Returns alternative conjunctions of tests. If one of them holds, the value is in `range`
-    /// (`inside` is true) or outside `range` (`inside` is false).
+    /// Returns alternative conjunctions of tests. If one of them holds, the value is in `range` (`inside` is
+    /// true) or outside `range` (`inside` is false). `depth` is the number of further nesting levels that are
+    /// accepted.
     fn tests(&mut self, range: &DataRange, inside: bool, depth: usize) -> Tests {
         if depth == 0 {
             return Err("datatypes that are defined by each other");

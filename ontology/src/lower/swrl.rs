@@ -12,7 +12,8 @@ use crate::owl::{Argument, Atom, ClassExpression, Rule};
 use crate::vocab::owl;
 
 /// Adds the lowered rules to `context`, without duplicates. Returns the number of duplicates: rules that
-/// differ from another rule at most in the names of variables and in the order of body atoms.
+/// differ from another rule at most in the names of variables and in the order of body atoms. Some duplicates
+/// are not recognised, see [`canonical`].
 pub(crate) fn lower(rules: &[Rule], context: &mut Context) -> usize {
     let mut contents = HashSet::new();
     let mut duplicates = 0;
@@ -123,8 +124,9 @@ fn lower_rule(rule: &Rule, identity: &RuleIdentity, context: &mut Context) -> Re
     Ok(())
 }
 
-/// Adds an `owl:Thing` atom for each variable that occurs only in `owl:Thing` or in an equality, because
-/// the variable ranges over all individuals.
+/// Binds the variables of `owl:Thing` atoms, which are otherwise dropped, and of equalities: adds an
+/// `owl:Thing` atom if neither a relation atom nor an equality binds the variable, so that it ranges over all
+/// individuals.
 fn individuals(context: &mut Context, rule: &Rule, body: &mut Conjunction, variables: &mut Variables) {
     for atom in &rule.body {
         let argument = match atom {

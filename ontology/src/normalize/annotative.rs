@@ -1,9 +1,9 @@
 //! Removes axioms that use an annotation property as another kind of property, each with a warning. OWL 2 DL
 //! forbids such axioms, and horned-owl rejects a document that contains one.
 //!
-//! Two forms occur in practice: `owl:equivalentProperty` between annotation properties, and restrictions on
-//! annotation properties. If a class expression contains such a restriction, every axiom with this expression
-//! is removed.
+//! Two forms, which occur in practice, are recognised: `owl:equivalentProperty` between annotation
+//! properties, and restrictions on annotation properties. If a class expression contains such a restriction,
+//! every axiom with this expression is removed.
 
 use oxrdf::{BlankNode, NamedOrBlankNode, Term};
 use rustc_hash::FxHashSet as HashSet;

@@ -44,8 +44,8 @@ impl Usage {
         };
         let uses: Vec<NameUse> = (0..names.len() as u32).map(reserved).collect();
         let [kind, individual] = [rdf::TYPE, owl::NAMED_INDIVIDUAL].map(|iri| names.find(iri));
-        // Annotations do not make a name part of an axiom.
         let mut usage = Self { uses, kind, individual };
+        // Annotations do not make a name part of an axiom.
         let comments = [rdfs::LABEL, rdfs::COMMENT, rdfs::SEE_ALSO, rdfs::IS_DEFINED_BY];
         let comments = comments.map(|iri| names.find(iri));
         for triple in documents.iter().flat_map(|document| &document.triples) {

@@ -4,7 +4,7 @@
 //! - A named class that *is* an expression, as in OWL 1, becomes equivalent to the expression ([1], tables 17
 //!   and 18).
 //! - Expressions without a type, or with a wrong one, get a type from their properties.
-//! - N-ary axioms with an IRI become blank nodes.
+//! - Axioms and annotations that are nodes with an IRI get a blank node instead.
 //! - Inverse properties in qualified cardinality restrictions get a name, which `crate::horned` translates
 //!   back.
 //! - Headers of ontologies without an IRI are removed.
@@ -64,7 +64,8 @@ fn take_all(graph: &mut Graph, node: &NamedOrBlankNode) {
     }
 }
 
-/// Moves the triples of n-ary axioms with an IRI to blank nodes.
+/// Moves the triples of axioms and annotations that are nodes with an IRI (such as `AllDifferent` and
+/// negative assertions) to blank nodes.
 fn remove_axiom_iris(graph: &mut Graph) {
     let kinds = [owl::ALL_DIFFERENT, owl::NEGATIVE_PROPERTY_ASSERTION, owl::AXIOM, owl::ANNOTATION];
     let named: Vec<NamedOrBlankNode> = kinds

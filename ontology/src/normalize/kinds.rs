@@ -64,7 +64,8 @@ pub(crate) fn declare(graph: &mut Graph, mut classes: BTreeSet<String>, warnings
     state(graph, ORIGIN, owl::ANNOTATION_PROPERTY);
 }
 
-/// Adds declarations of the `known` entities that the documents mention but do not declare.
+/// Adds declarations of the `known` entities, except individuals, that the documents mention but do not
+/// declare.
 pub(crate) fn declare_known(graph: &mut Graph, known: &[(EntityKind, Iri)], names: &Names) {
     if known.is_empty() {
         return;
@@ -108,9 +109,10 @@ impl Kinds<'_> {
         }
     }
 
-    /// Unifies the kinds of properties that axioms relate (equivalent, disjoint or subproperties): a known kind
-    /// propagates to undeclared properties. An axiom between properties of different kinds is removed, because
-    /// horned-owl rejects documents with such axioms.
+    /// Unifies the kinds of properties that axioms relate (equivalent, disjoint or subproperties): a known
+    /// kind propagates to undeclared properties. An axiom between properties of different kinds is removed,
+    /// because horned-owl rejects documents with such axioms. Returns the uses of the undeclared properties,
+    /// including the propagated kinds.
     fn propagate_kinds(mut self, graph: &mut Graph, warnings: &mut Vec<Warning>) -> BTreeMap<String, Use> {
         let relations = [owl::EQUIVALENT_PROPERTY, owl::PROPERTY_DISJOINT_WITH, rdfs::SUB_PROPERTY_OF];
         let pairs: Vec<_> = graph

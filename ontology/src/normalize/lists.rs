@@ -1,5 +1,6 @@
-//! Rewrites axioms with lists: `AllDisjointClasses` and `AllDisjointProperties` become pairs, a list that
-//! several axioms share is copied, and malformed property chains are removed.
+//! Rewrites axioms with lists: `AllDisjointClasses` and `AllDisjointProperties` become pairs, large sets of
+//! disjoint classes or different individuals become axioms without horned-owl, a list that several axioms
+//! share is copied, and malformed property chains are removed.
 
 use oxrdf::{NamedNode, NamedOrBlankNode, Term};
 
@@ -19,11 +20,13 @@ pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) -> Vec<Ann
     groups
 }
 
-/// Maximum number of members of an axiom that is left to horned-owl or expanded to pairs.
+/// Maximum number of members up to which an axiom about disjoint named classes is expanded to pairs, and one
+/// about different named individuals is left to horned-owl. Larger ones are read by [`groups`].
 const MAX_PAIRED_MEMBERS: usize = 16;
 
-/// Removes and returns axioms about many disjoint named classes or many different named individuals. Pairs
-/// would be too many, and the time of horned-owl grows with the square of the length of a list.
+/// Removes and returns axioms about more than [`MAX_PAIRED_MEMBERS`] disjoint named classes or different
+/// named individuals. Pairs would be too many, and the time of horned-owl grows with the square of the length
+/// of a list.
 fn groups(graph: &mut Graph) -> Vec<AnnotatedAxiom> {
     let mut axioms = Vec::new();
     for (kind, class) in
@@ -54,7 +57,8 @@ fn groups(graph: &mut Graph) -> Vec<AnnotatedAxiom> {
     axioms
 }
 
-/// Replaces each axiom of type `class` by `predicate` between all pairs of its members.
+/// Replaces each axiom of type `class` by `predicate` between all pairs of its members. Removes a malformed
+/// axiom, with a warning.
 fn pairs(graph: &mut Graph, class: &str, predicate: &str, warnings: &mut Vec<Warning>) {
     for (_, node) in graph.instances(class) {
         let members = graph.object(&node, owl::MEMBERS).and_then(|head| graph.list(head));
@@ -83,7 +87,8 @@ fn take(graph: &mut Graph, indices: Vec<usize>) {
     }
 }
 
-/// Removes property chains with members other than properties: horned-owl panics on them.
+/// Removes property chains that are malformed lists, have fewer than two members or have members other than
+/// properties, with a warning: horned-owl panics on them.
 fn check_chains(graph: &mut Graph, warnings: &mut Vec<Warning>) {
     let chains: Vec<_> = graph
         .iter()

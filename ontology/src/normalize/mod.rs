@@ -60,7 +60,8 @@ pub(crate) struct Merged {
     pub parts: Vec<(usize, Iri)>,
 }
 
-/// Merges documents. Triples for which `is_bulk` returns `true` are not added to the graph.
+/// Merges documents. Triples for which `is_bulk` returns `true` are not added to the graph. Imports, and the
+/// headers of all documents but the first, are dropped.
 pub(crate) fn merge(documents: Vec<Document>, names: &Names, is_bulk: impl Fn(&Compact) -> bool) -> Merged {
     let (mut graph, mut bulk, mut parts) = (Graph::default(), Vec::new(), Vec::new());
     let [rdf_type, ontology, imports, version] =

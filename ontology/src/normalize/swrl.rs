@@ -19,7 +19,7 @@ use crate::vocab::{owl, rdf, swrl};
 pub(crate) struct Origin {
     /// IRI of the ontology that states the rule; the document's name if the ontology has no IRI.
     pub ontology: Iri,
-    /// Index of the rule in its ontology, from 0.
+    /// Index of the rule in its document, from 0. Unreadable rules are counted, too.
     pub position: u32,
     /// The rule's IRI, if it has one.
     pub iri: Option<Iri>,
@@ -35,9 +35,9 @@ pub(crate) const TRUE: &str = "urn:metaplan:true";
 /// Annotation property whose value is the index of a rule in the list of [`Origin`]s.
 pub(crate) const ORIGIN: &str = "urn:metaplan:origin";
 
-/// Rewrites the SWRL rules of `graph` and returns the origin of each rewritten rule. Each element of
-/// `parts` is a document: the index of its first triple, and its ontology IRI. Unreadable rules cause
-/// warnings.
+/// Rewrites the SWRL rules of `graph` and returns the origin of each rewritten rule. Each element of `parts`
+/// is a document: the index of its first triple, and its ontology IRI. Unreadable rules are removed with a
+/// warning.
 pub(crate) fn rewrite(graph: &mut Graph, parts: &[(usize, Iri)], warnings: &mut Vec<Warning>) -> Vec<Origin> {
     let mut pass = Pass::new(graph);
     let (mut origins, mut positions) = (Vec::new(), vec![0; parts.len()]);

@@ -19,7 +19,8 @@ use crate::names::{Compact, Names, Object};
 use crate::triples::Document;
 use crate::vocab::{owl, rdf};
 
-/// Number of syntax errors in a document after which parsing stops.
+/// Number of syntax errors in a Turtle document after which parsing stops. Other parsers stop at the first
+/// error.
 const MAX_SYNTAX_ERRORS: usize = 10;
 
 /// Decodes a document to UTF-8 without a byte order mark.

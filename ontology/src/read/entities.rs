@@ -152,8 +152,8 @@ impl<'a> Expansion<'a> {
     }
 }
 
-/// Parses the document type declaration of an XML document. Returns `None` if there is none, or if it
-/// has no internal subset. External entities are ignored.
+/// Parses the document type declaration of an XML document. Returns `None` if there is none, if it has no
+/// internal subset, or if it is malformed. External entities are ignored.
 fn declarations(text: &[u8]) -> Option<Declarations<'_>> {
     let start = text.windows(9).position(|window| window == b"<!DOCTYPE")?;
     // Only the XML declaration, comments and processing instructions may precede it.

@@ -4,10 +4,11 @@ use std::path::Path;
 
 use crate::error::{Error, Errors};
 
-/// Maximum size of a document in bytes.
+/// Maximum size of a file in bytes. Standard input has no limit.
 const MAX_BYTES: u64 = 1 << 30;
 
-/// Reads a regular file. Other files are rejected: a pipe could block, and some devices have no end.
+/// Reads a regular file of at most [`MAX_BYTES`] bytes. Other files are rejected: a pipe could block, and
+/// some devices have no end.
 pub(super) fn regular_file(path: &Path) -> std::io::Result<Vec<u8>> {
     let metadata = std::fs::metadata(path)?;
     if !metadata.is_file() {

@@ -11,8 +11,8 @@
 //! 4. in the directory of the importing document, then in the given directories and their subdirectories: by
 //!    ontology IRI, then by the last segment of the URL; among several files with this name, the one whose path
 //!    has most segments of the URL;
-//! 5. in a directory that is named like a segment of the URL and lies next to a directory of the importing
-//!    document, because repositories are often checked out side by side;
+//! 5. in a directory that is named like one of the first two segments of the URL's path and lies next to a
+//!    directory of the importing document, because repositories are often checked out side by side;
 //! 6. among the documents already read, by file name;
 //! 7. among the embedded knowledge bases ([`crate::kb`]), by IRI or by the URL of their publication.
 
@@ -29,10 +29,11 @@ use crate::triples::Document;
 /// Name of the catalog that Protégé writes.
 const CATALOG: &str = "catalog-v001.xml";
 
-/// Maximum depth of the subdirectories that are searched for imports.
+/// Maximum depth of the subdirectories of the given directories that are searched for imports.
 const MAX_DEPTH: usize = 4;
 
-/// Number of ancestor directories in which directories named like segments of the URL are searched.
+/// Number of ancestor directories in which directories named like the first segments of the URL's path are
+/// searched.
 const MAX_ANCESTORS: usize = 3;
 
 /// Number of bytes at the start of a file that are searched for its ontology IRI.

@@ -4,11 +4,12 @@
 use super::text::Text;
 use crate::error::{Error, Position, Warning};
 
-/// Maximum number of warnings that get a position, because each search visits all documents.
+/// Number of warnings, from the first one on, that may get a position, because each search visits all
+/// documents.
 const MAX_SEARCHES: usize = 100;
 
 /// Sets the position of each warning about an undeclared name to the first occurrence of the name in the
-/// documents.
+/// documents. Considers only the first [`MAX_SEARCHES`] warnings.
 pub(super) fn locate(warnings: &mut [Warning], texts: &[(String, Text)]) {
     let undeclared = |warning: &&mut Warning| matches!(warning, Warning::Undeclared { .. });
     let mut unlocated: Vec<&mut Warning> =

@@ -19,7 +19,7 @@ pub(super) enum Text {
 }
 
 impl Text {
-    /// Returns the text in UTF-8; empty if the file no longer exists.
+    /// Returns the text in UTF-8; empty if the file can no longer be read or decoded.
     pub(super) fn get(&self) -> Cow<'_, [u8]> {
         match self {
             Self::Memory(text) => Cow::Borrowed(text),

@@ -139,7 +139,9 @@ impl Runtime {
         values.filter(is_of).find_map(|value| facts.number(value, terms::HAS_VALUE))
     }
 
-    /// Returns the requirements of an objective that a design's estimations do not meet according to the rules.
+    /// Returns the requirements of an objective that a design's estimations do not meet according to the
+    /// rules. Omits requirements on attributes without an estimation, and on attributes with a comparison
+    /// operator.
     fn missed(&self, objective: Symbol, design: Symbol) -> Result<Vec<Missed>, Error> {
         let facts = self.facts();
         let mut required: BTreeMap<Symbol, BigRational> = BTreeMap::new();
@@ -161,7 +163,8 @@ impl Runtime {
     }
 
     /// Returns the error status that the objective would have if it were grounded with `design` and the
-    /// attribute `kind` were measured as `value`.
+    /// attribute `kind` were measured as `value`. `None` if it would have no error, or an error even without
+    /// this value.
     fn hypothetical_status(
         &self,
         objective: Symbol,
@@ -198,8 +201,8 @@ impl Runtime {
         copy.error_status(&name)
     }
 
-    /// Ends the cycle, and returns the error status of an objective; `None` if the objective is not in
-    /// error.
+    /// Ends a cycle of the adaptation loop (see [`Runtime::conclude`]) and returns the first status of an
+    /// objective, or `None` if the objective is not in error.
     fn error_status(&mut self, objective: &str) -> Result<Option<String>, Error> {
         self.conclude()?;
         let objective_state = self.objectives().into_iter().find(|state| state.individual.iri == objective);

@@ -35,7 +35,7 @@ pub struct Runtime {
     pub(super) pending: BTreeSet<Fact>,
     /// Maps each latched fact, i.e. each conclusion that became an assertion, to its derivation.
     pub(super) reasons: BTreeMap<Fact, Derivation>,
-    /// Relations with asserted facts, and their arities.
+    /// Relations that may have asserted facts, with their arities.
     pub(super) relations: BTreeSet<(Symbol, usize)>,
 }
 

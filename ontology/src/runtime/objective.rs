@@ -80,10 +80,10 @@ impl Runtime {
         self.apply(Delta { insert: Vec::new(), delete })
     }
 
-    /// Grounds an objective: selects the design, which replaces any other design, and removes the
-    /// objective's status. Returns the new grounding. In retract mode, existing measurements are linked
-    /// to the grounding, and recoveries count as noted if the objective is updatable. In latch mode, as
-    /// in MROS, only later measurements are linked.
+    /// Grounds an objective: selects the design, which replaces any other design, and removes the objective's
+    /// status. Returns the new grounding. In retract mode, existing measurements are linked to the grounding,
+    /// and if the objective is updatable, recovered components count as working (see
+    /// [`Runtime::note_recoveries`]). In latch mode, as in MROS, only later measurements are linked.
     ///
     /// # Errors
     /// Returns [`Error::Unknown`] or [`Error::Engine`].
@@ -200,7 +200,8 @@ impl Runtime {
         components.flat_map(|component| self.statements(component, terms::STATUS)).collect()
     }
 
-    /// Returns the facts to delete before a new grounding: the groundings and the status of the objective.
+    /// Returns the facts to delete before a new grounding: the groundings of the objective, its status, and
+    /// the statement that it is updatable.
     fn release(&self, objective: Symbol) -> Vec<Fact> {
         let groundings = self.facts().subjects(objective, terms::SOLVES_O).into_iter();
         let mut delete: Vec<Fact> = groundings.flat_map(|grounding| self.mentions(grounding)).collect();
@@ -221,8 +222,8 @@ impl Runtime {
         kinds.flat_map(|kind| change::holders(facts, kind)).collect()
     }
 
-    /// Returns the IRI of a grounding: `fg_<design>`, with the objective's name as a suffix if another
-    /// objective has a grounding with this IRI.
+    /// Returns the IRI of a grounding: `fg_` and the name of the design without `fd_`, with the objective's
+    /// name as a suffix if another objective has a grounding with this IRI.
     fn grounding_name(&self, objective: Symbol, design: Symbol) -> String {
         let facts = self.facts();
         let (design, owner) = (self.individual(design).name, self.individual(objective).name);

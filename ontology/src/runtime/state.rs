@@ -54,7 +54,7 @@ pub struct Grounding {
     pub design: Option<Individual>,
     /// Statuses that the rules conclude; empty if there is no problem.
     pub statuses: Vec<String>,
-    /// Measurements since the grounding: the individual that holds the value, and the value.
+    /// Measurements linked to the grounding: the individual that holds the value, and the value.
     pub measurements: Vec<(Individual, Option<Literal>)>,
 }
 

@@ -32,7 +32,7 @@ pub fn build(designs: u32) -> Engine {
     Engine::new(symbols, program, facts).expect("safe rules")
 }
 
-/// Median time of one update.
+/// Returns the median wall-clock time of one update of the engine.
 pub fn engine(designs: u32) -> Duration {
     let mut engine = build(designs);
     let symbols = engine.symbols_mut();
@@ -50,7 +50,8 @@ pub fn engine(designs: u32) -> Duration {
     median(times.collect())
 }
 
-/// Median time of one update by differential dataflow, until the probe has reached the new time.
+/// Returns the median wall-clock time of one update by differential dataflow, until the probe has reached the
+/// time of the update.
 pub fn differential(designs: u32) -> Duration {
     timely::execute_directly(move |worker| {
         let (mut requires, mut types, mut solves, mut failed, probe) =

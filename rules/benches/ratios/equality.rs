@@ -10,7 +10,8 @@ use super::median;
 
 const RULES: &str = "linked(?x, ?y) ^ tagged(?y) -> near(?x) . linked(?x, ?y) -> linked(?y, ?x) .";
 
-/// 2,000 names in classes of the given size. Each name is linked to the next class.
+/// Returns facts about 2,000 names in classes of `names` equal names. Each name is linked to the first name
+/// of the next class. Also returns one of the `sameAs` facts, which the benchmark retracts and states again.
 fn facts(symbols: &mut Symbols, names: usize) -> (Vec<Fact>, Fact) {
     let classes = 2000 / names;
     let mut facts = Vec::new();
@@ -47,7 +48,8 @@ fn by_rules(program: &Program, symbols: &mut Symbols) -> Program {
     Program { rules, ..program.clone() }
 }
 
-/// Times to build the engine, retract a pair and state it again, and the number of facts that hold.
+/// Returns the median wall-clock times, in seconds, to build the engine, to retract a `sameAs` fact and to
+/// state it again, and the number of facts that hold. Equality is by representatives, or by rules.
 fn measure(names: usize, representatives: bool) -> ([f64; 3], usize) {
     let mut symbols = Symbols::new();
     let program = parse_rules(RULES, "bench", &mut symbols, &Prefixes::new()).expect("rules");

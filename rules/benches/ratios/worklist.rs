@@ -262,7 +262,8 @@ impl Run {
         }
     }
 
-    /// Derives the status of groundings whose measured value is less than the estimated one.
+    /// Derives the status of the groundings for which a measured value is less than the estimated one, for
+    /// attributes with the comparison operator `<`.
     fn missed(&mut self, symbols: &Symbols, less_than: Symbol, quality: Symbol) {
         let measured: Vec<(Symbol, Symbol)> = self.pairs("hasQAvalue").rows.clone();
         for (grounding, measurement) in measured {

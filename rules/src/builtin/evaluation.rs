@@ -7,8 +7,8 @@ use super::{library, math, pattern, temporal, text, uri};
 use crate::literal::Literal;
 
 impl BuiltIn {
-    /// Returns the built-in with an IRI of `swrlb`, or of any version of the libraries `swrlm` and
-    /// `temporal` of `SWRLTab`.
+    /// Returns the built-in with an IRI of `swrlb`, or of any version of the libraries `swrlm` and `temporal`
+    /// of `SWRLTab`; `None` for other IRIs.
     pub fn from_iri(iri: &str) -> Option<Self> {
         match iri.strip_prefix(SWRLB) {
             Some(local) => Self::from_name(local),
@@ -17,7 +17,8 @@ impl BuiltIn {
     }
 
     /// Returns all solutions of a built-in. Each solution contains the values of the unknown arguments, in
-    /// order. Empty unless the built-in [binds](Self::binds) these arguments.
+    /// order. If all arguments are known, there is one empty solution if the built-in holds. The result is
+    /// empty if the built-in does not [bind](Self::binds) the unknown arguments.
     pub fn solve(self, arguments: &[Option<&Literal>]) -> Vec<Vec<Literal>> {
         let bound_arguments: Option<Vec<&Literal>> = arguments.iter().copied().collect();
         if let Some(bound_arguments) = bound_arguments {
@@ -71,8 +72,8 @@ impl BuiltIn {
         }
     }
 
-    /// Returns the constant regular expression of the built-in with its error, if the expression is
-    /// invalid. `argument` returns the constant argument at a position.
+    /// Returns the regular expression of the built-in with its error, if the expression is constant and
+    /// invalid. `argument` returns the argument at a position, or `None` if it is not constant.
     pub(crate) fn bad_pattern<'l>(
         self,
         argument: &impl Fn(usize) -> Option<&'l Literal>,

@@ -1,5 +1,6 @@
-//! Numeric and boolean functions: exact on decimals, and otherwise in the widest floating-point type of the
-//! arguments.
+//! Numeric and boolean functions. On decimals, results are exact up to 34 fractional digits; sines, cosines,
+//! tangents and powers with fractional exponents are doubles. On other numbers, functions are computed in the
+//! widest floating-point type of the arguments.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
@@ -8,7 +9,8 @@ use num_traits::{Signed, ToPrimitive, Zero};
 use super::signature::BuiltIn;
 use crate::literal::{Decimal, Literal, ten_to};
 
-/// Maximum exponent of an exact power, and maximum number of digits for rounding.
+/// Maximum absolute exponent of an exact power (a larger one has no result), and maximum number of digits for
+/// rounding decimals (larger numbers count as this one).
 const MAX_EXPONENT: u32 = 1000;
 
 /// Numbers that are promoted to a common type.
@@ -72,7 +74,7 @@ fn exact(built_in: BuiltIn, values: &[BigRational]) -> Option<Literal> {
 fn integer_power(base: &BigRational, exponent: &BigRational) -> Option<BigRational> {
     let exponent = exponent.to_integer().to_i32().filter(|e| e.unsigned_abs() <= MAX_EXPONENT)?;
     let bits = base.numer().bits().max(base.denom().bits());
-    // Limits the result to 65,536 bits.
+    // Limits the result to about 65,536 bits.
     let affordable = bits.saturating_mul(u64::from(exponent.unsigned_abs())) <= 1 << 16;
     (affordable && (exponent >= 0 || !base.is_zero())).then(|| base.pow(exponent))
 }

@@ -1,4 +1,5 @@
-//! Built-ins of SWRL (`swrlb`) on the value spaces of XSD, with the functions of `XPath` ([1], section 8).
+//! Built-ins of SWRL (`swrlb`, section 8 of [1]) on the value spaces of XSD, with the functions of `XPath`
+//! ([2]). URIs follow [3].
 //!
 //! Arguments of an unsuitable kind make a built-in false, and never cause an error. A computed result is
 //! compared with a bound first argument by *identity* of interned values, so that the outcome does not

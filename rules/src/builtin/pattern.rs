@@ -1,6 +1,7 @@
-//! Translates regular expressions of `XPath` to the syntax of the `regex` crate, which supports neither
-//! back references nor names of Unicode blocks. An invalid constant pattern is an error of its rule (R210).
-//! An invalid pattern in a variable makes the built-in false.
+//! Regular expressions of `XPath`: matching, replacement and tokenisation. Patterns are translated to the
+//! syntax of the `regex` crate, which supports neither back references nor names of Unicode blocks. An
+//! invalid constant pattern is an error of its rule (R210). An invalid pattern in a variable makes the
+//! built-in false.
 //!
 //! [2] W3C `XQuery` 1.0 and `XPath` 2.0 Functions and Operators, 2007.
 
@@ -15,7 +16,7 @@ use crate::literal::Literal;
 const SIZE_LIMIT: usize = 1 << 20;
 
 /// Returns `true` if the first argument contains a match of the second, a regular expression. The third
-/// argument contains optional flags.
+/// argument contains optional flags. Returns `false` for an invalid expression.
 pub(super) fn matches(arguments: &[&Literal]) -> bool {
     let texts: Option<Vec<&str>> = arguments.iter().map(|argument| as_text(argument)).collect();
     match texts.as_deref() {
@@ -26,7 +27,8 @@ pub(super) fn matches(arguments: &[&Literal]) -> bool {
 }
 
 /// Replaces each match of the second argument in the first by the third, in which `$1` refers to the first
-/// group. `None` for a pattern that matches the empty text, which `XPath` forbids.
+/// group. `None` for an invalid pattern, and for a pattern that matches the empty text, which `XPath`
+/// forbids.
 pub(super) fn replace(arguments: &[&Literal]) -> Option<Literal> {
     let texts = arguments.iter().map(|argument| as_text(argument)).collect::<Option<Vec<&str>>>()?;
     let (text, pattern, replacement, flags) = match texts.as_slice() {
@@ -38,9 +40,9 @@ pub(super) fn replace(arguments: &[&Literal]) -> Option<Literal> {
     Some(Literal::String(regex.replace_all(text, expand(replacement)?.as_str()).into()))
 }
 
-/// Returns the distinct parts of the first argument between matches of the second, in order of
-/// occurrence. Empty for the empty text and for a pattern that matches the empty text ([2], section
-/// 7.6.4).
+/// Returns the distinct parts of the first argument between matches of the second, in order of occurrence.
+/// Empty for the empty text, for an invalid pattern, and for a pattern that matches the empty text ([2],
+/// section 7.6.4).
 pub(super) fn tokens(arguments: &[&Literal]) -> Vec<Literal> {
     let texts = arguments.iter().map(|argument| as_text(argument)).collect::<Option<Vec<&str>>>();
     let (text, pattern, flags) = match texts.as_deref() {
@@ -95,7 +97,8 @@ const NAME_START: &str = ":A-Z_a-z\\x{C0}-\\x{D6}\\x{D8}-\\x{F6}\\x{F8}-\\x{2FF}
 const NAME_CONTINUE: &str = "\\-.0-9\\x{B7}\\x{300}-\\x{36F}\\x{203F}-\\x{2040}";
 
 /// Translates a pattern of `XPath` to the syntax of the `regex` crate. Subtraction of classes is written
-/// `--`, and `\i` and `\c` are expanded.
+/// `--`, and `\i` and `\c` are expanded. Returns an error for a back reference, and for a class within a
+/// class that is not subtracted.
 fn translate(pattern: &str) -> Result<String, String> {
     let mut translated = String::new();
     // Nesting depth of classes, and a flag for an innermost class without members.

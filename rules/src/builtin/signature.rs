@@ -1,6 +1,5 @@
-//! Signatures of the built-ins: names, numbers of arguments, and computed arguments.
-//!
-//! [3] RFC 3986: Uniform Resource Identifier, 2005.
+//! Signatures of the built-ins: names, numbers of arguments, and which arguments are computed from the
+//! others.
 
 use super::custom::{CustomBuiltIn, Definition};
 
@@ -160,7 +159,8 @@ built_ins! {
     Tokenize "tokenize" 3..=4 Choice,
     /// URI composed of scheme, host, port, path, query and fragment. Absent parts are empty.
     AnyUri "anyURI" 7..=7 Parts,
-    /// Resolves the reference in the second argument against the base URI in the third (\[3\], section 5.2).
+    /// Resolves the reference in the second argument against the base URI in the third (RFC 3986, section
+    /// 5.2).
     ResolveUri "resolveURI" 3..=3 Function,
     /// Duration composed of years and months.
     YearMonthDuration "yearMonthDuration" 3..=3 Parts,
@@ -173,7 +173,7 @@ built_ins! {
     Date "date" 4..=5 Parts,
     /// Time composed of hour, minute, second and an optional time zone.
     Time "time" 4..=5 Parts,
-    /// Sum of two durations in months.
+    /// Sum of the second and third argument, both durations in months.
     AddYearMonthDurations "addYearMonthDurations" 3..=3 Function,
     /// Second argument minus the third, both durations in months.
     SubtractYearMonthDurations "subtractYearMonthDurations" 3..=3 Function,
@@ -181,7 +181,7 @@ built_ins! {
     MultiplyYearMonthDuration "multiplyYearMonthDuration" 3..=3 Function,
     /// Second argument, a duration in months, divided by the number in the third; rounded to months.
     DivideYearMonthDuration "divideYearMonthDurations" 3..=3 Function,
-    /// Sum of two durations in seconds.
+    /// Sum of the second and third argument, both durations in seconds.
     AddDayTimeDurations "addDayTimeDurations" 3..=3 Function,
     /// Second argument minus the third, both durations in seconds.
     SubtractDayTimeDurations "subtractDayTimeDurations" 3..=3 Function,
@@ -246,7 +246,7 @@ impl BuiltIn {
         Self::Custom(CustomBuiltIn(definition))
     }
 
-    /// Returns the built-in of `swrlb` with this local name.
+    /// Returns the built-in of `swrlb` with this local name, if there is one.
     pub fn from_name(local: &str) -> Option<Self> {
         let is_swrl = |built_in: &Self| !matches!(built_in, Self::DataRange | Self::OutsideDataRange);
         Self::ALL.iter().copied().find(|built_in| built_in.name() == local && is_swrl(built_in))
@@ -261,7 +261,8 @@ impl BuiltIn {
         }
     }
 
-    /// Returns `true` if the first argument is computed from the others, so that it may be unbound.
+    /// Returns `true` if the first argument is the one value that is computed from the others, so that it may
+    /// be unbound. `false` for `tokenize`, whose first argument is one of several values.
     pub fn is_function(self) -> bool {
         match self {
             Self::Custom(custom) => custom.definition().is_function(),

@@ -4,8 +4,9 @@ use super::library;
 use super::signature::{BuiltIn, SWRLB};
 
 impl BuiltIn {
-    /// Returns the name of the built-in of the same library with the most similar name, as [`diagnostics::nearest`] finds it. The
-    /// result is the local name of a SWRL built-in, or the IRI of another built-in.
+    /// Returns the name of the built-in that is most similar to `iri`, among the built-ins of the same
+    /// library; `None` if no name is similar enough (see [`diagnostics::nearest`]). The result is the local
+    /// name of a SWRL built-in, or the IRI of another built-in.
     pub fn similar(iri: &str) -> Option<&'static str> {
         let candidates: Vec<&'static str> = if iri.starts_with(SWRLB) {
             Self::ALL

@@ -119,7 +119,8 @@ fn scaled(built_in: BuiltIn, duration: &Duration, factor: &BigRational) -> Optio
     Some(Literal::Duration(duration))
 }
 
-/// Returns a moment plus or minus a duration.
+/// Returns a moment plus or minus a duration; `None` if the built-in is for another kind of moment or
+/// duration.
 fn shifted(built_in: BuiltIn, moment: &Moment, duration: &Duration) -> Option<Literal> {
     use BuiltIn as B;
     let (kind, months, forward) = match built_in {
@@ -143,7 +144,8 @@ fn shifted(built_in: BuiltIn, moment: &Moment, duration: &Duration) -> Option<Li
     moment.later(&duration).map(Literal::Moment)
 }
 
-/// Returns the duration between two moments.
+/// Returns the duration `left - right`; `None` if the built-in is for moments of another kind, or if the
+/// moments have no difference.
 fn difference(built_in: BuiltIn, left: &Moment, right: &Moment) -> Option<Literal> {
     use BuiltIn as B;
     let (kind, months) = match built_in {

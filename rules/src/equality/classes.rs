@@ -19,7 +19,7 @@ use crate::symbol::Symbol;
 /// because its edge keeps its own derivation.
 pub(super) type Step = DerivationStep;
 
-/// Number of an edge, in the order of creation.
+/// Number of an edge (recorded equality of two names), in the order of creation.
 pub(super) type EdgeId = u32;
 
 /// A stated or derived equality of two names, with its premises.
@@ -70,7 +70,7 @@ impl Classes {
         self.members(self.find(name)).map_or_else(|| Arc::from([name]), Arc::clone)
     }
 
-    /// Adds an edge. The classes do not change; see [`Classes::join`].
+    /// Adds an edge (recorded equality of two names). The classes do not change; see [`Classes::join`].
     pub fn connect(&mut self, edge: Edge) {
         let id = self.next;
         self.next += 1;
@@ -86,7 +86,8 @@ impl Classes {
         self.edges.insert(id, edge);
     }
 
-    /// Returns the edges that depend on any of these facts or rules, directly or through other edges.
+    /// Returns the edges (recorded equalities) whose derivations depend on any of these facts or rules,
+    /// directly or through other edges.
     pub fn depending_on<'f>(
         &self,
         facts: impl Iterator<Item = &'f Fact>,
@@ -107,7 +108,7 @@ impl Classes {
         dependent
     }
 
-    /// Removes edges. The classes do not change; see [`Classes::split`].
+    /// Removes edges (recorded equalities). The classes do not change; see [`Classes::split`].
     pub fn disconnect(&mut self, edges: &BTreeSet<EdgeId>) {
         fn forget<K: std::hash::Hash + Eq>(index: &mut FxHashMap<K, Vec<EdgeId>>, key: &K, edge: EdgeId) {
             if let Some(edges) = index.get_mut(key) {
@@ -148,7 +149,8 @@ impl Classes {
         self.members.insert(representative, members.into());
     }
 
-    /// Splits a class into the connected components of its remaining edges.
+    /// Splits the class of `representative` into the connected components of its remaining edges (recorded
+    /// equalities).
     pub fn split(&mut self, representative: Symbol) {
         let Some(members) = self.members.remove(&representative) else { return };
         for name in members.iter() {
@@ -163,8 +165,8 @@ impl Classes {
         }
     }
 
-    /// Returns the shortest path between two names of a class, by breadth-first search over the edges
-    /// with a number below `before`.
+    /// Returns a shortest path between two names, by breadth-first search over the edges (recorded
+    /// equalities) with a number below `before`. Empty if there is no path.
     pub fn path(&self, from: Symbol, to: Symbol, before: EdgeId) -> Vec<EdgeId> {
         let mut predecessors: FxHashMap<Symbol, (EdgeId, Symbol)> = FxHashMap::default();
         let (mut visited, mut front) = (FxHashSet::from_iter([from]), vec![from]);

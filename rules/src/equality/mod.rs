@@ -11,9 +11,9 @@
 //! over-deletes along all derivations and needs no record of equalities.
 //!
 //! To a client, every name of an individual has all facts of the individual. A literal is never equal to a
-//! name or to another literal: a pair with a literal merges nothing and is reported as a violation. A pair
-//! of a name with itself is reported only if it is stated. In rule bodies, an individual with several names
-//! is equal to itself.
+//! name or to another literal: a pair with a literal merges nothing and is reported as a violation. The pair
+//! of a name with itself holds only if it is stated. In rule bodies, an individual with several names is
+//! equal to itself.
 //!
 //! [1] Motik, Nenov, Piro, Horrocks, "Handling owl:sameAs via rewriting", AAAI 2015.
 //! [2] Motik, Nenov, Piro, Horrocks, "Combining rewriting and incremental materialisation maintenance for Datalog
@@ -99,7 +99,7 @@ impl Equality {
         Self { same_as, classes, originals, pairs, program: Arc::clone(program), constants }
     }
 
-    /// Returns an equality in which no pair and no other fact is stated.
+    /// Returns a copy without equalities and without stated facts, for the rules of `program`.
     pub fn without_facts(&self, program: &Arc<Program>) -> Self {
         Self::new(self.same_as, program)
     }

@@ -51,7 +51,8 @@ impl Equality {
     }
 
     /// Returns the facts about names that a row represents; `names` returns the names in the class of a
-    /// representative. An `owl:sameAs` row represents only pairs of different names.
+    /// representative. The `owl:sameAs` row of an individual with itself represents only pairs of different
+    /// names.
     pub(super) fn facts_of<'n>(
         &'n self,
         row: &Fact,

@@ -55,8 +55,8 @@ pub(super) fn base64(bytes: &[u8]) -> String {
     text
 }
 
-/// Parses a recurring date. Returns its canonical form, which identifies the value, and the local name of
-/// its datatype.
+/// Parses a recurring date (`xsd:gYear` or a related type) of the datatype with the local name `local`.
+/// Returns its canonical form, which identifies the value, and the local name; `None` if the text is invalid.
 pub(super) fn recurring(text: &str, local: &str) -> Option<(Box<str>, &'static str)> {
     let (body, zone) = split_zone(text)?;
     let number = |part: &str, range: std::ops::RangeInclusive<u32>| {

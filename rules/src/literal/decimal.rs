@@ -10,10 +10,11 @@ use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::{One, Signed, ToPrimitive, Zero};
 
-/// Largest accepted exponent in a lexical form. It prevents hostile input such as `1e999999999` from
-/// filling the memory.
+/// Largest accepted absolute value of an exponent in a lexical form. It prevents hostile input such as
+/// `1e999999999` from filling the memory.
 const MAX_EXPONENT: i64 = 1000;
-/// Largest scale of the small representation. `10^18` is the largest power of ten within 64 bits.
+/// Largest scale (number of fractional digits) of the small representation. `10^18` is the largest power of
+/// ten within 64 bits.
 const SMALL_SCALE: u32 = 18;
 /// Number of fractional digits of a rounded quotient.
 const DIVISION_DIGITS: u32 = 34;
@@ -38,8 +39,8 @@ impl Decimal {
         }
     }
 
-    /// Parses a decimal number such as `-12.50`, or `1e-05` in the form of Python's decimals. Returns
-    /// `None` for an invalid form.
+    /// Parses a decimal number such as `-12.50`, or `1e-05` in the form of Python's decimals. Returns `None`
+    /// for an invalid form, and for an exponent beyond ±1000.
     pub fn parse(lexical: &str) -> Option<Self> {
         let (mantissa, exponent) = match lexical.find(['e', 'E']) {
             Some(position) => (&lexical[..position], lexical[position + 1..].parse::<i64>().ok()?),
@@ -119,8 +120,8 @@ impl Decimal {
         Self::new(scaled.round().to_integer(), DIVISION_DIGITS)
     }
 
-    /// Converts a rational number exactly if at most 18 fractional digits suffice, and otherwise returns
-    /// `None`. This path avoids a long product with trailing zeros.
+    /// Converts a rational number exactly if it fits into the small representation: 64 bits and at most 18
+    /// fractional digits. Otherwise returns `None`. This path avoids a long product with trailing zeros.
     fn short(value: &BigRational) -> Option<Self> {
         let (numerator, denominator) = (value.numer().to_i64()?, value.denom().to_u64()?);
         let scale = (0..=SMALL_SCALE).find(|&scale| 10_u64.pow(scale).is_multiple_of(denominator))?;

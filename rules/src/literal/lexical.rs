@@ -99,7 +99,7 @@ fn parse_integer(lexical: &str, minimum: Option<i128>, maximum: Option<i128>) ->
     decimal::in_range(&value, minimum, maximum).then_some(Literal::Decimal(value))
 }
 
-/// Parses a float of XSD: `INF`, `-INF` and `NaN`, but not `infinity`, which Rust accepts.
+/// Parses a float of XSD. Accepts `INF`, `+INF`, `-INF` and `NaN`, but not `infinity`, which Rust accepts.
 fn parse_float<F: std::str::FromStr>(lexical: &str) -> Option<F> {
     let normal = match lexical {
         "INF" | "+INF" => "inf",
@@ -111,8 +111,8 @@ fn parse_float<F: std::str::FromStr>(lexical: &str) -> Option<F> {
     normal.parse().ok()
 }
 
-/// Parses an `owl:rational` of the form `numerator / denominator`. The result is a decimal if the value
-/// has a finite decimal expansion of at most 34 digits.
+/// Parses an `owl:rational` of the form `numerator / denominator`. The result is a decimal if 34 fractional
+/// digits suffice, and otherwise a [`Literal::Opaque`] in lowest terms.
 fn parse_rational(lexical: &str) -> Parsed {
     let text = lexical.trim_matches([' ', '\t', '\n', '\r']);
     let (numerator, denominator) = text.split_once('/').unwrap_or((text, "1"));

@@ -211,7 +211,8 @@ impl fmt::Display for Moment {
 }
 
 impl Duration {
-    /// Parses `P1Y2M3DT4H5M6.7S`, with an optional minus sign; `local` is the name of the datatype.
+    /// Parses `P1Y2M3DT4H5M6.7S`, with an optional minus sign; `local` is the name of the datatype. Returns
+    /// `None` if the form is invalid.
     pub(super) fn parse(lexical: &str, local: &str) -> Option<Self> {
         let (negative, body) = lexical.strip_prefix('-').map_or((false, lexical), |body| (true, body));
         let body = body.strip_prefix('P')?;
@@ -401,7 +402,7 @@ fn parse_clock(text: &str) -> Option<Decimal> {
     (value <= Decimal::from(DAY) && (hours < 24 || value == Decimal::from(DAY))).then_some(value)
 }
 
-/// Parses `-?yyyy-mm-dd` to days since 1970-01-01.
+/// Parses `-?yyyy-mm-dd`, with 4 to 9 digits of the year, to days since 1970-01-01.
 fn parse_date(text: &str) -> Option<i64> {
     let (negative, unsigned) = text.strip_prefix('-').map_or((false, text), |unsigned| (true, unsigned));
     let mut parts = unsigned.splitn(3, '-');

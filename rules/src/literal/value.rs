@@ -45,7 +45,7 @@ pub enum Literal {
     /// A literal of an unsupported datatype, a rational number that is not a decimal (in lowest terms), or
     /// an XML literal.
     Opaque {
-        /// Lexical form as written.
+        /// Lexical form as written; for a rational number, in lowest terms.
         lexical: Box<str>,
         /// IRI of the datatype.
         datatype: Box<str>,
@@ -104,8 +104,8 @@ impl Literal {
         matches!(self, Self::IllTyped { .. })
     }
 
-    /// Returns the IRI of the most specific datatype of the canonical form; `rdf:langString` for tagged
-    /// strings.
+    /// Returns the IRI of the datatype of the canonical form, for example `xsd:integer` for an integral
+    /// decimal; `rdf:langString` for tagged strings.
     pub fn datatype(&self) -> &str {
         match self {
             Self::String(_) => "http://www.w3.org/2001/XMLSchema#string",
@@ -125,7 +125,8 @@ impl Literal {
         }
     }
 
-    /// Returns the canonical lexical form.
+    /// Returns the canonical lexical form, or the form as written for an unsupported datatype and for an
+    /// ill-typed literal.
     pub fn lexical(&self) -> String {
         match self {
             Self::String(text) | Self::Uri(text) | Self::Language { text, .. } | Self::Recurring(text, _) => {
@@ -158,7 +159,9 @@ impl Literal {
     }
 
     /// Compares two values, with numeric promotion. Returns `None` if they are incomparable: values of
-    /// different kinds, NaN, or moments with and without a time zone whose order depends on the time zone.
+    /// different kinds, NaN, ill-typed literals, different values of a kind without an order (such as binary
+    /// data or tagged strings), durations whose months and seconds are in opposite orders, or moments with
+    /// and without a time zone whose order depends on the time zone.
     pub fn compare(&self, other: &Self) -> Option<Ordering> {
         match (self, other) {
             (Self::Decimal(a), Self::Decimal(b)) => Some(a.cmp(b)),

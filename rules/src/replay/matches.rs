@@ -61,7 +61,8 @@ fn group(body: &[Atom], position: usize) -> Vec<Term> {
 }
 
 impl Matcher<'_> {
-    /// Returns all matches of a rule's body. The values are first names of individuals.
+    /// Returns the matches of a rule's body: all of them, unless [`Matcher::too_many`] is set because there
+    /// are more than [`MATCH_LIMIT`]. The values are first names of individuals.
     pub fn matches_of(&mut self, rule: &Rule) -> Vec<Values> {
         let mut matches = Vec::new();
         let open: Vec<usize> = (0..rule.body.len()).collect();
@@ -69,8 +70,8 @@ impl Matcher<'_> {
         matches
     }
 
-    /// Extends `values` by the open atoms of a body, in depth-first order, and appends each complete
-    /// match to `matches`.
+    /// Extends `values` by the open atoms of a body, in depth-first order, and appends each complete match to
+    /// `matches`. Stops at [`MATCH_LIMIT`] matches.
     fn extend(&mut self, body: &[Atom], open: &[usize], values: Values, matches: &mut Vec<Values>) {
         let mut states: Vec<(Rc<[usize]>, Values)> = vec![(open.into(), values)];
         while let Some((open, values)) = states.pop() {
@@ -220,8 +221,8 @@ impl Matcher<'_> {
         terms.iter().map(literal).collect()
     }
 
-    /// Returns the value of the aggregate at `position` over the distinct matches of its atoms within
-    /// the group.
+    /// Returns the value of the aggregate at `position` over the distinct matches of its atoms within the
+    /// group; `None` if the aggregate has no value or a group variable is unbound.
     fn aggregate(&mut self, body: &[Atom], position: usize, values: &Values) -> Option<Literal> {
         let Atom::Aggregate { aggregate, body: inner, .. } = &body[position] else { return None };
         // Only the group is shared with the rule, so all other variables start unbound.

@@ -1,12 +1,12 @@
 //! Independent checker of derivations: checks each step by itself, and completeness by plain joins, without
 //! the engine.
 //!
-//! The facts that hold are the perfect model of a stratified program \[1\]. It is the only set of facts
-//! that is *founded* (each fact is stated, or derived by a rule from earlier facts while the negated atoms
-//! of the rule are not in the set) and *closed* (it contains all stated facts, and all facts that rules
-//! derive from the set), because a stratified program has exactly one stable model \[2\]. Therefore
-//! [`replay`] checks three properties: the rules are stratified, every step is founded, and no fact is
-//! missing. The last check is essential, since a rule may negate a missing fact.
+//! The facts that hold are the perfect model of a stratified program \[1\]. It is the only set of facts that
+//! is *founded* (each fact is stated, or derived by a rule from earlier facts while the negated atoms of the
+//! rule are not in the set) and *closed* (it contains all stated facts, and all facts that rules derive from
+//! the set), because a stratified program has exactly one stable model \[2\]. Therefore [`replay`] checks
+//! three properties: the rules are stratified, every step is founded, and no fact is missing. The last check
+//! is essential, since a rule may negate a missing fact. Contradictory facts are rejected, too.
 //!
 //! With equality, facts are compared by the first name of each class of equal names. A step may use only
 //! equalities of earlier steps.
@@ -57,7 +57,9 @@ pub struct Replayed {
 /// Each step must come after its supports. Values that rules compute are interned in `symbols`.
 ///
 /// # Errors
-/// Returns the first fault: a step that does not follow, a missing fact, or a contradiction.
+/// Returns the first [`Fault`]: rules without stratification, a step that does not follow, a missing fact, a
+/// contradiction, or something that the checker cannot decide (too many matches, or names that must differ
+/// but may be equal).
 pub fn replay(
     program: &Program,
     symbols: &mut Symbols,

@@ -7,13 +7,14 @@ use crate::engine::Engine;
 use crate::fact::Fact;
 
 impl Engine {
-    /// Returns one derivation of all facts that hold, as input of [`crate::replay`]. The derivation has
-    /// a step for each fact, after the steps of the supports of the fact.
+    /// Returns one derivation of all facts that hold, as input of [`crate::replay`]. The derivation has a
+    /// step for each fact, after the steps of the supports of the fact. Absent facts and the matches of
+    /// aggregates are omitted, because the checker computes them.
     pub fn everything(&self) -> Derivation {
         let mut positions: FxHashMap<Fact, usize> = FxHashMap::default();
         let mut steps = Vec::new();
-        // Rules that compare two of their own names have no support for the equality, so all equalities
-        // come first.
+        // A rule that compares two of its own names does not list their equality as a support, so all
+        // equalities come first.
         let pairs = self.equality.as_ref().map_or_else(Vec::new, |equality| equality.pairs_in_order());
         for fact in pairs.into_iter().chain(self.facts()) {
             if !positions.contains_key(&fact)
@@ -38,7 +39,7 @@ fn supports(reason: &Reason) -> Vec<usize> {
     }
 }
 
-/// Appends the steps of a derivation that are not yet present to `steps`, supports first.
+/// Appends to `steps` those steps of a derivation that it does not contain yet, supports first.
 fn append(derivation: &Derivation, positions: &mut FxHashMap<Fact, usize>, steps: &mut Vec<DerivationStep>) {
     let mut stack = vec![(0, 0)];
     while let Some((position, visited_count)) = stack.pop() {

@@ -9,8 +9,8 @@ use crate::literal::Literal;
 use crate::rule::{Atom, Program, Rule, Term, Variable};
 use crate::symbol::{Symbol, Symbols, Value};
 
-/// Prints one rule per line, with labels. IRIs are abbreviated by the prefixes, which are declared
-/// first.
+/// Prints one rule per line, with labels. IRIs are abbreviated by the prefixes, which are declared first,
+/// except the predefined ones.
 pub fn print_rules(program: &Program, symbols: &Symbols, prefixes: &Prefixes) -> String {
     let mut text = String::new();
     for (prefix, iri) in prefixes.iter().filter(|&(prefix, iri)| Prefixes::default().get(prefix) != Some(iri))

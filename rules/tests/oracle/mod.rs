@@ -43,7 +43,8 @@ pub fn naive(
 
 const SAME_AS: &str = "http://www.w3.org/2002/07/owl#sameAs";
 
-/// Equality classes of names, from the pairs among the facts. Literals are never equal to anything else.
+/// Returns the equality classes of names, from the `owl:sameAs` pairs among the facts. Literals are never
+/// equal to anything else.
 fn classes(symbols: &Symbols, facts: &BTreeSet<Fact>) -> Vec<BTreeSet<Symbol>> {
     let mut classes: Vec<BTreeSet<Symbol>> = Vec::new();
     let Some(same_as) = symbols.find_name(SAME_AS) else { return classes };
@@ -62,7 +63,7 @@ fn is_pair(fact: &Fact, same_as: Symbol, symbols: &Symbols) -> bool {
     fact.predicate == same_as && fact.arguments.iter().all(is_name)
 }
 
-/// Maps each name to the first name of its class.
+/// Maps each name with equal names to the first name of its class.
 pub fn representatives(symbols: &Symbols, facts: &BTreeSet<Fact>) -> BTreeMap<Symbol, Symbol> {
     let classes = classes(symbols, facts);
     let first = |class: &BTreeSet<Symbol>| *class.first().expect("a name");
@@ -78,7 +79,7 @@ pub fn normal(binding: &Binding, representatives: &BTreeMap<Symbol, Symbol>) -> 
     binding.iter().map(|(&variable, &symbol)| (variable, find(symbol))).collect()
 }
 
-/// Returns `true` if a fact relates a symbol to itself by equality.
+/// Returns `true` if a fact is the `owl:sameAs` pair of a symbol with itself.
 pub fn is_reflexive(symbols: &Symbols, fact: &Fact) -> bool {
     symbols.find_name(SAME_AS) == Some(fact.predicate) && fact.arguments[0] == fact.arguments[1]
 }
@@ -133,12 +134,13 @@ pub fn value(term: Term, binding: &Binding) -> Option<Symbol> {
     }
 }
 
-/// All matches of a body: relation atoms in textual order, then the other atoms as soon as they are bound.
+/// Returns all matches of a body: relation atoms in textual order, then the other atoms as soon as their
+/// variables are bound.
 pub fn matches(rule: &Rule, symbols: &mut Symbols, facts: &BTreeSet<Fact>) -> BTreeSet<Binding> {
     extensions(&rule.body, Binding::new(), symbols, facts)
 }
 
-/// All matches of a conjunction that extend a binding.
+/// Returns all matches of a conjunction that extend a binding.
 fn extensions(
     body: &[Atom],
     binding: Binding,
@@ -214,7 +216,7 @@ fn outside(body: &[Atom], aggregate: &Atom) -> BTreeSet<Term> {
     visible.collect()
 }
 
-/// Value of an aggregate of integers under a binding of its group.
+/// Returns the value of an aggregate of integers under a binding of its group; `None` if there is no value.
 pub fn aggregate(
     atom: &Atom,
     binding: &Binding,

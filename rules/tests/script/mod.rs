@@ -25,8 +25,8 @@ const DIFFERENCE: u8 = 4;
 const DIFFERENT_FROM: &str = "http://www.w3.org/2002/07/owl#differentFrom";
 const VARIABLES: u8 = 4;
 const CONSTANTS: u8 = 4;
-/// Predicates of changes and of heads. There are only few predicates, so that different conclusions
-/// interact.
+/// Numbers of the predicates that changes use ([`CONCLUDED`]: that heads use); frequent ones occur several
+/// times. There are only few predicates, so that different conclusions interact.
 const CHANGED: [u8; 16] = [0, 0, 0, 0, 1, 1, 1, 1, 0, 1, 2, 3, 3, 4, 6, 7];
 const CONCLUDED: [u8; 9] = [0, 1, 2, 3, 3, 4, 4, 6, 7];
 
@@ -327,7 +327,7 @@ fn check_state(engine: &Engine, world: &World, stated: &BTreeSet<Fact>) -> BTree
     let program = Program { rules, ..Program::default() };
     let expected = naive(&program, &mut symbols, stated, level, close);
     let facts: BTreeSet<Fact> = engine.facts().collect();
-    // A pair of a name with itself is reported only if it is stated.
+    // The pair of a name with itself holds only if it is stated.
     let is_shown = |fact: &&Fact| !is_reflexive(&symbols, fact) || stated.contains(fact);
     assert_eq!(facts, expected.iter().filter(is_shown).cloned().collect());
     for fact in &facts {

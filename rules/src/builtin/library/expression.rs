@@ -3,11 +3,12 @@
 //! The syntax consists of the operators `+`, `-`, `*`, `/`, `%` and `^`, signs, brackets, the constants `pi` and `e`,
 //! functions of one or two numbers, and implicit multiplication (`2x`, `3(a + b)`).
 
-/// Maximum nesting depth of brackets, signs and powers, which limits the recursion depth of the parser.
+/// Maximum nesting depth of brackets, calls, signs and powers, which limits the recursion depth of the
+/// parser.
 const MAX_DEPTH: usize = 200;
 
 /// Returns the value of an expression under an assignment of its variables; `None` if the expression is
-/// invalid.
+/// invalid or nested too deeply.
 pub(super) fn value(text: &str, variables: &[(&str, f64)]) -> Option<f64> {
     let mut parser = Parser { rest: text, variables, depth: 0 };
     let value = parser.sum()?;

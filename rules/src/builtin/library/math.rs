@@ -1,8 +1,8 @@
 //! The `swrlm` library: square root, natural logarithm, and evaluation of expressions.
 //!
-//! An expression of `eval` refers to the variables of its atom by name:
-//! `swrlm:eval(?r, "(57 * x) / y", ?x, ?y)`. A built-in receives values only. Therefore [`BuiltIn::with_names`] inserts the names into the
-//! text when a rule is parsed: `"x, y: (57 * x) / y"`. Text of that form is not changed.
+//! An expression of `eval` refers to the variables of its atom by name: `swrlm:eval(?r, "(57 * x) / y", ?x,
+//! ?y)`. A built-in receives values only. Therefore [`BuiltIn::with_names`] inserts the names into the text
+//! when a rule is parsed: `"x, y: (57 * x) / y"`. Text with a colon already has names and is not changed.
 
 use super::expression;
 use crate::builtin::custom::Definition;
@@ -72,9 +72,9 @@ impl Definition for Eval {
 }
 
 impl BuiltIn {
-    /// Returns the expression of a `swrlm:eval` atom, preceded by the names of the atom's arguments.
-    /// Returns `None` if the expression already has names, and for other built-ins. A constant has the
-    /// name `_`.
+    /// Returns the expression of a `swrlm:eval` atom, preceded by the local names of the atom's arguments.
+    /// Returns `None` if the expression already has names (contains a colon), if `names` is empty, and for
+    /// other built-ins. A constant argument has the name `_`.
     pub fn with_names(self, expression: &str, names: &[Option<&str>]) -> Option<String> {
         let is_eval = self.name() == EVAL && !expression.contains(':') && !names.is_empty();
         let local = |name: &str| name.rsplit(['#', '/', ':']).next().map(str::to_owned);

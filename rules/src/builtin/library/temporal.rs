@@ -46,7 +46,8 @@ impl Granularity {
         })
     }
 
-    /// Returns the number of the granule that contains a moment, relative to a fixed origin.
+    /// Returns the number of the granule (year, month, …) that contains a moment, counted from a fixed
+    /// origin. `None` if the number exceeds the range of `i64`.
     fn granule(self, moment: &Moment) -> Option<i64> {
         let ([year, month, _], _) = moment.in_utc().calendar();
         let per_second = match self {
@@ -78,8 +79,8 @@ impl Granularity {
     }
 }
 
-/// Converts an argument to a moment: a date, a date with time, or the text of either. Returns `None` for
-/// other literals.
+/// Converts an argument to a moment: a date, a date with time, or the (possibly truncated) text of either.
+/// Returns `None` for other literals.
 fn moment(literal: &Literal) -> Option<Moment> {
     let text = match literal {
         Literal::Moment(moment) if moment.kind() != MomentKind::Time => return Some(moment.clone()),
@@ -112,7 +113,7 @@ fn comparable(moments: &[Moment]) -> bool {
 }
 
 /// Returns the absolute number of granules between two moments. The arguments are two moments and a
-/// granularity.
+/// granularity. Returns `None` for other arguments and for incomparable moments.
 fn difference(arguments: &[&Literal]) -> Option<i64> {
     let [from, to, granularity] = arguments else { return None };
     let (granularity, moments) = (Granularity::from_literal(granularity)?, [moment(from)?, moment(to)?]);
@@ -126,14 +127,15 @@ struct DurationFunction;
 /// `temporal:add`: moment plus a number of granules.
 struct AddFunction;
 
-/// `temporal:durationLessThan` and related tests: compares a number with the granules between two moments.
+/// `temporal:durationLessThan` and related tests: compares a number with the number of granules between two
+/// moments.
 struct DurationComparison {
     iri: &'static str,
     orders: &'static [Ordering],
     negated: bool,
 }
 
-/// A test of one of Allen's interval relations, between instants or periods.
+/// A test of one of Allen's interval relations, between an instant and an instant or period.
 struct AllenRelation {
     iri: &'static str,
     relation: fn(Period, Period) -> bool,
@@ -216,8 +218,9 @@ impl Definition for AllenRelation {
     }
 }
 
-/// Parses the arguments of an Allen relation: an instant, then an instant or the two bounds of a period,
-/// then an optional granularity (by default milliseconds). Returns both as periods of granules.
+/// Parses the arguments of an Allen relation: an instant, then an instant or the two bounds of a period, then
+/// an optional granularity (by default milliseconds). Returns the two operands as periods of granules; `None`
+/// if the arguments are invalid or incomparable, or if the period ends before it starts.
 fn periods(arguments: &[&Literal]) -> Option<(Period, Period)> {
     let (granularity, moments) = match arguments.split_last()? {
         (last, others) if others.len() >= 2 => match Granularity::from_literal(last) {
