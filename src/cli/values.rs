@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use num_rational::BigRational;
-use num_traits::Num as _;
 use serde_json::Value;
+
+use crate::number::exact;
 
 pub(super) use verify::seconds;
 
@@ -34,10 +35,8 @@ pub(super) fn time(text: &str) -> Result<BigRational, String> {
         .ok_or_else(|| format!("`{text}` is not a time such as 0.001"))
 }
 
-/// Converts a JSON number to an exact rational number. Returns `None` for other JSON values, and for numbers that are
-/// displayed with an exponent.
+/// Converts a JSON number to an exact rational number. Returns `None` for other JSON values and for numbers that are too
+/// long.
 pub(super) fn decimal(value: &Value) -> Option<BigRational> {
-    let text = value.as_number()?.to_string();
-    let (whole, fraction) = text.split_once('.').unwrap_or((&text, ""));
-    BigRational::from_str_radix(&format!("{whole}{fraction}/1{}", "0".repeat(fraction.len())), 10).ok()
+    exact(&value.as_number()?.to_string())
 }

@@ -233,6 +233,7 @@ impl Stage {
             lost: self.world.lost,
             ending,
             cost: self.world.cost(),
+            maximize: self.world.maximizes(),
             time: self.world.time,
             found: self.world.found,
             distance: self.world.distance(),

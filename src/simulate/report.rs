@@ -51,6 +51,8 @@ pub struct Run {
     pub time_unit: TimeUnit,
     /// The mission's metric at the end.
     pub cost: f64,
+    /// Whether the metric is maximised.
+    pub maximize: bool,
     /// Duration of the mission.
     pub time: f64,
     /// Number of actions that succeeded.
@@ -84,6 +86,7 @@ impl Default for Run {
             ending: Ending::Time,
             time_unit: TimeUnit::default(),
             cost: 0.0,
+            maximize: false,
             time: 0.0,
             actions: 0,
             failed: 0,
@@ -129,9 +132,10 @@ impl Run {
     }
 
     /// Returns `true` if this run is better than `other`: it alone reached the goal, or both did
-    /// and its cost is lower.
+    /// and its metric is better.
     pub fn is_better_than(&self, other: &Self) -> bool {
         match (self.accomplished, other.accomplished) {
+            (true, true) if self.maximize => self.cost > other.cost + 1e-6,
             (true, true) => self.cost < other.cost - 1e-6,
             (mine, theirs) => mine && !theirs,
         }

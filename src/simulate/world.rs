@@ -10,7 +10,7 @@ use std::cell::OnceCell;
 
 use num_rational::BigRational;
 use ontology::tomasys::change::Status;
-use pddl::ast::{Condition, Domain, Problem};
+use pddl::ast::{Condition, Direction, Domain, Problem};
 use pddl::validate::{Options, PlanText, advance, metric_after, validate};
 
 use crate::mapek::{Command, Effect, Event, PlannedStep, resume};
@@ -382,6 +382,11 @@ impl World {
     pub fn cost(&self) -> f64 {
         let metric = metric_after(self.truth.domain(), self.filled(), &exact(self.time));
         metric.map_or(self.time, |metric| number::to_f64(&metric))
+    }
+
+    /// Returns `true` if the mission's metric is maximised.
+    pub fn maximizes(&self) -> bool {
+        self.filled().metric.as_ref().is_some_and(|metric| metric.direction == Direction::Maximize)
     }
 
     /// Returns the inspected length of the pipeline, in the unit of the mission's function for the
