@@ -247,7 +247,7 @@ fn is_available(knowledge: &Knowledge, design: &FunctionDesign) -> bool {
 }
 
 /// Computes the best plan after alterations of the situation. At a limit, returns the best plan found until then.
-/// Alterations with which reasoning fails are ignored.
+/// If reasoning fails with the alterations, the best plan is unknown.
 pub(super) fn in_situation(
     mission: &Mission,
     alterations: &[Alteration],
@@ -259,8 +259,8 @@ pub(super) fn in_situation(
     let mut mission = mission.clone();
     if let Some(knowledge) = mission.knowledge_mut() {
         knowledge.interrupt(limits.into());
-        let altered = altered(knowledge, alterations);
-        *knowledge = altered.unwrap_or_else(|| knowledge.clone());
+        let Some(altered) = altered(knowledge, alterations) else { return Ok(BestPlan::default()) };
+        *knowledge = altered;
     }
     best(&mission, limits)
 }
