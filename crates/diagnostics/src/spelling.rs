@@ -3,9 +3,9 @@
 /// Returns the name in `known` with the smallest edit distance to `written`; among equally similar
 /// names, the first one. `None` if no name is similar enough.
 ///
-/// Case does not matter, and a different order of the words counts as one edit. The maximum
-/// distance is a third of the letters of `written`, at least 1 and at most 3. A single letter has
-/// no suggestion, because it is similar to every other letter.
+/// Case does not matter, and a different order of the words counts as one edit. The maximum distance is a
+/// third of the letters of `written`, rounded down, but at least 1 and at most 3. For a single letter, only
+/// the same letter is returned, because it is similar to every other letter.
 pub fn nearest<'n>(written: &str, known: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
     let written = written.to_lowercase();
     let limit = match written.chars().count() {
@@ -22,8 +22,9 @@ pub fn nearest<'n>(written: &str, known: impl IntoIterator<Item = &'n str>) -> O
     best.map(|(_, name)| name)
 }
 
-/// Returns the optimal string alignment distance, in which a transposition of neighbours is one
-/// edit. Names with the same words in another order have distance 1.
+/// Returns the optimal string alignment distance, in which a transposition of neighbours is one edit. Names
+/// with the same words in another order have distance 1; names of very different lengths have distance
+/// `usize::MAX`.
 fn distance(left: &str, right: &str) -> usize {
     // Names within the maximum distance of 3 differ in length by at most three letters of at most
     // four bytes each.

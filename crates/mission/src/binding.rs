@@ -44,7 +44,8 @@ enum Query {
     /// Numeric function without parameters in a plain domain (without a type of designs): the sum
     /// of an attribute over the designs that are chosen for an action.
     Chosen(String),
-    /// Like `Chosen`, but sums only over the designs that were not in use before the action.
+    /// Numeric function without parameters in a plain domain (without a type of designs): the sum of an
+    /// attribute over those designs chosen for an action that replace another design of their function.
     Reconfigured(String),
     /// Action schema of a plain domain (without a type of designs): the corresponding action of the
     /// knowledge base.
@@ -97,14 +98,16 @@ impl Bindings {
         &self.written
     }
 
-    /// Returns the predicates that state which design solves which function.
+    /// Returns the predicates that state which design solves which function: explicitly bound ones and the
+    /// default names, declared or not.
     pub fn solves(&self) -> Vec<Name> {
         let bound =
             self.own.iter().filter(|(_, query)| **query == Query::Solves).map(|(name, _)| name.clone());
         bound.chain(SOLVES.map(Name::new)).collect()
     }
 
-    /// Returns the class that a type is bound to, by local name or IRI.
+    /// Returns the class that a type is bound to explicitly or by default, as local name or IRI. `None` if
+    /// the type is not bound to a class.
     pub(super) fn class(&self, name: &Name) -> Option<String> {
         match self.r#type(name) {
             Some(Query::Class(class)) => Some(class),
@@ -122,9 +125,9 @@ impl Bindings {
         self.r#type(name) == Some(Query::Class("FunctionDesign".to_owned()))
     }
 
-    /// Returns `true` if the action schema `name` of a plain domain (without a type of designs)
-    /// corresponds to the action `known` of the knowledge base. Without an explicit binding, the
-    /// names must agree.
+    /// Returns `true` if the action schema `name` of a plain domain (without a type of designs) corresponds
+    /// to the action `known` of the knowledge base. Without an explicit binding, the names must agree, except
+    /// that the action may have the prefix `a_`.
     pub(super) fn is_action(&self, name: &Name, known: &Individual) -> bool {
         both(known).iter().any(|known| match self.own.get(name) {
             Some(Query::Action(own)) => own == known,
@@ -240,10 +243,10 @@ fn parse_query(symbol: &str, query: &str) -> Result<Query, String> {
 /// Adds to a problem the objects, facts and values that the knowledge base has for the symbols of
 /// the domain. Returns warnings and errors.
 ///
-/// Availability facts of the problem are removed with a warning, except those about the designs
-/// `own`, whose availability the problem decides. Values that the problem states take precedence.
-/// Symbols for which `stands` returns `true` count as declared, because the explicit form removes
-/// them from a plain domain.
+/// Availability facts of the problem are removed with a warning, except those about the designs `own`, whose
+/// availability the problem decides. Values that the problem states take precedence. Symbols for which
+/// `stands` returns `true` count as declared, because the explicit form of a plain domain (with design
+/// parameters) does not have them.
 pub(super) fn fill(
     domain: &Domain,
     problem: &mut Problem,
@@ -372,8 +375,9 @@ impl Fill<'_> {
         }
     }
 
-    /// Adds a fact per action of the knowledge base: the action, followed by its required
-    /// functions. `only` restricts the facts to one action.
+    /// Adds a fact for each action of the knowledge base: the action, followed by its required functions.
+    /// Facts that the problem states are not repeated; an action that does not fit the predicate is reported.
+    /// `only` restricts the facts to one action.
     fn requires(&mut self, declared: &Declaration, only: Option<&str>) {
         let stated = self.stated(&declared.identifier.name);
         for action in self.known.actions() {
@@ -463,8 +467,8 @@ pub fn atom(predicate: &Name, arguments: &[&str]) -> Atom {
     }
 }
 
-/// Returns `true` if a name can be used as an object name: letters of any script, digits, `-`, `_`
-/// and `.`, and no invisible characters.
+/// Returns `true` if a name can be used as an object name: ASCII letters and digits, `-`, `_`, `.` and
+/// visible non-ASCII characters.
 pub(super) fn is_pddl_name(name: &str) -> bool {
     let allowed =
         |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c) || !c.is_ascii() && !c.is_whitespace();

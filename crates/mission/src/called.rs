@@ -10,7 +10,7 @@ use std::fmt;
 
 use crate::message::Message;
 
-/// Source location of an entry: a file, and a line and column in it.
+/// Source location of an entry: a file, and optionally a line and column in it.
 pub type Place = (String, Option<(usize, usize)>);
 
 /// Entries of `[bindings.names]` and `--name`: assignments of object names to individuals.
@@ -40,7 +40,8 @@ impl Names {
         self.entries.is_empty()
     }
 
-    /// Returns all entries without their places: object name by individual.
+    /// Returns all entries without their places: object name by individual. Of several entries for one
+    /// individual, the last one is returned.
     pub fn written(&self) -> BTreeMap<String, String> {
         self.entries.iter().map(|entry| (entry.individual.clone(), entry.object.clone())).collect()
     }
@@ -60,8 +61,7 @@ impl From<&BTreeMap<String, String>> for Names {
     }
 }
 
-/// Omits the places: missions with equal names are equal, regardless of where the names are
-/// written.
+/// Omits the places, so that the text does not depend on where the names are written.
 impl fmt::Debug for Names {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.written().fmt(f)

@@ -15,8 +15,9 @@ use crate::knowledge::Knowledge;
 use crate::message::{Message, did_you_mean};
 
 impl Mission {
-    /// Returns lint warnings about names of the knowledge base without counterpart in the PDDL
-    /// files, and about functions and attributes without a value.
+    /// Returns lint warnings: actions and designs of the knowledge base that the PDDL files do not name,
+    /// components and attributes that nothing uses or declares, bindings to unknown names, and numeric
+    /// functions without a value. Without a knowledge base, only numeric functions are checked.
     pub fn doubts(&self) -> Vec<Message> {
         let Some(knowledge) = &self.knowledge else { return self.functions_without_value() };
         let mut doubts = Vec::new();
@@ -67,7 +68,8 @@ impl Mission {
         self.bindings.written().iter().filter_map(idle).collect()
     }
 
-    /// Warns about actions of the knowledge base without a corresponding schema of the domain.
+    /// Warns about actions of the knowledge base without a corresponding schema of the domain, if they have
+    /// requirements or quality bounds and no predicate states these requirements.
     fn actions_without_schema(&self, knowledge: &Knowledge) -> Vec<Message> {
         let schemas: Vec<&Name> = self.domain.actions.iter().map(|action| &action.identifier.name).collect();
         let predicates: Vec<&Name> =
@@ -97,7 +99,8 @@ impl Mission {
         doubts
     }
 
-    /// Warns about numeric functions that are used but have no value.
+    /// Warns about numeric functions that are used but have neither an initial value nor an `assign` effect.
+    /// `total-cost` and sums over designs are exempt.
     fn functions_without_value(&self) -> Vec<Message> {
         if self.domain.functions.is_empty() {
             return Vec::new();
@@ -168,7 +171,8 @@ fn stated(engine: &Engine, iri: &str) -> (Vec<Fact>, Vec<Fact>) {
     facts.partition(|fact| fact.arguments.first() == Some(&symbol))
 }
 
-/// Warns about components without facts of their own, and about components that no design requires.
+/// Warns about components without facts of their own, and about components that no design requires. A
+/// component counts as unrequired only if other components are required and no other fact links it.
 fn components(knowledge: &Knowledge) -> Vec<Message> {
     let (engine, view) = (knowledge.engine(), knowledge.view());
     let designs = view.function_designs();
@@ -214,8 +218,8 @@ fn is_plain(engine: &Engine, fact: &Fact) -> bool {
     fact.arguments.len() == 1 || local_name(name) == "c_status"
 }
 
-/// Warns about attributes without a value, and about bounds of actions on attributes that no design
-/// estimates.
+/// Warns about attributes that are only mentioned, about attributes that nothing estimates, measures or
+/// bounds, and about bounds of actions on attributes that no design estimates.
 fn attributes(knowledge: &Knowledge) -> Vec<Message> {
     let (engine, view) = (knowledge.engine(), knowledge.view());
     let designs = view.function_designs();
@@ -261,8 +265,8 @@ fn attributes(knowledge: &Knowledge) -> Vec<Message> {
     doubts
 }
 
-/// Creates a warning at the first occurrence of an individual's local name in the documents.
-/// Without an occurrence, the warning has no location.
+/// Creates a warning at the first occurrence of an individual's local name in the documents, except on
+/// comment lines. Without an occurrence, the warning has no location.
 pub fn doubt_about(knowledge: &Knowledge, code: &str, iri: &str, text: String) -> Message {
     let name = local_name(iri);
     // `fd_a` must not match inside `fd_ab`, and a comment is not the place to correct.

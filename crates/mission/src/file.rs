@@ -1,5 +1,6 @@
-//! Reads input files and detects their kind. Only regular files of limited size are read. Messages
-//! never quote a file of another kind than expected, because a hostile manifest may name any file.
+//! Reads input files and detects their kind. Apart from standard input, only regular files of limited size
+//! are read. Messages never quote a file of another kind than expected, because a hostile manifest may name
+//! any file.
 
 use std::collections::BTreeMap;
 use std::io::{self, Read as _};
@@ -16,7 +17,7 @@ mod output;
 /// Error code for a file of an unexpected kind.
 pub(crate) const CODE: &str = "M131";
 
-/// Size limit of input files, in bytes.
+/// Size limit of input files, in bytes. It does not apply to standard input.
 const LARGEST: u64 = 1 << 28;
 
 /// Reads a regular file.
@@ -117,7 +118,9 @@ fn is_toml(line: &str) -> bool {
     }
 }
 
-/// Checks that a text is of the expected kind.
+/// Checks that a text is of the expected kind. A text of unknown kind may be a malformed text of the expected
+/// kind. It is accepted as PDDL if it begins with a parenthesis, as a manifest if it does not, and always as
+/// a knowledge base. An empty text is accepted.
 ///
 /// # Errors
 /// Names the detected kind and a remedy. The text itself is not quoted.
@@ -151,7 +154,7 @@ pub fn expect(kind: Kind, file: &str, text: &str) -> Result<(), Message> {
     Err(Message::at(CODE, file, None, text))
 }
 
-/// First words of a knowledge-base document, in all supported syntaxes.
+/// Possible beginnings of a knowledge-base document in all supported syntaxes, in lower case.
 const BEGINNINGS: [&str; 10] =
     ["@", "prefix", "base", "<", "_:", "[", "(", "ontology", "version", "\u{feff}"];
 
@@ -195,8 +198,8 @@ pub(crate) fn quoted(messages: Vec<Message>) -> Vec<Message> {
     messages.into_iter().map(quoted).collect()
 }
 
-/// Returns `true` if a file begins like a knowledge base, or cannot be opened. An unreadable file
-/// has not been quoted from disk.
+/// Returns `true` if a file begins like a knowledge base, or cannot be read. No message can quote the content
+/// of an unreadable file.
 fn is_knowledge(path: &Path) -> bool {
     let Ok(file) = std::fs::File::open(path) else { return true };
     let mut bytes = Vec::new();

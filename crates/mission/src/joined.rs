@@ -28,8 +28,8 @@ pub struct Mission {
     pub(super) adaptation: Option<CoAdaptation>,
     /// Designs whose availability is stated by the problem, not inferred from the knowledge base.
     pub(super) own: BTreeSet<Name>,
-    /// Set if the problem names designs, but not all of the knowledge base: the IRI of the first
-    /// unnamed design and the text of the warning.
+    /// The IRI of the first design of the knowledge base that the problem does not name, and the text of the
+    /// warning. `None` if no warning is needed (see [`NeverNamed`]).
     pub(super) never_named: NeverNamed,
     pub(super) planta: Option<Planta>,
     warnings: Vec<Message>,
@@ -39,7 +39,8 @@ impl Mission {
     /// Joins a domain and a problem with a knowledge base, if there is one.
     ///
     /// # Errors
-    /// All errors of the knowledge base, the domain, the problem and the bindings.
+    /// Errors of the knowledge base, the domain, the problem and the bindings. Names and bindings are checked
+    /// only if the files have no errors.
     pub fn new(
         name: &str,
         knowledge: Option<Result<Knowledge, Errors>>,
@@ -157,8 +158,8 @@ impl Mission {
         }
     }
 
-    /// Finds the first atom with this predicate in the conjunction of the goal and replaces its
-    /// last argument by `object`.
+    /// Finds the first atom with this predicate in the conjunction of the goal and replaces its last argument
+    /// by `object`. If there is no such atom, the goal is unchanged.
     pub fn aim(&mut self, predicate: &str, object: &str) {
         let mut parts = vec![&mut self.problem.goal];
         // Popping from a stack with reversed pushes visits the atoms in their textual order.
@@ -218,9 +219,8 @@ impl Mission {
         self.planta.as_ref().map(Planta::known)
     }
 
-    /// Rewrites a condition for display: predicates that only the explicit form of a plain domain
-    /// has are replaced. For example, "a design meets a requirement" becomes `(meets DESIGN
-    /// REQUIREMENT)`.
+    /// Rewrites a condition for display: in the explicit form of a plain domain, the predicate that a design
+    /// meets a quality bound is replaced by `(meets DESIGN BOUND)`.
     pub fn spoken(&self, condition: &str) -> String {
         self.adaptation
             .as_ref()
@@ -274,9 +274,9 @@ impl Mission {
     }
 }
 
-/// Renames individuals according to `[bindings.names]`, and compares the names in the PDDL files
-/// with those in the knowledge base. Returns the designs whose availability is stated by the
-/// problem, and the designs that the problem never names.
+/// Renames individuals according to `[bindings.names]`, and compares the names in the PDDL files with those
+/// in the knowledge base. Returns the designs whose availability is stated by the problem, and the warning
+/// about designs that the problem never names.
 ///
 /// # Errors
 /// Invalid entries of `[bindings.names]`, and required functions without a design that occurs in

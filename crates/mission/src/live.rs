@@ -14,8 +14,8 @@ use crate::knowledge::Knowledge;
 use crate::message::{Errors, Message};
 
 impl Mission {
-    /// Adds the current objects, facts and values of the knowledge base to a problem of this
-    /// mission. Returns warnings.
+    /// Adds the current objects, facts and values of the knowledge base to a problem of this mission. Returns
+    /// warnings and errors.
     pub fn fill(&self, problem: &mut Problem) -> Vec<Message> {
         self.knowledge.as_ref().map_or_else(Vec::new, |knowledge| {
             if let Some(planta) = &self.planta {
@@ -36,7 +36,7 @@ impl Mission {
         self.adaptation.as_ref().is_some_and(|adaptation| adaptation.stands_for_designs(function))
     }
 
-    /// Returns the knowledge base for modification.
+    /// Returns the knowledge base for modification, if the mission has one.
     pub fn knowledge_mut(&mut self) -> Option<&mut Knowledge> {
         self.knowledge.as_mut()
     }
@@ -113,7 +113,8 @@ impl Mission {
         self.decides_on(design) && predicates.any(|predicate| self.holds(&format!("{predicate} {design}")))
     }
 
-    /// Replaces the available designs of a filled problem and returns the domain for that problem.
+    /// Replaces the available designs of a filled problem and returns the domain for that problem. If no
+    /// predicate of the domain expresses availability, the problem is unchanged.
     ///
     /// `allowed` is called with the name of each design of the knowledge base and its current
     /// availability; the design becomes available if the result is `true`. Designs whose

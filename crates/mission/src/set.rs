@@ -19,7 +19,8 @@ impl Mission {
     ///   replaces all facts that differ in the last argument only.
     ///
     /// # Errors
-    /// No case matches.
+    /// No case matches, a value is not a decimal number, an attribute is only estimated, or the knowledge
+    /// base decides on the availability of the design.
     pub fn set(&mut self, name: &str, value: &str) -> Result<(), Message> {
         let value = value.trim();
         if let Some(knowledge) = &mut self.knowledge
@@ -40,7 +41,8 @@ impl Mission {
     /// measured attributes of the knowledge base.
     ///
     /// # Errors
-    /// No symbol of the problem matches.
+    /// No symbol of the problem matches, a value is not a decimal number, or the knowledge base decides on
+    /// the availability of the design.
     pub fn set_in_problem(&mut self, name: &str, value: &str) -> Result<(), Message> {
         let value = value.trim();
         let words: Vec<&str> = name.split_whitespace().collect();

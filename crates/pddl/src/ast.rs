@@ -102,8 +102,8 @@ impl From<Name> for Identifier {
     }
 }
 
-/// Type of a typed-list entry: one type name, or several for `either`. An empty list means `object`, whether
-/// written or implied.
+/// Type of a typed-list entry: one type name, or several for `either`. The type `object` is represented by an
+/// empty list.
 #[derive(Debug, Clone, Default)]
 pub struct TypeExpression {
     /// Names of the alternative types.
@@ -167,7 +167,7 @@ pub struct Derived {
 /// An action schema.
 #[derive(Debug, Clone)]
 pub struct Action {
-    /// Name of the schema. Several schemas may share one.
+    /// Name of the schema. Several schemas may have the same name.
     pub identifier: Identifier,
     /// Typed parameters.
     pub parameters: Vec<TypedName>,
@@ -179,14 +179,14 @@ pub struct Action {
     pub span: Span,
 }
 
-/// `(preference NAME CONDITION)` among the conditions of an action. A violation is counted; it does not
-/// prevent the action.
+/// `(preference NAME CONDITION)` among the conditions of an action. A violated preference is counted; it does
+/// not prevent the action.
 #[derive(Debug, Clone)]
 pub struct Preference {
     /// Variables of the quantifiers that enclose the preference. Each violated instance counts as one
     /// violation.
     pub variables: Vec<TypedName>,
-    /// Name of the preference. Several preferences may share one.
+    /// Name of the preference. Several preferences may have the same name.
     pub name: Identifier,
     /// Time at which the condition should hold. `AtStart` in an instantaneous action.
     pub time: ConditionTime,
@@ -202,8 +202,8 @@ pub struct Constraint {
     /// Variables of the quantifiers that enclose the constraint. If the constraint is a preference, each
     /// violated instance counts as one violation.
     pub variables: Vec<TypedName>,
-    /// Name, if the constraint is a preference. Several preferences may share one. `(is-violated NAME)` is
-    /// the number of violated instances. A constraint without a name is mandatory.
+    /// Name, if the constraint is a preference. Several preferences may have the same name; `(is-violated
+    /// NAME)` is the number of their violated instances. A constraint without a name is mandatory.
     pub preference: Option<Identifier>,
     /// Modal formula that the trajectory must satisfy. A preference of the goal is stored as
     /// [`Trajectory::AtEnd`].
@@ -250,7 +250,8 @@ pub enum Trajectory {
 pub enum ActionBody {
     /// `:action`.
     Instantaneous {
-        /// `:precondition`; an empty conjunction if the file has none.
+        /// `:precondition` without its preferences, together with the conditions that object fluents in the
+        /// effect impose. An empty conjunction if there are none.
         precondition: Condition,
         /// `:effect`.
         effect: Effect,
@@ -259,9 +260,10 @@ pub enum ActionBody {
     Durative {
         /// `:duration`: constraints on `?duration`. All of them must hold.
         duration: Vec<DurationConstraint>,
-        /// `:condition`, flattened: a conjunction of conditions, each at its time.
+        /// Conjuncts of `:condition` without its preferences, each with its time, and the conditions that
+        /// object fluents in the effects impose.
         conditions: Vec<(ConditionTime, Condition)>,
-        /// `:effect`, flattened: all effects, each at its time.
+        /// Conjuncts of `:effect`, each with its time.
         effects: Vec<(EffectTime, Effect)>,
     },
 }
@@ -370,7 +372,7 @@ impl Comparison {
         }
     }
 
-    /// Returns the relation with its sides exchanged: `a < b` becomes `b > a`.
+    /// Returns the relation after an exchange of the two sides: `a < b` becomes `b > a`.
     pub(crate) fn mirrored(self) -> Self {
         match self {
             Self::Less => Self::Greater,
@@ -385,7 +387,7 @@ impl Comparison {
 /// A numeric expression.
 #[derive(Debug, Clone)]
 pub enum Expression {
-    /// A number, exactly as written.
+    /// A number, with its exact value.
     Number(BigRational, Span),
     /// Numeric function. In a metric also `(is-violated NAME)`, whose argument is the name of a preference.
     Fluent(Atom),
@@ -421,8 +423,8 @@ pub enum Effect {
     Delete(Atom),
     /// `(forall (…) …)`.
     ForAll(Vec<TypedName>, Box<Effect>),
-    /// `(when CONDITION EFFECT)`. In a durative action, condition and effect have the time of the enclosing
-    /// entry.
+    /// `(when CONDITION EFFECT)`. In a durative action, both the condition and the effect have the time of
+    /// the effect's entry in [`ActionBody::Durative`].
     When(Condition, Box<Effect>),
     /// A numeric effect.
     Assign(Assignment, Atom, Expression, Span),
@@ -469,7 +471,7 @@ pub struct Problem {
 pub enum InitialElement {
     /// An atom that holds.
     Fact(Atom),
-    /// `(not ATOM)`: redundant, because the initial state is closed.
+    /// `(not ATOM)`: redundant, because atoms that are not stated are false.
     NegatedFact(Atom),
     /// `(= FUNCTION NUMBER)`.
     Value(Atom, BigRational, Span),
@@ -493,7 +495,7 @@ impl InitialElement {
 pub struct Metric {
     /// Direction of optimisation.
     pub direction: Direction,
-    /// Expression that is evaluated in the final state.
+    /// Expression to optimise. Its value is that in the final state of a plan.
     pub expression: Expression,
     /// Extent of the whole metric.
     pub span: Span,

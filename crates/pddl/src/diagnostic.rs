@@ -140,10 +140,11 @@ impl Diagnostic {
     }
 }
 
-/// Maximum number of diagnostics per file. A file in another language would produce very many.
+/// Maximum number of diagnostics that a [`Sink`] stores, apart from the final message P119, which counts the
+/// omitted ones. A file in another language would produce very many.
 const MAX_DIAGNOSTICS: usize = 200;
 
-/// Collects the diagnostics of one source.
+/// Collects the diagnostics of one stage (parsing or checking) about one source.
 #[derive(Debug)]
 pub(crate) struct Sink<'s> {
     source: &'s Source,
@@ -182,7 +183,8 @@ impl<'s> Sink<'s> {
         span: Span,
         message: String,
     ) -> &mut Diagnostic {
-        // Beyond the limit all diagnostics share the last slot, whose message `finish` replaces.
+        // Beyond the limit, diagnostics are only counted. The caller gets the last stored one, which `finish`
+        // replaces by P119.
         let index = self.diagnostics.len().min(MAX_DIAGNOSTICS);
         if self.is_full() {
             self.beyond_limit += 1;
@@ -202,8 +204,8 @@ impl<'s> Sink<'s> {
         self.diagnostics.len() + self.beyond_limit
     }
 
-    /// Returns `true` if the limit is reached. Further diagnostics are only counted, so suggestions need not
-    /// be computed.
+    /// Returns `true` if more than [`MAX_DIAGNOSTICS`] diagnostics are stored. Further ones are only counted,
+    /// so suggestions need not be computed.
     pub(crate) fn is_full(&self) -> bool {
         self.diagnostics.len() > MAX_DIAGNOSTICS
     }
@@ -212,7 +214,8 @@ impl<'s> Sink<'s> {
         self.beyond_limit > 0 || has_errors(&self.diagnostics)
     }
 
-    /// Returns the collected diagnostics in the order of the file.
+    /// Returns the collected diagnostics, sorted by position and without successive duplicates. If some were
+    /// only counted, the last stored one becomes an error P119 with their number.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(crate) fn finish(mut self) -> Vec<Diagnostic> {
         if let (Some(last), true) = (self.diagnostics.get_mut(MAX_DIAGNOSTICS), self.beyond_limit > 0) {

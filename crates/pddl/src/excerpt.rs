@@ -19,7 +19,7 @@ pub struct Excerpt {
     message: String,
 }
 
-/// Number of bytes of a long line that are shown before and after the marked position.
+/// Maximum number of bytes of a line that are shown before and after the beginning of the marked range.
 const CONTEXT: usize = 150;
 
 #[expect(
@@ -28,7 +28,8 @@ const CONTEXT: usize = 150;
 )]
 impl Excerpt {
     /// Creates an excerpt of the line in which a byte range begins. `line` is the number of this line.
-    /// Returns `None` if the range does not fit the text.
+    /// Offsets are clamped to the text, and the mark to the shown part of the line, so the result is always
+    /// `Some`.
     pub(crate) fn new(
         file: &str,
         text: &str,

@@ -50,6 +50,7 @@ pub use validator::Validator;
 use ast::{Direction, Domain, Metric, Problem};
 
 /// Parses the expression of a metric and checks it against a domain and a problem. Returns the metric.
+/// Warnings are returned only together with an error.
 ///
 /// # Errors
 ///

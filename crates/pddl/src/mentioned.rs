@@ -1,11 +1,12 @@
-//! Names that occur in a domain and a problem, declared or not.
+//! Predicates and objects that occur in a domain and a problem, declared or not.
 
 use std::collections::BTreeSet;
 
 use crate::ast::{Atom, Condition, Domain, Effect, InitialElement, Name, Problem, Term};
 use crate::visit::Node;
 
-/// Names that occur in a domain, and optionally in a problem, whether declared or not.
+/// Predicates and objects that occur in a domain, and optionally in a problem, whether declared or not.
+/// Declarations themselves do not count.
 #[derive(Debug, Clone, Default)]
 pub struct Mentioned {
     /// Predicates in conditions, effects, preferences, constraints, and the initial state.
@@ -14,19 +15,20 @@ pub struct Mentioned {
     pub changed: BTreeSet<Name>,
     /// Predicates of timed initial literals.
     pub timed: BTreeSet<Name>,
-    /// Objects in conditions, effects and the initial state.
+    /// Objects in atoms, equalities, targets of numeric effects, and the initial state. Objects that occur
+    /// only as arguments in numeric expressions are not included.
     pub objects: BTreeSet<Name>,
 }
 
 impl Mentioned {
-    /// Returns the names that occur in a domain.
+    /// Returns the predicates and objects that occur in a domain.
     pub fn by_domain(domain: &Domain) -> Self {
         let mut mentioned = Self::default();
         domain.walk(&mut |node| mentioned.node(node));
         mentioned
     }
 
-    /// Adds the names that occur in a problem.
+    /// Adds the predicates and objects that occur in a problem.
     #[must_use]
     pub fn and_problem(mut self, problem: &Problem) -> Self {
         problem.walk(&mut |node| self.node(node));
@@ -56,7 +58,7 @@ impl Mentioned {
         }));
     }
 
-    /// Adds the names that occur in a condition.
+    /// Adds the predicates and objects that occur in a condition.
     pub fn condition(&mut self, condition: &Condition) {
         condition.walk(&mut |node| self.node(node));
     }

@@ -15,12 +15,12 @@ pub(crate) enum Literal {
     Name,
     /// A number.
     Number(BigRational),
-    /// A number with more than [`MAX_DIGITS`] digits.
+    /// A number that has more than [`MAX_DIGITS`] digits if written without exponent.
     TooLong,
 }
 
-/// Parses a symbol as a number: `5`, `-0.5`, `100.`, `.5`, `1e-3`. Any other symbol is a name, for example
-/// `0.8_decimal`.
+/// Parses a symbol as a number: `5`, `-0.5`, `100.`, `.5`, `1e-3`. A number that has more than [`MAX_DIGITS`]
+/// digits without exponent is too long. Any other symbol is a name, for example `0.8_decimal`.
 pub(crate) fn literal(text: &str) -> Literal {
     let unsigned = text.strip_prefix(['-', '+']).unwrap_or(text);
     let (mantissa, exponent) = match unsigned.split_once(['e', 'E']) {
@@ -44,10 +44,10 @@ pub(crate) fn literal(text: &str) -> Literal {
     Literal::Number(if text.starts_with('-') { -value } else { value })
 }
 
-/// Returns the number of digits of a number written without exponent. `digits` and `fraction` count the
-/// digits of the mantissa and those after its point.
+/// Returns the number of digits of a number if it is written without exponent. `digits` is the number of
+/// digits of its mantissa, `fraction` the number of those after the decimal point.
 fn written_out(digits: usize, fraction: usize, exponent: i32) -> usize {
-    // A length that does not fit exceeds the limit in any case.
+    // An exponent that does not fit into `usize` gives more digits than [`MAX_DIGITS`] in any case.
     let exponent_length = usize::try_from(exponent.unsigned_abs()).unwrap_or(usize::MAX);
     match (exponent >= 0, exponent_length.checked_sub(fraction)) {
         (true, Some(zeros)) => digits.saturating_add(zeros),

@@ -1,8 +1,8 @@
 //! Normalises a domain and a problem to a form that other planners accept.
 //!
-//! Requirements list the used features, used symbols are declared, duplicates are removed, and the problem
-//! names its domain. Features without an equivalent (two actions of one name, names that begin with a digit)
-//! stay as they are.
+//! Missing requirement flags are added, `total-cost` and supertypes are declared, objects that the domain
+//! uses become constants, duplicates are removed, and the problem names its domain. Features without an
+//! equivalent (two actions of one name, names that begin with a digit) stay as they are.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -21,7 +21,7 @@ pub fn portable(domain: &Domain, problem: &Problem) -> (Domain, Problem) {
     move_constants(&mut domain, &mut problem);
     remove_duplicates(&domain, &mut problem);
     problem.domain = domain.name.clone();
-    // The requirements of both files are collected in the domain.
+    // The domain states the requirement flags for the features of both files.
     problem.requirements.clear();
     require(&mut domain, &problem);
     (domain, problem)
@@ -95,7 +95,7 @@ fn constant(term: &Term) -> Option<Name> {
 }
 
 /// Removes objects that are also constants, repeated facts and values, and negated facts, which the
-/// closed-world assumption implies.
+/// closed-world assumption implies. Merges repeated declarations of an object.
 fn remove_duplicates(domain: &Domain, problem: &mut Problem) {
     let constants: FxHashSet<Name> =
         domain.constants.iter().map(|constant| constant.identifier.name.clone()).collect();
@@ -171,7 +171,7 @@ fn require(domain: &mut Domain, problem: &Problem) {
     insert("timed-initial-literals", problem.init.iter().any(is_timed));
     let is_durative = domain.actions.iter().any(|action| matches!(action.body, ActionBody::Durative { .. }));
     insert("durative-actions", is_durative);
-    // Planners for durative actions know the older name.
+    // Planners for durative actions accept the older name `fluents`.
     if is_durative && required.remove("numeric-fluents") {
         required.insert("fluents");
     }

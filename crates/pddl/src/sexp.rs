@@ -11,8 +11,8 @@ use crate::number::dense;
 /// a stack of 2 MB. Real files stay below 30.
 const DEPTH_LIMIT: usize = 200;
 
-/// Keywords that open a section of a file. At a greater depth they show that the preceding section was not
-/// closed.
+/// Keywords of sections. A list inside a section that begins with such a keyword shows that the section was
+/// not closed.
 pub(super) const SECTIONS: [&str; 20] = [
     ":requirements",
     ":types",
@@ -39,7 +39,7 @@ pub(super) const SECTIONS: [&str; 20] = [
 #[derive(Debug, Clone, Copy)]
 struct Node {
     span: Span,
-    /// Index of the next node that is neither this node nor one of its items.
+    /// Index of the first node after this node and all nodes inside it.
     next: u32,
     is_list: bool,
 }
@@ -157,8 +157,8 @@ pub(super) fn read<'s>(text: &'s str, sink: &mut Sink<'_>) -> Option<Tree<'s>> {
     Some(Tree { text, nodes })
 }
 
-/// Returns the extent of the next parenthesis or symbol at or after byte `at`. Skips white space and
-/// comments.
+/// Returns the extent of the next parenthesis or symbol at or after byte `at`, and `None` at the end of the
+/// text. Skips white space and comments.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "positions in a text in memory, which are at most its length"
@@ -204,7 +204,7 @@ struct Reader<'r, 's> {
     /// Indices of the open lists, outermost first.
     open: Vec<u32>,
     sink: &'r mut Sink<'s>,
-    /// End of the last closing parenthesis.
+    /// Byte offset behind the last closing parenthesis.
     last_close: u32,
 }
 
@@ -222,7 +222,8 @@ impl Reader<'_, '_> {
 
     #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     fn symbol(&mut self, span: Span, text: &str) {
-        // Only the first item of a list opens a section, and only directly below `(define`.
+        // A section keyword is the first item of a list directly below `(define`. At any other depth, a
+        // parenthesis is superfluous or missing before the keyword.
         let is_first = self.open.last().is_some_and(|list| *list as usize + 1 == self.nodes.len());
         if is_first && text.starts_with(':') && SECTIONS.iter().any(|name| name.eq_ignore_ascii_case(text)) {
             match self.open.len() {
@@ -245,7 +246,8 @@ impl Reader<'_, '_> {
     /// reopened.
     #[expect(clippy::arithmetic_side_effects, reason = "the definition was closed before, by a parenthesis")]
     fn reopen_define(&mut self, span: Span, text: &str) {
-        // Only the first definition of the file can be reopened, and only if it is closed.
+        // Only the first item of the text can be reopened, and only if it is a list that precedes this
+        // section.
         if self.open[0] == 0 || !self.nodes[0].is_list {
             return;
         }

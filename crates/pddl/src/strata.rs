@@ -5,7 +5,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::ast::{Condition, Domain, Name};
 
-/// Stratum of each derived predicate of a domain.
+/// Number of the stratum of each derived predicate of a domain, from 0.
 #[derive(Debug)]
 pub(crate) struct Strata<'d> {
     level: FxHashMap<&'d Name, usize>,
@@ -66,7 +66,7 @@ impl<'d> Strata<'d> {
 /// Dependency of a derived predicate (first) on another (second). The number is 1 if the dependency is negated, else 0.
 type Dependency<'d> = (&'d Name, &'d Name, usize);
 
-/// Returns the first predicate that depends on its own negation.
+/// Returns the head of the first negated dependency that lies on a cycle, and `None` if there is none.
 fn on_negative_cycle<'d>(edges: &[Dependency<'d>]) -> Option<&'d Name> {
     let depends = |from: &'d Name, target: &Name| {
         let (mut visited, mut open) = (FxHashSet::from_iter([from]), vec![from]);
@@ -83,7 +83,7 @@ fn on_negative_cycle<'d>(edges: &[Dependency<'d>]) -> Option<&'d Name> {
 }
 
 /// Calls `visit(predicate, negated)` for each atom of a condition. `negated` is `true` below an odd number of
-/// negations.
+/// negations; the premise of an implication counts as negated.
 fn uses<'d>(condition: &'d Condition, negated: bool, visit: &mut impl FnMut(&'d Name, bool)) {
     match condition {
         Condition::Not(inner) => uses(inner, !negated, visit),

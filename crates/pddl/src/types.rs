@@ -48,7 +48,7 @@ impl TypeHierarchy {
     }
 
     /// Returns `true` if `lower` is a subtype of `upper` or equal to it. An undeclared `upper` counts as
-    /// `object`.
+    /// `object`; an undeclared `lower` is a subtype of `object` only.
     pub(crate) fn is_a(&self, lower: &Name, upper: &Name) -> bool {
         let Some(upper) = self.index.get(upper) else { return true };
         // `object` has index 0.
@@ -62,7 +62,8 @@ impl TypeHierarchy {
         lower == upper || closure(&self.parents, lower)[upper]
     }
 
-    /// Returns `true` if an object of type `subtype` is also of type `supertype`.
+    /// Returns `true` if an object of type `subtype` is also of type `supertype`. With `either`, one matching
+    /// pair of alternatives suffices.
     pub fn fits(&self, subtype: &TypeExpression, supertype: &TypeExpression) -> bool {
         let is_subtype =
             |lower: &Name| supertype.alternatives.iter().any(|upper| self.is_a(lower, &upper.name));
@@ -70,8 +71,9 @@ impl TypeHierarchy {
         supertype.alternatives.is_empty() || subtype.alternatives.iter().any(|lower| is_subtype(&lower.name))
     }
 
-    /// Returns `true` if some object can be of both types: one is a subtype of the other, or the two have a
-    /// common subtype.
+    /// Returns `true` if some object can be of both types: an alternative of one type is a subtype of an
+    /// alternative of the other, or the two have a common subtype. An undeclared type overlaps with every
+    /// type.
     pub(crate) fn overlap(&self, left: &TypeExpression, right: &TypeExpression) -> bool {
         let common = |left: &Name, right: &Name| {
             self.is_a(left, right) || self.is_a(right, left) || self.have_common_subtype(left, right)
@@ -96,7 +98,8 @@ impl TypeHierarchy {
         below_left.iter().zip(&below_right).any(|(left, right)| *left && *right)
     }
 
-    /// Returns `true` if a type is its own supertype through at least one other type.
+    /// Returns `true` if a type is its own supertype through at least one other type. `object` counts as
+    /// acyclic.
     pub(crate) fn is_cyclic(&self, name: &Name) -> bool {
         let Some(index) = self.index.get(name) else { return false };
         *index != 0
@@ -104,7 +107,8 @@ impl TypeHierarchy {
     }
 }
 
-/// Returns for each type whether it is reachable from `from` by zero or more `links`.
+/// Returns for each type whether it is reachable from the type `from` in zero or more steps. `links` lists
+/// the direct successors of each type.
 fn closure(links: &[Vec<usize>], from: usize) -> Vec<bool> {
     let mut reached = vec![false; links.len()];
     reached[from] = true;

@@ -46,7 +46,8 @@ impl Domain {
 }
 
 impl Problem {
-    /// Visits the goal, the constraints and the metric, with all nodes below them.
+    /// Visits the goal, the constraints and the metric, with all nodes below them. The initial state is not
+    /// visited.
     pub fn walk<'t>(&'t self, visit: Visit<'_, 't>) {
         self.goal.walk(visit);
         self.constraints.iter().for_each(|constraint| constraint.walk(visit));

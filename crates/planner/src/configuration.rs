@@ -39,7 +39,8 @@ pub struct DesignChoice {
     pub missed: usize,
     /// Utility of the design; higher is better.
     pub utility: BigRational,
-    /// Consumption of each budget by the design.
+    /// Consumption of each budget by the design, in the order of the budgets. Missing entries are 0; negative
+    /// ones add to the budget.
     pub demands: Vec<BigRational>,
     /// Exclusive components that the design uses, numbered by the caller. At most one selected design may use
     /// each component.
@@ -53,12 +54,13 @@ pub struct Assignment {
     pub designs: Vec<Option<usize>>,
     /// Sum of the utilities of the selected designs.
     pub utility: BigRational,
-    /// `true` if the assignment is proved optimal; `false` if a limit was reached before.
+    /// `true` if the assignment is proved optimal; `false` if a limit was reached first.
     pub optimal: bool,
 }
 
 /// Computes the best assignment of designs to functions that respects the budgets. Among equally good
-/// assignments, earlier designs are preferred.
+/// assignments, earlier designs are preferred. At a limit, returns the best known assignment. If no
+/// assignment respects the budgets, no design is selected.
 pub fn configure(functions: &[Vec<DesignChoice>], budgets: &[BigRational], limits: &Limits) -> Assignment {
     let problem = Problem::new(functions, budgets);
     let (prices, incumbent) = problem.prices();
@@ -109,7 +111,7 @@ impl Label {
     }
 
     /// Returns `true` if every completion of `other` that respects the budgets is also possible for `self`,
-    /// i.e. `self` consumes no more of any budget.
+    /// i.e. if `self` consumes no more of any budget.
     fn is_as_free(&self, other: &Self) -> bool {
         self.spent.iter().zip(&other.spent).all(|(left, right)| left <= right)
     }
@@ -192,8 +194,8 @@ impl Problem {
         ahead.zip(&self.budgets).all(|(spent, budget)| spent <= *budget)
     }
 
-    /// Assigns to each function the design with the highest preference that fits the budgets. If the result
-    /// violates a budget, no function is served.
+    /// Assigns to each function in turn the design with the highest preference that fits the remaining
+    /// budgets, if there is one. If the result violates a budget, no function is served.
     fn greedy(&self, preference: impl Fn(&Item) -> f64) -> Label {
         let mut label = self.nothing();
         for (at, designs) in self.functions.iter().enumerate() {
@@ -211,8 +213,8 @@ impl Problem {
         self.functions.iter().fold(self.nothing(), |label, _| label.with(None, None))
     }
 
-    /// Computes good multipliers by subgradient ascent. Also returns the best assignment found during the
-    /// ascent.
+    /// Computes good multipliers by a subgradient method, which lowers the upper bound. Also returns the best
+    /// assignment found by greedy selection along the way.
     #[expect(clippy::cast_possible_truncation, reason = "rounding is meant; bounds hold for whatever prices")]
     fn prices(&self) -> (LagrangeMultipliers, Label) {
         let float = |number: &BigInt| number.to_f64().unwrap_or(f64::MAX);
@@ -272,8 +274,8 @@ impl Problem {
         (LagrangeMultipliers { each, after }, incumbent)
     }
 
-    /// Returns an upper bound on the worth of all completions of a label, in units of 2^-`PRICE_BITS`. The
-    /// functions from index `from` on are not assigned yet.
+    /// Returns an upper bound on the worth of all completions of a label (a partial assignment), in units of
+    /// 2^-`PRICE_BITS`. The functions from index `from` on are not assigned yet.
     fn bound(&self, label: &Label, from: usize, prices: &LagrangeMultipliers) -> BigInt {
         let slack = self.budgets.iter().zip(&label.spent).map(|(budget, spent)| budget - spent);
         let paid: BigInt = slack.zip(&prices.each).map(|(slack, price)| slack * price).sum();
@@ -302,14 +304,15 @@ impl Problem {
                     if is_hopeless || next.iter().any(is_worse) {
                         continue;
                     }
-                    // Of equally good labels, the older one is preferred and kept.
+                    // Of equally good labels (partial assignments), the older one is preferred and kept.
                     next.retain(|old| old.worth >= new.worth || !new.is_as_free(old));
                     next.push(new);
                 }
             }
             labels = next;
         }
-        // Labels are generated in order of preference, so the first of several best labels is preferred.
+        // Labels (partial assignments) are generated in order of preference, so the first of several best
+        // labels is preferred.
         let best =
             labels.into_iter().reduce(|best, label| if label.worth > best.worth { label } else { best });
         Ok(best.map_or_else(|| incumbent.designs.clone(), |best| best.designs))

@@ -100,16 +100,19 @@ impl<'a> Planner<'a> {
     }
 
     /// Calls `report` for every better plan and lower bound. If `report` returns `Break`, planning ends with
-    /// the best known plan.
+    /// the best known plan. `report` is not called if the task is solved in exact rationals (see
+    /// [`Planner::plan`]), if actions can reduce the cost, or if the metric contains fluents with
+    /// state-dependent changes.
     #[must_use]
     pub fn on_improvement(mut self, report: impl FnMut(&Improvement) -> ControlFlow<()> + 'a) -> Self {
         self.report = Box::new(report);
         self
     }
 
-    /// Computes a sequential plan that is lexicographically optimal: optimal by the first objective, among
-    /// these plans optimal by the second, and so on. Numbers may have any size. If they overflow machine
-    /// integers, the task is solved in exact rationals, which is slower and supports only one objective.
+    /// Computes a sequential plan that is, within the limits, lexicographically optimal: optimal by the first
+    /// objective, among these plans optimal by the second, and so on. Numbers may have any size. If they
+    /// overflow machine integers, the task is solved in exact rationals, which is slower and supports only
+    /// one objective.
     ///
     /// # Errors
     /// Returns all unsupported constructs with their source locations, or an error if a limit is reached
@@ -133,7 +136,8 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// Computes the Pareto front of the first two objectives, with one plan for each pair of values.
+    /// Computes the Pareto front of the first two objectives within the limits, with one plan for each pair
+    /// of values.
     ///
     /// # Errors
     /// See [`Planner::plan`]. Tasks that overflow machine integers are also an error.

@@ -9,7 +9,8 @@ use testing::random::Random;
 use crate::tally::limits;
 use pddl::{Source, read};
 
-/// Engines, each with the number of states that A\* stores before the other components of the planner start.
+/// Engines, each with the number of states that A\* stores before the other components of the planner
+/// (satisficing search and SAT solver) start.
 const WAYS: [(Engine, usize); 5] =
     [(Engine::Auto, 20_000), (Engine::Auto, 30), (Engine::Auto, 1), (Engine::Search, 1), (Engine::Sat, 0)];
 

@@ -267,7 +267,7 @@ fn plans_stay_close_to_the_old_one() {
         panic!("no plan")
     };
     let old = named(&old);
-    // Both designs are equally good. The other design comes first in model order.
+    // Both designs are equally good. The other design comes first in the order of declaration.
     problem.init.push(InitialElement::Fact(atom("fd_available left")));
     let limits = Limits::none();
     let plan = |replanner: &mut Replanner, close_to: Option<&[(String, Vec<String>)]>| {

@@ -1,11 +1,12 @@
-//! Writes output files atomically. A regular file is replaced by renaming a temporary file over it,
-//! and keeps its mode and owner. Any other file (device, FIFO, socket descriptor) is opened and
-//! written. A symbolic link is followed. Neither a special file nor a link is ever replaced.
+//! Writes output files, atomically where possible. A regular file is replaced by renaming a temporary file
+//! over it, and keeps its mode and owner. Any other file (device, FIFO) is opened and written. If the path
+//! denotes standard output or standard error, the open descriptor is used, so it may also be a socket. A
+//! symbolic link is followed. Neither a special file nor a link is ever replaced.
 //!
-//! A file is overwritten in place if a rename would change more than its content: it has other hard
-//! links, its owner cannot be kept, its directory is not writable, it is a mount point, or the path
-//! is a descriptor (`/dev/fd/3`). Vim's `backupcopy=auto` follows the same rule. If overwriting
-//! fails, the former content is restored.
+//! A file is overwritten in place if a rename would change more than its content: it has other hard links,
+//! its owner cannot be kept, its directory is not writable, it is a mount point, or the path is a descriptor
+//! (`/dev/fd/3`). Vim's `backupcopy=auto` follows the same rule. If overwriting fails, the former content is
+//! restored if it could be read.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, ErrorKind, Read as _, Seek as _, Write as _};
@@ -21,8 +22,8 @@ const STDOUT: &str = "-";
 /// Limit on consecutive symbolic links, as in Linux; more are treated as a loop.
 const MAX_LINKS: usize = 40;
 
-/// Writes a text to a file atomically, or to standard output if the path is `-`. A closed pipe is
-/// not an error.
+/// Writes a text to a file, atomically where possible, or to standard output if the path is `-`. A closed
+/// pipe is not an error.
 ///
 /// # Errors
 /// M109: the file cannot be written.
@@ -104,7 +105,8 @@ impl Pending {
     /// Moves the content to its final path.
     ///
     /// # Errors
-    /// The file cannot be written. An existing file then keeps its former content.
+    /// The file cannot be written. An existing file then keeps its former content; if it is overwritten in
+    /// place, only as far as the content could be restored.
     pub fn commit(self) -> io::Result<()> {
         let Some((temporary, target, existing)) = self.0 else { return Ok(()) };
         // The content must reach the disk before the rename, or a crash could leave an empty file.
@@ -126,7 +128,8 @@ fn pending(file: NamedTempFile, target: PathBuf, old: Option<InPlace>) -> (File,
     (file, Pending(Some((temporary, target, old))))
 }
 
-/// Overwrites a file with the content of `source`. On failure the former content is restored.
+/// Overwrites a file with the content of `source`. On failure the former content is restored, if it could be
+/// read.
 fn overwrite(mut file: File, source: &Path) -> io::Result<()> {
     let mut former = Vec::new();
     let is_kept = file.read_to_end(&mut former).is_ok();
@@ -207,7 +210,8 @@ impl PendingDirectory {
         self.files.path()
     }
 
-    /// Moves the files to the final path of the directory.
+    /// Moves the files to the final path of the directory: as a whole if the target is absent, otherwise one
+    /// by one into the existing directory.
     ///
     /// # Errors
     /// The directory cannot be written.

@@ -64,7 +64,7 @@ pub struct Contradiction {
 }
 
 impl Knowledge {
-    /// Reads documents and rules.
+    /// Reads documents and rules, with OWL's semantics of equality between individuals.
     ///
     /// # Errors
     /// All errors of the sources.
@@ -288,7 +288,7 @@ impl Knowledge {
     /// Marks a component as failed, given by IRI, local name or object name.
     ///
     /// # Errors
-    /// There is no such component.
+    /// There is no such component, or inference exceeds its limits.
     pub fn fail(&mut self, component: &str) -> Result<(), Message> {
         self.report(component, Status::Failed).map(|_| ())
     }
@@ -307,7 +307,7 @@ impl Knowledge {
     /// the change of all facts.
     ///
     /// # Errors
-    /// There is no such attribute, or the value is not a number.
+    /// There is no such attribute, the value is not a number, or inference exceeds its limits.
     pub fn measure(&mut self, attribute: &str, value: &str) -> Result<Delta, Message> {
         let literal = Literal::parse(value, Some("http://www.w3.org/2001/XMLSchema#decimal"), None);
         if literal.as_rational().is_none() {
@@ -331,12 +331,12 @@ impl Knowledge {
         self.changed(outcome)
     }
 
-    /// Replaces the objectives of the robot that are named `o_<function>`. `configuration` lists
-    /// the functions, each with the design that grounds it, by their object names. Component
-    /// statuses are unchanged.
+    /// Replaces the objectives of the robot that are named `o_<function>`, where `<function>` is the name of
+    /// their function. `configuration` lists the functions, each with the design that grounds it, by their
+    /// object names. Component statuses are unchanged.
     ///
     /// # Errors
-    /// There is no such function or design.
+    /// There is no such function or design, or inference exceeds its limits.
     pub fn pursue(&mut self, configuration: &[(String, String)]) -> Result<(), Message> {
         self.pursue_now(configuration).map_err(|error| Message::from_ontology(&error))
     }

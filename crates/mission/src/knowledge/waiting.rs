@@ -27,7 +27,7 @@ pub struct Fault {
     pub code: String,
     /// Description in a sentence.
     pub message: String,
-    /// The rule that was being evaluated.
+    /// The rule that was being evaluated when inference failed; empty if unknown.
     pub rule: String,
 }
 
@@ -90,7 +90,7 @@ impl RobotReport {
 }
 
 impl Waiting {
-    /// Serialises pending reports for a snapshot; null if nothing is pending.
+    /// Serialises the pending reports and objectives for a snapshot; null if inference has not failed.
     pub fn to_record(&self) -> Value {
         let Some(fault) = &self.fault else { return Value::Null };
         let reports: Vec<Value> = self

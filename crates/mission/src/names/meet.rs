@@ -32,12 +32,13 @@ pub(crate) struct Meeting {
     pub(crate) errors: Vec<Message>,
     /// Warnings about names that occur only in the problem or only in the knowledge base.
     pub(crate) warnings: Vec<Message>,
-    /// Designs of the knowledge base that the problem never names.
+    /// The first design of the knowledge base that the problem never names.
     pub(crate) never_named: NeverNamed,
 }
 
-/// Set if the problem names designs, but not all of the knowledge base: the IRI of the first
-/// unnamed design and the text of the warning.
+/// The IRI of the first design of the knowledge base that the problem does not name, and the text of the
+/// warning. `None` if the problem names no designs of its own, if it names all designs that solve its
+/// functions, or if it names designs that the knowledge base does not have (a different warning).
 pub(crate) type NeverNamed = Option<(String, String)>;
 
 /// Compares the names in the PDDL files with those in the knowledge base.
@@ -115,8 +116,8 @@ impl Comparison<'_> {
         facts(self.problem).filter_map(pair).collect()
     }
 
-    /// Returns the designs of the problem that the knowledge base does not have and that solve no
-    /// function of the knowledge base.
+    /// Returns the designs for which the problem states solved functions, if the knowledge base has neither
+    /// the design nor any of these functions.
     fn own_designs(&self) -> BTreeSet<Name> {
         let (designs, functions) = (self.roles.of(DESIGN), self.roles.of(FUNCTION));
         let stated = self.stated();
@@ -131,8 +132,9 @@ impl Comparison<'_> {
             .collect()
     }
 
-    /// Returns the functions that actions require. The position is that of the fact if the problem
-    /// states the requirement, otherwise `None`.
+    /// Returns the functions that actions require according to the problem or, if they have a counterpart in
+    /// the domain, to the knowledge base. The position is that of the fact if the problem states the
+    /// requirement, otherwise `None`.
     fn required(&self) -> Vec<(Name, Option<Span>)> {
         let functions = self.roles.of(FUNCTION);
         let mut required: Vec<(Name, Option<Span>)> = Vec::new();
@@ -160,8 +162,8 @@ impl Comparison<'_> {
         required
     }
 
-    /// Returns an error for each required function that no design can solve because the names in
-    /// the problem and the knowledge base differ.
+    /// Returns an error for each required function that no design can solve because the names in the problem
+    /// and the knowledge base differ. Empty if no predicate of the domain expresses availability.
     fn unsolved(&self, own: &BTreeSet<Name>) -> Vec<Finding> {
         let is_availability =
             |declared: &Declaration| self.bindings.is_availability(&declared.identifier.name);
@@ -173,7 +175,8 @@ impl Comparison<'_> {
         required.iter().filter_map(|(function, span)| self.fault(function, *span, own)).collect()
     }
 
-    /// Returns the error that no design can solve a required function, or `None` if a design can.
+    /// Returns the error that no design can solve a required function. `None` if a design can, or if
+    /// different names are not the cause.
     fn fault(&self, function: &Name, span: Option<Span>, own: &BTreeSet<Name>) -> Option<Finding> {
         let (designs, functions) = (self.roles.of(DESIGN), self.roles.of(FUNCTION));
         let solutions = self.stated();

@@ -94,17 +94,18 @@ impl Roles {
         roles
     }
 
-    /// Returns all roles.
+    /// Returns all roles (classes within which names are compared).
     pub(super) fn all(&self) -> &[Role] {
         &self.roles
     }
 
-    /// Returns the role of a class, given by local name.
+    /// Returns the role (individuals and objects) of a class, given by local name. The class must have a
+    /// role.
     pub(super) fn of(&self, class: &str) -> &Role {
         self.roles.iter().find(|role| role.class == class).expect("invariant: TOMASys' own roles are there")
     }
 
-    /// Assigns roles to the objects whose types are bound to a class.
+    /// Assigns to each object whose type is bound to a class the role of this class.
     fn place(&mut self, domain: &Domain, problem: &Problem) {
         let types = TypeHierarchy::of(domain);
         let constants = domain.constants.iter().map(|constant| (constant, true));
@@ -117,7 +118,8 @@ impl Roles {
         }
     }
 
-    /// Assigns roles by facts, for each class to which no type of the domain is bound.
+    /// Assigns to objects the roles that follow from facts, such as that a design solves a function. This is
+    /// done only for classes to which no type of the domain is bound.
     fn place_by_facts(&mut self, domain: &Domain, problem: &Problem, bindings: &Bindings) {
         let constants = domain.constants.iter().map(|constant| (constant, true));
         let declared: Vec<_> =

@@ -1,15 +1,17 @@
 //! Native co-adaptation: compiles a plain domain to the explicit form, using the requirements that
 //! the knowledge base has for its actions.
 //!
-//! A domain is plain if it declares no type of function designs. An action that the knowledge base
-//! has as well (`move` as `move` or `a_move`, or by a binding) gets a parameter for the design of
-//! each function that the action requires. It also gets conditions: the design solves the function,
-//! is available, and meets the quality bounds of the action (`t:requiresQuality`). A quality bound
-//! with a context applies only in this context. A numeric function without parameters that is named
-//! like an estimated attribute is replaced by the sum over the chosen designs. A function that is
-//! bound to `reconfigured:ATTRIBUTE` is replaced by the sum over the designs that were not in use
-//! before. As in an explicit domain, the planner chooses the designs for these parameters without
-//! grounding them into actions, unless reconfiguration costs make the designs part of the state.
+//! A domain is plain if it declares no type of function designs. An action that the knowledge base has as
+//! well (`move` as `move` or `a_move`, or by a binding) gets a parameter for the design of each function that
+//! the action requires. It also gets conditions: the design solves the function, is available, and meets the
+//! quality bounds of the action (`t:requiresQuality`). A quality bound with a context applies only in this
+//! context. A numeric function without parameters that is named like an estimated attribute, but is neither
+//! measured nor has an initial value, is replaced by the sum over the chosen designs. So is a function that
+//! is bound to `chosen:ATTRIBUTE`. A function that is bound to `reconfigured:ATTRIBUTE` is replaced by the
+//! sum over the newly chosen designs, i.e. those that replace another design of their function; the first
+//! design of a function is not counted. As in an explicit domain, the planner chooses the designs for these
+//! parameters without grounding them into actions, unless reconfiguration costs make the designs part of the
+//! state.
 
 mod spoken;
 mod walk;
@@ -45,8 +47,8 @@ pub struct CoAdaptation {
     actions: BTreeMap<Name, Needs>,
     /// Maps each numeric function to the attribute whose sum over the chosen designs replaces it.
     chosen: BTreeMap<Name, String>,
-    /// Maps each numeric function to the attribute whose sum over the newly chosen designs replaces
-    /// it.
+    /// Maps each numeric function to the attribute whose sum over the newly chosen designs (those that
+    /// replace another design of their function) replaces it.
     changed: BTreeMap<Name, String>,
 }
 
@@ -67,8 +69,8 @@ struct Needed {
 }
 
 impl CoAdaptation {
-    /// Determines the additions to a domain. Returns `None` if the domain declares a type of
-    /// designs, or if the knowledge base requires no function for its actions.
+    /// Determines the additions to a domain. Returns `None` if the domain declares a type of designs, or if
+    /// the knowledge base requires no function for the domain's actions.
     ///
     /// # Errors
     /// Function names that PDDL does not admit, contexts that are not predicates of the domain,
@@ -194,8 +196,8 @@ impl CoAdaptation {
         self.actions.get(&Name::new(action)).map(|needs| needs.parameters)
     }
 
-    /// Returns the explicit form of a plain domain: actions with parameters, conditions and effects
-    /// for their designs.
+    /// Returns the explicit form of a plain domain: actions with parameters, conditions and effects for their
+    /// designs, and the types, constants, predicates and numeric functions that these use.
     pub(super) fn explicit(&self, domain: &Domain) -> Domain {
         let mut explicit = domain.clone();
         for own in [FUNCTION, DESIGN] {
@@ -341,8 +343,9 @@ impl CoAdaptation {
         }
     }
 
-    /// Handles the numeric effects that use functions of newly chosen designs. Appends to `out` a
-    /// conditional effect for each design, which applies if the design was not in use before.
+    /// Appends to `out`, for each `increase` and `decrease` effect that uses functions of newly chosen
+    /// designs, a conditional effect for each design. It adds the design's share if the design replaces
+    /// another one.
     fn changes(&self, effect: &Effect, designs: &[(Identifier, &Needed)], out: &mut Vec<Effect>) {
         match effect {
             Effect::And(parts) => parts.iter().for_each(|part| self.changes(part, designs, out)),
@@ -439,8 +442,8 @@ fn changed(design: &Identifier, function: &str) -> Condition {
     Condition::And(vec![configured, Condition::Not(Box::new(at_work))])
 }
 
-/// Returns two maps from numeric functions to attributes: functions that are sums over the chosen
-/// designs, and functions that are sums over the newly chosen designs.
+/// Returns two maps from numeric functions to attributes: functions that are sums over the chosen designs,
+/// and functions that are sums over the newly chosen designs (those that replace another design).
 fn attributes(
     domain: &Domain,
     problem: &Problem,

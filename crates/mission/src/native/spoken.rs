@@ -1,5 +1,5 @@
-//! Translates predicates of the explicit form for display, because the user's files do not contain
-//! them.
+//! Names of the explicit form of a plain domain that the user's files do not contain: recognises them, and
+//! translates them for display.
 
 use pddl::ast::Name;
 
@@ -12,7 +12,8 @@ impl CoAdaptation {
         self.chosen.contains_key(function) || self.changed.contains_key(function)
     }
 
-    /// Rewrites a condition for display: predicates that co-adaptation has added are replaced.
+    /// Rewrites a condition for display: the predicate that a design meets a quality bound becomes `(meets
+    /// DESIGN BOUND)`.
     pub(crate) fn spoken(&self, condition: &str) -> String {
         let mut text = condition.to_owned();
         for quality in self.quality() {

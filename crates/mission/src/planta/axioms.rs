@@ -171,7 +171,7 @@ impl Terms {
     }
 }
 
-/// Returns the name of an axiom's kind in the OWL specification.
+/// Returns the name of an axiom's kind in the OWL specification, or a description of several kinds.
 fn kind(axiom: &Axiom) -> &'static str {
     match axiom {
         Axiom::EquivalentClasses(_) => "EquivalentClasses",

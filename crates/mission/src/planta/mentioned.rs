@@ -14,7 +14,8 @@ pub(super) fn undeclared(domain: &Domain) -> BTreeSet<Name> {
     used
 }
 
-/// Returns the types of parameters, constants and objects, and the declared types.
+/// Returns the declared types and their supertypes, and the types of constants, objects and parameters (not
+/// those of quantified variables).
 pub(super) fn types(domain: &Domain, problem: &Problem) -> BTreeSet<Name> {
     let mut types = BTreeSet::new();
     let mut note = |r#type: &TypeExpression| {

@@ -33,9 +33,9 @@ use names::{EQUAL, LESS, NUMBER_TYPES, UNGROUND, UNREALISABLE};
 use syntax::{Fact as PddlFact, atom, object};
 pub use terms::Terms;
 
-/// Returns the translation of an ontology to PDDL if the domain is in PLANTA's form: it uses
-/// undeclared predicates, and at least one of them is `inferred-…` or has the name of a class or
-/// property. Otherwise returns `None`.
+/// Returns the translation of an ontology to PDDL if the domain is in PLANTA's form: it uses undeclared
+/// predicates, and at least one of them is `inferred-…` or has the name of a class or property. Otherwise, or
+/// if the domain has no readable definition, returns `None`.
 pub(crate) fn wanted(ontology: &Ontology, domain: &str) -> Option<Terms> {
     let source = Source::new("domain", domain);
     let missing = mentioned::undeclared(&pddl::parse_domain(&source).0?);
@@ -58,8 +58,9 @@ pub(crate) struct Planta {
 }
 
 impl Planta {
-    /// Completes a domain with types, constants, predicates and axioms from the knowledge base.
-    /// Returns the translation state, the completed domain, and warnings.
+    /// Completes a domain with types, constants, predicates and axioms from the knowledge base. Removes
+    /// objects of the problem that repeat constants with an undeclared type. Returns the translation state,
+    /// the completed domain, and warnings.
     pub(crate) fn new(
         terms: &Arc<Terms>,
         domain: &Domain,
@@ -105,8 +106,8 @@ impl Planta {
         errors.collect()
     }
 
-    /// Adds the asserted facts `stated` and the comparisons of numbers to a problem. Returns
-    /// warnings.
+    /// Adds the asserted facts `stated`, their objects, and the comparisons of numbers to a problem. Removes
+    /// contradictory values of functional properties. Returns warnings.
     pub(crate) fn fill(
         &self,
         domain: &Domain,

@@ -101,7 +101,8 @@ fn term(argument: &Argument, variables: &mut Variables, terms: &mut Terms) -> Te
     }
 }
 
-/// Translates a body atom of a rule. Returns `None` if the atom is a tautology.
+/// Translates a body atom of a rule. Returns `None` for an atom of `owl:Thing` or `owl:Nothing`, which have
+/// no predicate.
 fn condition(
     stated: &Atom,
     variables: &mut Variables,

@@ -145,15 +145,15 @@ impl<'a> Checker<'a> {
         for (index, term) in atom.arguments.iter().enumerate() {
             let info = self.term(term, scope);
             let (Some(actual), Some(parameter)) = (info, declaration.parameters.get(index)) else { continue };
-            // With a wrong number of arguments, positions do not correspond.
+            // With a wrong number of arguments, arguments and parameters do not correspond.
             if arity == count && !self.argument_fits(&actual, &parameter.r#type) {
                 self.argument_type(atom, index, &actual, parameter);
             }
         }
     }
 
-    /// Checks that an assigned variable has the value type of the function. A wider type is an error, because
-    /// no further condition narrows it.
+    /// Checks that the value type of an object fluent covers the type of the variable that is assigned to it.
+    /// A wider type is an error, because no further condition narrows it.
     pub(super) fn assigned_value(&mut self, atom: &'a Atom, scope: &Scope<'a>) {
         let symbols = self.symbols;
         let declaration = symbols.predicates.get(&atom.predicate.name);
@@ -219,8 +219,8 @@ impl<'a> Checker<'a> {
         let is_value = index + 1 == atom.arguments.len() && self.symbols.object_fluents.contains(name);
         let subject = if is_value { "the value".to_owned() } else { format!("argument {}", index + 1) };
         let message = format!("{subject} of `{name}` is {parameter}, but `{shown}` is {argument}");
-        // As the value of an object fluent, an untyped object would violate functionality: the deletions of
-        // an assignment range over the declared type only.
+        // With an untyped object as its value, an object fluent could get a second value: an assignment
+        // deletes only the values of the declared type.
         if is_untyped && !is_value {
             self.sink.warning("P126", span, message).help("give it a type in `:objects` or `:constants`");
         } else {

@@ -1,4 +1,5 @@
-//! Checks requirements, types, constants, objects, predicates and functions.
+//! Checks requirements, types, constants, objects, predicates, functions and parameters, and the domain that
+//! the problem names.
 
 use rustc_hash::FxHashMap;
 
@@ -203,7 +204,8 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Checks the parameters of an action, an axiom or a quantifier.
+    /// Checks that the parameters of an action, an axiom or a quantifier have declared types and different
+    /// names.
     pub(super) fn parameters(&mut self, parameters: &[TypedName]) {
         let mut declared: FxHashMap<&Name, Span> = FxHashMap::default();
         for parameter in parameters {

@@ -1,4 +1,5 @@
-//! Semantic checks of a domain and a problem: symbols are declared and used with the declared types.
+//! Semantic checks of a domain and a problem: symbols are declared and used with the declared types,
+//! declarations do not contradict each other, and no derived predicate depends on its own negation.
 
 mod action;
 mod condition;
@@ -21,13 +22,15 @@ const UNDECLARED_CODES: [&str; 5] = ["P120", "P121", "P122", "P123", "P136"];
 /// `OWLToPDDL`.
 const MIN_TEMPLATE_PREDICATES: usize = 3;
 
-/// Checks a domain without a problem. Returns errors and warnings.
+/// Checks a domain without a problem. Returns errors and warnings. For a template of PLANTA's `OWLToPDDL`,
+/// one error P134 replaces the messages about undeclared names.
 pub fn check_domain(domain: &Domain, source: &Source) -> Vec<Diagnostic> {
     let symbols = Symbols::of(domain, None);
     check_domain_with(domain, source, &symbols).0
 }
 
-/// Checks a domain and a problem. Returns errors and warnings. Messages about the domain come first.
+/// Checks a domain and a problem. Returns errors and warnings. Messages about the domain come first. For a
+/// template of PLANTA's `OWLToPDDL`, one error P134 replaces the messages about undeclared names.
 pub fn check(
     domain: &Domain,
     domain_source: &Source,
@@ -101,7 +104,7 @@ fn template_message(domain: &Domain, source: &Source, inferred_count: usize) -> 
     diagnostic
 }
 
-/// Checker state.
+/// State of the checks of one file.
 struct Checker<'a> {
     symbols: &'a Symbols<'a>,
     sink: Sink<'a>,
@@ -124,7 +127,8 @@ impl<'a> Checker<'a> {
         Self { symbols, sink, undeclared_inferred, in_domain: false, in_durative_action: false }
     }
 
-    /// Reports an undeclared name and suggests the most similar name among `candidates`.
+    /// Reports an undeclared name. Suggests the most similar name among `candidates`, if one is similar and
+    /// the sink is not full.
     fn undeclared<'n>(
         &mut self,
         code: &'static str,
@@ -140,7 +144,7 @@ impl<'a> Checker<'a> {
     }
 }
 
-/// Maximum number of candidates for a suggestion.
+/// Maximum number of declared names that are compared with an undeclared name.
 const MAX_CANDIDATES: usize = 5_000;
 
 fn did_you_mean<'n>(written: &str, candidates: impl IntoIterator<Item = &'n Name>) -> Option<String> {

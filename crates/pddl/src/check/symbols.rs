@@ -14,7 +14,8 @@ pub(super) struct Object<'a> {
     pub(super) is_constant: bool,
 }
 
-/// Declared symbols of a domain and a problem by name. The first of several declarations counts.
+/// Declared symbols of a domain and a problem, by name. Of several declarations of a predicate or a function,
+/// the first counts.
 #[derive(Debug)]
 pub(super) struct Symbols<'a> {
     pub(super) types: TypeHierarchy,

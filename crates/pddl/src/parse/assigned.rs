@@ -55,8 +55,8 @@ impl Parser<'_> {
 }
 
 impl Assigned {
-    /// Returns `true` if different instances of the assignment set different terms, that is, if each
-    /// quantified variable is an argument.
+    /// Returns `true` if no two instances of the assignment set the same fluent, that is, if each variable of
+    /// an enclosing quantifier is an argument.
     fn is_functional(&self) -> bool {
         let is_argument = |variable: &TypedName| {
             self.arguments.iter().any(
@@ -67,8 +67,8 @@ impl Assigned {
     }
 }
 
-/// Returns the condition that two assignments do not take place together, set different terms, or assign the
-/// same value. `None` if the condition is trivially true.
+/// Returns the condition that two assignments do not take place together, set different fluents, or assign
+/// the same value (or both `undefined`). `None` if the condition is trivially true.
 fn consistency(first: &Assigned, second: &Assigned) -> Option<Condition> {
     let equal =
         |left: &Term, right: &Term| Condition::Equal(left.clone(), right.clone(), first.function.span);
@@ -92,7 +92,7 @@ fn consistency(first: &Assigned, second: &Assigned) -> Option<Condition> {
     Some(if variables.is_empty() { need } else { Condition::ForAll(variables, Box::new(need)) })
 }
 
-/// Returns whether two terms are equal, if this is statically known.
+/// Returns whether two terms are equal, and `None` if this is not statically known.
 fn known_equality(left: &Term, right: &Term) -> Option<bool> {
     match (left, right) {
         (Term::Constant(left), Term::Constant(right)) => Some(left.name == right.name),

@@ -39,7 +39,8 @@ impl Parser<'_> {
         Some(domain)
     }
 
-    /// Returns the name in `(define (KIND NAME)` and the sections that follow.
+    /// Returns the name in `(define (KIND NAME)` and the sections that follow. If the text defines another
+    /// kind, reports an error and returns `None`.
     pub(super) fn header<'t>(
         &mut self,
         define: Item<'t>,
@@ -89,7 +90,8 @@ impl Parser<'_> {
             ":durative-action" => return domain.actions.extend(self.durative_action(section)),
             _ => return self.other_section(section, "domain"),
         }
-        // Warnings count as well. A false alarm only suppresses later messages of a file with errors.
+        // Once the file has an error, warnings about this section count as well. A false alarm only
+        // suppresses later messages about names.
         if self.sink.len() > message_count && self.sink.has_errors() {
             self.declarations_intact = false;
         }
@@ -106,7 +108,7 @@ impl Parser<'_> {
         }
     }
 
-    /// Reports a section whose keyword is unsupported or unknown.
+    /// Reports a section whose keyword is unsupported, unknown or ignored.
     pub(super) fn other_section(&mut self, section: Item<'_>, kind: &str) {
         let keyword = section.head().unwrap_or_default().to_ascii_lowercase();
         let refused = match keyword.as_str() {

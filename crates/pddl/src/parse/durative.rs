@@ -143,7 +143,8 @@ impl Parser<'_> {
         }
     }
 
-    /// Parses `(when (at T (p)) (at T (q)))`. Both times must be equal.
+    /// Parses `(when (at T (p)) (at T (q)))` and appends conditional effects to `timed_effects`. All times
+    /// must be equal.
     fn timed_when(&mut self, item: Item<'_>, timed_effects: &mut TimedEffects) {
         let Some([condition, effect]) = self.operands(item, "(when (at end (p)) (at end (q)))") else {
             return;

@@ -48,7 +48,7 @@ impl Parser<'_> {
         }
     }
 
-    /// Parses `(predicate terms)`.
+    /// Parses `(predicate terms)`. `description` names the expected construct in messages, with its article.
     pub(super) fn atom(&mut self, item: Item<'_>, description: &str) -> Option<Atom> {
         let Some(first) = item.items().next() else {
             self.expected(item, description);
@@ -137,7 +137,8 @@ impl Parser<'_> {
         (operands.len() == count).then_some(Expression::Operation(operation, operands, item.span()))
     }
 
-    /// Parses an expression without functions, as required in `:init`, and returns its value.
+    /// Parses an expression without functions, as required in `:init` and for times of trajectory
+    /// constraints, and returns its value. Reports an error if there is none.
     pub(super) fn constant(&mut self, item: Item<'_>) -> Option<BigRational> {
         let expression = self.expression(item)?;
         let value = evaluate(&expression);
@@ -148,7 +149,8 @@ impl Parser<'_> {
     }
 }
 
-/// Evaluates an expression without functions.
+/// Evaluates an expression. `None` if it contains a function, divides by zero, or has an intermediate result
+/// that exceeds [`MAX_BITS`].
 fn evaluate(expression: &Expression) -> Option<BigRational> {
     match expression {
         Expression::Number(value, _) => Some(value.clone()),
@@ -164,8 +166,8 @@ fn evaluate(expression: &Expression) -> Option<BigRational> {
     }
 }
 
-/// Maximum number of bits of a number computed during parsing. Such a number can still be written as a
-/// literal.
+/// Maximum number of bits of the numerator and of the denominator of a number that is computed during
+/// parsing, about 90 decimal digits.
 const MAX_BITS: u64 = 300;
 
 fn apply(operation: Arithmetic, left: &BigRational, right: &BigRational) -> Option<BigRational> {

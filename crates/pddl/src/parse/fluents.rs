@@ -9,13 +9,13 @@ use crate::types::TypeHierarchy;
 /// parsed.
 #[derive(Default)]
 pub(super) struct Objects {
-    /// Predicates that represent object fluents.
+    /// Predicates that represent object fluents, by name. The last parameter is the value.
     pub(super) functions: FxHashMap<Name, Declaration>,
     /// Declared types.
     pub(super) types: FxHashSet<Name>,
-    /// Common prefix of new variables; `None` before the first one.
+    /// Common prefix of the names of generated variables; `None` before the first is generated.
     pub(super) prefix: Option<String>,
-    /// Number of new variables.
+    /// Number of generated variables.
     pub(super) count: usize,
     /// Whether the current context allows terms with object fluents.
     pub(super) is_open: bool,
@@ -32,14 +32,14 @@ pub(super) struct Objects {
     pub(super) initial: FxHashMap<(Name, Vec<Name>), (Option<Name>, Span)>,
 }
 
-/// Variable for the value of a term, and the atom that binds it.
+/// Variable for the value of an object-fluent term, and the atom that binds the variable.
 pub(super) struct Value {
     pub(super) variable: TypedName,
     pub(super) atom: Atom,
 }
 
-/// Lengths of `needs` and `assigned` at some point of parsing. Later entries belong to effects parsed after
-/// this point.
+/// Lengths of [`Objects::needs`] and [`Objects::assigned`] at some point of parsing. Later entries belong to
+/// effects parsed after this point.
 #[derive(Clone, Copy)]
 pub(super) struct Mark {
     pub(super) needs: usize,
@@ -82,8 +82,8 @@ pub(super) struct Assigned {
     pub(super) value: Option<Term>,
     /// Variables of the enclosing quantifiers.
     pub(super) variables: Vec<TypedName>,
-    /// New variables for the values of object-fluent terms within the assignment.
+    /// Generated variables for the values of object-fluent terms within the assignment.
     pub(super) values: Vec<TypedName>,
-    /// Conditions of the enclosing `when` effects.
+    /// Conditions of the enclosing `when` effects, and the atoms that bind `values`.
     pub(super) conditions: Vec<Condition>,
 }

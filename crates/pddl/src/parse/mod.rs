@@ -40,7 +40,8 @@ pub fn parse_problem(source: &Source) -> (Option<Problem>, Vec<Diagnostic>) {
     (parsed.tree, parsed.diagnostics)
 }
 
-/// Parses a problem of a domain that may declare object fluents (functions with objects as values).
+/// Parses a problem of a domain that may declare object fluents (functions with objects as values). In case
+/// of errors the tree lacks the unreadable parts, or is absent.
 pub fn parse_problem_of(domain: &Domain, source: &Source) -> (Option<Problem>, Vec<Diagnostic>) {
     let parsed = problem_of(domain, source);
     (parsed.tree, parsed.diagnostics)
@@ -214,7 +215,7 @@ impl Parser<'_> {
         operands
     }
 
-    /// Reads a number.
+    /// Parses a number. Reports anything else, and a number that is too long.
     fn number(&mut self, item: Item<'_>) -> Option<num_rational::BigRational> {
         match item.symbol().map(literal) {
             Some(Literal::Number(value)) => Some(value),

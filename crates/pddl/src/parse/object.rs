@@ -23,7 +23,8 @@ use super::{Parser, at_start};
 const UNDEFINED: &str = "undefined";
 
 impl Parser<'_> {
-    /// Declares an object fluent as a predicate with an additional parameter for the value.
+    /// Declares an object fluent as a predicate with an additional parameter for the value. Reports a
+    /// repeated declaration.
     pub(super) fn object_fluent(
         &mut self,
         mut declaration: Declaration,
@@ -103,7 +104,7 @@ impl Parser<'_> {
         let mut r#type = declaration
             .and_then(|declaration| declaration.parameters.last())
             .map_or_else(TypeExpression::default, |parameter| parameter.r#type.clone());
-        // An undeclared type was reported where it is declared for the function; here it restricts nothing.
+        // An undeclared value type is reported at the declaration of the function; here it restricts nothing.
         r#type.alternatives.retain(|alternative| self.objects.types.contains(&alternative.name));
         r#type.alternatives.iter_mut().for_each(|alternative| alternative.span = span);
         TypedName { identifier: self.new_variable(span), r#type }
@@ -114,7 +115,7 @@ impl Parser<'_> {
         item.head().is_some_and(|head| self.objects.contains(&Name::new(head)))
     }
 
-    /// Reports an object fluent in place of a predicate or a number.
+    /// Reports an object fluent in place of a predicate or a number. Always returns `None`.
     pub(super) fn misplaced_object_fluent<T>(&mut self, item: Item<'_>, name: &Name) -> Option<T> {
         self.sink
             .error("P106", at_start(item), format!("`{name}` is a function with an object as its value"))
@@ -253,8 +254,8 @@ impl Parser<'_> {
         Some(effect)
     }
 
-    /// Parses an effect and binds the values of its object-fluent terms by `forall` and `when`. A missing
-    /// value makes the action inexecutable.
+    /// Parses an effect and binds the values of its object-fluent terms by `forall` and `when`. The existence
+    /// of the values becomes a condition of the action.
     pub(super) fn for_values(&mut self, read: impl FnOnce(&mut Self) -> Option<Effect>) -> Option<Effect> {
         let mark = self.mark_effects();
         let (effect, values) = self.with_terms(read)?;
@@ -284,8 +285,8 @@ impl Parser<'_> {
         Mark { needs: self.objects.needs.len(), assigned: self.objects.assigned.len() }
     }
 
-    /// Quantifies the needs of all effects parsed since `mark` over `variables`. Needs are conditions that
-    /// effects impose on the state.
+    /// Quantifies universally over `variables` the needs of all effects parsed since `mark`. Needs are
+    /// conditions that effects impose on the state.
     pub(super) fn effects_below(&mut self, mark: Mark, variables: &[TypedName]) {
         for (_, need) in &mut self.objects.needs[mark.needs..] {
             let inner = std::mem::replace(need, Condition::And(Vec::new()));
@@ -321,7 +322,8 @@ impl Parser<'_> {
         needs.into_iter().map(|(time, need)| (at(time), need)).collect()
     }
 
-    /// Reads `(= (place-of tool) here)` in the initial state.
+    /// Parses `(= (place-of tool) here)` in the initial state. Returns `None` for the value `undefined`, and
+    /// after a reported error.
     pub(super) fn initial_object(&mut self, left: Item<'_>, right: Item<'_>) -> Option<InitialElement> {
         let (term, value_item) = if self.is_object_fluent(left) { (left, right) } else { (right, left) };
         let (predicate, mut arguments) = self.object_term(term)?;

@@ -129,8 +129,8 @@ impl Parser<'_> {
         Some(Declaration { identifier, parameters })
     }
 
-    /// Parses the declarations of `:functions` with the types of their values: `(f ?x) - number`,
-    /// `(place-of ?x) - place`, `(g)`.
+    /// Parses the declarations of `:functions` with the types of their values: `(f ?x) - number`, `(place-of
+    /// ?x) - place`, `(g)`. Functions with other values than numbers are declared as object fluents.
     pub(super) fn function_list(&mut self, items: Items<'_>, domain: &mut Domain) {
         let mut untyped = Vec::new();
         let mut items = items;

@@ -1,7 +1,7 @@
-//! Pretty printer for nested lists. A list that fits is printed on one line; otherwise each of its items is
-//! on a separate line.
+//! Pretty printer for nested lists. A list that fits is printed on one line; otherwise each item after the
+//! first ones is on a separate line.
 
-/// Maximum line width, in characters.
+/// Maximum width of a list that is printed on one line, in characters, including the indentation.
 const WIDTH: usize = 100;
 
 /// A list or a word, with its width.
@@ -43,7 +43,8 @@ pub(super) fn list(head: &str, first_line_items: usize, items: impl IntoIterator
 }
 
 impl Doc {
-    /// Forces the list onto several lines: each item after the first line gets a separate line.
+    /// Prints the list on several lines even if it fits: each item after the first line gets a separate line.
+    /// Has no effect on a word, or if all items stay on the first line.
     pub(super) fn broken(mut self) -> Self {
         self.is_broken = match &self.content {
             Content::Text(_) => false,

@@ -1,7 +1,8 @@
 //! Prints syntax trees as text that other planners accept. Parsing the printed text and printing it again
 //! yields the same text.
 //!
-//! Empty sections and empty preconditions are omitted, because several planners reject them.
+//! Empty sections other than `:init` and `:goal`, and empty preconditions, are omitted, because several
+//! planners reject them.
 
 mod layout;
 mod soft;

@@ -126,8 +126,8 @@ pub(super) fn duration(constraints: &[DurationConstraint]) -> Doc {
     }
 }
 
-/// Formats a typed list in groups of equal type, each name with `prefix`. The type `object` may be omitted
-/// only at the end, because a type applies to all preceding untyped names.
+/// Formats a typed list: one text for each group of successive names of equal type, each name with `prefix`.
+/// The type `object` may be omitted only at the end, because a type applies to all preceding untyped names.
 #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
 pub(super) fn typed(prefix: &str, entries: &[TypedName]) -> Vec<String> {
     let bare_from =

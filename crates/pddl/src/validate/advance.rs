@@ -24,13 +24,13 @@ use super::world::{Arguments, State, Symbol, World};
 /// Changes of one step.
 #[derive(Debug, Clone)]
 pub struct Advance {
-    /// Facts that become true, sorted.
+    /// Facts that become true, sorted by their text. Derived facts are not included.
     pub added: Vec<Atom>,
-    /// Facts that become false, sorted.
+    /// Facts that become false, sorted by their text. Derived facts are not included.
     pub deleted: Vec<Atom>,
     /// Numeric functions that the step changes, sorted.
     pub values: Vec<ValueChange>,
-    /// Duration, in the domain's time unit.
+    /// Duration of the step, in the domain's time unit.
     pub duration: BigRational,
     /// Metric value if the plan ended with the step; `None` without a metric or if the value is undefined.
     pub metric: Option<BigRational>,

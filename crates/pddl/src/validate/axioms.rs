@@ -95,7 +95,7 @@ struct Walk<'w, 'p> {
 
 impl<'p> Walk<'_, 'p> {
     /// Records the atoms of the stratum's predicates below `condition`. Returns `true` if the condition is
-    /// opaque: it mentions such a predicate where new facts cannot be joined.
+    /// opaque: it mentions such a predicate in a part into which new facts cannot be joined.
     fn visit(&mut self, condition: &'p Condition) -> bool {
         let mut is_opaque = false;
         match condition {

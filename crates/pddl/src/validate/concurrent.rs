@@ -23,8 +23,8 @@ struct Recent<'e, 'p> {
     footprint: Footprint,
 }
 
-/// Executes the steps at their start times. Sets `total_time` to the end of the last action and applies all
-/// events (timed initial literals) up to this time.
+/// Executes the steps at their start times until the first violation. Sets `total_time` to the end of the
+/// last executed action and applies all events (timed initial literals) up to this time.
 pub(super) fn run<'e, 'p>(
     execution: &mut Execution<'e, 'p>,
     steps: &'e [Step<'p>],
@@ -124,8 +124,8 @@ struct Simultaneous<'e, 'p> {
 }
 
 impl<'e, 'p> Simultaneous<'e, 'p> {
-    /// Checks that the happenings interfere neither with each other nor with the `recent` happenings. Adds
-    /// them to `recent`.
+    /// Checks that the happenings interfere neither with each other nor with the `recent` happenings, except
+    /// events among themselves and the two happenings of one step. Adds the happenings to `recent`.
     fn check_separation(
         &mut self,
         execution: &Execution<'e, 'p>,
@@ -159,8 +159,8 @@ impl<'e, 'p> Simultaneous<'e, 'p> {
     }
 }
 
-/// Checks that a happening does not interfere with a recent happening. Two happenings of the same step are
-/// not compared.
+/// Checks that a happening does not interfere with a recent happening. Two events, and two happenings of the
+/// same step, are not compared.
 fn check_pair<'p>(
     execution: &Execution<'_, 'p>,
     (step, time, footprint): (Option<&Step<'p>>, &BigRational, &Footprint),

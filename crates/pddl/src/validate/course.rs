@@ -1,5 +1,5 @@
-//! Numeric trace of a plan: the value of each function after each happening, and the bounds that conditions
-//! impose.
+//! Numeric trace of a plan: the new values of functions at each start and end of an action, and the bounds
+//! that conditions impose.
 //!
 //! Used for charts of plans that [`validate`](super::validate()) has accepted. Effects are applied by the
 //! same rules; conditions are not checked again.
@@ -66,7 +66,8 @@ pub struct NumberBound {
 /// Executes a plan and records the numbers. A step without a start time begins when the preceding step ends.
 ///
 /// # Errors
-/// Returns a violation if a step is not an action of the domain, or if an effect is undefined.
+/// Returns a violation if a step is not an action of the domain, if its duration is missing or violates the
+/// domain's constraints, or if its effects are undefined or conflict.
 pub fn course(domain: &Domain, problem: &Problem, plan: &PlanText) -> Result<Course, Box<Violation>> {
     let world = World::new(domain, problem, &|| false);
     let texts = plan.steps.iter().zip(1..);
@@ -115,8 +116,8 @@ struct Follower<'e, 'p> {
 }
 
 impl<'e, 'p> Follower<'e, 'p> {
-    /// Starts a step at its start time, or at the end of the preceding step. Returns `None` if the action
-    /// takes no time and has already ended.
+    /// Starts a step at its start time or, if none is stated, at the time of the last end of an action.
+    /// Returns `None` if the action takes no time and has already ended.
     fn start(&mut self, index: usize, step: &'e Step<'p>) -> Result<Option<Running<'e, 'p>>, Box<Violation>> {
         let time = step.text.start.clone().unwrap_or_else(|| self.clock.clone());
         self.execution.apply_events_until(&time, true);
@@ -191,8 +192,9 @@ impl<'e, 'p> Follower<'e, 'p> {
         self.course.goal = bounds;
     }
 
-    /// Appends the bounds that a condition imposes on changeable functions. Only the condition itself and its
-    /// conjuncts are considered.
+    /// Appends the bounds that a condition imposes on functions that actions can change. Only comparisons
+    /// that have such a function alone on one side are considered, and only if the condition is one or has
+    /// them as conjuncts.
     fn collect_bounds(
         &self,
         evaluator: &Evaluator<'_, 'p>,

@@ -30,7 +30,8 @@ pub(super) fn derive_facts(world: &World<'_>, state: &mut State) {
     }
 }
 
-/// An instance of an axiom with an opaque condition. It is re-evaluated until its condition holds.
+/// An instance of an axiom with an opaque condition (one into which new facts cannot be joined). The instance
+/// is re-evaluated until its condition holds.
 struct WaitingInstance {
     axiom: usize,
     arguments: Arguments,
@@ -88,8 +89,9 @@ impl<'p> Closure<'_, 'p> {
         }
     }
 
-    /// Returns the head arguments for which the condition of an axiom holds, ignoring its opaque parts. A
-    /// seed restricts the solutions to those in which the occurrence matches the given fact.
+    /// Returns the head arguments for which the condition of an axiom holds, ignoring its opaque parts (those
+    /// into which new facts cannot be joined). A seed restricts the solutions to those in which the
+    /// occurrence matches the given fact.
     fn heads(&self, axiom: usize, seed: Option<(&Occurrence<'p>, &Arguments)>) -> Vec<Arguments> {
         let Axiom { derived, opaque } = &self.stratum.axioms[axiom];
         let derived: &'p Derived = derived;
@@ -123,8 +125,8 @@ impl<'p> Closure<'_, 'p> {
         heads
     }
 
-    /// Derives the heads of an axiom. If the condition has opaque parts, a head is derived only after its
-    /// whole condition has been evaluated.
+    /// Derives the heads of an axiom. If the condition has opaque parts (into which new facts cannot be
+    /// joined), a head is derived only after its whole condition has been evaluated.
     fn conclude(&mut self, axiom: usize, heads: Vec<Arguments>) {
         let is_opaque = !self.stratum.axioms[axiom].opaque.is_empty();
         for arguments in heads {

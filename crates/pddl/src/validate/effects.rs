@@ -103,7 +103,7 @@ fn change(kind: Assignment, value: BigRational) -> Result<Change, Undefined> {
 
 impl Changes {
     /// Combines a numeric change with the earlier changes of the same function. Returns an error if the
-    /// changes do not commute.
+    /// changes do not commute, or if their combination is too large.
     fn record(&mut self, target: Ground, change: Change) -> Result<(), EffectError> {
         let combined = match (self.numeric.get(&target), change) {
             (None, change) => change,
@@ -122,7 +122,8 @@ impl Changes {
         Ok(())
     }
 
-    /// Adds the changes of another simultaneous action. Returns an error if numeric changes do not commute.
+    /// Adds the changes of another part of the same happening, for example of a simultaneous action. Returns
+    /// an error if numeric changes do not commute.
     pub(super) fn merge(&mut self, other: Self) -> Result<(), EffectError> {
         self.added.extend(other.added);
         self.deleted.extend(other.deleted);

@@ -1,7 +1,8 @@
 //! Evaluates conditions and expressions in a state, directly on the syntax tree.
 //!
-//! A comparison with an undefined function is neither true nor false (Kleene's three-valued logic). A
-//! compound condition is undefined only if its truth depends on such a comparison.
+//! A comparison with an undefined value (a function without a value, or a division by zero) is neither true
+//! nor false (Kleene's three-valued logic). A compound condition is undefined only if its truth depends on
+//! such a comparison.
 
 use num_rational::BigRational;
 use num_traits::Zero;
@@ -21,7 +22,7 @@ pub(super) enum Undefined {
     Function(String),
     /// A division by zero.
     Division,
-    /// A number with more than [`BITS_LIMIT`] bits.
+    /// A number whose numerator or denominator has more than [`BITS_LIMIT`] bits.
     Size,
     /// `?duration` or `total-time` in a context that does not define it.
     Place,
@@ -236,8 +237,8 @@ impl<'e, 'p> Evaluator<'e, 'p> {
 }
 
 impl<'p> World<'p> {
-    /// Calls `visit` for each assignment of objects to variables until `visit` returns `false`. Returns
-    /// `true` if all assignments were visited.
+    /// Calls `visit` for each assignment of objects to `variables`, until `visit` returns `false` or the
+    /// budget is spent. Returns `true` if all assignments were visited.
     #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     pub(super) fn each(
         &self,

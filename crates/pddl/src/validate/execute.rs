@@ -64,8 +64,9 @@ impl<'e, 'p> Execution<'e, 'p> {
         self.pending.last().map(|(time, ..)| time)
     }
 
-    /// Starts a step as an instance of the first schema whose start conditions hold, and determines the
-    /// duration.
+    /// Starts a step as an instance of the first schema whose duration constraints and conditions at start
+    /// hold, and determines the duration. If there is none, returns the violation of the first schema that
+    /// fits the step.
     pub(super) fn begin(
         &self,
         step: &'e Step<'p>,
@@ -84,7 +85,8 @@ impl<'e, 'p> Execution<'e, 'p> {
         Err(first_violation.unwrap_or_else(|| unresolved(self.world, step, time)))
     }
 
-    /// Starts a step as an instance of the first matching schema, without checking its conditions.
+    /// Starts a step as an instance of the first schema that fits its name and objects. Conditions are not
+    /// checked, but the duration is.
     pub(super) fn begin_anyway(
         &self,
         step: &'e Step<'p>,
@@ -117,8 +119,9 @@ impl<'e, 'p> Execution<'e, 'p> {
         Ok(running)
     }
 
-    /// Determines the duration of a step: the exact value if the domain fixes it, else the value stated in
-    /// the plan. A stated value must satisfy all duration constraints at start within the tolerance.
+    /// Determines the duration of a step: the exact value if an equality of the domain fixes it, else the
+    /// value stated in the plan. A stated value must satisfy all duration constraints at start within the
+    /// tolerance. Without a stated value, only the first equality is used.
     fn duration(
         &self,
         step: &Step<'p>,
@@ -182,8 +185,8 @@ impl<'e, 'p> Execution<'e, 'p> {
         Err(step.violation(time, ViolationKind::Duration, message))
     }
 
-    /// Checks the conditions of an action at its start, over all, or at its end. An unsatisfied condition is
-    /// a violation.
+    /// Checks the conditions of an action at its start, over all, or at its end; at the end, also the
+    /// duration constraints at end. An unsatisfied or undefined condition is a violation.
     pub(super) fn check(
         &self,
         running: &Running<'e, 'p>,
@@ -260,7 +263,8 @@ impl<'e, 'p> Execution<'e, 'p> {
     }
 
     /// Applies the changes of a happening to the state. Recomputes the derived facts if a changed fact or
-    /// function occurs in a condition of an axiom.
+    /// function occurs in a condition of an axiom. Returns a violation if a changed function has no value or
+    /// its new value is too large.
     pub(super) fn apply(
         &mut self,
         step: &Step<'p>,

@@ -10,8 +10,8 @@ use super::evaluate::{Bindings, Evaluator, Undefined};
 use super::verdict::Unmet;
 use super::world::World;
 
-/// Returns the conjuncts of a condition that do not hold, with the values of the numeric functions that they
-/// read.
+/// Returns the conjuncts of a condition that are false or undefined. Each has the values of the numeric
+/// functions that it reads, except those that depend on quantified variables.
 pub(super) fn unmet<'p>(
     evaluator: Evaluator<'_, 'p>,
     condition: &'p Condition,

@@ -40,8 +40,9 @@ impl Running<'_, '_> {
 }
 
 impl<'e, 'p> Execution<'e, 'p> {
-    /// Computes the changes of a part of an action in the current state. Checks the conditions at end if the
-    /// part includes the end; the caller must have checked the conditions at start.
+    /// Computes the changes of a part of an action in the current state. If the part includes the end, checks
+    /// the conditions at end; if it is the whole durative action, checks that start and end do not interfere.
+    /// The caller must have checked the conditions at start.
     pub(super) fn happening(
         &self,
         running: &Running<'e, 'p>,
@@ -103,7 +104,7 @@ impl<'e, 'p> Execution<'e, 'p> {
     }
 
     /// Removes the pending events (timed initial literals) of the next event time and returns them as one
-    /// happening.
+    /// happening with this time. `None` if no events are pending.
     pub(super) fn take_next_timed(&mut self) -> Option<(BigRational, Happening)> {
         let time = self.next_timed()?.clone();
         let mut changes = Changes::default();
@@ -122,8 +123,8 @@ impl<'e, 'p> Execution<'e, 'p> {
         Some((time, Happening { changes, footprint }))
     }
 
-    /// Executes a part of an action in sequential execution. Events at the same time are applied first and
-    /// must not interfere with the part.
+    /// Executes a part of an action in sequential execution. Applies all pending events up to `time` first;
+    /// those at `time` must not interfere with the part.
     pub(super) fn execute(
         &mut self,
         running: &Running<'e, 'p>,

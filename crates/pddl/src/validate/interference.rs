@@ -51,7 +51,7 @@ impl Pattern {
     }
 }
 
-/// Read and write sets of the start or the end of an action.
+/// Read and write sets of a happening: the start or the end of an action, or both, or timed initial literals.
 #[derive(Debug, Default)]
 pub(super) struct Footprint {
     facts_read: Vec<Pattern>,

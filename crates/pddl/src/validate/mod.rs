@@ -65,8 +65,8 @@ pub fn validate(domain: &Domain, problem: &Problem, plan: &PlanText, options: &O
     judge_readings(&World::new(domain, problem, &|| false), plan, options)
 }
 
-/// Executes a plan like [`validate`], but ends early once `stop` returns `true`. `stop` is called every few
-/// hundred steps of each loop.
+/// Executes a plan like [`validate`], but ends early once `stop` returns `true`. `stop` is called at the
+/// beginning, and then every few hundred steps of each loop.
 ///
 /// # Errors
 /// Returns [`Interrupted`] if `stop` has returned `true`.
@@ -85,7 +85,9 @@ pub fn validate_within(
     world.budget.check(verdict)
 }
 
-/// Executes all readings of a plan and returns the best verdict.
+/// Executes a plan with the first schema that can start for each step. If there are several readings, but not
+/// more than [`MAX_READINGS`], executes each of them as well. Returns the best verdict, which is meaningless
+/// after an interruption.
 #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
 fn judge_readings(world: &World<'_>, plan: &PlanText, options: &Options) -> Verdict {
     let steps: Vec<_> =

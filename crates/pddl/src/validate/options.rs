@@ -8,7 +8,7 @@ use num_rational::BigRational;
 #[non_exhaustive]
 pub struct Options {
     /// Whether actions may overlap, by the rules of PDDL 2.1. Otherwise each action begins when the preceding
-    /// one has ended.
+    /// one has ended, or later.
     pub concurrent: bool,
     /// Tolerance, in the domain's time unit; not negative.
     ///

@@ -17,7 +17,7 @@ pub struct PlanText {
 /// One action of a plan.
 #[derive(Debug, Clone)]
 pub struct PlanStep {
-    /// Name of the schema. Several schemas may share this name.
+    /// Name of the schema. Several schemas may have this name.
     pub action: Name,
     /// Objects for the parameters.
     pub arguments: Vec<Name>,
@@ -36,7 +36,8 @@ impl PlanText {
     ///
     /// # Errors
     ///
-    /// Returns an error for each line that is not a step.
+    /// Returns an error for each other line that is neither empty nor a comment, or a single error if the
+    /// text exceeds 4 GB.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions in a text in memory, which are at most its length"

@@ -34,7 +34,8 @@ impl Record {
         record
     }
 
-    /// Appends the state after a happening. A happening replaces the state after the events at the same time.
+    /// Appends the state after a happening. It replaces the last recorded state if that one results from
+    /// events at the same time. Without constraints nothing is recorded.
     pub(super) fn note(&mut self, time: &BigRational, state: &State, is_event: bool) {
         // Without constraints nothing is recorded, to save memory.
         let Some(last) = self.moments.last() else { return };
@@ -45,7 +46,7 @@ impl Record {
     }
 }
 
-/// Returns all constraints of a domain and a problem.
+/// Returns all constraints of a domain and a problem, including preferences.
 pub(super) fn constraints<'p>(world: &World<'p>) -> impl Iterator<Item = &'p Constraint> + use<'p> {
     world.domain.constraints.iter().chain(&world.problem.constraints)
 }

@@ -12,8 +12,9 @@ use crate::visit::Node;
 
 use super::plan::PlanStep;
 
-/// Returns the problem without the facts and values that neither the steps nor the metric can read. Returns
-/// `None` if the readable facts cannot be determined, for example with axioms.
+/// Returns the problem without facts and values that neither the steps nor the metric can read. Some unread
+/// ones may remain. Returns `None` if the readable facts cannot be determined, for example with axioms,
+/// constraints or quantifiers.
 pub(super) fn relevant(domain: &Domain, problem: &Problem, steps: &[PlanStep]) -> Option<Problem> {
     // Axioms and constraints can read every fact.
     let is_plain =

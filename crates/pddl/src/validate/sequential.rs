@@ -1,4 +1,5 @@
-//! Sequential execution of actions, in the order of their start times.
+//! Sequential execution of actions, in the order of their start times or, if a start time is missing, of the
+//! plan's text.
 
 use num_rational::BigRational;
 use num_traits::Zero;

@@ -49,8 +49,9 @@ impl Branch<'_, '_> {
 }
 
 impl<'e, 'p> Evaluator<'e, 'p> {
-    /// Calls `on_solution` for each binding of the unbound variables from position `first` on that satisfies
-    /// all `parts`. Returns `false` if the search ended early.
+    /// Calls `on_solution` for each binding of the unbound variables from position `first` on for which no
+    /// condition in `parts` is false. With disjunctions, a binding can occur several times. Returns `false`
+    /// if the search ended early, because `on_solution` returned `false` or the budget is spent.
     pub(super) fn solve(
         &self,
         parts: Vec<&'p Condition>,
@@ -101,7 +102,7 @@ impl<'e, 'p> Evaluator<'e, 'p> {
     }
 
     /// Evaluates the conditions whose variables are all bound and opens quantifiers. Returns the remaining
-    /// conditions, or `None` if a condition does not hold.
+    /// conditions, or `None` if a condition does not hold or the budget is spent.
     fn settle(&self, (mut todo, mut undefined): Goals<'p>, bindings: &mut Bindings<'p>) -> Option<Goals<'p>> {
         let mut unsolved = Vec::new();
         while let Some(condition) = todo.pop() {
@@ -173,7 +174,7 @@ impl<'e, 'p> Evaluator<'e, 'p> {
     }
 
     /// Tries the next option of a branching point. Returns the conditions to solve next, or `None` after the
-    /// last option.
+    /// last option or if the budget is spent.
     fn next(&self, branch: &mut Branch<'e, 'p>, bindings: &mut Bindings<'p>) -> Option<Goals<'p>> {
         branch.undo(bindings);
         let mut conditions = branch.open.clone();
@@ -203,8 +204,8 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         self.indexed_rows(atom, bindings).map_or_else(unindexed, <[Arguments]>::len)
     }
 
-    /// Facts that an atom may match. If no plan can change the predicate, only facts that agree with the atom
-    /// in one bound argument are returned.
+    /// Facts that an atom may match. If no plan can change the predicate and an argument is bound, only facts
+    /// that agree with the atom in one bound argument are returned.
     fn rows(&self, atom: &Atom, bindings: &Bindings<'p>) -> Box<dyn Iterator<Item = &'e Arguments> + 'e> {
         match self.indexed_rows(atom, bindings) {
             Some(rows) => Box::new(rows.iter()),

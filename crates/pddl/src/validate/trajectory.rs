@@ -19,7 +19,8 @@ use super::verdict::{Violation, ViolationKind};
 use super::world::World;
 
 impl<'e, 'p> Execution<'e, 'p> {
-    /// Records the preferences of an action that are violated at the given time: its start or its end.
+    /// Records the preferences of an action that are violated at the given time: its start or its end. An
+    /// undefined preference is a violation of the plan.
     pub(super) fn record_preferences(
         &mut self,
         running: &Running<'e, 'p>,
@@ -40,7 +41,8 @@ impl<'e, 'p> Execution<'e, 'p> {
         Ok(())
     }
 
-    /// Returns the violated preferences; each name occurs once per violation.
+    /// Returns the violated preferences of the actions, the domain and the problem; each name occurs once per
+    /// violation.
     ///
     /// # Errors
     /// Returns a violation if a mandatory constraint does not hold.
@@ -77,7 +79,7 @@ impl<'e, 'p> Execution<'e, 'p> {
     }
 }
 
-/// Returns the number of violated instances of a preference.
+/// Returns the number of violated instances of a preference, or an error if an instance is undefined.
 fn count_violated<'p>(
     evaluator: &Evaluator<'_, 'p>,
     preference: &'p Preference,
@@ -153,8 +155,8 @@ impl<'p> TrajectoryEvaluator<'_, 'p> {
     }
 }
 
-/// Returns `true` if a condition holds in the state at time `from` and in all later states whose times
-/// satisfy `is_included`.
+/// Returns `true` if a condition holds in the state that persists at time `from`, and in all states that
+/// begin at `from` or later and whose times satisfy `is_included`. `holds` has one entry per state.
 fn lasts(
     holds: &[bool],
     times: &[&BigRational],

@@ -11,7 +11,7 @@ pub struct Verdict {
     /// Whether the plan is executable, reaches the goal, and satisfies all mandatory constraints.
     pub valid: bool,
     /// `total-time`, in the domain's time unit: the sum of the durations for sequential execution, and the
-    /// end of the last action for concurrent execution.
+    /// end of the last action for concurrent execution. After a violation, only the executed part counts.
     pub total_time: BigRational,
     /// Metric value of a valid plan, in the metric's unit. `None` without `:metric` or if the value is
     /// undefined.
@@ -30,7 +30,7 @@ pub struct Violation {
     pub step: Option<usize>,
     /// Action of the step as written.
     pub action: Option<String>,
-    /// Time, in the domain's time unit.
+    /// Time of the violation, in the domain's time unit.
     pub time: BigRational,
     /// Kind of violation.
     pub kind: ViolationKind,
@@ -80,9 +80,9 @@ pub enum ViolationKind {
     Undefined,
     /// Two simultaneous effects conflict.
     Conflict,
-    /// Two steps overlap in sequential execution.
+    /// Two steps overlap by more than the tolerance in sequential execution.
     Overlap,
-    /// Two interfering happenings are less than the separation apart.
+    /// Two interfering happenings are simultaneous, or less than the separation apart.
     Interference,
     /// The goal does not hold at the end.
     Goal,

@@ -181,7 +181,8 @@ impl<'p> World<'p> {
         state
     }
 
-    /// Returns the symbol of a name. All undeclared names have the same symbol, which occurs in no fact.
+    /// Returns the symbol of a name. All undeclared names have one common symbol, which occurs in no fact of
+    /// a checked problem.
     pub(super) fn symbol(&self, name: &Name) -> Symbol {
         self.symbols.get(name).copied().unwrap_or(Symbol(u32::MAX))
     }

@@ -13,7 +13,7 @@ use task::task::{Argument, Task};
 /// cost.
 #[derive(Debug, Clone)]
 pub struct Alternatives {
-    /// Cheapest plans other than the first plan.
+    /// Cheapest plans other than the first plan, at most the requested number.
     pub plans: Vec<Plan>,
     /// `true` if it is proved that there are no other cheapest plans, except by adding idle actions.
     pub complete: bool,
@@ -33,7 +33,7 @@ pub struct Forced {
 }
 
 /// A choice of the first plan: the operator of a step (if `slot` is `None`), or the design of one of its
-/// slots.
+/// slots (parameters whose designs are not grounded).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Choice {
     pub(super) step: usize,
@@ -51,8 +51,9 @@ impl Choice {
     }
 }
 
-/// Without a slot, returns `true` if both steps have the same operator. With a slot, returns `true` if
-/// `second` also uses the slot and design that `first` has at this position.
+/// Without a slot (a parameter whose design is not grounded), returns `true` if both steps have the same
+/// operator. With a slot, returns `true` if `second` also uses the slot and design that `first` has at this
+/// position.
 pub(super) fn shares(task: &Task, first: &GroundStep, second: &GroundStep, slot: Option<u32>) -> bool {
     match slot {
         None => second.operator == first.operator,
@@ -69,7 +70,7 @@ fn design(task: &Task, step: &GroundStep, position: usize) -> (usize, u32) {
     (usage.slot.index(), usage.designs[step.choice[position] as usize])
 }
 
-/// Converts shared choices to names, for each step of the first plan.
+/// Converts the choices that all cheapest plans share to names, for each step of the first plan.
 pub(super) fn forced(task: &Task, first: &[GroundStep], choices: &[Choice]) -> Vec<Forced> {
     let of_step = |(at, step): (usize, &GroundStep)| {
         let is_shared = |slot: Option<u32>| choices.contains(&Choice { step: at, slot });

@@ -31,10 +31,11 @@ use task::plan::ground::GroundStep;
 use task::task::number::TaskNumber;
 use task::task::{OperatorId, State, Task};
 
-/// Maximum number of combinations of designs of one operator.
+/// Maximum number of combinations of designs of one operator in the second search, which distinguishes all
+/// states.
 const MAX_CHOICES: usize = 20_000;
 
-/// An edge of the graph: a step from one label to another.
+/// An edge of the graph: a step from one label (node) to another.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Edge {
     pub(super) from: u32,
@@ -43,15 +44,16 @@ pub(super) struct Edge {
     pub(super) step: u32,
 }
 
-/// Graph of labels (states) and the steps between them.
+/// Graph of labels and the steps between them. A label (node) represents a state or, in the first search, a
+/// set of states.
 pub(super) struct Graph {
     /// Edges in ascending order of [`Edge::from`], and then of their steps.
     pub(super) edges: Vec<Edge>,
     /// Distinct steps.
     pub(super) steps: Vec<GroundStep>,
-    /// For each label: whether it satisfies the goal and its cost is that of a cheapest plan.
+    /// For each label (node): whether it satisfies the goal and its cost is that of a cheapest plan.
     pub(super) goals: Vec<bool>,
-    /// For each label: whether a goal label can be reached from it.
+    /// For each label (node): whether a goal label can be reached from it.
     pub(super) alive: Vec<bool>,
     /// `true` if every cheapest plan is a path of the graph.
     pub(super) is_complete: bool,
@@ -59,14 +61,15 @@ pub(super) struct Graph {
     pub(super) is_exact: bool,
 }
 
-/// Index of the label of the initial state.
+/// Index of the label (node) of the initial state.
 pub(super) const ROOT: u32 = 0;
 
 /// Predicate on an unfinished graph. Returns `true` if the graph already contains enough plans.
 pub(super) type IsEnough<'e> = dyn FnMut(&Graph) -> bool + 'e;
 
-/// Builds the graph of all plans with cost `cost`, which must be the cost of a cheapest plan. Returns `None`
-/// if an operator has too many combinations of designs, or a negative cost.
+/// Builds the graph of all plans with cost `cost`, which must be the cost of a cheapest plan. At a limit, or
+/// once `is_enough` returns `true`, the graph is incomplete (see [`Graph::is_complete`]). Returns `None` if
+/// an operator has too many combinations of designs, or a negative cost.
 pub(super) fn cheapest(
     context: Context<'_>,
     bounds: &Bounds,
@@ -85,10 +88,11 @@ pub(super) fn cheapest(
     Some(graph)
 }
 
-/// Key of comparable labels: the values of the basic variables, and the numbers that are not compared.
+/// Key of comparable labels (nodes): the values of the basic (not derived) variables, and the numbers that
+/// are not compared.
 type Place = (Box<[u32]>, Box<[Int]>);
 
-/// Labels of a search: states, each with the cost of the path by which it was reached.
+/// Labels (nodes) of a search: states, each with the cost of the path by which it was reached.
 struct Labels {
     all: Vec<(State, Int)>,
     places: FxHashMap<Place, Vec<u32>>,
@@ -98,24 +102,25 @@ struct Labels {
     basic: usize,
 }
 
-/// Relation of a state to the existing labels.
+/// Relation of a state, reached at some cost, to the existing labels (nodes) that agree with it except in
+/// compared numbers.
 enum Known {
-    /// Another label costs less and is no worse in any compared number.
+    /// Another label (node) costs less and is no worse in any compared number.
     Beaten,
-    /// Another label has equal cost and is no worse in any compared number.
+    /// Another label (node), with this index, has equal cost and is no worse in any compared number.
     Covered(u32),
     New,
 }
 
 impl Labels {
-    /// Creates an empty set of labels in which a label also represents all states that are no better in any
-    /// compared number.
+    /// Creates an empty set of labels (nodes) in which a label also represents all states that are no better
+    /// in any compared number.
     fn comparing(task: &Task) -> Self {
         let asked = directions(task).into_iter().enumerate();
         Self::new(task, asked.filter(|(_, asked)| !(asked.up && asked.down)).collect())
     }
 
-    /// Creates an empty set of labels in which each label represents a single state.
+    /// Creates an empty set of labels (nodes) in which each label represents a single state.
     fn exact(task: &Task) -> Self {
         Self::new(task, Vec::new())
     }
@@ -137,7 +142,8 @@ impl Labels {
         })
     }
 
-    /// Returns the labels that are no worse than a state, each with `true` if its cost is lower.
+    /// Returns the labels (nodes) at `place` that cost at most as much as a state and are no worse in any
+    /// compared number, each with `true` if its cost is lower.
     fn no_worse<'l>(
         &'l self,
         place: &Place,
@@ -208,7 +214,7 @@ struct Growth {
     numbers: FxHashMap<GroundStep, u32>,
     goals: Vec<bool>,
     /// Open list. Keys are the estimated cost of the whole plan (0 in the second search) and then the highest
-    /// path cost; the last field is the label.
+    /// path cost; the last field is the index of the label (node).
     open: BinaryHeap<Reverse<(Int, Reverse<Int>, u32)>>,
     is_complete: bool,
 }
@@ -246,7 +252,7 @@ impl Growth {
     }
 }
 
-/// Returns, for each label, whether a goal label can be reached from it.
+/// Returns, for each label (node), whether a goal label can be reached from it.
 fn alive(edges: &[Edge], goals: &[bool]) -> Vec<bool> {
     let mut before: Vec<u32> = (0..dense(edges.len())).collect();
     before.sort_by_key(|position| edges[*position as usize].to);
@@ -276,10 +282,11 @@ impl<'a> Search<'a> {
         Some(Self { context, bounds, cost, index, monotone, best: choices(), all: choices() })
     }
 
-    /// Builds a graph from the initial state until it is complete, a limit is reached, or `is_enough` returns
-    /// `true`. Returns `None` if an operator has too many combinations of designs. The optional `guide` holds
-    /// the labels of the first search, and whether a goal can be reached from each of them. With a guide,
-    /// every label represents a single state, and states that the guide excludes are omitted.
+    /// Builds a graph from the initial state until it is complete, a time or memory limit is reached, or
+    /// `is_enough` returns `true`. Returns `None` if an operator has too many combinations of designs. The
+    /// optional `guide` holds the labels (nodes) of the first search, and whether a goal can be reached from
+    /// each of them. With a guide, every label represents a single state, and states that the guide excludes
+    /// are omitted. `is_enough` is called only with a guide.
     fn explore(
         &self,
         labels: Labels,
@@ -379,8 +386,8 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// Returns the label of a state that was reached at this cost, and adds the label if it is new. Returns
-    /// `None` if no cheapest plan reaches the state at this cost.
+    /// Returns the label (node) of a state that was reached at this cost, and adds the label if it is new.
+    /// Returns `None` if no cheapest plan reaches the state at this cost.
     fn reach(
         &self,
         growth: &mut Growth,

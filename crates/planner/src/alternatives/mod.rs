@@ -27,9 +27,9 @@ use paths::{End, Paths};
 
 pub use choices::{Alternatives, Forced};
 
-/// Searches for at most `most` cheapest plans other than the plan of an optimal solution. Plans with fewer
-/// steps come first. At a limit, returns the plans that were found before. Returns `None` if the solution is
-/// not optimal.
+/// Searches for at most `most` cheapest plans other than the plan of an optimal solution. Graph search lists
+/// plans with fewer steps first; SAT search has no particular order. At a limit, returns the plans that were
+/// found before. Returns `None` if the solution is not optimal.
 pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Config) -> Option<Alternatives> {
     let first = solution.ground.as_ref().filter(|_| solution.status == Status::Optimal)?;
     let context = Context::new(task, &config.limits);
@@ -43,8 +43,8 @@ pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Conf
     by_graph.or_else(|| by_formula(context, &bounds, first, most, config)).or(Some(unknown))
 }
 
-/// Searches for other cheapest plans in the graph of all cheapest plans. Returns `None` if graph search is
-/// not applicable to the task.
+/// Searches for at most `most` other cheapest plans in the graph of all cheapest plans. Returns `None` if
+/// graph search is not applicable to the task.
 fn by_graph(context: Context<'_>, bounds: &Bounds, first: &GroundPlan, most: usize) -> Option<Alternatives> {
     let task = context.task;
     let mut is_enough = |graph: &Graph| List::new(context, first, most, graph).0.is_full();
@@ -58,7 +58,7 @@ fn by_graph(context: Context<'_>, bounds: &Bounds, first: &GroundPlan, most: usi
     Some(Alternatives { plans: list.plans, complete, forced })
 }
 
-/// Decoded plans other than the first plan. Plans that differ only in waits are listed once.
+/// Decoded plans other than the first plan, at most `most`. Plans that differ only in waits are listed once.
 struct List {
     plans: Vec<Plan>,
     most: usize,
@@ -91,7 +91,8 @@ impl List {
     }
 }
 
-/// Returns the choices of a plan that all cheapest plans share.
+/// Returns the choices of a plan that all cheapest plans share. The graph must be complete, and each of its
+/// paths to a goal must be a plan.
 fn shared(task: &Task, first: &[GroundStep], graph: &Graph) -> Vec<Choice> {
     let layers = Paths::new(graph).layers(first.len());
     let mut choices = Choice::all(first);

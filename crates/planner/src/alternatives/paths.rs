@@ -1,5 +1,5 @@
 //! Enumerates the paths in the graph of all cheapest plans. Shorter paths come first; paths of equal length
-//! are in model order.
+//! are in the order of their operators and designs in the task.
 
 use rustc_hash::FxHashSet;
 use task::plan::ground::GroundStep;
@@ -18,17 +18,17 @@ pub(super) enum End {
     Stopped,
 }
 
-/// Enumerator of the paths of a graph.
+/// Enumerator of the paths of a graph from the initial label (node) to goal labels.
 pub(super) struct Paths<'g> {
     graph: &'g Graph,
-    /// Index of the first edge of each label, followed by the number of edges.
+    /// Index of the first edge of each label (node), followed by the number of edges.
     first: Vec<usize>,
-    /// Pairs of a label and a length, such that no path of this length leads from the label to a goal.
+    /// Pairs of a label (node) and a length, such that no path of this length leads from the label to a goal.
     dead: FxHashSet<(u32, usize)>,
     work: usize,
 }
 
-/// A label on the current path, and the index of its next edge to follow.
+/// A label (node of the graph) on the current path, and the index of the next edge to follow from it.
 struct Branch {
     label: u32,
     next: usize,
@@ -47,14 +47,14 @@ impl<'g> Paths<'g> {
         Self { graph, first, dead: FxHashSet::default(), work: MAX_WORK }
     }
 
-    /// Returns the edges of a label that lead to labels from which a goal can be reached.
+    /// Returns the edges of a label (node) that lead to labels from which a goal can be reached.
     pub(super) fn edges(&self, label: u32) -> impl Iterator<Item = &'g Edge> + use<'_, 'g> {
         let (from, to) = (self.first[label as usize], self.first[(label as usize).saturating_add(1)]);
         self.graph.edges[from..to].iter().filter(|edge| self.graph.alive[edge.to as usize])
     }
 
-    /// Calls `visit` with each path, in order of length. Stops early if `visit` returns `false` or the limit
-    /// of [`MAX_WORK`] edges is reached.
+    /// Calls `visit` with the steps of each path from the initial label to a goal label, in order of length.
+    /// Stops early if `visit` returns `false` or the limit of [`MAX_WORK`] edges is reached.
     pub(super) fn each(&mut self, visit: &mut dyn FnMut(Vec<GroundStep>) -> bool) -> End {
         if !self.graph.alive.first().is_some_and(|is_alive| *is_alive) {
             return End::Exhausted;
@@ -115,7 +115,8 @@ impl<'g> Paths<'g> {
         End::Exhausted
     }
 
-    /// Returns the number of steps of a longest path, or `None` if the graph has a cycle.
+    /// Returns the number of steps of a longest path from the initial label to a goal label, or `None` if the
+    /// graph has a cycle.
     fn longest(&self) -> Option<usize> {
         let labels = self.graph.goals.len();
         let mut into = vec![0_usize; labels];

@@ -148,8 +148,8 @@ impl Trimmer {
         }
     }
 
-    /// Starts watching a new clause. If it is a unit clause under the current assignment, assigns its
-    /// literal.
+    /// Starts watching a new clause, unless it is a tautology. If it is a unit clause under the current
+    /// assignment, assigns its literal; if all its literals are false, records the conflict.
     fn watch(&mut self, position: u32) {
         let mut clause = std::mem::take(&mut self.clauses[position as usize]);
         clause.sort_unstable();
@@ -202,8 +202,8 @@ impl Trimmer {
         units.chain([position]).collect()
     }
 
-    /// Derives a clause of the solver's proof and adds it with its hints. Returns an error if it does not
-    /// follow.
+    /// Derives a clause of the solver's proof and adds it with its hints. Ignores a tautology. Returns an
+    /// error if the clause does not follow.
     fn conclude(&mut self, clause: &[Literal]) -> Result<(), String> {
         if clause.iter().any(|literal| clause.binary_search(&-*literal).is_ok()) {
             return Ok(());

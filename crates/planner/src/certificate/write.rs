@@ -32,8 +32,9 @@ pub struct Certificate {
 }
 
 /// Creates the certificate of a solution. Returns `None` in any of these cases: the solution is not proved
-/// for plans of any length, the task has several objectives, operators can reduce the cost, or the search
-/// does not end within the limits.
+/// for plans of any length, the task has several objectives, its numbers have different scales, the metric is
+/// partly evaluated in the last state, operators can reduce the cost, or the search does not end within the
+/// limits.
 pub fn certify(task: &Task, solution: &Solution, limits: &Limits) -> Option<Certificate> {
     // The format has a single scale for all numbers, and does not support metrics that are partly evaluated
     // in the last state.
@@ -63,7 +64,8 @@ pub fn certify_exact(task: &ExactTask, solution: &Solution, limits: &Limits) -> 
     certified(context, (solution, cost), &scales, bounds, |rounded| &rounded.bounds)
 }
 
-/// Creates a certificate from heuristic bounds and scales. `plain` returns the bounds in integers.
+/// Creates a certificate from heuristic bounds and scales. `plain` returns the bounds in integers. Returns
+/// `None` in the cases that [`certify`] lists.
 fn certified<N: TaskNumber, E: Heuristic<N>>(
     context: Context<'_, N>,
     (solution, cost): (&Solution, Option<N>),
@@ -141,7 +143,8 @@ impl<K: Hash + Eq + Clone, V> Pool<K, V> {
     }
 }
 
-/// Slots of an operator, each with its suitable designs.
+/// Slots of an operator (parameters whose designs are not grounded), each with the indices of its suitable
+/// designs.
 type Uses = Vec<(u32, Vec<u32>)>;
 
 struct Writer<'w, N> {

@@ -57,11 +57,12 @@ impl ExactTask {
     }
 }
 
-/// Finds a cheapest plan by heuristic search. Of the configuration, only the horizon and the limits are used.
+/// Finds a cheapest plan by heuristic search, or the best plan known at a limit. Of the configuration, only
+/// the horizon and the limits are used.
 ///
-/// If a cheapest plan is longer than the horizon, the result is a best plan within the horizon; its status is
-/// not optimal. If actions can improve the metric, the result is a plan with the fewest steps, and the best
-/// metric among these plans.
+/// If a cheapest plan is longer than the horizon, the result is a best plan within the horizon, if there is
+/// one; its status is not optimal. If actions can improve the metric, the result is a plan with the fewest
+/// steps, and the best metric among these plans.
 pub fn optimize_exact(task: &ExactTask, config: &Config) -> Solution {
     let started = Instant::now();
     let task = &task.0;
@@ -102,7 +103,8 @@ fn cheapest(task: &Task<Rational>, config: &Config) -> Solution {
     }
 }
 
-/// Finds a best plan with at most `horizon` steps. `lower` is a lower bound on the cost of every plan.
+/// Finds a best plan with at most `horizon` steps or, at a limit, the best plan known by then. `lower` is a
+/// lower bound on the cost of every plan.
 fn within(context: Context<'_, Rational>, horizon: usize, lower: &Rational) -> Solution {
     let shorter = with_horizon(context.task, horizon);
     let (status, plan, proof) = match explore(Context { task: &shorter, ..context }) {

@@ -9,7 +9,9 @@ use crate::optimize::optimizer_run::Run;
 use crate::optimize::solve::solve;
 use crate::optimize::unbounded_metric::shortest_then_best;
 
-/// Finds a cheapest plan of a task. Calls `report` for every better plan or lower bound.
+/// Finds a cheapest plan of a task, or the best plan known at a limit. Calls `report` for every better plan
+/// or lower bound. If actions can reduce the cost, the result is instead a plan with the fewest steps, and
+/// the cheapest of these; `report` is then not called.
 ///
 /// If the metric contains fluents with state-dependent changes, no plan is proved optimal, and `report` is
 /// not called.

@@ -44,11 +44,12 @@ pub struct Config {
     pub horizon: Option<usize>,
     /// Algorithms that find plans and prove optimality.
     pub engine: Engine,
-    /// Number of states that A\* stores before the other components of the planner start. Also scales their
-    /// budgets in the first round.
+    /// Number of states that A\* stores before the other components of the planner (satisficing search and
+    /// SAT solver) start. Also scales the work of each component in the first round.
     pub head_start: usize,
-    /// Whether the SAT solver must confirm proofs of other engines, without a time limit. If `false`,
-    /// confirmation is attempted with a small budget.
+    /// Whether the SAT solver confirms proofs of other engines without a budget. If `false`, confirmation is
+    /// attempted with a small budget. A proof that is not confirmed remains valid. With [`Engine::Search`],
+    /// nothing is confirmed.
     pub confirm: bool,
     /// Step semantics of the SAT formulas. With a horizon, which counts actions, the semantics is always
     /// sequential. The default (`None`) is parallel for a first plan and sequential for the optimality proof.
@@ -89,13 +90,15 @@ impl Config {
         Self { engine, ..self }
     }
 
-    /// Sets the number of states that A\* stores before the other components of the planner start.
+    /// Sets the number of states that A\* stores before the other components of the planner (satisficing
+    /// search and SAT solver) start.
     #[must_use]
     pub fn with_head_start(self, head_start: usize) -> Self {
         Self { head_start, ..self }
     }
 
-    /// Sets whether the SAT solver must confirm proofs of other engines, without a time limit.
+    /// Sets whether the SAT solver confirms proofs of other engines without a budget; see
+    /// [`Config::confirm`].
     #[must_use]
     pub fn with_confirmation(self, confirm: bool) -> Self {
         Self { confirm, ..self }

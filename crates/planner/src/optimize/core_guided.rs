@@ -97,7 +97,7 @@ impl Search {
     }
 
     /// Adds a soft literal of the given weight that is true if more than `count` inputs of a totalizer are
-    /// true.
+    /// true. Has no effect if the totalizer does not have more than `count` inputs.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "weights are at most what the limit on the cost leaves, and each core has its own literals"
@@ -133,8 +133,8 @@ impl Search {
     }
 }
 
-/// Raises the lower bound on the cost of the formula's plans until it exceeds the limit or a plan with this
-/// cost is found.
+/// Raises the lower bound on the cost of the formula's plans until it exceeds `limit`, a plan with this cost
+/// is found, or a resource limit is reached. Cheaper plans are stored in `best`.
 pub(super) fn raise(
     run: &mut Run<'_>,
     mut encoding: Encoding<'_>,

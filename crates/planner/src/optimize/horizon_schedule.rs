@@ -22,6 +22,7 @@ pub(super) struct HorizonSchedule {
     /// Next longer horizon; `None` after the last horizon.
     next: Option<usize>,
     /// Upper bound on the number of steps of a shortest plan, or the configured horizon if it is smaller.
+    /// `usize::MAX` if there is neither.
     most: usize,
     /// Greatest horizon whose formula was proved unsatisfiable.
     refuted: usize,
@@ -45,7 +46,8 @@ impl HorizonSchedule {
         Self { open: Vec::new(), next: Some(0), most: max_horizon, refuted: 0 }
     }
 
-    /// Adds the next horizon, and solves the formulas of all undecided horizons with the given budget each.
+    /// Adds the next horizon unless its formula would be too large, and solves the formulas of all undecided
+    /// horizons with the given budget each.
     pub(super) fn advance(
         &mut self,
         run: &mut Run<'_>,

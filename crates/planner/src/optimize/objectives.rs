@@ -19,7 +19,8 @@ use task::task::{NumericEffect, Operator, Task};
 use crate::optimize::cheapest::optimize;
 use crate::optimize::config::Config;
 
-/// A point of the Pareto front, or the result of a query that did not finish.
+/// A solution with its values under all objectives: a point of the Pareto front, a lexicographically optimal
+/// plan, or the result of a query that did not finish.
 #[derive(Debug, Clone)]
 pub struct Point {
     /// The solution with its plan. The cost of the plan is its cost under the first objective.
@@ -34,13 +35,14 @@ pub struct Point {
 pub struct Front {
     /// Points in order, from the best by the first objective to the best by the second.
     pub points: Vec<Point>,
-    /// `Optimal` if the front is proved complete; `Unsolvable` if it is proved that there is no plan.
+    /// `Optimal` if the front is proved complete; `Unsolvable` if it is proved that there is no plan;
+    /// `Feasible` if there may be further points. Without a plan, the status of the first query.
     pub status: Status,
 }
 
 /// Finds a lexicographically optimal plan: optimal under the first objective, among these plans optimal under
 /// the second objective, and so on. Also returns its values under all objectives, which are empty if there is
-/// no plan.
+/// no plan. At a limit, returns the best known plan, if there is one, with the status `Feasible`.
 ///
 /// ```
 /// use metaplan_planner::pddl::{ast::Direction, read_objective};
@@ -69,8 +71,8 @@ pub fn lexicographic(task: &Task, config: &Config, report: &mut dyn FnMut(Improv
     in_order(task, &order, &[], config, report)
 }
 
-/// Enumerates the Pareto front of the first two objectives. For each pair of values, only one plan is
-/// returned.
+/// Enumerates the Pareto front of the first two objectives until it is complete or a limit is reached. For
+/// each pair of values, only one plan is returned. The task must have at least two objectives.
 ///
 /// ```
 /// use metaplan_planner::pddl::{ast::Direction, read_objective};
@@ -124,8 +126,8 @@ pub fn pareto(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement))
     }
 }
 
-/// Optimises the objectives lexicographically in the order of the indices `order`. Each budget is an
-/// objective with the maximum cost under it.
+/// Optimises the objectives lexicographically in the order of the indices `order`, until the optimum under an
+/// objective is not proved. Each budget is an objective with the maximum cost under it.
 fn in_order(
     task: &Task,
     order: &[usize],

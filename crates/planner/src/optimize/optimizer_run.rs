@@ -18,7 +18,8 @@ use tracing::info_span;
 
 use crate::optimize::config::Config;
 
-/// A rise of the lower bound is recorded if it is at least 1/`REPORT_STEP` of the bound.
+/// A rise of the lower bound is recorded if it is more than 1/`REPORT_STEP` of the bound recorded last, or if
+/// the bound reaches the cost of the best plan.
 const REPORT_STEP: Int = 100;
 
 /// State of one optimizer run.
@@ -28,7 +29,7 @@ pub(super) struct Run<'a> {
     pub(super) report: &'a mut dyn FnMut(Improvement),
     pub(super) statistics: Statistics,
     started: Instant,
-    /// Cost of the best plan and lower bound, as recorded last.
+    /// Cost of the best plan (`None` without a plan) and lower bound, as recorded last.
     noted: Option<(Option<Int>, Int)>,
     /// Symmetries of the task for formulas, computed at first use.
     symmetry: OnceCell<Symmetry>,
@@ -42,7 +43,8 @@ pub(super) struct Best {
     pub(super) lower: Int,
 }
 
-/// Scope of a formula: the cost limit, the allowed operators at each step, and the step bound.
+/// Scope of a formula: the cost limit of the plans, the operators that are allowed at each step, and the
+/// proved bound on the number of steps.
 pub(super) struct FormulaScope {
     /// Maximum cost of the plans that the formula describes.
     pub(super) limit: Int,
@@ -65,7 +67,7 @@ impl FormulaScope {
 pub(super) enum StrategyOutcome {
     /// The formula has no plan that is within its cost limit and cheaper than the best known plan.
     Exhausted,
-    /// A limit was reached.
+    /// A limit was reached, or the budget is used up.
     Interrupted,
 }
 
@@ -157,7 +159,9 @@ impl<'a> Run<'a> {
         Some(encoding)
     }
 
-    /// Returns the scope of a formula for plans with a cost of at most `limit`.
+    /// Returns the scope of a formula for plans with a cost of at most `limit`. Without a proved bound on
+    /// their number of steps, the formula has the configured horizon, or about twice the number of steps of
+    /// the best plan.
     pub(super) fn extent(
         &self,
         bounds: &Bounds,
@@ -190,7 +194,8 @@ impl<'a> Run<'a> {
     }
 
     /// Solves a formula under assumptions with a solver that may already have some of its clauses. If the
-    /// formula is satisfiable, also returns the decoded plan.
+    /// formula is satisfiable, also returns the decoded plan, unless it is not executable or its cost
+    /// overflows.
     pub(super) fn call(
         &mut self,
         live: &mut IncrementalSolver,
@@ -238,8 +243,8 @@ impl<'a> Run<'a> {
         (answer, plan)
     }
 
-    /// Executes a decoded plan and computes its cost. The formula should admit only plans; this check detects
-    /// errors of the encoding.
+    /// Executes a decoded plan and computes its cost. Returns `None` if the plan is not executable or its
+    /// cost overflows. The formula should admit only plans; this check detects errors of the encoding.
     fn check(&mut self, steps: Vec<GroundStep>) -> Option<GroundPlan> {
         if pass(self.task, &self.task.initial, &steps).is_none() {
             self.report_internal_contradiction("a formula admits a sequence of actions that is not a plan");

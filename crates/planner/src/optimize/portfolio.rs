@@ -1,8 +1,8 @@
 //! Portfolio of exact search, satisficing search and SAT, which take turns.
 //!
-//! In each round, all three components get about equal work, and twice the work of the previous round. Work
-//! is counted in units instead of time, so results are deterministic. The plans and bounds of a component
-//! limit the others.
+//! In each round, all three components get about equal work, and twice the work of the previous round; the
+//! budgets of unsuccessful components are reduced. Work is counted in units instead of time, so results are
+//! deterministic. The plans and bounds of a component limit the others.
 
 use std::time::Instant;
 
@@ -30,8 +30,8 @@ const CLAUSES_PER_STATE: usize = 50;
 const STATES_PER_CONFLICT: u64 = 4;
 /// Maximum number of times that the budget of an unsuccessful component is halved.
 const MAX_BACKOFF: u32 = 3;
-/// Numerator and denominator of a ratio. If the cost of a plan exceeds the lower bound by more than this
-/// ratio, a better plan is probably easier to find than a proof.
+/// Numerator and denominator of a ratio. If the cost of a plan divided by the lower bound exceeds this ratio,
+/// a better plan is probably easier to find than a proof.
 const NEAR_OPTIMAL_RATIO: (Int, Int) = (3, 2);
 
 /// The portfolio: its active components, the best known plan and the lower bound.
@@ -46,9 +46,9 @@ struct Portfolio<'r, 'a> {
     lower: Int,
     /// Proof of the lower bound `lower`.
     reason: Proof,
-    /// Number of times that the budget of formulas is halved.
+    /// Number of times that the budget of formulas is halved, at most [`MAX_BACKOFF`].
     share: u32,
-    /// Number of times that the budget of the satisficing search is halved.
+    /// Number of times that the budget of the satisficing search is halved, at most [`MAX_BACKOFF`].
     satisficer_share: u32,
 }
 
@@ -66,7 +66,8 @@ enum Ending {
     Over,
 }
 
-/// Finds a cheapest plan with a portfolio of components that take turns.
+/// Finds a cheapest plan with a portfolio of components that take turns, or the best plan known at a limit.
+/// `lower` is a lower bound on the cost of every plan.
 pub(super) fn solve(run: Run<'_>, bounds: &Bounds, lower: Int) -> Solution {
     let started = Instant::now();
     let context = run.context();
@@ -206,7 +207,8 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         };
         let allowance = if alone { SatBudget::UNLIMITED } else { allowance };
         let turn = self.ask_for(allowance);
-        // An unsuccessful turn halves the next budget; a successful turn doubles it.
+        // An unsuccessful turn halves the next budget; a successful turn doubles it. The number of halvings
+        // stays between 0 and `MAX_BACKOFF`.
         let achieved = before != (self.lower, self.best.as_ref().map(|plan| plan.cost));
         self.share =
             if achieved { share.saturating_sub(1) } else { share.saturating_add(1).min(MAX_BACKOFF) };
@@ -247,8 +249,8 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         }
     }
 
-    /// Replaces the best known plan if `plan` is cheaper. Ends the run if the cost then equals the lower
-    /// bound.
+    /// Replaces and reports the best known plan if `plan` is cheaper. Ends the run if the cost of the best
+    /// plan then equals the lower bound.
     fn improve(&mut self, plan: GroundPlan, part: PlannerPart) -> Turn {
         if self.best.as_ref().is_none_or(|best| plan.cost < best.cost) {
             self.run.statistics.found_by = Some(part);

@@ -38,7 +38,8 @@ pub(super) enum ProverOutcome {
 }
 
 impl Prover {
-    /// Solves formulas, each within a budget. Improves the best known plan and the lower bound.
+    /// Solves formulas, each within a budget, until the best known plan is proved optimal or the prover
+    /// cannot continue. Improves the best known plan and the lower bound.
     pub(super) fn advance(
         &mut self,
         run: &mut Run<'_>,
@@ -88,7 +89,7 @@ impl Prover {
 }
 
 /// Searches for plans within the scope of a formula and optimises their cost, starting from the best known
-/// plan.
+/// plan, until none is cheaper or the budget is used up.
 pub(super) fn within(
     run: &mut Run<'_>,
     bounds: &Bounds,

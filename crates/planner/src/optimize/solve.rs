@@ -16,7 +16,7 @@ use crate::optimize::prover::{Prover, ProverOutcome};
 use crate::optimize::sat_budget::SatBudget;
 use crate::optimize::sat_confirmation::{into_solution, proved_by_bound, proved_by_search};
 
-/// Solves a task whose operators have non-negative costs.
+/// Solves a task whose operators have non-negative costs, with the configured engine.
 pub(super) fn solve(mut run: Run<'_>) -> Solution {
     let started = Instant::now();
     let Ok(bounds) = Bounds::new(run.context()) else {
@@ -34,8 +34,8 @@ pub(super) fn solve(mut run: Run<'_>) -> Solution {
     }
 }
 
-/// Runs heuristic search, which ignores the horizon. If its plan is longer than the horizon or no plan is
-/// found, solves formulas.
+/// Runs heuristic search, which ignores the horizon. Solves formulas if the plan of the search is longer than
+/// the horizon, or if the search reaches a limit without a plan.
 fn solve_within(mut run: Run<'_>, bounds: &Bounds, lower: Int, horizon: usize) -> Solution {
     let started = Instant::now();
     let outcome = search(run.context(), bounds);
@@ -64,7 +64,8 @@ fn solve_by_formulas(mut run: Run<'_>, bounds: &Bounds, lower: Int) -> Solution 
     }
 }
 
-/// Improves a plan with SAT formulas until it is a cheapest plan.
+/// Improves a plan with SAT formulas until it is a cheapest plan, a limit is reached, or formulas cannot
+/// prove more.
 fn improve(mut run: Run<'_>, bounds: &Bounds, mut best: Best) -> Solution {
     run.announce(&best, best.plan.steps.len());
     if best.plan.cost <= best.lower {

@@ -19,7 +19,8 @@ use crate::optimize::sat_budget::SatBudget;
 use crate::optimize::solve::solve;
 
 /// Solves a task in which actions can improve the metric. Minimises the number of steps, and then the metric
-/// among the plans with this number of steps.
+/// among the plans with this number of steps. If the minimum number of steps is not proved, the result has no
+/// plan.
 pub(super) fn shortest_then_best(original: Run<'_>) -> Solution {
     let lowest = original.task.operators.iter().map(|operator| operator.cost.minimum()).min().unwrap_or(0);
     let by_steps = with_costs(original.task, |_| Quantity::constant(1));

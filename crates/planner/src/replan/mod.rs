@@ -88,7 +88,7 @@ impl Replanner {
         Some(Self { base: Arc::new(GroundBase { task, layout, requirements }), sets: Vec::new() })
     }
 
-    /// Computes a best plan for the state and availability of a query.
+    /// Computes a best plan for the state and availability of a query, within the limits of the query.
     pub fn plan(&mut self, query: &Query<'_>) -> ReplanOutcome {
         self.plan_aloud(query, &mut |_| {})
     }
@@ -109,9 +109,11 @@ impl Replanner {
     }
 
     /// Returns a minimal set of unavailable objects that makes the problem unsolvable: if any single object
-    /// of the set and all objects outside the set were available, there would be a plan. Returns an empty set
-    /// if the problem has no plan even with all objects available. Returns `None` if a limit prevents the
-    /// answer. Uses deletion-based extraction of a minimal unsatisfiable subset \[1\].
+    /// of the set and all objects outside the set were available, there would be a plan. The problem must
+    /// have no plan with the availability of the query. Returns an empty set if the problem has no plan even
+    /// with all objects available. Returns `None` if a limit prevents the answer, or if the problem differs
+    /// from the grounded one in more than state and availability. Uses deletion-based extraction of a minimal
+    /// unsatisfiable subset \[1\].
     ///
     /// - \[1\] J. Marques-Silva, I. Lynce: On improving MUS extraction algorithms, SAT 2011.
     pub fn blocking(&mut self, query: &Query<'_>) -> Option<Vec<String>> {

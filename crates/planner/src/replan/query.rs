@@ -32,8 +32,8 @@ pub struct Query<'a> {
     pub first: &'a [FirstStep],
     /// Metric of the mission if it ended now; 0 without a metric.
     pub metric: BigRational,
-    /// Current plan: names and arguments of its actions after the first step. If the plan is still valid,
-    /// more expensive plans are pruned.
+    /// Current plan: names and arguments of its actions after the first step. If the plan is still valid, its
+    /// metric is an upper bound for the search.
     pub old: Option<&'a [(String, Vec<String>)]>,
     /// Whether, among equally good plans, a plan with as many of these actions as possible is selected.
     pub stay_close: bool,
@@ -53,7 +53,8 @@ pub enum ReplanOutcome {
         /// Metric of the whole mission.
         metric: BigRational,
     },
-    /// A limit was reached. Contains the best plan found, which may be the current plan.
+    /// The time limit was reached, or planning was interrupted. Contains the best plan found, which may be
+    /// the current plan.
     Feasible {
         /// Index of the plan's first step in `Query::first`, if that list is not empty.
         first: Option<usize>,
@@ -62,11 +63,13 @@ pub enum ReplanOutcome {
         /// Metric of the whole mission.
         metric: BigRational,
     },
-    /// It is proved that there is no plan of any length.
+    /// It is proved that no plan of any length begins with one of the first steps of the query (if it has
+    /// any).
     Unsolvable,
     /// The problem differs from the grounded problem in more than state and availability.
     Misfit,
-    /// A limit was reached before a plan was found.
+    /// No result: a limit was reached before a plan was found, the search stored its maximum number of
+    /// states, or the search does not support the task.
     Unknown,
 }
 

@@ -30,7 +30,8 @@ pub(super) struct AvailabilityContext {
 }
 
 impl GroundBase {
-    /// Returns the ground task restricted to the available objects.
+    /// Returns the ground task restricted to the available objects: for each availability predicate, those in
+    /// the list `available[predicate]`, which is in ascending order.
     pub(super) fn masked(&self, available: &[Vec<ObjectId>], limits: &Limits) -> Result<Task, Interrupted> {
         let is_allowed = |schema: u32, position: usize, object: ObjectId| {
             let mut predicates_needed =

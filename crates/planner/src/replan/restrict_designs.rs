@@ -1,8 +1,8 @@
 //! Restricts a task that was grounded with all designs to the available designs.
 //!
-//! Operators that require an unavailable object are removed. Tables and forbidden combinations of open slots
-//! keep only the rows of available designs. The result equals the task that grounding would produce with
-//! these designs, except that it may contain unreachable operators.
+//! Operators that require an unavailable object are removed. Tables and forbidden combinations of slots
+//! (parameters whose designs are not grounded) keep only the rows of available designs. The result equals the
+//! task that grounding would produce with these designs, except that it may contain unreachable operators.
 
 use std::sync::Arc;
 
@@ -14,10 +14,12 @@ use task::number::{Int, dense};
 use task::task::quantity::{Linear, Quantity, SlotSet, Table};
 use task::task::{Argument, ForbiddenCombinations, NumericEffect, Operator, SlotUse, Task};
 
-/// For each slot of an operator: the indices of the designs that remain.
+/// For each slot of an operator (parameter whose design is not grounded): the indices of the designs that
+/// remain.
 type KeptDesigns = Arc<[Vec<u32>]>;
 
-/// The remaining designs of an operator's slots, and the restricted slots.
+/// The remaining designs of an operator's slots (parameters whose designs are not grounded), and the slots
+/// restricted to them.
 type RestrictedSlots = (KeptDesigns, Arc<[SlotUse]>);
 
 /// Cache of restricted data that several operators share. Keys are addresses of data in the original task,
@@ -70,7 +72,8 @@ pub(super) fn restrict(
 }
 
 impl SharedTables {
-    /// Returns the restricted operator, or `None` if a slot has no remaining design.
+    /// Returns the operator restricted to allowed designs, or `None` if a slot (a parameter whose design is
+    /// not grounded) has no remaining design.
     fn operator(
         &mut self,
         task: &Task,
@@ -140,7 +143,8 @@ impl SharedTables {
     }
 }
 
-/// Returns the remaining designs of an operator's slots, and the restricted slots.
+/// Returns the remaining designs of an operator's slots (parameters whose designs are not grounded), and the
+/// slots restricted to them.
 fn left(task: &Task, operator: &Operator, allowed: &dyn Fn(usize, ObjectId) -> bool) -> RestrictedSlots {
     let arguments = |slot: usize| {
         let is_in_slot = move |argument: &Argument| *argument == Argument::Slot(dense(slot));

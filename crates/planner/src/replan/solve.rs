@@ -2,8 +2,8 @@
 //!
 //! First steps are searched in the order of their lower bounds. A first step whose lower bound exceeds the
 //! best metric is skipped. Ties are broken as in planning: fewest steps, then fewest reconfigurations, then
-//! model order. If the current plan should be preserved, a plan that shares most of its steps is selected
-//! among the optimal plans with the fewest steps.
+//! the order of declaration. If the current plan should be preserved, the number of its steps that the new
+//! plan contains is maximised before the reconfigurations.
 
 use num_rational::BigRational;
 use rustc_hash::FxHashSet;
@@ -32,8 +32,9 @@ struct Start {
     own: BigRational,
 }
 
-/// Finds a best plan for a query. Each search stores at most `max_states` states. `report` receives the
-/// progress.
+/// Finds a best plan for a query, or the best plan known at the time limit. Each search stores at most
+/// `max_states` states; if this is not enough, the outcome is [`ReplanOutcome::Unknown`]. `report` receives
+/// the progress.
 pub(super) fn solve(
     base: &GroundBase,
     set: &AvailabilityContext,

@@ -24,16 +24,16 @@ pub(super) struct Layout {
     /// Predicates that state availability. Each has one parameter.
     assumed: Vec<Name>,
     objects: FxHashMap<String, ObjectId>,
-    /// Text of the problem without its initial state. It must be equal for all problems.
+    /// Text of the problem without its initial state. All supported problems have this text.
     frame: String,
     /// Variable and value of each fact, and whether the fact is reachable in the relaxation.
     facts: FxHashMap<String, (Fact, bool)>,
     /// Index of each numeric variable.
     numbers: FxHashMap<String, usize>,
     scale: BigRational,
-    /// Static facts that must be true in every problem, numbered from 0.
+    /// Static facts that must be true in every problem, each with an index from 0.
     fixed: FxHashMap<String, usize>,
-    /// Static values that must be equal in every problem, numbered from 0.
+    /// Static numeric values that must be equal in every problem, each with an index from 0.
     values: FxHashMap<String, (usize, BigRational)>,
     /// Values of the variables if no fact is true.
     nothing: Vec<u32>,
@@ -87,14 +87,14 @@ impl Layout {
         layout
     }
 
-    /// Returns `true` if a fact that has no variable must be the same in every problem.
+    /// Returns `true` if a fact that has no variable in the task must be stated by every problem or by none.
     fn matters(&self, atom: &Atom, key: &str) -> bool {
         let predicate = &atom.predicate.name;
         !self.assumed.contains(predicate)
             && (!self.usage.is_changed(predicate) || self.usage.is_read(predicate, key))
     }
 
-    /// Returns `true` if a value that has no variable must be the same in every problem.
+    /// Returns `true` if a numeric value that has no variable in the task must be equal in every problem.
     fn value_matters(&self, function: &Atom) -> bool {
         let name = &function.predicate.name;
         !self.usage.is_changed(name) || self.usage.is_function_read(name)
@@ -253,8 +253,8 @@ fn frame(problem: &Problem) -> String {
     text
 }
 
-/// Returns the facts of the basic variables by their names, and whether each is true initially or an effect
-/// of an operator.
+/// Returns the facts of the basic (not derived) variables by their names, and whether each is true initially
+/// or an effect of an operator.
 fn facts(task: &Task) -> FxHashMap<String, (Fact, bool)> {
     let mut reached: FxHashSet<Fact> = FxHashSet::default();
     for operator in &task.operators {

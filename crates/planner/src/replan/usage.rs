@@ -18,7 +18,7 @@ pub(super) struct Usage {
     goal: FxHashSet<String>,
     /// Predicates and functions that effects or axioms change.
     changed: FxHashSet<Name>,
-    /// Functions that conditions, durations or effects read.
+    /// Functions that conditions (including the goal), durations or effects read.
     functions: FxHashSet<Name>,
 }
 
@@ -134,7 +134,7 @@ fn conjuncts(condition: &Condition) -> Vec<&Atom> {
     }
 }
 
-/// Returns the number of occurrences of a predicate in conditions and effects of a domain.
+/// Returns the number of occurrences of a predicate in the conditions and effects of actions, and in axioms.
 fn occurrences(domain: &Domain, predicate: &Name) -> usize {
     let mut count = Count { predicate, mentions: 0 };
     for action in &domain.actions {

@@ -1,6 +1,6 @@
 //! Certificates as a faulty grounder would write them: operators, effects, conditions and numbers of the
-//! ground task are changed, and possibly the witness too. A changed certificate that the comparison with the
-//! files accepts must not prove a false claim.
+//! ground task are changed, and possibly the witness (the over-approximation of the reachable states) too. A
+//! changed certificate that the comparison with the files accepts must not prove a false claim.
 //!
 //! The truth is determined by an independent search over the written task, based on the specification of
 //! `metaplan-task/1`. A changed task must not be accepted if it has no plan, or only more expensive plans,
@@ -35,7 +35,7 @@ fn fraction(text: &str) -> BigRational {
     text.parse().unwrap_or_else(|_| panic!("{text} is not a fraction"))
 }
 
-/// Returns the certificate of an example, and its witness.
+/// Returns the certificate of an example, and its witness (the over-approximation of the reachable states).
 fn certified(example: &Example) -> (Certificate, String) {
     let (domain, problem) = files(example);
     let task = ground(&domain, &problem, &GroundConfig::default())
@@ -206,7 +206,8 @@ fn no_shift_of_a_time_makes_a_false_claim_verified() {
     assert!(count.lies >= 15 && count.harmless >= 50, "{count:?}");
 }
 
-/// The grounder omits an operator, and changes the witness to hide this.
+/// The grounder omits an operator, and changes the witness (the over-approximation of the reachable states)
+/// to hide this.
 #[test]
 fn no_change_of_the_witness_hides_that_an_operator_is_missing() {
     let mut count = Count::default();
