@@ -243,6 +243,25 @@ fn classes_required_by_one_action_do_not_guard_facts_of_others() {
     assert_eq!(comparison.least_steps, Some(2));
 }
 
+/// No individual belongs to `owl:Nothing`, so a rule that requires one concludes nothing.
+#[test]
+fn rules_that_require_an_individual_of_nothing_conclude_nothing() {
+    let knowledge = knowledge(
+        "ClassAssertion(:Ca :i1) SubClassOf(:Ce <http://www.w3.org/2002/07/owl#Nothing>)
+         DLSafeRule(Body(ClassAtom(:Ca Variable(:x)) ClassAtom(<http://www.w3.org/2002/07/owl#Nothing> Variable(:x)))
+           Head(ClassAtom(:Cb Variable(:x))))\n",
+    );
+    let domain = "(define (domain d) (:requirements :strips :derived-predicates)\n (:predicates (done ?x))
+ (:action b :parameters (?x) :precondition (inferred-Cb ?x) :effect (done ?x)))\n"
+        .to_owned();
+    let problem = "(define (problem p) (:domain d) (:init) (:goal (done i1)))\n".to_owned();
+    let directory = tempfile::tempdir().expect("a directory");
+    let input = Texts { knowledge, domain, problem }.write(directory.path());
+    let (_, stdout, stderr) = metaplan(&input.arguments("plan", &["--format", "json"]));
+    let answer: serde_json::Value = serde_json::from_str(&stdout).unwrap_or_else(|_| panic!("{stderr}"));
+    assert_eq!(answer["status"], "unsolvable", "{answer}");
+}
+
 /// An observed fact is used even if no action could have added it: the action requires `Ca`, which is not
 /// asserted for `i2`.
 #[test]

@@ -391,6 +391,24 @@ fn the_tolerance_delays_steps_and_limits_rounding_of_durations() {
 }
 
 #[test]
+fn a_fixed_duration_must_satisfy_the_other_constraints() {
+    let action = |constraints: &str| {
+        format!(
+            "(:durative-action a :parameters () :duration (and {constraints})
+               :condition (and) :effect (at end (g)))\n"
+        )
+    };
+    for (constraints, expected) in [
+        ("(= ?duration 5) (<= ?duration 3)", "duration"),
+        ("(= ?duration 5) (= ?duration 4)", "duration"),
+        ("(= ?duration 5) (<= ?duration 6)", "valid"),
+    ] {
+        let both = task(&[action(constraints)], "", "(g)");
+        both.check(IN_SEQUENCE, &[("(a)", expected), ("0: (a) [5]", expected)]);
+    }
+}
+
+#[test]
 fn a_single_step_has_the_same_effects_as_in_a_plan() {
     let single = |duration: &str, condition: &str, effect: &str, forced: bool| {
         let (domain, problem) = task(&[durative("a", duration, condition, effect)], "(r)", "").parse();

@@ -9,7 +9,7 @@ use pddl::ast::{Condition, Derived, Name, Span, Term};
 use super::names;
 use super::swrl;
 use super::syntax::{atom, axiom, exists, variable};
-use super::terms::{Terms, is_annotation, is_top};
+use super::terms::{Terms, is_annotation, is_bottom, is_top};
 use crate::message::Message;
 
 impl Terms {
@@ -68,7 +68,10 @@ impl Terms {
                 let (Some(lower), Some(upper)) = (lower, upper) else {
                     return Err("SubClassOf of expressions");
                 };
-                if !is_top(upper) && !is_top(lower) {
+                if is_bottom(upper) && !is_bottom(lower) || is_top(lower) && !is_top(upper) {
+                    return Err("SubClassOf of owl:Thing or to owl:Nothing");
+                }
+                if !is_top(upper) && !is_bottom(lower) {
                     self.follows(upper, &["x"], lower, vec![x], &[])?;
                 }
             }
@@ -82,6 +85,9 @@ impl Terms {
                 let (Some(own), Some(class)) = (property(own), named(class)) else {
                     return Err("ObjectPropertyDomain of expressions");
                 };
+                if is_bottom(class) {
+                    return Err("ObjectPropertyDomain owl:Nothing");
+                }
                 if !is_annotation(own) && !is_top(class) {
                     self.follows(class, &["x"], own, vec![x, y], &["y"])?;
                 }
@@ -90,12 +96,18 @@ impl Terms {
                 let (Some(own), Some(class)) = (property(own), named(class)) else {
                     return Err("ObjectPropertyRange of expressions");
                 };
+                if is_bottom(class) {
+                    return Err("ObjectPropertyRange owl:Nothing");
+                }
                 if !is_annotation(own) && !is_top(class) {
                     self.follows(class, &["y"], own, vec![x, y], &["x"])?;
                 }
             }
             Axiom::DataPropertyDomain(own, class) => {
                 let Some(class) = named(class) else { return Err("DataPropertyDomain of expressions") };
+                if is_bottom(class) {
+                    return Err("DataPropertyDomain owl:Nothing");
+                }
                 if !is_annotation(own) && !is_top(class) {
                     self.follows(class, &["x"], own, vec![x, y], &["y"])?;
                 }

@@ -12,7 +12,7 @@ use pddl::ast::{Condition, Derived, Name, Span, Term};
 
 use super::names::{self, EQUAL, LESS};
 use super::syntax::{atom, axiom, exists, variable};
-use super::terms::{Terms, is_top};
+use super::terms::{Terms, is_bottom, is_top};
 
 /// PDDL names for the variables of a rule. Different variables have different names.
 #[derive(Default)]
@@ -59,7 +59,9 @@ fn conclude(
     terms: &mut Terms,
 ) -> Result<Derived, String> {
     let (iri, arguments) = match head {
-        Atom::Class(ClassExpression::Class(class), own) if !is_top(class) => (class, vec![own]),
+        Atom::Class(ClassExpression::Class(class), own) if !is_top(class) && !is_bottom(class) => {
+            (class, vec![own])
+        }
         Atom::ObjectProperty(ObjectPropertyExpression::Property(property), own, other)
         | Atom::ObjectProperty(ObjectPropertyExpression::Inverse(property), other, own)
         | Atom::DataProperty(property, own, other) => (property, vec![own, other]),
@@ -116,6 +118,9 @@ fn condition(
             let individual = term(individual, variables, terms);
             if is_top(class) {
                 return Ok(None);
+            }
+            if is_bottom(class) {
+                return Err("its body requires an individual of owl:Nothing".to_owned());
             }
             terms.inferred(class, vec![individual])?
         }

@@ -50,7 +50,7 @@ impl Terms {
             [(EntityKind::Class, 1), (EntityKind::ObjectProperty, 2), (EntityKind::DataProperty, 2)]
         {
             for iri in ontology.entities(kind) {
-                if !is_annotation(iri) && !is_top(iri) {
+                if !is_annotation(iri) && !is_top(iri) && !is_bottom(iri) {
                     // A name that is both a class and a property is reported only if an axiom or
                     // rule uses it.
                     let _ = self.plain(iri, arity);
@@ -156,7 +156,12 @@ pub(super) fn is_annotation(iri: &str) -> bool {
     iri.starts_with(annotation::NS)
 }
 
-/// Returns `true` for `owl:Thing` and `owl:Nothing`, which have no predicate.
+/// Returns `true` for `owl:Thing`, to which every individual belongs. It has no predicate.
 pub(super) fn is_top(iri: &str) -> bool {
-    [owl::THING, owl::NOTHING].contains(&iri)
+    iri == owl::THING
+}
+
+/// Returns `true` for `owl:Nothing`, to which no individual belongs. It has no predicate.
+pub(super) fn is_bottom(iri: &str) -> bool {
+    iri == owl::NOTHING
 }

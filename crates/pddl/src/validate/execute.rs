@@ -121,7 +121,7 @@ impl<'e, 'p> Execution<'e, 'p> {
 
     /// Determines the duration of a step: the exact value if an equality of the domain fixes it, else the
     /// value stated in the plan. A stated value must satisfy all duration constraints at start within the
-    /// tolerance. Without a stated value, only the first equality is used.
+    /// tolerance. Without a stated value, the value of the first equality must satisfy them.
     fn duration(
         &self,
         step: &Step<'p>,
@@ -133,6 +133,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         };
         let evaluator = self.evaluator(None);
         let mut exact = None;
+        let mut bounds = Vec::new();
         for constraint in constraints.iter().filter(|constraint| constraint.time == EffectTime::AtStart) {
             let bound = evaluator
                 .value(&constraint.expression, &instance.bindings)
@@ -141,8 +142,11 @@ impl<'e, 'p> Execution<'e, 'p> {
             if constraint.operator == Comparison::Equal && exact.is_none() {
                 exact = Some(bound.clone());
             }
-            if let Some(stated) = &step.text.duration {
-                self.check_duration(step, time, constraint.operator, stated, &bound)?;
+            bounds.push((constraint.operator, bound));
+        }
+        if let Some(duration) = step.text.duration.as_ref().or(exact.as_ref()) {
+            for (operator, bound) in &bounds {
+                self.check_duration(step, time, *operator, duration, bound)?;
             }
         }
         let duration = exact.or_else(|| step.text.duration.clone());
@@ -160,7 +164,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         Ok(duration)
     }
 
-    /// Checks that the stated duration satisfies one constraint within the tolerance.
+    /// Checks that the stated or fixed duration satisfies one constraint within the tolerance.
     fn check_duration(
         &self,
         step: &Step<'p>,
@@ -180,8 +184,10 @@ impl<'e, 'p> Execution<'e, 'p> {
         if holds {
             return Ok(());
         }
+        let source =
+            if step.text.duration.is_some() { "the plan says" } else { "an equality of the domain says" };
         let (stated, bound) = (show_number(stated), show_number(bound));
-        let message = format!("the plan says {stated}, but the domain wants ?duration {sign} {bound}");
+        let message = format!("{source} {stated}, but the domain wants ?duration {sign} {bound}");
         Err(step.violation(time, ViolationKind::Duration, message))
     }
 
