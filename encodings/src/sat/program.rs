@@ -110,8 +110,8 @@ impl Program {
         }
     }
 
-    /// Runs the program and returns its output. Returns `None` if a limit was reached and the
-    /// program was killed.
+    /// Runs the program and returns its output. Returns `None` if the program was killed, because a limit or
+    /// the time that replaces the conflict budget was reached.
     fn run(&mut self) -> Result<Option<String>, String> {
         let started = Instant::now();
         let mut child = Process(self.command.spawn().map_err(|error| format!("cannot be started: {error}"))?);

@@ -57,7 +57,7 @@ impl std::ops::Not for Lit {
 pub enum Answer {
     Satisfiable,
     Unsatisfiable,
-    /// A limit was reached; the solver must not be used again.
+    /// A limit was reached, or an external program failed; the solver should not be used again.
     Interrupted,
 }
 
@@ -68,11 +68,13 @@ pub trait Solver {
     /// Decides whether all added clauses are satisfiable together with the assumptions. The
     /// assumptions apply to this call only.
     fn solve(&mut self, assumptions: &[Lit]) -> Answer;
-    /// Returns the failed assumptions of the last call, if its answer was `Unsatisfiable`. They are
-    /// a subset of the assumptions that is inconsistent with the clauses, unordered and not
-    /// necessarily minimal. The subset is empty if the clauses alone are unsatisfiable.
+    /// Returns the failed assumptions of the last call, if its answer was `Unsatisfiable`. They are a subset
+    /// of the assumptions that is inconsistent with the clauses, unordered and not necessarily minimal. If
+    /// the clauses alone are unsatisfiable, built-in solvers return an empty subset; external programs always
+    /// return all assumptions.
     fn core(&self) -> &[Lit];
-    /// Returns the value of a variable in the last satisfying assignment.
+    /// Returns the value of a variable in the last satisfying assignment; `false` if the variable has no
+    /// value.
     fn value(&self, variable: u32) -> bool;
     /// Returns the number of learnt clauses over all calls, one per conflict; 0 if the solver does
     /// not report them.

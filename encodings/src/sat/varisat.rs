@@ -119,9 +119,9 @@ fn translate(literal: Lit) -> varisat::Lit {
     varisat::Lit::from_index(literal.variable() as usize, literal.is_positive())
 }
 
-/// Decides DIMACS clauses with Varisat, and writes a DRAT proof to `proof`. The proof is a
-/// refutation if the answer is `Unsatisfiable`. Stops at a limit or after more than `budget` added
-/// clauses.
+/// Decides DIMACS clauses with Varisat, and writes a DRAT proof to `proof`. The proof is a refutation if the
+/// answer is `Unsatisfiable`. Stops at a limit or after more than `budget` added clauses. The answer is
+/// `Interrupted` then, or if the proof cannot be written.
 pub fn refute_with_proof(
     clauses: impl Iterator<Item = impl Iterator<Item = i32>>,
     proof: Box<dyn io::Write>,

@@ -253,8 +253,8 @@ impl<N: TaskNumber> H2Builder<'_, N> {
         }
     }
 
-    /// Computes the pairs of facts that a reachable state may contain. Returns `None` if the work limit is
-    /// reached.
+    /// Computes the pairs of facts that a reachable state may contain if `useless` operators are not applied.
+    /// Returns `None` if the work limit is reached.
     fn forwards(
         &mut self,
         rules: &[Rule],
@@ -312,8 +312,9 @@ impl<N: TaskNumber> H2Builder<'_, N> {
         }
     }
 
-    /// Computes the pairs of facts that a state from which the goal is reachable may contain. Only pairs in
-    /// `forwards` are considered. Returns `None` if the work limit is reached.
+    /// Computes the pairs of facts that a state from which the goal is reachable may contain if `useless`
+    /// operators are not applied. Only pairs in `forwards` are considered. Returns `None` if the work limit
+    /// is reached.
     fn backwards(
         &mut self,
         rules: &[Rule],

@@ -19,8 +19,9 @@
 //! is thus preserved. Pruning of dominated and symmetric states remains sound \[3\]: the stored state has a
 //! plan with the same operators or their images.
 //!
-//! If an operator requires a value of a variable and sets another value, it disturbs only those operators
-//! that change the variable from the required value or from any value.
+//! If o requires a value of a variable and sets another value, fewer operators suffice for this variable:
+//! those that require the same value, those that may set the variable without requiring a value of it, and
+//! those that read it in a clause or in the condition of a conditional effect.
 //!
 //! Pruning is disabled if it removes too few operators to justify its time.
 //!
@@ -36,7 +37,7 @@ use task::lists::Lists;
 use task::number::dense;
 use task::task::{Condition, Fact, Literal, Operator, OperatorId, Task};
 
-/// Pruning stays enabled if at least one of this number of applicable operators is pruned on average.
+/// Pruning stays enabled if, on average, at least one in this number of applicable operators is pruned.
 const MIN_PRUNED_FRACTION: u64 = 5;
 
 /// Indices of a task: the operators that require, set or read each fact or variable.
@@ -162,8 +163,8 @@ impl StubbornSetPruning {
         self.looked == self.trial && self.left_out.saturating_mul(MIN_PRUNED_FRACTION) < self.applicable
     }
 
-    /// Computes a stubborn set and removes all other operators from `applicable`. Removes none if the state
-    /// satisfies the goal. Returns the size of the set.
+    /// Computes a stubborn set and removes all other operators from `applicable`. Removes no operator if the
+    /// state satisfies the goal. Returns the size of the set, including inapplicable operators.
     pub(super) fn prune_operators<N>(
         &mut self,
         task: &Task<N>,
