@@ -142,7 +142,7 @@ fn greedy_best_first<N: TaskNumber, E: Heuristic<N>>(
 }
 
 /// Two A\* searches of a task that alternate. The first uses pattern databases only; the second, which is
-/// added after the first call of `run`, also evaluates LM-cut lazily.
+/// added if the first call of `run` does not finish, also evaluates LM-cut lazily.
 pub struct InterleavedSearch<'a, N, E> {
     space: SearchProblem<'a, N, E>,
     initial: State<N>,
@@ -197,8 +197,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
         self.searches.iter().fold(self.figures, |sum, search| sum.plus(search.statistics))
     }
 
-    /// Returns the best plan of all searches, including abandoned searches. Returns `None` if no search has
-    /// found a plan that is better than an incumbent from outside.
+    /// Returns the best plan of all searches, including abandoned searches. Returns `None` if no plan was
+    /// found, or only plans that are not better than one set from outside.
     pub fn best_plan(&self) -> Option<GroundPlan<N>> {
         let plans = self.searches.iter().filter_map(AStar::best_plan);
         plans.fold(self.best.clone(), |best, plan| cheaper(best, Some(plan)))
@@ -321,9 +321,9 @@ fn cheaper<N: Ord>(first: Option<GroundPlan<N>>, second: Option<GroundPlan<N>>) 
 pub type ClosedEntry<N> = (Vec<u32>, Vec<N>, N);
 
 /// Runs an A\* search and returns the closed states whose f value (path cost plus heuristic value) is below
-/// `cost`, the cost of an optimal plan. If `cost` is `None`, no plan must exist, and all closed states are
-/// returned. Returns `None` if these conditions do not hold, or the search has no proof after `STATE_LIMIT`
-/// states.
+/// `cost`, which must not exceed the cost of an optimal plan. If `cost` is `None`, no plan must exist, and
+/// all closed states are returned. Returns `None` if these conditions do not hold, or the search has no proof
+/// after `STATE_LIMIT` states.
 pub fn closed_labels<N: TaskNumber>(
     context: Context<'_, N>,
     bounds: &impl Heuristic<N>,

@@ -20,9 +20,10 @@ use crate::task::{
 /// Limit on the total number of operators that are compared, over all pairs of objects.
 const WORK_LIMIT: usize = 2_000_000;
 
-/// Returns generators of the symmetry group: exchanges of neighbouring objects within classes of
-/// interchangeable objects. Every exchange preserves the operators and the goal. If `initially` is `true`, it
-/// also preserves the initial state.
+/// Returns exchanges of neighbouring objects within classes of interchangeable objects. Every exchange
+/// preserves the operators and the goal; if `initially` is `true`, it also preserves the initial state. Some
+/// symmetries may be missing, because the number of comparisons is limited. Tasks with derived variables
+/// yield an empty list.
 ///
 /// # Errors
 /// A limit is reached.

@@ -143,6 +143,7 @@ impl<N: Number> Quantity<N> {
     }
 
     /// Returns the sum of the tables whose slots are all contained in `slots`, for a combination of designs.
+    /// The constant is not included.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"

@@ -9,7 +9,7 @@ use crate::ground::vocabulary::world::World;
 use crate::lifted::{Arguments, Bound, Formula, ObjectId, PredicateId, Term};
 use crate::limits::Interrupted;
 
-/// An atom that must be possibly true for a binding to matter: its predicate and its terms.
+/// Guard of a quantifier: an atom (predicate and terms) that must be possibly true for a binding to matter.
 type Guard<'f> = (PredicateId, &'f [Term]);
 
 /// Returns the atoms that are necessary for the body of an existential quantifier. The body is false for
@@ -38,9 +38,9 @@ pub fn guards_of_forall(body: &Formula) -> Vec<Guard<'_>> {
     guards
 }
 
-/// Calls `visit` with every binding of the variables in `bound` for which all guards can hold, until `visit`
-/// returns `false`. Returns `true` if `visit` always returned `true`. Afterwards the variables are unbound,
-/// unless a limit was reached.
+/// Calls `visit` with every binding of the variables in `bound` for which all guards (necessary atoms) can
+/// hold, until `visit` returns `false`. Returns `true` if `visit` always returned `true`. Afterwards the
+/// variables are unbound, unless a limit was reached.
 ///
 /// # Errors
 /// A limit is reached.
@@ -82,7 +82,7 @@ pub fn each_binding<'a>(
     }
 }
 
-/// The variables and guard atoms of an enumeration of bindings.
+/// The quantified variables and guards (necessary atoms) of an enumeration of bindings.
 struct Join<'j> {
     /// Variables with their candidates, in ascending order of the variables.
     bound: &'j [Bound],
@@ -113,8 +113,8 @@ impl Level {
 }
 
 impl Join<'_> {
-    /// Returns the next level of the search: the rows of the guard with the fewest unbound variables, or the
-    /// candidates of the next variable. Returns `None` if all variables are bound.
+    /// Returns the next level of the search: the rows of the guard (necessary atom) with the fewest unbound
+    /// variables, or else the candidates of the next variable. Returns `None` if all variables are bound.
     fn next_level(
         &mut self,
         world: &mut World<'_>,
@@ -141,8 +141,9 @@ impl Join<'_> {
         Some(Level { options, fresh: Vec::new() })
     }
 
-    /// Returns the position of the unused guard with the fewest unbound variables. Guards without unbound
-    /// variables, or with unbound variables of other quantifiers, are excluded.
+    /// Returns the position of the unused guard (necessary atom) with the fewest unbound variables, or
+    /// `None`. Guards without unbound variables, with unbound variables of other quantifiers, or with more
+    /// than 64 terms are excluded.
     fn next_guard(&self, binding: &Binding) -> Option<usize> {
         let open_variables = |(position, (_, terms)): (usize, &Guard<'_>)| {
             let open = terms.iter().filter_map(|term| match term {

@@ -104,7 +104,7 @@ fn table(
     Ok(Linear { coefficients: Vec::new(), quantity })
 }
 
-/// Callback that receives the binding, and the index of the chosen design for each slot.
+/// Callback that receives the binding, and the index of the chosen design for each slot of the enumeration.
 type Visit<'v> = dyn FnMut(&Binding, &[u32]) -> Result<(), Failure> + 'v;
 
 /// Calls `visit` for every combination of designs of the slots in `mentioned`; the last slot varies fastest.

@@ -46,7 +46,8 @@ pub struct Group {
     pub(crate) exclusive: Vec<AtomId>,
 }
 
-/// Returns groups with pairwise disjoint `atoms`, the largest group first.
+/// Returns mutex groups of relevant atoms with pairwise disjoint `atoms`, in decreasing number of these
+/// atoms. Not all mutex groups are found.
 #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
 pub fn groups(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Result<Vec<Group>, Interrupted> {
     let limits = task.world.limits;
@@ -108,7 +109,8 @@ fn key_of(task: &GroundTask<'_>, candidate: &Candidate, atom: AtomId) -> Option<
     Some(part.key.iter().map(|position| arguments[*position]).collect())
 }
 
-/// Returns the candidates that are invariants, i.e. that no operator violates.
+/// Returns the candidates that no operator violates. At most `CANDIDATE_LIMIT` candidates are checked. The
+/// initial state is not considered.
 #[expect(clippy::arithmetic_side_effects, reason = "no more than the limit on candidates")]
 fn invariants(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Result<Vec<Candidate>, Interrupted> {
     let mut arities: BTreeMap<PredicateId, usize> = BTreeMap::new();

@@ -144,7 +144,8 @@ impl<'t> TimelineWindow<'t> {
         }
     }
 
-    /// Returns the time one moment after `time`.
+    /// Returns the time one moment after `time`; the moment is a very short time whose length is not known
+    /// yet.
     fn later(&self, time: &Rational) -> Linear<Rational> {
         let mut later = Linear::variable(self.timeline.moment);
         later.quantity.constant = time.clone();
@@ -188,7 +189,7 @@ impl<'t> TimelineWindow<'t> {
         conditions
     }
 
-    /// Returns the changes of each event strictly between the start and the end, in order.
+    /// Returns the changes of each event after the start and strictly before the end, in order.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
@@ -232,8 +233,8 @@ impl<'t> TimelineWindow<'t> {
         Some((*clock, end))
     }
 
-    /// Returns the earliest times of the start and the end, if the window fixes them. The flag is `true` if
-    /// the time is one moment later.
+    /// Returns the lower bounds on the times of the start and the end that the window implies. The flag is
+    /// `true` if the time is one moment (a very short time) later.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
