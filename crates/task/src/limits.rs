@@ -140,7 +140,7 @@ impl From<&Limits> for Interrupt {
     }
 }
 
-/// Error: a limit was reached, so the computation has no result.
+/// Error: the deadline has passed or the interrupt flag is set, so the computation has no result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Interrupted;
 

@@ -50,8 +50,8 @@ pub enum CostEncoding {
 /// conjunction, holds.
 type Increments = Vec<(Vec<Lit>, Int)>;
 
-/// Source of cost at a step, which contributes at most one amount: operators that exclude each
-/// other, or the design tables of a set of slots.
+/// Source of cost at a step, which contributes at most one amount: operators that exclude each other, or the
+/// design tables of one set of slots.
 struct Source {
     step: u32,
     /// Index of this source of cost within its step.
@@ -141,7 +141,7 @@ impl Cost {
     }
 }
 
-/// State of the encoding of a cost sum.
+/// State of the encoding of the costs of all steps.
 struct Sum<'s, 'a> {
     builder: &'s mut Builder<'a>,
     cost: &'s CostLimit<'s>,

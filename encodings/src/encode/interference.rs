@@ -8,8 +8,8 @@
 //! condition, E contains all its writers:
 //!
 //! - ∃-step: `¬o@t ∨ ¬p@t` for o ∈ E before p ∈ R in the order, by a ladder: `o@t → a@t`,
+//!   `a@t → a'@t`, `a@t → ¬p@t`;
 //! - ∀-step: these clauses, and again in the reverse order;
-//! - ∀-step: the same, and again in the reverse order;
 //! - exclusion: at most one of the operators that share a slot, a numeric variable, or a transition
 //!   of the cost potential (the projection that reduces costs). So numbers, designs and costs are
 //!   encoded as in sequential semantics.
@@ -72,7 +72,7 @@ struct Conflict {
 struct Uses {
     /// Operators with a plain condition on the variable, by required value.
     require: BTreeMap<u32, Vec<OperatorId>>,
-    /// Operators that read the variable in another way.
+    /// Operators that read the variable in another way than by a plain condition.
     read: Vec<OperatorId>,
     /// Operators that set the variable, each with the new value.
     write: Vec<(OperatorId, u32)>,

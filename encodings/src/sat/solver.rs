@@ -69,9 +69,9 @@ pub trait Solver {
     /// assumptions apply to this call only.
     fn solve(&mut self, assumptions: &[Lit]) -> Answer;
     /// Returns the failed assumptions of the last call, if its answer was `Unsatisfiable`. They are a subset
-    /// of the assumptions that is inconsistent with the clauses, unordered and not necessarily minimal. If
-    /// the clauses alone are unsatisfiable, built-in solvers return an empty subset; external programs always
-    /// return all assumptions.
+    /// of the assumptions that is inconsistent with the clauses, unordered and not necessarily minimal. If a
+    /// built-in solver finds that the clauses alone are unsatisfiable, the subset is empty; external programs
+    /// always return all assumptions.
     fn core(&self) -> &[Lit];
     /// Returns the value of a variable in the last satisfying assignment; `false` if the variable has no
     /// value.

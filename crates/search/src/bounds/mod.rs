@@ -47,7 +47,7 @@ pub struct Bounds {
     resources: Vec<Resource>,
     /// Cost partitionings; empty if they do not improve the heuristic.
     partitions: Vec<CostPartitioning>,
-    /// Projections that only the cost partitionings use.
+    /// Further projections, which are evaluated only if there are cost partitionings.
     further: Vec<Projection>,
 }
 

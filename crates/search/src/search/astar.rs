@@ -40,7 +40,7 @@ const STUBBORN_SET_COST: u64 = 10;
 /// Outcome of an optimal search.
 #[derive(Debug)]
 pub enum SearchOutcome<N = Int> {
-    /// An optimal plan.
+    /// A cheapest plan. With the order `OpenListOrder::Fewest`, also the shortest among the cheapest plans.
     Optimal(GroundPlan<N>),
     /// Proof that no plan exists (within the cost limit of the search, if it has one): every reachable state
     /// was expanded, is dominated, or cannot lead to a plan.
@@ -83,7 +83,8 @@ pub(super) enum OutOfMemoryPolicy {
     Needed,
 }
 
-/// Sort key of an open node: primary value, lower bound on steps, and a tie-breaker that prefers deep nodes.
+/// Sort key of an open node: f value (heuristic value in greedy search), lower bound on steps, and a
+/// tie-breaker that prefers deep nodes.
 type NodeKey<N> = (N, u32, u32);
 
 /// Returns a tie-breaker that decreases with the depth `steps` of a node, so that deep nodes come first.
@@ -110,7 +111,7 @@ pub struct AStar<'a, N, E> {
     own_work: u64,
     /// Number of searches that share the memory limit.
     sharing: usize,
-    /// Lower bound on the cost of every plan.
+    /// Lower bound on the cost of every plan; `None` before the first expansion.
     bound: Option<N>,
     is_interrupted: bool,
     pub(super) patience: OutOfMemoryPolicy,

@@ -59,27 +59,27 @@ pub struct Stubborn {
 /// State of stubborn-set pruning: scratch buffers, and statistics for disabling it.
 pub(super) struct StubbornSetPruning {
     stubborn: Arc<Stubborn>,
-    /// For each operator: whether it is in the set.
+    /// For each operator: whether it is in the stubborn set of the current state.
     is_in: Vec<bool>,
-    /// For each operator: whether it is applicable in the state.
+    /// For each operator: whether it is applicable in the current state.
     can_be_applied: Vec<bool>,
-    /// Operators of the set that are not processed yet.
+    /// Operators of the stubborn set that are not processed yet.
     open: Vec<u32>,
-    /// All operators of the set.
+    /// All operators of the stubborn set.
     all: Vec<u32>,
-    /// For each fact: whether all operators that set it are in the set.
+    /// For each fact: whether all operators that set it are in the stubborn set.
     is_set: Vec<bool>,
     /// Facts for which `is_set` is `true`.
     set: Vec<u32>,
-    /// Number of applicable operators that are not in the set.
+    /// Number of applicable operators that are not in the stubborn set.
     out: usize,
     /// Number of expansions after which pruning is disabled if it has pruned too little.
     trial: u64,
-    /// Number of expanded states.
+    /// Number of states that were expanded with pruning.
     looked: u64,
-    /// Number of applicable operators in all expanded states.
+    /// Sum of the numbers of applicable operators over the states expanded with pruning.
     applicable: u64,
-    /// Number of pruned operators.
+    /// Number of operators that were pruned, over all expanded states.
     left_out: u64,
 }
 

@@ -117,7 +117,7 @@ pub struct Axiom<N = Int> {
 #[derive(Debug, Clone)]
 pub struct Layer<N = Int> {
     pub rules: Vec<Axiom<N>>,
-    /// `true` if a rule depends on a head of this layer.
+    /// `true` if the body of a rule depends on the head of a rule of this layer.
     pub recursive: bool,
 }
 

@@ -87,7 +87,7 @@ struct Join<'j> {
     /// Variables with their candidates, in ascending order of the variables.
     bound: &'j [Bound],
     guards: &'j [Guard<'j>],
-    /// For each guard: `true` while the enumeration is inside a loop over its rows.
+    /// For each guard (necessary atom): `true` while the enumeration is inside a loop over its rows.
     is_used: Vec<bool>,
 }
 
@@ -98,7 +98,7 @@ struct Level {
 }
 
 enum Options {
-    /// The position of a guard, and its remaining rows.
+    /// The position of a guard (necessary atom), and its remaining rows.
     Rows(usize, std::vec::IntoIter<Arguments>),
     /// The position of a variable, and the index of its next candidate.
     Candidates(usize, usize),

@@ -2,10 +2,11 @@
 //! finite-domain variables.
 //!
 //! Invariant synthesis after Helmert [1]. A candidate is a set of predicates with key arguments; at most one
-//! further argument of each predicate is counted, i.e. ignored. An instance of the candidate fixes the
-//! objects of the key. The candidate is an invariant if no operator increases the number of true atoms of any
-//! instance. If an operator violates a candidate, the candidate is extended by a predicate that the operator
-//! deletes. The check uses ground operators, so statically impossible instances do not violate candidates.
+//! further argument of each predicate is counted, i.e. ignored (more for atoms of running actions). An
+//! instance of the candidate fixes the objects of the key. The candidate is an invariant if no operator
+//! increases the number of true atoms of any instance. If an operator violates a candidate, the candidate is
+//! extended by a predicate that the operator deletes. The check uses ground operators, so statically
+//! impossible instances do not violate candidates.
 //!
 //! \[1\] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial
 //! Intelligence 173, 2009, section 5.

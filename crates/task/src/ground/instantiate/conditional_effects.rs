@@ -21,7 +21,8 @@ use crate::lifted::Schema;
 use crate::limits::Limits;
 use crate::task::ForbiddenCombinations;
 
-/// Limit on the number of operators of one action instance.
+/// Limit on the number of combinations of truth values, separately for the conditions of start effects and of
+/// numeric end effects of an action instance.
 const CASE_LIMIT: usize = 64;
 
 /// A case of an action instance: one combination of truth values of the effect conditions. All parts are
