@@ -72,7 +72,7 @@ pub enum Error {
         /// The action or metric that contains the number, if known.
         place: Option<Place>,
     },
-    /// A limit was reached before grounding was complete.
+    /// The deadline passed or the run was interrupted before grounding was complete.
     #[error("a limit was reached while grounding")]
     Interrupted,
     /// A rule of the relaxed reachability program that the Datalog engine rejects.

@@ -115,7 +115,8 @@ impl Limits {
         if self.reached() { Err(Interrupted) } else { Ok(()) }
     }
 
-    /// Iterates over the items until a limit is reached; then yields a single error and ends.
+    /// Iterates over the items until the deadline passes or the interrupt flag is set; then yields a single
+    /// error and ends.
     pub fn watch<I: IntoIterator>(&self, items: I) -> LimitedIter<'_, I::IntoIter> {
         LimitedIter { items: items.into_iter(), pulse: self.pulse(), is_over: false }
     }
@@ -164,7 +165,7 @@ impl LimitPoll<'_> {
     /// Counts one loop iteration; checks the limits if enough iterations have passed since the last check.
     ///
     /// # Errors
-    /// [`Interrupted`] if a limit is reached.
+    /// [`Interrupted`] if the deadline has passed or the interrupt flag is set.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "above 0 where it is taken from; a stride is at most twice the longest"
@@ -192,7 +193,7 @@ impl LimitPoll<'_> {
     }
 }
 
-/// Iterator that ends with an error at a limit; see [`Limits::watch`].
+/// Iterator that ends with an error at the deadline or an interruption; see [`Limits::watch`].
 #[derive(Debug)]
 pub struct LimitedIter<'a, I> {
     items: I,

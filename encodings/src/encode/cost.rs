@@ -79,7 +79,7 @@ enum Spent {
 impl Cost {
     /// Encodes the costs of all steps. Excludes sums above the cost limit, or only single amounts in the
     /// encoding `CostEncoding::Apart`. Without `interference` there is one operator per step. Returns `None`
-    /// if a limit is reached.
+    /// if the deadline passes or the run is interrupted, or there are too many clauses.
     pub(super) fn new(
         builder: &mut Builder<'_>,
         cost: &CostLimit<'_>,
@@ -151,7 +151,8 @@ struct Sum<'s, 'a> {
 }
 
 impl Sum<'_, '_> {
-    /// Returns all sources of cost in the order of steps, or `None` if a limit is reached.
+    /// Returns all sources of cost in the order of steps, or `None` if the deadline passes or the run is
+    /// interrupted, or there are too many clauses.
     fn sources(&mut self) -> Option<Vec<Source>> {
         let mut sources = Vec::new();
         for step in 0..self.builder.variables.horizon() {

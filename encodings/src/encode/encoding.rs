@@ -47,10 +47,9 @@ pub struct Encoding<'a> {
 }
 
 impl<'a> Encoding<'a> {
-    /// Encodes plans with symmetry breaking: of plans that differ only by exchanging
-    /// interchangeable designs or objects, not all are admitted. `symmetry` caches the symmetries
-    /// of the task. Returns `None` if a limit is reached, there are too many clauses, or numbers
-    /// are too large.
+    /// Encodes plans with symmetry breaking: of plans that differ only by exchanging interchangeable designs
+    /// or objects, not all are admitted. `symmetry` caches the symmetries of the task. Returns `None` if the
+    /// deadline passes or the run is interrupted, there are too many clauses, or numbers are too large.
     pub fn new(
         context: Context<'a>,
         plans: PlanConstraints<'_>,
@@ -77,8 +76,8 @@ impl<'a> Encoding<'a> {
         Self { task, formula, variables, cost }
     }
 
-    /// Adds clauses for a lower cost limit. The new limit must not exceed the limit of the encoding. An
-    /// encoding without a cost limit stays unchanged.
+    /// Adds clauses for a lower cost limit. A limit above that of the encoding has no effect. An encoding
+    /// without a cost limit stays unchanged.
     pub fn tighten(&mut self, limit: Int) {
         if let Some(cost) = &self.cost {
             cost.at_most(&mut self.formula, limit);
@@ -145,8 +144,8 @@ impl<'a> Encoding<'a> {
     }
 }
 
-/// Adds all families of clauses except symmetry breaking. Returns `None` if a limit is reached, there are too
-/// many clauses, or numbers are too large.
+/// Adds all families of clauses except symmetry breaking. Returns `None` if the deadline passes or the run is
+/// interrupted, there are too many clauses, or numbers are too large.
 fn build<'a>(context: Context<'a>, plans: PlanConstraints<'_>) -> Option<(Builder<'a>, Option<Cost>)> {
     let PlanConstraints { allowed, cost, semantics, max_clauses: max_clause_count } = plans;
     let potential = cost.as_ref().and_then(|cost| cost.bounds.projections.first());

@@ -37,8 +37,9 @@ struct Range {
     high: Int,
 }
 
-/// Encodes all numeric variables. Returns their bits before each step and after the last step.
-/// Returns `None` if a limit is reached or a number can exceed the available bits.
+/// Encodes all numeric variables. Returns their bits before each step and after the last step. Returns `None`
+/// if the deadline passes or the run is interrupted, there are too many clauses, or a number can exceed the
+/// available bits.
 pub(super) fn numeric(builder: &mut Builder<'_>) -> Option<Vec<Vec<Bits>>> {
     let initial = &builder.task.initial.numbers;
     let mut ranges: Vec<Range> = initial.iter().map(|n| Range { low: *n, high: *n }).collect();

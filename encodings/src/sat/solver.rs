@@ -57,7 +57,8 @@ impl std::ops::Not for Lit {
 pub enum Answer {
     Satisfiable,
     Unsatisfiable,
-    /// A limit was reached, or an external program failed; the solver should not be used again.
+    /// The deadline, an interruption or the conflict budget stopped the solver, or an external program
+    /// failed; the solver should not be used again.
     Interrupted,
 }
 

@@ -146,8 +146,8 @@ impl FfHeuristic {
     }
 
     /// Processes a node when its last condition is reached: lowers the costs of its effects and of the
-    /// numeric comparisons that it can achieve. If all conditions cost 0, its operator is added to
-    /// `applicable`.
+    /// numeric comparisons that it can achieve. If the node is the unconditional part of an operator and all
+    /// conditions cost 0, the operator is added to `applicable`.
     fn reached<N: TaskNumber>(&mut self, relaxation: &Relaxation<N>, prices: &[u32], node: u32) {
         let sum = self.sums[node as usize];
         let operator = relaxation.operators[node as usize];

@@ -182,7 +182,7 @@ struct Ties<'a> {
 }
 
 /// Returns the canonical plan among all plans with the cost and the number of steps of `plan`. Returns `plan`
-/// if a limit is reached.
+/// if a limit on labels, comparisons or time is reached.
 pub fn select_canonical_plan(context: Context<'_>, bounds: &Bounds, plan: GroundPlan) -> GroundPlan {
     let close_to = FxHashSet::default();
     let beginning = PlanPrefix { state: &context.task.initial, designs: &[], close_to: &close_to };
@@ -238,7 +238,7 @@ struct Branch<'a> {
 
 impl Ties<'_> {
     /// Returns the canonical plan and its changes, or `None` if more than `max_changes` are necessary or a
-    /// limit is reached.
+    /// limit on labels, comparisons or time is reached.
     fn first(&self, start: Label, max_changes: Changes) -> Option<(Vec<GroundStep>, Changes)> {
         let (changes, first_labels) = self.fewest_changes(start.clone(), max_changes)?;
         let steps = self.first_in_order(start, changes, &first_labels)?;
@@ -297,7 +297,8 @@ impl Ties<'_> {
     }
 
     /// Returns the minimum changes of a plan that starts at the label `from`, and all labels (partial plans)
-    /// that were stored. Returns `None` if the minimum exceeds `max_changes` or a limit is reached.
+    /// that were stored. Returns `None` if the minimum exceeds `max_changes` or a limit on labels,
+    /// comparisons or time is reached.
     fn fewest_changes(&self, from: Label, max_changes: Changes) -> Option<(Changes, Labels)> {
         let mut open = BinaryHeap::from([Reverse((from.changes, Reverse(from.steps), 0))]);
         let mut labels = Labels { all: vec![from], ..Labels::default() };
@@ -322,7 +323,7 @@ impl Ties<'_> {
     }
 
     /// Returns the first plan in model order with at most `changes`, which must be the minimum. Uses
-    /// depth-first search. Returns `None` if a limit is reached.
+    /// depth-first search. Returns `None` if a limit on labels, comparisons or time is reached.
     ///
     /// A label (partial plan) is pruned if a visited label is at least as good. If the visited label has led
     /// to no plan, the new label leads to none either. If the visited label is an ancestor of the new label,

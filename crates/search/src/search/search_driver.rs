@@ -35,8 +35,8 @@ const WORK_PER_STATE: u64 = 2_500;
 const ABANDON_WORK: u64 = 100_000_000_000;
 
 /// Searches for an optimal plan. All operators must have non-negative costs. Ends without a proof if a
-/// forecast shows that memory will not suffice, if a limit is reached, or if an operator has too many
-/// combinations of designs.
+/// forecast shows that memory will not suffice, if the deadline passes or the run is interrupted, or if an
+/// operator has too many combinations of designs.
 pub fn search(context: Context<'_>, bounds: &Bounds) -> SearchOutcome {
     let Ok(Some(prepared)) = SearchTask::new(context) else { return SearchOutcome::Unknown(None) };
     let space = || SearchProblem { context, bounds, prepared: &prepared, orbits: None };

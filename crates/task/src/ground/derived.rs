@@ -47,7 +47,8 @@ pub fn simplify(task: &mut GroundTask<'_>) -> Result<(), Interrupted> {
     Ok(())
 }
 
-/// Keeps the items for which `keep` returns `true`. Returns an error once a limit is reached.
+/// Keeps the items for which `keep` returns `true`. Returns an error if the deadline passes or the run is
+/// interrupted; the remaining items are then kept.
 fn retain<T>(
     items: &mut Vec<T>,
     limits: &Limits,

@@ -210,7 +210,7 @@ pub fn measured<'s, N: TaskNumber>(
 }
 
 impl Plan {
-    /// Returns the end time of the last action, in the domain's time unit.
+    /// Returns the latest end time of an action, in the domain's time unit; 0 for an empty plan.
     pub fn makespan(&self) -> Exact {
         let ends = self.steps.iter().map(|step| step.start.0.clone() + &step.duration.0);
         Exact(ends.max().unwrap_or_default())

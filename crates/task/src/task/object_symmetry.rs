@@ -26,7 +26,7 @@ const WORK_LIMIT: usize = 2_000_000;
 /// yield an empty list.
 ///
 /// # Errors
-/// A limit is reached.
+/// The deadline has passed or the run is interrupted.
 #[expect(clippy::arithmetic_side_effects, reason = "work is looked at each time")]
 pub fn symmetry_generators(context: Context<'_>, initially: bool) -> Result<Vec<Exchange>, Interrupted> {
     let Context { task, limits } = context;

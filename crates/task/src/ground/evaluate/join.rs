@@ -40,10 +40,10 @@ pub fn guards_of_forall(body: &Formula) -> Vec<Guard<'_>> {
 
 /// Calls `visit` with every binding of the variables in `bound` for which all guards (necessary atoms) can
 /// hold, until `visit` returns `false`. Returns `true` if `visit` always returned `true`. Afterwards the
-/// variables are unbound, unless a limit was reached.
+/// variables are unbound, unless the enumeration was interrupted.
 ///
 /// # Errors
-/// A limit is reached.
+/// The deadline has passed or the run is interrupted.
 pub fn each_binding<'a>(
     world: &mut World<'a>,
     bound: &[Bound],

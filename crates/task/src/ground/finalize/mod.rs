@@ -32,7 +32,8 @@ use crate::task::{Condition, Objective, Operator, State, Task};
 /// reason why no plan exists, if known.
 ///
 /// # Errors
-/// `Error::Overflow` if numbers exceed exact integers, `Error::Interrupted` at a limit.
+/// `Error::Overflow` if numbers exceed exact integers, `Error::Interrupted` if the deadline passes or the run
+/// is interrupted.
 pub fn finish<N: TaskNumber>(
     mut task: GroundTask<'_>,
     unreachable: Option<String>,

@@ -1,5 +1,5 @@
 //! Case distinction: splits an action instance into operators, one for each combination of truth values of
-//! the conditions of its effects.
+//! the conditions of its start effects and numeric effects.
 
 use std::sync::Arc;
 

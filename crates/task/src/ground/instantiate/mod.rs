@@ -54,7 +54,7 @@ use crate::number::dense;
 ///
 /// # Errors
 /// Returns the first unsupported expression or condition of each action schema and of the goal, or an error
-/// at a limit.
+/// if the deadline passes or the run is interrupted.
 pub fn instantiate<'a>(
     world: World<'a>,
     designs: &[Vec<SlotParameter>],
@@ -86,7 +86,7 @@ pub fn instantiate<'a>(
 /// `errors`.
 ///
 /// # Errors
-/// `Error::Interrupted` at a limit.
+/// `Error::Interrupted` if the deadline passes or the run is interrupted.
 fn operators(
     instantiation: &mut Instantiation<'_>,
     designs: &[Vec<SlotParameter>],
