@@ -53,7 +53,7 @@ words! {
 pub(super) struct Interference {
     /// `true` if conflicts apply in the reverse order as well (∀-step semantics).
     both_orders: bool,
-    /// Groups of operators of which at most one may occur at a step.
+    /// Exclusion groups, i.e. groups of operators of which at most one may occur at a step.
     exclusions: Vec<Vec<OperatorId>>,
     conflicts: Vec<Conflict>,
     /// For each operator: index of the first exclusion group that contains it.
@@ -145,8 +145,8 @@ impl Interference {
         Ok(Some(Self { both_orders: semantics == StepSemantics::ForAllStep, exclusions, conflicts, classes }))
     }
 
-    /// Returns the first exclusion group that contains an operator, or `None` if no group does. Operators
-    /// with the same exclusion group never share a step.
+    /// Returns the first exclusion group (operators of which at most one occurs at a step) that contains an
+    /// operator, or `None` if no group does. Operators with the same exclusion group never share a step.
     pub(super) fn class(&self, operator: OperatorId) -> Option<usize> {
         self.classes[operator.index()]
     }

@@ -35,7 +35,7 @@ pub(super) struct Landmark {
     pub(super) is_goal: bool,
 }
 
-/// All landmarks of a task that were found.
+/// The landmarks that were found for a task, with their orders.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Landmarks {
     pub(super) all: Vec<Landmark>,

@@ -45,8 +45,9 @@ pub enum SearchOutcome<N = Int> {
     /// Proof that no plan exists (within the cost limit of the search, if it has one): every reachable state
     /// was expanded, is dominated, or cannot lead to a plan.
     None,
-    /// No proof. Contains the best plan found if a limit was reached. Contains `None` if no plan was found,
-    /// or if the search proved that no plan is cheaper than an external incumbent.
+    /// No proof. Contains the best plan found if a limit on time, memory or states was reached. Contains
+    /// `None` if no plan was found, or if the search proved that no plan is cheaper than an external
+    /// incumbent.
     Unknown(Option<GroundPlan<N>>),
 }
 
@@ -92,7 +93,7 @@ fn later(steps: u32) -> u32 {
     u32::MAX.saturating_sub(steps)
 }
 
-/// A resumable A\* search.
+/// A resumable A\* search, or greedy best-first search with the order `OpenListOrder::Greedy`.
 pub struct AStar<'a, N, E> {
     task: &'a Task<N>,
     limits: &'a Limits,
@@ -321,7 +322,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         self.incumbent_is_external && self.limit == self.bound
     }
 
-    /// Returns `true` if a limit or a cancellation ended the search.
+    /// Returns `true` if the deadline or an interruption ended the search.
     pub(super) fn is_interrupted(&self) -> bool {
         self.is_interrupted
     }

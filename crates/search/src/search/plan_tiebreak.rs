@@ -73,8 +73,8 @@ struct Choice {
 /// Combinations of designs of an operator, in ascending order; `None` if there are too many.
 type Choices = Option<Vec<Choice>>;
 
-/// Key of a Pareto front: values of the basic variables, last designs of the functions and, if the task is
-/// not monotone, numbers.
+/// Key of a Pareto front: values of the basic variables, last designs of the functions and, if more of a
+/// number may be worse (the task is not monotone), numbers.
 type Place = (Box<[u32]>, Vec<Option<ObjectId>>, Vec<Int>);
 
 /// All labels of a search, and their indices by Pareto front.

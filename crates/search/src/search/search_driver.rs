@@ -150,7 +150,7 @@ pub struct InterleavedSearch<'a, N, E> {
     has_begun: bool,
     /// `true` if searches continue although memory is forecast to run out.
     is_patient: bool,
-    /// Greatest lower bound on the cost of every plan that a search has proved.
+    /// Greatest proved lower bound on the cost of every plan.
     bound: Option<N>,
     /// Best plan of the abandoned searches.
     best: Option<GroundPlan<N>>,

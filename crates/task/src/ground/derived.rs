@@ -80,7 +80,7 @@ fn fold(task: &mut GroundTask<'_>, axioms: &mut Vec<GroundAxiom>) -> Result<(), 
                 truth_values.insert(axiom.head, true);
             }
         }
-        // An atom without a rule is false.
+        // A derived atom without a rule is false.
         for atom in derived.iter().filter(|atom| !has_rule.contains(*atom)) {
             truth_values.entry(*atom).or_insert(false);
         }

@@ -122,7 +122,7 @@ impl Join<'_> {
         binding: &Binding,
     ) -> Option<Level> {
         let guard = match last {
-            // Candidates are enumerated only after all guards.
+            // Candidates are enumerated only after the rows of all guards (necessary atoms).
             Some(Level { options: Options::Candidates(..), .. }) => None,
             _ => self.next_guard(binding),
         };
