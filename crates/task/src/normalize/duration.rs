@@ -32,7 +32,7 @@ pub(super) fn rewards_time(metrics: &[Metric]) -> Option<bool> {
 }
 
 /// Returns the constant coefficient of `total-time` in an expression, or `None` if the coefficient is not
-/// constant.
+/// recognised as constant.
 pub fn time_factor(expression: &Expression) -> Option<Rational> {
     let number = |expression: &Expression| match expression {
         Expression::Number(number) => Some(number.clone()),

@@ -347,7 +347,8 @@ impl Operator {
 }
 
 impl<N: TaskNumber> Operator<N> {
-    /// Returns `true` if the operator is applicable with this combination of designs.
+    /// Returns `true` if the condition of the operator holds in a state for this combination of designs.
+    /// Forbidden combinations are not checked, see [`Operator::admits`].
     pub fn applicable(&self, state: &State<N>, choice: &[u32]) -> bool {
         self.condition.holds_propositionally(&state.values)
             && self.condition.holds_numerically(&state.numbers, choice, &self.sizes())

@@ -144,8 +144,8 @@ pub struct Exchange {
 }
 
 impl Exchange {
-    /// Creates the exchange of objects `a` and `b`. Returns `None` if the atoms of a variable are not all
-    /// mapped to atoms of one variable.
+    /// Creates the exchange of objects `a` and `b`. Returns `None` unless the atoms of each variable are
+    /// mapped to atoms of a single variable with equally many values.
     fn new(
         parts: &Parts<'_>,
         a: ObjectId,

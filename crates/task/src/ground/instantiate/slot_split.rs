@@ -48,7 +48,8 @@ impl<'a> Conjuncts<'a> {
     }
 }
 
-/// Returns `true` if relaxed reachability decides the conjunct exactly, i.e. if it is a static literal.
+/// Returns `true` if relaxed reachability decides the conjunct exactly, i.e. if it is a literal of a static
+/// predicate that is not derived.
 fn settled(lifted: &Lifted, conjunct: &Formula) -> bool {
     match conjunct {
         Formula::Literal { predicate, .. } => {
