@@ -68,8 +68,8 @@ impl Limits {
     }
 
     /// Returns limits for completing an answer after the deadline. The new deadline is later by a tenth of
-    /// the time limit and a constant grace period; without a deadline, there is still none. The interrupt
-    /// flag is new, and the memory limit and thresholds are the defaults.
+    /// the time limit and a constant grace period. If the limits have no deadline, the new limits have no
+    /// deadline, either. The interrupt flag is new, and the memory limit and thresholds are the defaults.
     #[must_use]
     pub fn extended(&self) -> Self {
         let grace = self.time.mul_f64(0.1).saturating_add(GRACE);

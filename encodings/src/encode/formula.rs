@@ -126,8 +126,8 @@ pub struct Formula {
     literals: Vec<Lit>,
     /// For each clause: its end in `literals`, and its family.
     clauses: Vec<(u32, Family)>,
-    /// For each literal: the number, from 1, of the last clause to which it was added; 0 if there is none or
-    /// this clause was dropped.
+    /// For each literal: the number, from 1, of the last clause to which it was added; 0 if no clause
+    /// contains it or this clause was dropped.
     last: Vec<u32>,
 }
 

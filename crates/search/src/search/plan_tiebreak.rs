@@ -57,7 +57,7 @@ impl Label {
 }
 
 /// Secondary objectives in lexicographic order, summed over the steps: the number of steps that are not in
-/// the reference plan (0 if there is none), and the number of changes of a function's design.
+/// the reference plan (0 without a reference plan), and the number of changes of a function's design.
 pub type Changes = (usize, usize);
 
 /// A combination of designs for the slots of an operator.
@@ -89,8 +89,8 @@ pub struct PlanPrefix<'a> {
     pub state: &'a State,
     /// Last design of each function before the plan, as pairs (function, design).
     pub designs: &'a [(ObjectId, ObjectId)],
-    /// Steps of a reference plan; empty if there is none. Among equally good plans, a plan with more of these
-    /// steps is selected.
+    /// Steps of a reference plan; empty without a reference plan. Among equally good plans, a plan with more
+    /// of these steps is selected.
     pub close_to: &'a FxHashSet<GroundStep>,
 }
 
