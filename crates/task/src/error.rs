@@ -72,7 +72,7 @@ pub enum Error {
         /// The action or metric that contains the number, if known.
         place: Option<Place>,
     },
-    /// A limit was reached before grounding was complete.
+    /// The deadline passed or the run was interrupted before grounding was complete.
     #[error("a limit was reached while grounding")]
     Interrupted,
     /// A rule of the relaxed reachability program that the Datalog engine rejects.
@@ -98,7 +98,8 @@ impl Error {
         Self::Overflow { what: what.to_owned(), place: None }
     }
 
-    /// Adds a name and, if none is set, a location to an overflow error. Returns other errors unchanged.
+    /// Appends a name to the description in an overflow error and, if it has no location yet, adds one.
+    /// Returns other errors unchanged.
     #[must_use]
     pub fn within(self, name: &str, place: Option<Place>) -> Self {
         match self {

@@ -68,8 +68,8 @@ impl Limits {
     }
 
     /// Returns limits for completing an answer after the deadline. The new deadline is later by a tenth of
-    /// the time limit and a constant grace period. The interrupt flag is new, and the memory limit is the
-    /// default.
+    /// the time limit and a constant grace period. If the limits have no deadline, the new limits have no
+    /// deadline, either. The interrupt flag is new, and the memory limit and thresholds are the defaults.
     #[must_use]
     pub fn extended(&self) -> Self {
         let grace = self.time.mul_f64(0.1).saturating_add(GRACE);
@@ -97,7 +97,7 @@ impl Limits {
         &self.thresholds
     }
 
-    /// Returns the memory limit of a search in bytes.
+    /// Returns the memory limit of a search in bytes, which has a default.
     pub fn room(&self) -> usize {
         self.room.unwrap_or(DEFAULT_MEMORY)
     }
@@ -115,7 +115,8 @@ impl Limits {
         if self.reached() { Err(Interrupted) } else { Ok(()) }
     }
 
-    /// Iterates over the items until a limit is reached; then yields a single error and ends.
+    /// Iterates over the items until the deadline passes or the interrupt flag is set; then yields a single
+    /// error and ends.
     pub fn watch<I: IntoIterator>(&self, items: I) -> LimitedIter<'_, I::IntoIter> {
         LimitedIter { items: items.into_iter(), pulse: self.pulse(), is_over: false }
     }
@@ -140,7 +141,7 @@ impl From<&Limits> for Interrupt {
     }
 }
 
-/// Error: a limit was reached, so the computation has no result.
+/// Error: the deadline has passed or the interrupt flag is set, so the computation has no result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Interrupted;
 
@@ -164,7 +165,7 @@ impl LimitPoll<'_> {
     /// Counts one loop iteration; checks the limits if enough iterations have passed since the last check.
     ///
     /// # Errors
-    /// [`Interrupted`] if a limit is reached.
+    /// [`Interrupted`] if the deadline has passed or the interrupt flag is set.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "above 0 where it is taken from; a stride is at most twice the longest"
@@ -192,7 +193,7 @@ impl LimitPoll<'_> {
     }
 }
 
-/// Iterator that ends with an error at a limit; see [`Limits::watch`].
+/// Iterator that ends with an error at the deadline or an interruption; see [`Limits::watch`].
 #[derive(Debug)]
 pub struct LimitedIter<'a, I> {
     items: I,

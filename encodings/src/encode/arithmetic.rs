@@ -109,7 +109,7 @@ impl Arithmetic<'_> {
         majority
     }
 
-    /// Returns the sum of two numbers with `width` bits. The sum must fit into this width.
+    /// Returns the sum of two numbers as a number with `width` bits. The sum must fit into this width.
     pub(crate) fn add(&mut self, a: &Bits, b: &Bits, width: usize) -> Bits {
         let (a, b) = (Self::extend(a, width), Self::extend(b, width));
         let mut carry = !Formula::truth();
@@ -122,7 +122,8 @@ impl Arithmetic<'_> {
         sum
     }
 
-    /// Returns the product of a number and a constant with `width` bits, by shifts and additions.
+    /// Returns the product of a number and a constant as a number with `width` bits, by shifts and additions.
+    /// The product must fit into this width.
     pub(crate) fn multiple(&mut self, bits: &Bits, factor: Int, width: usize) -> Bits {
         if factor == 1 {
             return Self::extend(bits, width);
@@ -142,9 +143,9 @@ impl Arithmetic<'_> {
         sum
     }
 
-    /// Returns a number that has the given value if its premise, a conjunction, is true, and is 0
-    /// if `active` is false. At most one premise may be true at a time, and one must be true if
-    /// `active` is.
+    /// Returns a number that depends on `premises`, which are pairs of a conjunction and a value. The number
+    /// has the value whose conjunction is true, and is 0 if `active` is false. At most one conjunction may be
+    /// true at a time, and one must be true if `active` is.
     pub(crate) fn choose(&mut self, premises: &[(Vec<Lit>, Int)], active: Lit) -> Bits {
         let low = premises.iter().map(|(_, value)| *value).fold(0, Int::min);
         let high = premises.iter().map(|(_, value)| *value).fold(0, Int::max);

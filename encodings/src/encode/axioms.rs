@@ -21,8 +21,8 @@ use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::encode::numeric::is_at_least_zero;
 use crate::sat::Lit;
 
-/// Adds the clauses for derived variables before a step. `numbers` has the bits of the numeric
-/// variables. Returns `None` if numbers can exceed the available bits.
+/// Adds the clauses for derived variables before a step. `numbers` has the bits of the numeric variables
+/// before the step. Returns `None` if numbers can exceed the available bits.
 pub(super) fn axioms(builder: &mut Builder<'_>, step: usize, numbers: &[Bits]) -> Option<()> {
     let task = builder.task;
     for (layer, index) in task.axioms.iter().zip(0..) {
@@ -59,8 +59,8 @@ pub(super) fn axioms(builder: &mut Builder<'_>, step: usize, numbers: &[Bits]) -
     Some(())
 }
 
-/// Adds level constraints for a recursive layer: each true variable is derived in a round after the
-/// variables that support it. So variables that support only each other are false.
+/// Adds level constraints for a recursive layer: each true variable is derived in a round after the variables
+/// of the layer that support it. So variables that support only each other are false.
 #[expect(clippy::arithmetic_side_effects, reason = "rounds count from 1")]
 fn levels(
     builder: &mut Builder<'_>,

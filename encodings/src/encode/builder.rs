@@ -41,13 +41,14 @@ impl<'a> Builder<'a> {
         Ok(Self { task, limits, formula, variables, most: max_clauses, groups: FxHashMap::default() })
     }
 
-    /// Returns an error if a limit is reached or there are too many clauses.
+    /// Returns an error if the deadline has passed, the interrupt flag is set, or there are too many clauses.
     pub(super) fn check(&self) -> Result<(), Interrupted> {
         if self.formula.clause_count() > self.most { Err(Interrupted) } else { self.limits.check() }
     }
 
-    /// Returns the literal of a group of operators at a step, and adds its defining clauses to
-    /// `family` if it is new. Members that are impossible at the step are ignored.
+    /// Returns a literal that is true if an operator in `members` is executed at the step. If the group is
+    /// new, its defining clauses are added to `family`. Members that are impossible at the step are ignored;
+    /// if at most one or all possible operators of the step remain, an existing literal is returned.
     pub(super) fn group(&mut self, step: usize, members: &[OperatorId], family: Family) -> Lit {
         let present: Vec<_> = {
             let candidates = &self.variables.operators[step];

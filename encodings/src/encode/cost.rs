@@ -6,9 +6,9 @@
 //! and the lower bound has to be counted, and an operator on a cheapest path has the reduced cost
 //! 0. The entries of design tables count as differences from the cheapest entry.
 //!
-//! The sum has an order encoding: one variable for each possible amount, which is implied if *at
-//! least* this amount has been spent. The converse is not encoded. If too many amounts are
-//! possible, binary addition is used instead.
+//! The sum has an order encoding: one variable for each possible amount, which is implied if *at least* this
+//! amount has been spent. The converse is not encoded. If too many amounts are possible, binary addition is
+//! used instead. For core-guided search, the amounts are not summed but returned as weighted literals.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -27,8 +27,9 @@ use crate::sat::Lit;
 /// encoded by binary addition.
 const AMOUNT_LIMIT: usize = 1_000;
 
-/// Cost limit of an encoding: only plans with a cost of at most `limit` are admitted. `bounds`
-/// provides projections of the task, whose lower bounds reduce the costs that are summed.
+/// Cost limit of an encoding: only plans with a cost of at most `limit` are admitted (with
+/// `CostEncoding::Apart`, only single amounts above the limit are excluded). The goal distances in the first
+/// projection of `bounds` are the potential by which operator costs are reduced (see the head of this file).
 pub struct CostLimit<'a> {
     pub limit: Int,
     pub bounds: &'a Bounds,
@@ -49,8 +50,8 @@ pub enum CostEncoding {
 /// conjunction, holds.
 type Increments = Vec<(Vec<Lit>, Int)>;
 
-/// Source of cost at a step, which contributes at most one amount: operators that exclude each
-/// other, or the design tables of a set of slots.
+/// Source of cost at a step, which contributes at most one amount: operators that exclude each other, or the
+/// design tables of one set of slots.
 struct Source {
     step: u32,
     /// Index of this source of cost within its step.
@@ -76,8 +77,9 @@ enum Spent {
 }
 
 impl Cost {
-    /// Encodes and bounds the sum of the costs of all steps. Without `interference` there is one
-    /// operator per step. Returns `None` if a limit is reached.
+    /// Encodes the costs of all steps. Excludes sums above the cost limit, or only single amounts in the
+    /// encoding `CostEncoding::Apart`. Without `interference` there is one operator per step. Returns `None`
+    /// if the deadline passes or the run is interrupted, or there are too many clauses.
     pub(super) fn new(
         builder: &mut Builder<'_>,
         cost: &CostLimit<'_>,
@@ -109,8 +111,8 @@ impl Cost {
         Some(Self { lower, spent })
     }
 
-    /// Returns a lower bound on the cost of every plan, and weighted literals for the cost beyond
-    /// it.
+    /// Returns a lower bound on the cost of every plan, and weighted literals for the cost beyond it. Without
+    /// the encoding `CostEncoding::Apart`, there are no weighted literals.
     pub(super) fn payments(&self) -> (Int, &[(Lit, Int)]) {
         match &self.spent {
             Spent::Apart(literals) => (self.lower, literals),
@@ -118,8 +120,8 @@ impl Cost {
         }
     }
 
-    /// Adds clauses that admit only plans with a cost of at most `limit`. Has no effect on weighted
-    /// literals.
+    /// Adds clauses that admit only plans with a cost of at most `limit`. A limit above that of the encoding
+    /// has no effect. With weighted literals, only a limit below the lower bound has an effect.
     pub(super) fn at_most(&self, formula: &mut Formula, limit: Int) {
         // The gap is negative if no plan can have this cost.
         let gap = limit.saturating_sub(self.lower);
@@ -139,7 +141,7 @@ impl Cost {
     }
 }
 
-/// State of the encoding of a cost sum.
+/// State of the encoding of the costs of all steps.
 struct Sum<'s, 'a> {
     builder: &'s mut Builder<'a>,
     cost: &'s CostLimit<'s>,
@@ -149,7 +151,8 @@ struct Sum<'s, 'a> {
 }
 
 impl Sum<'_, '_> {
-    /// Returns all sources of cost in the order of steps, or `None` if a limit is reached.
+    /// Returns all sources of cost in the order of steps, or `None` if the deadline passes or the run is
+    /// interrupted, or there are too many clauses.
     fn sources(&mut self) -> Option<Vec<Source>> {
         let mut sources = Vec::new();
         for step in 0..self.builder.variables.horizon() {
@@ -392,7 +395,7 @@ fn next_amounts(spent: &BTreeSet<Int>, increments: impl Iterator<Item = Int>, ga
     amounts
 }
 
-/// Returns `true` if the number of possible accumulated amounts is small enough for the order
+/// Returns `true` if the number of possible accumulated amounts up to `gap` is small enough for the order
 /// encoding.
 fn amounts_fit(sources: &[Source], gap: Int) -> bool {
     let mut spent = BTreeSet::new();

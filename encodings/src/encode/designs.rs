@@ -3,8 +3,8 @@
 use task::number::dense;
 use task::task::{Operator, SlotUse};
 
-/// Returns slot and design in the numbering of the task. `slot` and `design` are indices within an
-/// operator with the slots `slots`.
+/// Returns slot and design in the numbering of the task: indices into the slots of the task and into the
+/// designs of this slot. `slot` and `design` are indices within an operator with the slots `slots`.
 pub(super) fn task_slot(slots: &[SlotUse], slot: u32, design: u32) -> (usize, usize) {
     let usage = &slots[slot as usize];
     (usage.slot.index(), usage.designs[design as usize] as usize)

@@ -33,7 +33,8 @@ pub struct PlanConstraints<'a> {
     pub cost: Option<CostLimit<'a>>,
     /// Number and order of the operators within a step.
     pub semantics: StepSemantics,
-    /// Maximum number of clauses; beyond it, no encoding is created.
+    /// Maximum number of clauses, which is checked after each part of the encoding; beyond it, no encoding is
+    /// created.
     pub max_clauses: usize,
 }
 
@@ -46,10 +47,9 @@ pub struct Encoding<'a> {
 }
 
 impl<'a> Encoding<'a> {
-    /// Encodes plans with symmetry breaking: of plans that differ only by exchanging
-    /// interchangeable designs or objects, not all are admitted. `symmetry` caches the symmetries
-    /// of the task. Returns `None` if a limit is reached, there are too many clauses, or numbers
-    /// are too large.
+    /// Encodes plans with symmetry breaking: of plans that differ only by exchanging interchangeable designs
+    /// or objects, not all are admitted. `symmetry` caches the symmetries of the task. Returns `None` if the
+    /// deadline passes or the run is interrupted, there are too many clauses, or numbers are too large.
     pub fn new(
         context: Context<'a>,
         plans: PlanConstraints<'_>,
@@ -76,8 +76,8 @@ impl<'a> Encoding<'a> {
         Self { task, formula, variables, cost }
     }
 
-    /// Adds clauses for a lower cost limit. The new limit must not exceed the limit of the
-    /// encoding.
+    /// Adds clauses for a lower cost limit. A limit above that of the encoding has no effect. An encoding
+    /// without a cost limit stays unchanged.
     pub fn tighten(&mut self, limit: Int) {
         if let Some(cost) = &self.cost {
             cost.at_most(&mut self.formula, limit);
@@ -89,15 +89,16 @@ impl<'a> Encoding<'a> {
         self.variables.horizon()
     }
 
-    /// Returns the cost as a sum for core-guided search: a lower bound on the cost of every plan,
-    /// and literals whose weights are added to it if the literals are true. Without weighted
-    /// literals, the slice is empty.
+    /// Returns the cost as a sum for core-guided search: a lower bound on the cost of every plan, and
+    /// literals whose weights are added to it if the literals are true. Without weighted literals, the slice
+    /// is empty. Without a cost limit, the lower bound is 0.
     pub fn payments(&self) -> (Int, &[(Lit, Int)]) {
         self.cost.as_ref().map_or((0, &[]), Cost::payments)
     }
 
-    /// Returns the literal for a choice of a plan at the step `at`: the operator, or the design of
-    /// one of its slots.
+    /// Returns the literal for a choice of a plan at the step `at`: the operator if `slot` is `None`,
+    /// otherwise the design of this slot. Returns the constant false if the operator is impossible at the
+    /// step.
     pub fn choice(&self, plan: &[GroundStep], (at, slot): (usize, Option<u32>)) -> Lit {
         let step = &plan[at];
         match slot {
@@ -143,8 +144,8 @@ impl<'a> Encoding<'a> {
     }
 }
 
-/// Adds all families of clauses except symmetry breaking. Returns `None` if a limit is reached or
-/// numbers are too large.
+/// Adds all families of clauses except symmetry breaking. Returns `None` if the deadline passes or the run is
+/// interrupted, there are too many clauses, or numbers are too large.
 fn build<'a>(context: Context<'a>, plans: PlanConstraints<'_>) -> Option<(Builder<'a>, Option<Cost>)> {
     let PlanConstraints { allowed, cost, semantics, max_clauses: max_clause_count } = plans;
     let potential = cost.as_ref().and_then(|cost| cost.bounds.projections.first());

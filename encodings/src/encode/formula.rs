@@ -1,4 +1,5 @@
-//! Formula under construction: its clauses with their families, and the meanings of its variables.
+//! Formula under construction: its clauses with their families, and the meanings of its variables. Also
+//! auxiliary constraints: conjunction, disjunction, and at-most-one.
 
 use std::fmt;
 
@@ -95,7 +96,8 @@ pub enum VariableMeaning {
     Design { slot: u32, design: u32, step: u32 },
     /// An operator of the group is executed at the step.
     Group { group: u32, step: u32 },
-    /// The accumulated cost before the step, minus its lower bound, is at least the amount.
+    /// The accumulated reduced cost (cost beyond the lower bound), after the source of cost `stage` of the
+    /// step `step` − 1, is at least the amount. The literal is implied by this condition, not equivalent.
     CostAtLeast { amount: Int, step: u32, stage: u32 },
     /// A source of cost at the step adds this amount. It is implied by the choices that cause the
     /// amount.
@@ -110,7 +112,8 @@ pub enum VariableMeaning {
     Bit { bit: u32 },
     /// Selector that excludes known plans while it is assumed.
     Others,
-    /// A count of true literals in a core of the core-guided search.
+    /// At least a certain number of the literals of a core are true (variable of a totalizer of the
+    /// core-guided search).
     Paid,
     /// Auxiliary variable without a meaning in the task, for example of an at-most-one constraint.
     Ladder,
@@ -123,8 +126,8 @@ pub struct Formula {
     literals: Vec<Lit>,
     /// For each clause: its end in `literals`, and its family.
     clauses: Vec<(u32, Family)>,
-    /// For each literal: the number, from 1, of the last clause that contains it; 0 if no clause
-    /// does.
+    /// For each literal: the number, from 1, of the last clause to which it was added; 0 if no clause
+    /// contains it or this clause was dropped.
     last: Vec<u32>,
 }
 
@@ -194,7 +197,8 @@ impl Formula {
         }
     }
 
-    /// Returns a literal that is equivalent to the conjunction of the premises.
+    /// Returns a literal that is equivalent to the conjunction of the premises. Returns the constant true if
+    /// no premises remain without it, and the premise itself if one remains.
     pub(crate) fn equivalent(&mut self, meaning: VariableMeaning, premises: &[Lit], family: Family) -> Lit {
         let premises: Vec<_> = premises.iter().copied().filter(|l| *l != Self::truth()).collect();
         match premises[..] {

@@ -1,8 +1,8 @@
 //! Detects interchangeable designs of a slot (a parameter for a function design) by hashing.
 //!
-//! Each design has a signature: a hash of its entries in all tables and forbidden combinations of
-//! the task. Only designs with the same signature are compared. The running time is linear in the
-//! size of the tables, independent of the number of designs.
+//! Each design has a signature: a hash of its entries in all tables and forbidden combinations of the task.
+//! Only designs with equal signatures are compared. The running time is linear in the size of the tables,
+//! independent of the number of designs.
 
 use std::hash::{BuildHasher, Hash};
 
@@ -67,8 +67,8 @@ fn hash<T: Hash>(value: &T) -> u64 {
     FxBuildHasher.hash_one(value)
 }
 
-/// Returns the designs of a slot that are interchangeable with an earlier design of the slot,
-/// ascending.
+/// Returns the designs of a slot (as indices into its designs, ascending) that are interchangeable with an
+/// earlier design of the slot.
 pub(super) fn equal_designs(context: Context<'_>, slot: SlotId) -> Result<Vec<u32>, Interrupted> {
     let Context { task, limits } = context;
     let witnesses = witnesses(context, slot)?;
@@ -91,8 +91,8 @@ pub(super) fn equal_designs(context: Context<'_>, slot: SlotId) -> Result<Vec<u3
     Ok(equal)
 }
 
-/// Returns all parts of the task that refer to designs of a slot. A part that operators share
-/// occurs once.
+/// Returns all parts of the task that may distinguish designs of a slot. A part that operators share occurs
+/// once.
 #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
 fn witnesses(context: Context<'_>, slot: SlotId) -> Result<Vec<Witness<'_>>, Interrupted> {
     let Context { task, limits } = context;

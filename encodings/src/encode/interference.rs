@@ -9,7 +9,7 @@
 //!
 //! - ∃-step: `¬o@t ∨ ¬p@t` for o ∈ E before p ∈ R in the order, by a ladder: `o@t → a@t`,
 //!   `a@t → a'@t`, `a@t → ¬p@t`;
-//! - ∀-step: the same, and again in the reverse order;
+//! - ∀-step: these clauses, and again in the reverse order;
 //! - exclusion: at most one of the operators that share a slot, a numeric variable, or a transition
 //!   of the cost potential (the projection that reduces costs). So numbers, designs and costs are
 //!   encoded as in sequential semantics.
@@ -53,7 +53,7 @@ words! {
 pub(super) struct Interference {
     /// `true` if conflicts apply in the reverse order as well (∀-step semantics).
     both_orders: bool,
-    /// Groups of operators of which at most one may occur at a step.
+    /// Exclusion groups, i.e. groups of operators of which at most one may occur at a step.
     exclusions: Vec<Vec<OperatorId>>,
     conflicts: Vec<Conflict>,
     /// For each operator: index of the first exclusion group that contains it.
@@ -72,7 +72,7 @@ struct Conflict {
 struct Uses {
     /// Operators with a plain condition on the variable, by required value.
     require: BTreeMap<u32, Vec<OperatorId>>,
-    /// Operators that read the variable in another way.
+    /// Operators that read the variable in another way than by a plain condition.
     read: Vec<OperatorId>,
     /// Operators that set the variable, each with the new value.
     write: Vec<(OperatorId, u32)>,
@@ -145,8 +145,8 @@ impl Interference {
         Ok(Some(Self { both_orders: semantics == StepSemantics::ForAllStep, exclusions, conflicts, classes }))
     }
 
-    /// Returns the exclusion group of an operator. Operators with the same group never share a
-    /// step; operators without a group may share a step with any operator.
+    /// Returns the first exclusion group (operators of which at most one occurs at a step) that contains an
+    /// operator, or `None` if no group does. Operators with the same exclusion group never share a step.
     pub(super) fn class(&self, operator: OperatorId) -> Option<usize> {
         self.classes[operator.index()]
     }
@@ -274,7 +274,7 @@ fn sorted(numbers: &mut Vec<usize>) -> &[usize] {
     numbers
 }
 
-/// Adds clauses by which no operator that needs a fact follows an operator that erases it. `chain`
+/// Adds clauses by which no operator that needs a fact follows another operator that erases the fact. `chain`
 /// has the operators in order, each with two flags: it erases the fact, it needs the fact.
 fn ladder(formula: &mut Formula, chain: &[(Lit, (bool, bool))]) {
     let last = chain.iter().rposition(|(_, (_, needs))| *needs);

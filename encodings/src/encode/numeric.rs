@@ -30,15 +30,16 @@ type Shape = Vec<(NumericId, Int)>;
 /// of each.
 type TableKey = (Vec<Vec<(usize, usize)>>, Arc<[Int]>);
 
-/// Interval that contains all possible values of a number.
+/// Interval that contains all possible values of a number at a step.
 #[derive(Debug, Clone, Copy)]
 struct Range {
     low: Int,
     high: Int,
 }
 
-/// Encodes all numeric variables. Returns their bits before each step and after the last step.
-/// Returns `None` if a limit is reached or a number can exceed the available bits.
+/// Encodes all numeric variables. Returns their bits before each step and after the last step. Returns `None`
+/// if the deadline passes or the run is interrupted, there are too many clauses, or a number can exceed the
+/// available bits.
 pub(super) fn numeric(builder: &mut Builder<'_>) -> Option<Vec<Vec<Bits>>> {
     let initial = &builder.task.initial.numbers;
     let mut ranges: Vec<Range> = initial.iter().map(|n| Range { low: *n, high: *n }).collect();
@@ -117,9 +118,9 @@ impl Transition<'_, '_> {
         Some(self.plus_quantities(base, &members, &quantity, active, width))
     }
 
-    /// Returns the part of the next value that depends on present values: the linear combination of
-    /// the effect at the step, or `current` if no operator changes the number. `shapes` groups the
-    /// operators by their linear combinations.
+    /// Returns the part of the next value that depends on present values: the linear combination of the
+    /// effect at the step, or `current` if no operator changes the number. `shapes` groups the operators by
+    /// their linear combinations. Returns `None` if the part can exceed the available bits.
     fn base(&mut self, shapes: &BTreeMap<Shape, Vec<OperatorId>>, current: &Bits) -> Option<Bits> {
         let mut options = Vec::new();
         let mut length = current.len();
@@ -149,8 +150,9 @@ impl Transition<'_, '_> {
         Some(base)
     }
 
-    /// Adds the constants and table entries of the operators `members` to `base`: one summand for
-    /// the constants, and one summand for the tables of each set of slots.
+    /// Adds the constants and table entries of the operators `members` to `base`: one summand for the
+    /// constants, and one summand for the tables of each set of slots. `active` is true if a member is
+    /// executed. The sum has `width` bits.
     fn plus_quantities(
         &mut self,
         base: Bits,
@@ -214,8 +216,8 @@ impl Transition<'_, '_> {
         arithmetic.add(&base, &summand, width)
     }
 
-    /// Adds clauses for the numeric conditions of the operators at the step. `next` has the bits of
-    /// the numbers after the step.
+    /// Adds clauses for the numeric conditions of the operators at the step. `next` has the bits of the
+    /// numbers after the step. Returns `None` if a number can exceed the available bits.
     #[expect(clippy::arithmetic_side_effects, reason = "widths of numbers of 128 bits")]
     fn comparisons(&mut self, next: &[Bits]) -> Option<()> {
         for index in 0..self.builder.variables.operators[self.step].len() {
@@ -288,8 +290,8 @@ fn weighted(formula: &mut Formula, shape: &Shape, numbers: &[Bits], ranges: &[Ra
     Some(sum.unwrap_or_else(|| Arithmetic::constant(0, 1)))
 }
 
-/// Returns a literal that is true if a linear expression without tables is at least 0. Returns
-/// `None` if numbers can exceed the available bits.
+/// Returns a literal that is true exactly if a linear expression without tables is at least 0. Returns `None`
+/// if numbers can exceed the available bits.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "widths of numbers of 128 bits; a number has a bit at least"

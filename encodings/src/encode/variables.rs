@@ -26,8 +26,8 @@ pub(super) struct Variables {
 }
 
 impl Variables {
-    /// Creates the variables. `allowed[step][operator]` is `true` if the operator may occur at the
-    /// step.
+    /// Creates the variables. `allowed[step][operator]` is `true` if the operator may occur at the step.
+    /// Operators whose required facts cannot hold before the step are omitted.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "steps are fewer than the horizon, whose formula is in memory"
@@ -44,8 +44,8 @@ impl Variables {
         for (variable, value) in task.initial.values.iter().enumerate() {
             possible[variable][*value as usize] = true;
         }
-        // All values of derived variables are possible, because the other variables determine them
-        // at every step.
+        // Both values of each derived variable that has a rule are possible at every step, because the other
+        // variables determine them at every step.
         for values in &mut possible[task.basic..] {
             values[1] = true;
         }
@@ -82,7 +82,7 @@ impl Variables {
         self.operators.len()
     }
 
-    /// Returns the literal of a fact before a step.
+    /// Returns the literal of a fact before a step (or after the last step, if `step` is the horizon).
     pub(super) fn fact(&self, fact: Fact, step: usize) -> Lit {
         self.values[step][fact.variable.index()][fact.value as usize]
     }

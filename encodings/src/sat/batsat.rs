@@ -21,7 +21,8 @@ pub(super) struct Batsat {
     core: Vec<Lit>,
 }
 
-/// Solver callbacks: count conflicts, and stop the solver at a limit or beyond the conflict budget.
+/// Solver callbacks: count conflicts, and stop the solver at the deadline, at an interruption, or beyond the
+/// conflict budget.
 struct Watch {
     limits: Limits,
     budget: u64,
@@ -48,7 +49,8 @@ impl Callbacks for Watch {
 }
 
 impl Batsat {
-    /// Creates a solver that stops at a limit or after more than `budget` conflicts.
+    /// Creates a solver that stops at the deadline, at an interruption, or after more than `budget`
+    /// conflicts.
     pub(super) fn new(limits: &Limits, budget: u64) -> Self {
         let watch = Watch {
             limits: limits.clone(),

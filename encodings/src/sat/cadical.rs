@@ -16,7 +16,8 @@ pub(super) struct Cadical {
     core: Vec<Lit>,
 }
 
-/// Solver callbacks: count conflicts, and stop the solver at a limit or beyond the conflict budget.
+/// Solver callbacks: count conflicts, and stop the solver at the deadline, at an interruption, or beyond the
+/// conflict budget.
 struct Watch {
     limits: Limits,
     budget: u64,
@@ -38,7 +39,8 @@ impl cadical::Callbacks for Watch {
 }
 
 impl Cadical {
-    /// Creates a solver that stops at a limit or after more than `budget` conflicts.
+    /// Creates a solver that stops at the deadline, at an interruption, or after more than `budget`
+    /// conflicts.
     pub(super) fn new(limits: &Limits, budget: u64) -> Self {
         let mut solver = cadical::Solver::new();
         solver.set_callbacks(Some(Watch { limits: limits.clone(), budget, conflicts: 0 }));

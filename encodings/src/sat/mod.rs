@@ -1,8 +1,9 @@
 //! SAT solvers behind one trait.
 //!
-//! Each solver has its own file, and only this file names the solver's crate. Solvers are
-//! incremental: they accept further clauses after each answer, keep learnt clauses, solve under
-//! assumptions, and report a core, i.e. assumptions that together are inconsistent.
+//! Each solver has its own file, and no other file names the solver's crate. Solvers are incremental: they
+//! accept further clauses after each answer, solve under assumptions, and report a core, i.e. assumptions
+//! that together are inconsistent with the clauses. Built-in solvers keep learnt clauses; an external program
+//! starts from the beginning in each call.
 
 mod batsat;
 #[cfg(feature = "cadical")]
@@ -73,7 +74,8 @@ impl Backend {
         "cadical",
     ];
 
-    /// Starts a solver that stops at a limit or after `budget` conflicts.
+    /// Starts a solver that stops at the deadline, at an interruption, or after more than `budget` conflicts.
+    /// An external program with a conflict budget gets a time limit instead.
     pub fn start(&self, limits: &Limits, budget: u64) -> Box<dyn Solver> {
         match self {
             Self::Varisat => Box::new(varisat::Varisat::new(limits, budget)),

@@ -39,8 +39,8 @@ pub(super) struct Program {
 }
 
 impl Program {
-    /// Prepares a solver without clauses. Each run of the program ends at a limit, or after
-    /// [`BUDGET_TIME`] unless `budget` is `u64::MAX`.
+    /// Prepares a solver without clauses. Each run of the program ends at the deadline, at an interruption,
+    /// or after [`BUDGET_TIME`] unless `budget` is `u64::MAX`.
     pub(super) fn new(command: &str, arguments: &[String], limits: &Limits, budget: u64) -> Self {
         let mut process = Command::new(command);
         process.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null());
@@ -110,8 +110,8 @@ impl Program {
         }
     }
 
-    /// Runs the program and returns its output. Returns `None` if a limit was reached and the
-    /// program was killed.
+    /// Runs the program and returns its output. Returns `None` if the program was killed, because a limit or
+    /// the time that replaces the conflict budget was reached.
     fn run(&mut self) -> Result<Option<String>, String> {
         let started = Instant::now();
         let mut child = Process(self.command.spawn().map_err(|error| format!("cannot be started: {error}"))?);
@@ -150,9 +150,9 @@ impl Program {
     }
 }
 
-/// Waits for the end of a program that has closed its output. Returns `false` if a limit is reached
-/// first. A SAT solver exits with status 10, 20 or 0; after any other status the output may be
-/// incomplete, so the result is an error.
+/// Waits for the end of a program that has closed its output. Returns `false` if the deadline or an
+/// interruption comes first. A SAT solver exits with status 10, 20 or 0; after any other status the output
+/// may be incomplete, so the result is an error.
 fn has_ended(child: &mut Child, is_over: &dyn Fn() -> bool) -> Result<bool, String> {
     while !is_over() {
         match child.try_wait().map_err(|error| format!("how it ended is not known: {error}"))? {

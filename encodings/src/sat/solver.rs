@@ -57,7 +57,8 @@ impl std::ops::Not for Lit {
 pub enum Answer {
     Satisfiable,
     Unsatisfiable,
-    /// A limit was reached; the solver must not be used again.
+    /// The deadline, an interruption or the conflict budget stopped the solver, or an external program
+    /// failed; the solver should not be used again.
     Interrupted,
 }
 
@@ -68,11 +69,13 @@ pub trait Solver {
     /// Decides whether all added clauses are satisfiable together with the assumptions. The
     /// assumptions apply to this call only.
     fn solve(&mut self, assumptions: &[Lit]) -> Answer;
-    /// Returns the failed assumptions of the last call, if its answer was `Unsatisfiable`. They are
-    /// a subset of the assumptions that is inconsistent with the clauses, unordered and not
-    /// necessarily minimal. The subset is empty if the clauses alone are unsatisfiable.
+    /// Returns the failed assumptions of the last call, if its answer was `Unsatisfiable`. They are a subset
+    /// of the assumptions that is inconsistent with the clauses, unordered and not necessarily minimal. If a
+    /// built-in solver finds that the clauses alone are unsatisfiable, the subset is empty; external programs
+    /// always return all assumptions.
     fn core(&self) -> &[Lit];
-    /// Returns the value of a variable in the last satisfying assignment.
+    /// Returns the value of a variable in the last satisfying assignment; `false` if the variable has no
+    /// value.
     fn value(&self, variable: u32) -> bool;
     /// Returns the number of learnt clauses over all calls, one per conflict; 0 if the solver does
     /// not report them.

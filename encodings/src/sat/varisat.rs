@@ -28,7 +28,8 @@ pub(super) struct Varisat {
     /// `true` if an earlier call was unsatisfiable because of assumptions; later cores need
     /// confirmation.
     failed: bool,
-    /// `true` if a limit was reached. Varisat must not be called again then, since it would panic.
+    /// `true` if the deadline, an interruption or the conflict budget stopped a call. Varisat must not be
+    /// called again then, since it would panic.
     interrupted: bool,
     limits: Limits,
     budget: u64,
@@ -42,7 +43,8 @@ pub(super) struct Varisat {
 }
 
 impl Varisat {
-    /// Creates a solver that stops at a limit or after more than `budget` conflicts.
+    /// Creates a solver that stops at the deadline, at an interruption, or after more than `budget`
+    /// conflicts.
     pub(super) fn new(limits: &Limits, budget: u64) -> Self {
         let conflicts = Rc::new(Cell::new(0));
         Self {
@@ -119,9 +121,9 @@ fn translate(literal: Lit) -> varisat::Lit {
     varisat::Lit::from_index(literal.variable() as usize, literal.is_positive())
 }
 
-/// Decides DIMACS clauses with Varisat, and writes a DRAT proof to `proof`. The proof is a
-/// refutation if the answer is `Unsatisfiable`. Stops at a limit or after more than `budget` added
-/// clauses.
+/// Decides DIMACS clauses with Varisat, and writes a DRAT proof to `proof`. The proof is a refutation if the
+/// answer is `Unsatisfiable`. Stops at the deadline, at an interruption, or after more than `budget` added
+/// clauses. The answer is `Interrupted` then, or if the proof cannot be written.
 pub fn refute_with_proof(
     clauses: impl Iterator<Item = impl Iterator<Item = i32>>,
     proof: Box<dyn io::Write>,
@@ -254,7 +256,8 @@ impl Steps {
     }
 }
 
-/// Proof sink that counts learnt clauses, and fails at a limit or beyond the conflict budget.
+/// Proof sink that counts learnt clauses, and fails at the deadline, at an interruption, or beyond the
+/// conflict budget.
 struct BudgetSink {
     limits: Limits,
     budget: u64,
@@ -277,8 +280,8 @@ impl io::Write for BudgetSink {
     }
 }
 
-/// Proof sink that forwards a DRAT proof and counts added clauses. It fails at a limit or beyond
-/// the budget.
+/// Proof sink that forwards a DRAT proof and counts added clauses. It fails at the deadline, at an
+/// interruption, or beyond the budget.
 struct DratSink {
     limits: Limits,
     budget: u64,

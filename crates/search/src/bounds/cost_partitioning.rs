@@ -1,10 +1,10 @@
 //! Saturated cost partitioning \[1\] over projections of a task.
 //!
-//! The projections of an order take shares of the operator costs in turn. Each projection takes only the
-//! costs that its goal distances need, and the next projection gets the remaining costs. The sum of all goal
-//! distances is consistent, because each projection uses its own share. The result depends on the order, so
-//! several orders are tried. The sum includes costs that no single projection contains, for example of goals
-//! of another robot or of design changes.
+//! The projections take shares of the operator costs one after another. Each projection takes only the costs
+//! that its goal distances need, and the next projection gets the remaining costs. The sum of all goal
+//! distances is a consistent heuristic, because each projection uses its own share. The result depends on the
+//! order of the projections, so several orders are tried. The sum includes costs that no single projection
+//! contains, for example of goals of another robot or of design changes.
 //!
 //! \[1\] J. Seipp, T. Keller, M. Helmert: Saturated cost partitioning for optimal classical
 //! planning, JAIR 67, 2020.
@@ -22,18 +22,19 @@ use crate::bounds::pattern_database::Projection;
 const MAX_PARTITIONINGS: usize = 4;
 /// Maximum number of orders of projections that are tried.
 const MAX_ORDERS: usize = 60;
-/// Maximum number of transitions visited over all orders.
+/// Limit on the work for all tried orders together, as the number of visited abstract states and transitions.
+/// If a single order would exceed it, no cost partitioning is computed.
 const MAX_TRANSITIONS: usize = 6_000_000;
 
-/// A cost partitioning: for each projection in it, its index and the goal distances of its abstract states
-/// under its share of the costs.
+/// A cost partitioning: for some projections, the index of the projection and the goal distances of its
+/// abstract states under its share of the costs. A projection whose distances are all 0 is omitted.
 pub(super) struct CostPartitioning {
     parts: Vec<(usize, Vec<Option<Int>>)>,
 }
 
 impl CostPartitioning {
-    /// Returns the heuristic value of a state. `states` is the abstract state of the state in each
-    /// projection.
+    /// Returns the heuristic value of a state: the sum of the goal distances, where unreachable goals count
+    /// as 0. `states` contains, for each projection, the abstract state that represents the state.
     pub(super) fn estimate(&self, states: &[u32]) -> Int {
         let shares = self.parts.iter().map(|(position, to_go)| to_go[states[*position] as usize]);
         // Dead ends are detected by the projections, so a missing distance counts as 0. The capped sum
@@ -63,8 +64,9 @@ impl CostPartitioning {
     }
 }
 
-/// Returns saturated cost partitionings, sorted by decreasing heuristic value of the initial state. Returns
-/// an empty list if none is better than the best single projection.
+/// Returns at most `MAX_PARTITIONINGS` saturated cost partitionings, sorted by decreasing heuristic value of
+/// the initial state. The list is empty if none of them is better for the initial state than the best single
+/// projection, if fewer than two projections are useful, or if these have too many transitions.
 pub(super) fn saturated_cost_partitionings(
     context: Context<'_>,
     projections: &[Projection],
@@ -77,7 +79,7 @@ pub(super) fn saturated_cost_partitionings(
     let mut positions: Vec<usize> = (0..projections.len()).filter(|position| alone(*position) > 0).collect();
     positions.sort_by_key(|position| projections[*position].pattern.len());
     for position in positions {
-        // A projection to fewer variables with equal values makes the finer projection useless.
+        // A projection to fewer variables with equal goal distances makes the finer projection useless.
         let is_coarser = |coarser: &usize| projections[position].is_dominated_by(&projections[*coarser]);
         if !useful.iter().any(is_coarser) {
             useful.push(position);
@@ -121,8 +123,9 @@ pub(super) fn saturated_cost_partitionings(
     Ok(tried.into_iter().map(|(.., partition)| partition).collect())
 }
 
-/// Orders projections by the ratio of the initial state's goal distance to the costs that they use, highest
-/// ratio first.
+/// Orders the projections `useful` by a ratio, highest first: the goal distance of the initial state
+/// (`alone`) divided by the sum of the operator costs that the projection uses. Projections are given by
+/// their indices.
 fn by_yield(projections: &[Projection], useful: &[usize], alone: impl Fn(usize) -> Int) -> Vec<usize> {
     let used_cost = |position: usize| {
         let projection = &projections[position];

@@ -32,8 +32,7 @@ impl Lists {
         self.ends.push(dense(self.all.len()));
     }
 
-    /// Returns the inverse relation: for each value below `count`, the positions of the lists that contain
-    /// it.
+    /// Returns the inverse relation: for each value below `count`, the indices of the lists that contain it.
     fn inverse(&self, count: usize) -> Self {
         let mut positions: Vec<Vec<u32>> = vec![Vec::new(); count];
         for list in 0..dense(self.ends.len()) {
@@ -62,7 +61,7 @@ impl Lists {
 pub(super) struct DeleteRelaxation {
     /// Cost of each payer. Payers are the operators, followed by one payer without cost.
     pub(super) costs: Vec<u64>,
-    /// For each rule: the operator that pays for it.
+    /// For each rule: the index in `costs` of its payer, which is an operator or the payer without cost.
     pub(super) payers: Vec<u32>,
     /// For each rule: the facts of its condition, which is never empty.
     pub(super) required: Lists,
@@ -139,7 +138,8 @@ impl DeleteRelaxation {
         self.required_by.len()
     }
 
-    /// Returns the numbers of the facts that hold in a state.
+    /// Returns the numbers of the facts that hold in a state, without derived variables, followed by
+    /// `ALWAYS`.
     #[expect(clippy::arithmetic_side_effects, reason = "facts are numbered")]
     pub(super) fn state<'s>(&'s self, values: &'s [u32]) -> impl Iterator<Item = u32> + 's {
         let values = values[..self.basic].iter().zip(&self.first);
@@ -183,7 +183,8 @@ impl<'a> Builder<'a> {
         values.map(|value| self.fact(Fact { value, ..literal.fact })).collect()
     }
 
-    /// Returns a fact that represents the disjunction of facts, and adds rules for it if it is new.
+    /// Returns a fact that represents the disjunction of `facts`. If no existing fact represents it, creates
+    /// an artificial fact with a rule for each disjunct.
     #[expect(clippy::arithmetic_side_effects, reason = "facts are held in memory")]
     fn any(&mut self, mut facts: Vec<u32>) -> u32 {
         facts.sort_unstable();

@@ -2,9 +2,10 @@
 //!
 //! The h^max values determine the supporter of each rule of the delete relaxation, i.e. its most expensive
 //! condition. The goal zone contains the facts from which the goal can be reached at no cost. Rules that lead
-//! into the goal zone form a landmark: every plan uses one of their operators. The minimum of their costs is
-//! added to the heuristic value and subtracted from each cost. This is repeated until the goal costs nothing.
-//! The rules of an operator with conditional effects share a single cost, so no cost is counted twice.
+//! from outside into the goal zone form a landmark: every plan uses one of their operators. The minimum cost
+//! of these operators is added to the heuristic value and subtracted from the cost of each of them. This is
+//! repeated until the goal costs nothing. The rules of an operator with conditional effects share a single
+//! cost, so no cost is counted twice.
 //!
 //! \[1\] M. Helmert, C. Domshlak: Landmarks, critical paths and abstractions: what's the difference
 //! anyway?, ICAPS 2009.
@@ -51,7 +52,7 @@ pub struct LandmarkCut {
     supports: Vec<u64>,
     queue: BinaryHeap<Reverse<(u64, u32)>>,
     stack: Vec<u32>,
-    /// Payers of the rules in the cut.
+    /// Payers (operators, or the payer without cost) of the rules in the current cut.
     cut: Vec<u32>,
     /// For each payer: `true` if it is in `cut`.
     in_cut: Vec<bool>,
@@ -63,7 +64,7 @@ pub struct LandmarkCut {
     reason = "costs are below 2^40, and cuts are fewer than steps of a computer"
 )]
 impl LandmarkCut {
-    /// Creates the heuristic. Returns `None` if an operator costs too much.
+    /// Creates the heuristic. Returns `None` if an operator costs more than 2^40.
     pub(crate) fn new(task: &Task) -> Option<Self> {
         let relaxed = DeleteRelaxation::new(task)?;
         let (facts, rules) = (relaxed.facts(), relaxed.payers.len());
@@ -91,8 +92,8 @@ impl LandmarkCut {
         self.work.saturating_mul(WORK_PER_VISIT)
     }
 
-    /// Returns the LM-cut value of a state, which is an admissible estimate of its goal distance. Returns
-    /// `None` if the goal is unreachable.
+    /// Returns the LM-cut value of a state, which is a lower bound on its goal distance. Returns `None` if
+    /// the goal is unreachable in the delete relaxation, and thus in the task.
     pub(crate) fn lm_cut_value(&mut self, values: &[u32]) -> Option<u64> {
         self.costs.clone_from(&self.relaxed.costs);
         self.reach(values);
@@ -109,7 +110,7 @@ impl LandmarkCut {
         Some(sum)
     }
 
-    /// Computes the h^max values of all facts from a state.
+    /// Computes the h^max values of all facts from a state, and the supporter of each reached rule.
     fn reach(&mut self, values: &[u32]) {
         self.values.fill(UNREACHABLE);
         self.supporters.fill(NONE);
@@ -140,7 +141,8 @@ impl LandmarkCut {
         }
     }
 
-    /// Marks the goal zone: the facts from which the goal is reachable at no cost.
+    /// Marks the goal zone: the facts from which the goal is reachable at no cost through the supporters of
+    /// rules.
     fn mark_goal_zone(&mut self) {
         self.zones[GOAL as usize] = CutSide::Goal;
         self.stack.push(GOAL);
@@ -160,8 +162,8 @@ impl LandmarkCut {
         }
     }
 
-    /// Finds the payers of the rules that lead into the goal zone, and subtracts the minimum of their costs
-    /// from each of them. Returns this minimum.
+    /// Finds the payers of the rules that lead into the goal zone from facts that are reachable outside it.
+    /// Subtracts the minimum of their costs from each of these costs, and returns the minimum.
     fn cross(&mut self, values: &[u32]) -> u64 {
         for payer in self.cut.drain(..) {
             self.in_cut[payer as usize] = false;

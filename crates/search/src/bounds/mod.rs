@@ -3,8 +3,9 @@
 //! A projection to a few finite-domain variables is solved exactly. Dijkstra's algorithm from the abstract
 //! goal states yields an admissible and consistent heuristic: a pattern database \[1\]. Dynamic programming
 //! over steps and abstract states yields two more results: the operators that can occur at each step of a
-//! plan cheaper than the best known plan, and the number of steps above which no such plan exists. Cost
-//! partitioning adds the values of several projections.
+//! plan within a cost limit, and the number of steps above which no such plan exists. Cost partitioning adds
+//! the values of several projections. LM-cut is a more accurate but slower heuristic. Lower bounds on the
+//! consumption of resources detect dead ends.
 //!
 //! \[1\] S. Edelkamp: Planning with pattern databases, ECP 2001.
 
@@ -31,7 +32,7 @@ use task::task::{State, VariableId};
 
 /// Maximum number of steps up to which step bounds are computed.
 const STEP_LIMIT: usize = 4_000;
-/// Maximum number of abstract states of a projection.
+/// Maximum number of abstract states of a projection to two variables.
 const STATE_LIMIT: usize = 20_000;
 /// Maximum number of projections to pairs of variables.
 const PAIR_LIMIT: usize = 40;
@@ -46,23 +47,25 @@ pub struct Bounds {
     resources: Vec<Resource>,
     /// Cost partitionings; empty if they do not improve the heuristic.
     partitions: Vec<CostPartitioning>,
-    /// Projections that only the cost partitionings use.
+    /// Further projections, which are evaluated only if there are cost partitionings.
     further: Vec<Projection>,
 }
 
-/// Information about plans whose cost and number of steps are limited.
+/// The plans within a limit on cost and steps: their maximum length, and the operators of each step.
 pub struct ReachableWindow {
-    /// Upper bound on the number of steps of these plans. `None` if no projection yields a bound.
+    /// Upper bound on the number of steps of plans within the cost limit. `None` if there is no cost limit,
+    /// or no projection yields a bound of at most `STEP_LIMIT`.
     pub steps: Option<usize>,
-    /// For each step and each operator: whether the operator can occur at the step.
+    /// For each step and each operator: whether the operator can occur at the step. The number of steps is
+    /// the lesser of `steps` and the horizon of the query.
     pub allowed: Vec<Vec<bool>>,
 }
 
 impl Bounds {
-    /// Computes projections and saturated cost partitionings of a task.
+    /// Computes projections, lower bounds on resources, and saturated cost partitionings of a task.
     ///
     /// # Errors
-    /// Fails when a limit is reached.
+    /// Fails if the deadline has passed or the interrupt flag is set.
     pub fn new(context: Context<'_>) -> Result<Self, Interrupted> {
         let _span = info_span!("bounds").entered();
         let mut bounds = Self::of_projections(context)?;
@@ -76,10 +79,10 @@ impl Bounds {
         Ok(bounds)
     }
 
-    /// Computes projections only, without cost partitioning.
+    /// Computes projections and lower bounds on resources, without cost partitioning.
     ///
     /// # Errors
-    /// Fails when a limit is reached.
+    /// Fails if the deadline has passed or the interrupt flag is set.
     pub fn of_projections(context: Context<'_>) -> Result<Self, Interrupted> {
         let task = context.task;
         let basic = |variable: &VariableId| variable.index() < task.basic;
@@ -117,7 +120,7 @@ impl Bounds {
     /// Returns the heuristic that is 0 everywhere except at dead ends of the projection to no variable.
     ///
     /// # Errors
-    /// Fails when a limit is reached.
+    /// Fails if the deadline has passed or the interrupt flag is set.
     pub fn trivial(context: Context<'_>) -> Result<Self, Interrupted> {
         let projections = vec![Projection::new(context, Vec::new())?];
         Ok(Self { projections, resources: Vec::new(), partitions: Vec::new(), further: Vec::new() })
@@ -144,9 +147,9 @@ impl Bounds {
         self.resources.iter().all(enough).then_some(best)
     }
 
-    /// Returns lower bounds on resources that states must have. Each item is a numeric variable, a
-    /// projection, and the required amount for each abstract state of the projection; `None` means that no
-    /// amount suffices.
+    /// Returns lower bounds on the resources that a state must have to reach the goal or a replenishment.
+    /// Each item is a numeric variable, a projection, and the required amount for each abstract state of the
+    /// projection; `None` means that no amount suffices.
     pub fn needs(&self) -> impl Iterator<Item = (NumericId, &Projection, &[Option<Int>])> {
         let projection = |position: &usize| &self.projections[*position];
         self.resources.iter().flat_map(move |resource| {
@@ -155,11 +158,11 @@ impl Bounds {
         })
     }
 
-    /// Returns information about the plans with cost at most `limit` and at most `horizon` steps. A missing
-    /// limit does not restrict the plans.
+    /// Returns the maximum length and the possible operators of the plans with a cost of at most `limit` and
+    /// at most `horizon` steps. `None` means that cost or steps are not limited.
     ///
     /// # Errors
-    /// Fails when a limit is reached.
+    /// Fails if the deadline has passed or the interrupt flag is set.
     pub fn window(
         &self,
         context: Context<'_>,

@@ -89,7 +89,7 @@ impl Projection {
         self.sizes.iter().product()
     }
 
-    /// Returns the abstract state of a state.
+    /// Returns the index of the abstract state that represents a state.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "an abstract state is below the number of them, which are in memory"
@@ -138,8 +138,8 @@ impl Projection {
         states
     }
 
-    /// Returns the abstract states to which an operator can lead. If the condition of a conditional effect
-    /// mentions variables outside the pattern, both outcomes are possible.
+    /// Returns the abstract states to which an operator can lead from `source`. If the values of the pattern
+    /// do not determine whether a conditional effect occurs, both outcomes are included.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "abstract states are below the number of them, which are in memory"
@@ -179,7 +179,8 @@ impl Projection {
         reached.into_iter().map(index).collect()
     }
 
-    /// Returns the goal distance of each abstract state under the given operator costs.
+    /// Returns the goal distance of each abstract state under the given operator costs; `None` if the goal is
+    /// unreachable from it.
     pub(crate) fn goal_distances(
         &self,
         costs: &[Int],
@@ -188,8 +189,8 @@ impl Projection {
         self.distances(|operator| costs[operator], self.goals.iter().map(|goal| (*goal, 0)), limits)
     }
 
-    /// Returns the saturated costs: for each operator, the minimum cost that preserves the given goal
-    /// distances.
+    /// Returns the saturated costs: for each operator, the minimum non-negative cost that preserves the given
+    /// goal distances.
     #[expect(clippy::arithmetic_side_effects, reason = "costs to go are between 0 and GROWTH_LIMIT")]
     pub(crate) fn saturated(&self, to_go: &[Option<Int>]) -> impl Iterator<Item = Int> {
         self.operators.iter().map(|(_, transitions)| {
@@ -226,14 +227,16 @@ impl Projection {
         self.size() + self.operators.iter().map(|(_, transitions)| transitions.len()).sum::<usize>()
     }
 
-    /// Returns the minimum number of steps from each abstract state to the goal.
+    /// Returns the minimum number of steps from each abstract state to the goal; `None` if the goal is
+    /// unreachable.
     pub(crate) fn steps_to_go(&self, limits: &Limits) -> Result<Vec<Option<Int>>, Interrupted> {
         self.distances(|_| 1, self.goals.iter().map(|goal| (*goal, 0)), limits)
     }
 
     /// Returns, for each abstract state, a lower bound on the consumption of a resource until the resource is
-    /// replenished or a goal state is reached. `used` is the consumption of each operator, or `None` if the
-    /// operator may replenish. `left` is the amount that must remain in a goal state.
+    /// replenished or a goal state is reached; `None` if neither is reachable. `used` is the consumption of
+    /// each operator, or `None` if the operator may replenish. `left` is the amount that must remain in a
+    /// goal state.
     pub(crate) fn needs(
         &self,
         used: &[Option<Int>],
@@ -253,7 +256,7 @@ impl Projection {
     }
 
     /// Returns the minimum, over all targets, of the path cost from each abstract state to the target plus
-    /// the target's initial value. Uses a backward Dijkstra search.
+    /// the target's initial value; `None` if no target is reachable. Uses a backward Dijkstra search.
     fn distances(
         &self,
         cost: impl Fn(usize) -> Int,
@@ -305,8 +308,8 @@ impl Projection {
         &self.operators[operator.index()].1
     }
 
-    /// Returns the minimum cost of reaching each abstract state with one more step. `costs` are the minimum
-    /// costs before this step.
+    /// Returns the minimum cost of reaching each abstract state with one more step; `None` if it is
+    /// unreachable. `costs` are the minimum costs before this step.
     fn advance(&self, costs: &[Option<Int>]) -> Vec<Option<Int>> {
         let improve =
             |slot: &mut Option<Int>, cost: Int| *slot = Some(slot.map_or(cost, |least| least.min(cost)));
@@ -366,8 +369,8 @@ impl Projection {
         Ok(None)
     }
 
-    /// Sets `allowed[step][operator]` to `false` if no plan with cost at most `limit` can apply the operator
-    /// at that step.
+    /// Sets `allowed[step][operator]` to `false` if the projection proves that no plan with a cost of at most
+    /// `limit` (of any cost if `None`) applies the operator at this step.
     pub(crate) fn restrict(
         &self,
         limit: Option<Int>,

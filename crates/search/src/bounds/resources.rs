@@ -19,8 +19,8 @@ use crate::bounds::pattern_database::Projection;
 /// A resource, with lower bounds on its amount for the abstract states of some projections.
 pub(super) struct Resource {
     pub(super) variable: NumericId,
-    /// Index of a projection, with the required amount for each of its abstract states; `None` means that no
-    /// amount suffices.
+    /// Index of a projection, with the amount of the resource that is required in each of its abstract
+    /// states; `None` means that no amount suffices.
     pub(super) needs: Vec<(usize, Vec<Option<Int>>)>,
 }
 
@@ -36,7 +36,8 @@ impl Resource {
     }
 }
 
-/// Returns the resources of a task, with their lower bounds in each projection.
+/// Returns the resources of a task, with their lower bounds in each projection. A projection is omitted if an
+/// operator that may replenish the resource neither reads nor changes its pattern.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "numbers of a task are above the least number of their type"
@@ -56,7 +57,8 @@ pub(super) fn resources(
         let required = required.map(|comparison| -comparison.quantity.constant).fold(0, Int::max);
         let mut needs = Vec::new();
         for (projection, position) in projections.iter().zip(0..) {
-            // If an operator replenishes in every abstract state, all lower bounds would be 0.
+            // If an operator replenishes in every abstract state, all lower bounds of the projection would be
+            // 0.
             let anywhere =
                 |operator: usize| used[operator].is_none() && !projection.affects_pattern(operator);
             if !(0..used.len()).any(anywhere) {

@@ -42,7 +42,8 @@ impl<K: Ord> AlternatingOpenList<K> {
         Self { lists: lists.into_iter().map(list).collect(), steps: Vec::new() }
     }
 
-    /// Adds a state with its heuristic value for each list, its applicable steps, and its preferred steps.
+    /// Adds a state with its heuristic value for each list. Lists of preferred operators get its preferred
+    /// steps, and the other lists get all its applicable steps. A list that would get no steps gets no entry.
     pub fn push(
         &mut self,
         state: u32,
@@ -63,8 +64,8 @@ impl<K: Ord> AlternatingOpenList<K> {
         }
     }
 
-    /// Removes and returns the next entry: a state and one of its untried steps. Returns `None` if all lists
-    /// are empty.
+    /// Removes the next untried step from its list, and returns it with its state, as (state, step). Returns
+    /// `None` if all lists are empty.
     pub fn pop(&mut self) -> Option<(u32, u32)> {
         let waiting = self.lists.iter_mut().filter(|list| !list.buckets.is_empty());
         let list = waiting.min_by_key(|list| list.turns)?;

@@ -37,7 +37,8 @@ impl Queue {
         self.count = self.count.saturating_add(1);
     }
 
-    /// Removes an item with the lowest cost; the last one added comes first. Returns its cost and the item.
+    /// Removes and returns an item with the lowest cost, as (cost, item). Among equal costs, the last item
+    /// added comes first; for costs of at least `BUCKET_COUNT`, the smallest item.
     pub(crate) fn pop(&mut self) -> Option<(u32, u32)> {
         if self.count == 0 {
             return self.dear.pop().map(|std::cmp::Reverse(least)| least);
@@ -51,8 +52,9 @@ impl Queue {
         }
     }
 
-    /// Removes an item with the lowest cost; the first one added comes first. A queue must be emptied either
-    /// by this method or by `pop`, never by both.
+    /// Removes and returns an item with the lowest cost, as (cost, item). Among equal costs, the first item
+    /// added comes first; for costs of at least `BUCKET_COUNT`, the smallest item. A queue must be emptied
+    /// either by this method or by `pop`, never by both.
     pub fn pop_first(&mut self) -> Option<(u32, u32)> {
         if self.count == 0 {
             return self.dear.pop().map(|std::cmp::Reverse(least)| least);

@@ -1,12 +1,12 @@
 //! Delete relaxation of a ground task as an AND/OR graph: nodes with conditions and effects over
 //! propositions.
 //!
-//! Propositions are facts, disjunctions and numeric comparisons. A node is an operator, a conditional effect,
-//! a rule of a derived variable, or one disjunct of a disjunction. Conditions that require a derived variable
-//! to be false are assumed to hold. For each numeric comparison separately, the most favourable designs are
-//! assumed. The number of repetitions of an operator until a comparison holds is estimated as by Scala et al.
-//! \[1\]. An operator whose numeric effect is not the addition of a constant is assumed to achieve a
-//! comparison with one application.
+//! Propositions are facts, disjunctions and numeric comparisons. A node is the goal, an operator, a
+//! conditional effect, a rule of a derived variable, or one disjunct of a disjunction. Conditions that
+//! require a derived variable to be false are assumed to hold. For each numeric comparison separately, the
+//! most favourable designs are assumed. The number of repetitions of an operator until a comparison holds is
+//! estimated as by Scala et al. \[1\]. An operator whose numeric effect is not the addition of a constant is
+//! assumed to achieve a comparison with one application.
 //!
 //! \[1\] E. Scala, P. Haslum, S. Thiébaux: Heuristics for numeric planning via subgoaling, IJCAI 2016.
 
@@ -19,7 +19,7 @@ use task::task::number::{TaskNumber, sum_of_products};
 use task::task::quantity::{Linear, NumericId, Quantity};
 use task::task::{Condition, Fact, Literal, Operator, OperatorId, State, Task, VariableId};
 
-/// Index of a proposition: a fact, a disjunction or a numeric comparison.
+/// Index of a proposition: a fact, a disjunction, a numeric comparison, or the artificial goal.
 pub(super) type Proposition = u32;
 
 /// Operator index of a node that does not belong to an operator.
@@ -82,7 +82,7 @@ impl<N: TaskNumber> Relaxation<N> {
         self.first[fact.variable.index()].saturating_add(fact.value)
     }
 
-    /// Returns the fact of a proposition, or `None` if the proposition is a disjunction or a comparison.
+    /// Returns the fact of a proposition, or `None` if the proposition is not a fact.
     pub(super) fn fact_of(&self, proposition: Proposition) -> Option<Fact> {
         if proposition >= *self.first.last()? {
             return None;
@@ -99,7 +99,8 @@ impl<N: TaskNumber> Relaxation<N> {
 }
 
 impl<N: TaskNumber> Relaxation<N> {
-    /// Returns `true` if a fact or a numeric comparison holds in a state. Returns `false` for disjunctions.
+    /// Returns `true` if the proposition is a fact or a numeric comparison that holds in a state. Returns
+    /// `false` for disjunctions and the artificial goal, and if the value of a comparison overflows.
     pub(super) fn holds(&self, proposition: Proposition, state: &State<N>) -> bool {
         if let Some(fact) = self.fact_of(proposition) {
             return fact.holds(&state.values);
@@ -251,8 +252,8 @@ impl<'a, N: TaskNumber> Builder<'a, N> {
         propositions
     }
 
-    /// Returns the proposition of a comparison under the most favourable designs, or `None` if it always
-    /// holds.
+    /// Returns the proposition of the comparison `linear` > 0 if `strict`, otherwise ≥ 0, under the most
+    /// favourable designs. Returns `None` if it is constant and holds.
     fn comparison(&mut self, linear: &Linear<N>, strict: bool) -> Option<Proposition> {
         let threshold = negated(maximum(&linear.quantity));
         if linear.coefficients.is_empty() {
@@ -325,8 +326,9 @@ impl<'a, N: TaskNumber> Builder<'a, N> {
         Some(proposition)
     }
 
-    /// Returns, for each node, the numeric expressions that the operator of the node increases. Only
-    /// unconditional parts of operators have entries.
+    /// Returns, for each node, the linear expressions in conditions that the operator of the node can
+    /// increase, and by how much. The list is empty for nodes that are not the unconditional part of an
+    /// operator.
     fn supports(&self, limits: &Limits) -> Result<Vec<Vec<Achiever>>, Interrupted> {
         let mut conditions_by_variable: FxHashMap<NumericId, Vec<usize>> = FxHashMap::default();
         for (index, direction) in self.directions.iter().enumerate() {

@@ -71,9 +71,10 @@ impl FfHeuristic {
         }
     }
 
-    /// Returns the cost of a relaxed plan under the operator costs `prices`, each at least 1. Returns `None`
-    /// if there is no relaxed plan. Afterwards `applicable` contains the operators that may be applicable in
-    /// the state, and `preferred` contains those of them that belong to the relaxed plan.
+    /// Returns the cost of a relaxed plan under the operator costs `prices`, each at least 1. The cost is
+    /// capped at `MAX_COST`. Returns `None` if there is no relaxed plan. Afterwards `applicable` contains the
+    /// operators that may be applicable in the state, and `preferred` contains those of them that belong to
+    /// the relaxed plan.
     pub(super) fn estimate<N: TaskNumber>(
         &mut self,
         relaxation: &Relaxation<N>,
@@ -144,7 +145,9 @@ impl FfHeuristic {
         }
     }
 
-    /// Processes a node when its last condition is reached: updates the costs of its effects.
+    /// Processes a node when its last condition is reached: lowers the costs of its effects and of the
+    /// numeric comparisons that it can achieve. If the node is the unconditional part of an operator and all
+    /// conditions cost 0, the operator is added to `applicable`.
     fn reached<N: TaskNumber>(&mut self, relaxation: &Relaxation<N>, prices: &[u32], node: u32) {
         let sum = self.sums[node as usize];
         let operator = relaxation.operators[node as usize];
@@ -214,7 +217,8 @@ impl FfHeuristic {
     }
 }
 
-/// Returns the number of applications whose gains add up to at least the missing amount.
+/// Returns the estimated number of applications whose gains add up to at least the missing amount: at least 1
+/// and at most `MAX_REPETITIONS`.
 fn times(missing: f64, gain: f64) -> u32 {
     if gain.is_infinite() {
         return 1;

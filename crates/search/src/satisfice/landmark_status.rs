@@ -1,9 +1,9 @@
 //! Landmark status: the landmarks reached on the path to a state, and the number of landmarks that are still
 //! required.
 //!
-//! A landmark is reached when it is true and all its predecessors have been reached. A reached landmark is
-//! required again in two cases \[1\]: it is a goal that is not true, or it is not true and must hold directly
-//! before another landmark that is not reached.
+//! A landmark is reached when it is true and all its predecessors have been reached before. A reached
+//! landmark is required again in two cases \[1\]: it is a goal that is not true, or it is not true and must
+//! hold directly before another landmark that is not reached.
 //!
 //! \[1\] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010, section 5.
 
@@ -102,7 +102,8 @@ impl LandmarkStatus {
         reached
     }
 
-    /// Returns the number of landmarks that are still required in the state of the last call of `progress`.
+    /// Returns the number of landmarks that are unreached or required again in the state of the last call of
+    /// `progress`. `reached` is the bitset of the reached landmarks.
     pub(super) fn remaining(&self, reached: &[u64]) -> u32 {
         let mut count: u32 = 0;
         for (landmark, index) in self.landmarks.all.iter().zip(0_u32..) {
@@ -117,7 +118,8 @@ impl LandmarkStatus {
         count
     }
 
-    /// Marks the propositions of all unreached landmarks whose predecessors are reached.
+    /// Marks the propositions of all unreached landmarks whose predecessors are reached as wanted, and no
+    /// others.
     pub(super) fn request_landmark(&mut self, reached: &[u64]) {
         for mark in self.marks.drain(..) {
             self.wanted[mark as usize] = false;

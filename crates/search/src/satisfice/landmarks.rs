@@ -1,10 +1,10 @@
 //! Landmarks of a task and their orders, found by backchaining from the goal \[1\].
 //!
-//! A fact that is a condition of all possible first achievers of a landmark is a landmark itself, with a
-//! greedy-necessary order before the other. If each achiever requires a fact of one predicate, the
-//! disjunction of these facts is a landmark. A landmark that is unreachable in the relaxation without another
-//! landmark comes after the other. A reasonable order delays a landmark that would have to be destroyed to
-//! achieve another landmark; such orders only guide the search.
+//! A fact A that is a condition of all possible first achievers of a landmark B is a landmark, too. A is then
+//! ordered before B by a greedy-necessary order. If each achiever of B requires a fact of one predicate, the
+//! disjunction of these facts is a landmark. If B is unreachable in the relaxation without A, A comes before
+//! B. A reasonable order delays a landmark that would have to be destroyed to achieve another landmark; such
+//! orders only guide the search.
 //!
 //! \[1\] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010, section 4.
 
@@ -35,7 +35,7 @@ pub(super) struct Landmark {
     pub(super) is_goal: bool,
 }
 
-/// All landmarks of a task that were found.
+/// The landmarks that were found for a task, with their orders.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Landmarks {
     pub(super) all: Vec<Landmark>,
@@ -56,7 +56,8 @@ struct LandmarkFactory<'a, N> {
 }
 
 impl Landmarks {
-    /// Finds the landmarks of a task for its initial state, and their orders.
+    /// Finds landmarks of a task for its initial state, and their orders. The number of landmarks is limited,
+    /// so the result need not contain all landmarks.
     pub(super) fn new<N: TaskNumber>(
         task: &Task<N>,
         relaxation: &Relaxation<N>,
@@ -129,7 +130,8 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
         index
     }
 
-    /// Finds landmarks that must hold before a landmark, and adds their orders.
+    /// Finds landmarks that must hold before `landmark`, and adds their orders. Also orders `landmark` before
+    /// the known landmarks that are unreachable without it. Does nothing if `landmark` holds initially.
     fn before(&mut self, landmark: u32) {
         let propositions = self.all[landmark as usize].any_of.clone();
         // A landmark that holds initially needs no achiever.
@@ -171,8 +173,9 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
         }
     }
 
-    /// Adds disjunctive landmarks: sets of facts of one predicate such that each achiever requires a fact of
-    /// the set.
+    /// Adds disjunctive landmarks: sets of 2 to `MAX_DISJUNCTION` facts of one predicate, none of them
+    /// initially true, such that each achiever requires a fact of the set. The conditions `shared` by all
+    /// achievers are not used.
     fn disjunctive(&mut self, achievers: &[u32], shared: &[Proposition], landmark: u32) {
         if achievers.len() < 2 {
             return;
@@ -211,8 +214,9 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
         }
     }
 
-    /// Computes relaxed reachability if the propositions `excluded` are never true. Returns for each
-    /// proposition whether it is reached, and for each node whether all its conditions are reached.
+    /// Computes relaxed reachability if the propositions `excluded` are never true. All other numeric
+    /// comparisons count as reached. Returns for each proposition whether it is reached, and for each node
+    /// whether all its conditions are reached.
     fn reach_without(&self, excluded: &[Proposition]) -> (Vec<bool>, Vec<bool>) {
         let relaxation = self.relaxation;
         let mut reached = vec![false; relaxation.propositions];
@@ -296,7 +300,8 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
     }
 
     /// Returns propositions that are true when a landmark is achieved: the landmark, the common effects of
-    /// all its achievers, and landmarks required directly before. Returns an empty list for a disjunction.
+    /// all its achievers, and the single facts required directly before. Returns an empty list for a
+    /// disjunctive landmark.
     fn side(&self, landmark: u32) -> Vec<Proposition> {
         let [proposition] = self.all[landmark as usize].any_of[..] else { return Vec::new() };
         let mut achievers = self.adders[proposition as usize].iter();

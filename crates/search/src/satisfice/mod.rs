@@ -48,7 +48,7 @@ const MEMORY_SHARE: usize = 16;
 
 /// Result of one turn of the satisficing search.
 pub enum StepResult<N> {
-    /// A plan that costs less than the given limit.
+    /// A plan that costs less than the limit, if a limit was given.
     Plan(GroundPlan<N>),
     /// The task has no plan.
     Unsolvable,
@@ -73,7 +73,7 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
     /// Prepares the searches. Returns `None` if an operator has too many combinations of designs.
     ///
     /// # Errors
-    /// Fails when a limit is reached.
+    /// Fails if the deadline has passed or the interrupt flag is set.
     pub fn new(context: Context<'a, N>) -> Result<Option<Self>, Interrupted> {
         let Some(context_data) = SearchContext::new(context)? else { return Ok(None) };
         Ok(Some(Self {
@@ -86,16 +86,17 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
         }))
     }
 
-    /// Returns the number of searches that have ended.
+    /// Returns the number of searches of the sequence that have ended or were skipped.
     pub fn restarts(&self) -> usize {
         self.phase
     }
 
-    /// Searches for a plan with a cost below `limit` (for any plan if `None`), with at most `work` work
-    /// units. A work unit is a visit of one node or proposition of the delete relaxation.
+    /// Searches for a plan with a cost below `limit` (for any plan if `None`), with about `work` work units.
+    /// Evaluating a state takes one work unit for each node and each proposition of the delete relaxation;
+    /// generating a state takes a constant number.
     ///
     /// # Errors
-    /// Fails when a limit is reached.
+    /// Fails if the deadline has passed or the interrupt flag is set.
     pub fn run(&mut self, limit: Option<&N>, work: u64) -> Result<StepResult<N>, Interrupted> {
         let Some((priced, weight)) = SEARCH_SEQUENCE.get(self.phase).copied() else {
             return Ok(StepResult::Ended);
@@ -149,7 +150,7 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
 
     fn next(&mut self) {
         self.phase = self.phase.saturating_add(1);
-        // With uniform operator costs, this search would repeat the first search.
+        // With uniform operator costs, the greedy search with operator costs would repeat the first search.
         let is_uniform = || {
             let costs = self.known.operator_costs();
             costs.iter().all(|cost| Some(cost) == costs.first())

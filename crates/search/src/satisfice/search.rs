@@ -3,7 +3,9 @@
 //! A state is evaluated when it is expanded, and its successors are queued with its heuristic values \[1\].
 //! The two heuristics are the cost of the relaxed plan and the number of required landmarks; their open lists
 //! alternate. The first search of a sequence uses unit costs, and later searches use operator costs with
-//! decreasing weights \[2\]. If the open lists are empty, all states that have a relaxed plan were visited.
+//! decreasing weights \[2\]. A state without a relaxed plan is a dead end. If the open lists are empty and
+//! `incomplete` is `false`, all reachable states were visited, except those behind dead ends and those that
+//! the h² mutexes prove useless.
 //!
 //! - \[1\] M. Helmert: The Fast Downward planning system, JAIR 26, 2006, section 5.
 //! - \[2\] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010, section 6.
@@ -41,9 +43,9 @@ struct Node<N> {
 
 /// Result of running a search with a work budget.
 pub(super) enum Outcome<N> {
-    /// A plan that costs less than the limit.
+    /// A plan that costs less than the limit, if there is a limit.
     Plan(GroundPlan<N>),
-    /// The open lists are empty. No plan within the limit exists, unless the search is incomplete.
+    /// The open lists are empty. No plan exists, unless `Search::incomplete` is `true`.
     Exhausted,
     /// The work budget is used up. The search can be resumed.
     Paused,
@@ -53,7 +55,7 @@ pub(super) enum Outcome<N> {
 pub(super) struct Search<N> {
     weight: HeuristicWeight,
     prices: Vec<u32>,
-    /// Mean operator cost, used to convert a number of landmarks to a cost.
+    /// Mean scaled operator cost, without useless operators. Converts a number of landmarks to a cost.
     mean: u32,
     store: Store<N>,
     nodes: Vec<Node<N>>,
@@ -62,7 +64,7 @@ pub(super) struct Search<N> {
     open: AlternatingOpenList<u64>,
     /// Lowest value of each heuristic among the evaluated states.
     best: [u32; 2],
-    /// `true` if states were pruned because a number overflowed or their cost reached the limit.
+    /// `true` if states were pruned because a number overflowed or their path cost reached the limit.
     pub(super) incomplete: bool,
 }
 
@@ -97,7 +99,8 @@ impl<N: TaskNumber> Search<N> {
         self.store.size().saturating_add(self.reached.len()).saturating_add(self.open.size())
     }
 
-    /// Searches for a plan that costs less than `limit`, with at most `work` work units.
+    /// Searches for a plan that costs less than `limit` (for any plan if `None`), with about `work` work
+    /// units.
     pub(super) fn run(
         &mut self,
         context: &mut SearchContext<'_, N>,
@@ -173,7 +176,7 @@ impl<N: TaskNumber> Search<N> {
     }
 
     /// Evaluates a state and adds its applicable steps to the open lists. A state without a relaxed plan is a
-    /// dead end.
+    /// dead end, so none of its steps are added.
     fn look(&mut self, context: &mut SearchContext<'_, N>, id: u32, state: &State<N>, reached: &[u64]) {
         let Some(ff_value) = context.explorer.estimate(&context.relaxation, &self.prices, state) else {
             return;

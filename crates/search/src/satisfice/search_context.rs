@@ -30,7 +30,7 @@ pub(super) struct SearchContext<'a, N> {
     pub(super) relaxation: Relaxation<N>,
     pub(super) explorer: FfHeuristic,
     pub(super) status: LandmarkStatus,
-    /// The h² mutexes; `None` until they are computed.
+    /// The h² mutexes; `None` if they are not computed yet, or their computation exceeded its limits.
     pub(super) pairs: Option<MutexPairs>,
     steps: Vec<Step<N>>,
     /// Index of the first step of each operator, followed by the total number of steps.
@@ -69,7 +69,9 @@ impl<'a, N: TaskNumber> SearchContext<'a, N> {
         (*operator, choice, cost)
     }
 
-    /// Returns the applicable steps of the state that was evaluated last, and the preferred steps among them.
+    /// Returns the applicable steps of `state`, and the preferred steps among them: those of operators that
+    /// belong to the relaxed plan or achieve a wanted landmark. `state` must be the state that was evaluated
+    /// last.
     pub(super) fn steps(&mut self, state: &State<N>) -> (Vec<u32>, Vec<u32>) {
         self.explorer.applicable.sort_unstable();
         self.explorer.preferred.sort_unstable();
@@ -106,8 +108,8 @@ impl<'a, N: TaskNumber> SearchContext<'a, N> {
         effects.iter().any(|fact| self.status.is_wanted(self.relaxation.fact(*fact)))
     }
 
-    /// Returns operator costs scaled to integers: positive costs are scaled to a mean of about 10, and 1 is
-    /// added to every cost.
+    /// Returns operator costs (with the cheapest designs) scaled to integers: positive costs are scaled to a
+    /// mean of about 10, and 1 is added to every cost.
     pub(super) fn operator_costs(&self) -> Vec<u32> {
         let costs: Vec<f64> =
             self.task.operators.iter().map(|operator| operator.cost.minimum().approximate()).collect();

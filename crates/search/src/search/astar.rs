@@ -1,12 +1,12 @@
 //! A\* with Pareto dominance over numeric variables. Returns a cheapest plan, and among these a plan with the
-//! fewest steps.
+//! fewest steps if the open list has the order `Fewest`. The same code runs the greedy best-first search.
 //!
 //! States with equal finite-domain variables are compared by cost and by numeric variables. If a higher value
 //! of a numeric variable is never worse (for example battery charge), a state dominates another state that
 //! costs at least as much and has at most the same values. This is label setting for resource-constrained
-//! shortest paths \[1\]. The result is exact if the search ends before its limits.
+//! shortest paths \[1\]. The result is exact if the search ends before its limits and no number overflows.
 //!
-//! The open list is sorted by path cost plus heuristic value. Ties are broken by the lower bound on the
+//! The open list of A\* is sorted by path cost plus heuristic value. Ties are broken by a lower bound on the
 //! number of steps, then by depth. A plan is optimal once no open node can lead to a cheaper plan, or to a
 //! plan of equal cost with fewer steps.
 //!
@@ -41,12 +41,14 @@ const STUBBORN_SET_COST: u64 = 10;
 /// Outcome of an optimal search.
 #[derive(Debug)]
 pub enum SearchOutcome<N = Int> {
-    /// An optimal plan.
+    /// A cheapest plan. With the order `OpenListOrder::Fewest`, also the shortest among the cheapest plans.
     Optimal(GroundPlan<N>),
-    /// Proof that no plan exists: every reachable state was expanded or is dominated.
+    /// Proof that no plan exists (within the cost limit of the search, if it has one): every reachable state
+    /// was expanded, is dominated, or cannot lead to a plan.
     None,
-    /// No proof. Contains the best plan found if a limit was reached. Contains `None` if no plan was found,
-    /// or if the search proved that no plan is cheaper than an external incumbent.
+    /// No proof. Contains the best plan found if a limit on time, memory or states was reached. Contains
+    /// `None` if no plan was found, or if the search proved that no plan is cheaper than an external
+    /// incumbent.
     Unknown(Option<GroundPlan<N>>),
 }
 
@@ -62,10 +64,11 @@ pub struct SearchProblem<'a, N, E> {
 /// Sort order of the open list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OpenListOrder {
-    /// By f value, then by a lower bound on the length of the plan. Finds a cheapest plan with the fewest
-    /// steps.
+    /// By f value (path cost plus heuristic value), then by a lower bound on the length of the plan. Finds a
+    /// cheapest plan with the fewest steps.
     Fewest,
-    /// By f value, then by a lower bound on the steps to the goal. Finds a cheapest plan of any length.
+    /// By f value (path cost plus heuristic value), then by a lower bound on the steps to the goal. Finds a
+    /// cheapest plan of any length.
     Nearest,
     /// By heuristic value only, ignoring the path cost (greedy best-first search).
     Greedy,
@@ -76,13 +79,14 @@ pub enum OpenListOrder {
 pub(super) enum OutOfMemoryPolicy {
     /// Stop the search.
     None,
-    /// Ignore forecasts; the last forecast was favourable.
+    /// Ignore forecasts; the last forecast was favourable, or there was none.
     Some,
     /// Ignore forecasts; the last forecast was unfavourable.
     Needed,
 }
 
-/// Sort key of an open node: primary value, lower bound on steps, and a tie-breaker that prefers deep nodes.
+/// Sort key of an open node: f value (heuristic value in greedy search), lower bound on steps, and a
+/// tie-breaker that prefers deep nodes.
 type NodeKey<N> = (N, u32, u32);
 
 /// Returns a tie-breaker that decreases with the depth `steps` of a node, so that deep nodes come first.
@@ -90,7 +94,7 @@ fn later(steps: u32) -> u32 {
     u32::MAX.saturating_sub(steps)
 }
 
-/// A resumable A\* search.
+/// A resumable A\* search, or greedy best-first search with the order `OpenListOrder::Greedy`.
 pub struct AStar<'a, N, E> {
     task: &'a Task<N>,
     limits: &'a Limits,
@@ -109,13 +113,14 @@ pub struct AStar<'a, N, E> {
     own_work: u64,
     /// Number of searches that share the memory limit.
     sharing: usize,
-    /// Lower bound on the cost of every plan.
+    /// Lower bound on the cost of every plan; `None` before the first expansion.
     bound: Option<N>,
     is_interrupted: bool,
     pub(super) patience: OutOfMemoryPolicy,
     /// Goal node of the best plan of this search.
     best: Option<u32>,
-    /// Cost of the best known plan (the incumbent), if any. More expensive nodes are pruned.
+    /// Cost of the best known plan (the incumbent), or a cost limit set by the caller. More expensive nodes
+    /// are pruned.
     limit: Option<N>,
     /// `true` if the incumbent was found by another component of the planner.
     incumbent_is_external: bool,
@@ -186,8 +191,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         search
     }
 
-    /// Searches until more than `max_states` states are stored. Returns `None` if the search is not finished
-    /// and can be resumed.
+    /// Searches until more than `max_states` states are stored or the memory limit is reached. Returns `None`
+    /// if the search has not finished before.
     pub(super) fn run_until_states(
         &mut self,
         max_states: usize,
@@ -197,7 +202,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
     }
 
     /// Searches until the total work exceeds `work` units. Returns `None` if the search is not finished and
-    /// can be resumed.
+    /// can be resumed. If the memory limit is reached, the outcome is `Unknown` with the best plan.
     pub(super) fn run_for_work(
         &mut self,
         work: u64,
@@ -291,7 +296,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
     }
 
     /// Returns `true` if neither a node with this cost and number of steps nor any later node can improve the
-    /// incumbent.
+    /// incumbent. A greedy search stops at its first plan.
     fn can_stop_at(&self, cost: &N, steps: u32) -> bool {
         if self.order == OpenListOrder::Greedy {
             return self.best.is_some();
@@ -305,15 +310,16 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         self.limit.as_ref()
     }
 
-    /// Lowers the upper bound on the plan cost. The search still looks for plans with exactly this cost.
+    /// Lowers the upper bound on the plan cost to `cost`, unless it is already lower. The search still looks
+    /// for plans with exactly this cost.
     pub(super) fn set_upper_bound_inclusive(&mut self, cost: &N) {
         if self.limit.as_ref().is_none_or(|limit| cost < limit) {
             self.limit = Some(cost.clone());
         }
     }
 
-    /// Sets the cost of an incumbent that another component found. The search ends once the lower bound
-    /// reaches this cost.
+    /// Sets the cost of an incumbent that another component found, if it is below the current upper bound.
+    /// The plan of this search is then discarded. The search ends once the lower bound reaches the cost.
     pub(crate) fn set_upper_bound(&mut self, cost: N) {
         if self.limit.as_ref().is_none_or(|limit| cost < *limit) {
             self.limit = Some(cost);
@@ -328,7 +334,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         self.incumbent_is_external && self.limit == self.bound
     }
 
-    /// Returns `true` if a limit or a cancellation ended the search.
+    /// Returns `true` if the deadline or an interruption ended the search.
     pub(super) fn is_interrupted(&self) -> bool {
         self.is_interrupted
     }
@@ -344,7 +350,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
     }
 
     /// Returns the expected lower bound after `times` further doublings of the number of states. Assumes that
-    /// each doubling raises the bound as much as the last doubling did.
+    /// each doubling raises the bound as much as the last doubling did. Returns `None` before the second
+    /// sample.
     #[expect(clippy::arithmetic_side_effects, reason = "sums of costs that fit")]
     pub(super) fn forecast_lower_bound(&self, times: u32) -> Option<N> {
         let [.., before, now] = &self.progress[..] else { return None };
@@ -363,7 +370,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
 
     /// Returns `true` if the lower bound is expected to reach the cost of the incumbent before the memory
     /// limit is reached. Assumes that each doubling of the number of states raises the bound as much as the
-    /// last doubling did.
+    /// last doubling did. Also returns `true` if there is nothing to forecast from: no incumbent, fewer than
+    /// two samples, or a bound that does not rise.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "sums of costs that fit, and less than what is limited by memory"
@@ -486,8 +494,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         self.limit.as_ref().is_some_and(|limit| cost > limit)
     }
 
-    /// Returns `true` if the incumbent is at least as good as every plan with this cost and this number of
-    /// steps.
+    /// Returns `true` if this search found the incumbent, and it is at least as good as every plan with this
+    /// cost and this number of steps.
     fn is_dominated_by_incumbent(&self, cost: &N, steps: u32) -> bool {
         let (Some(limit), Some(fewest)) = (&self.limit, self.fewest) else { return false };
         (limit, fewest) <= (cost, steps)

@@ -36,7 +36,7 @@ pub type CostedCombinations<N> = Vec<(Vec<u32>, N)>;
 /// with m designs each, this avoids m^k comparisons.
 ///
 /// # Errors
-/// Fails when a limit is reached.
+/// Fails if the deadline has passed or the interrupt flag is set.
 pub fn pareto_optimal_combinations<N: TaskNumber>(
     operator: &Operator<N>,
     monotone: bool,
@@ -71,7 +71,8 @@ pub fn pareto_optimal_combinations<N: TaskNumber>(
     Ok(Some(front.into_iter().map(|Partial { choice, cost, .. }| (choice, cost)).collect()))
 }
 
-/// Returns the non-dominated combinations of designs for some slots, or `None` if there are too many.
+/// Returns the non-dominated combinations of designs for the slots of one group, or `None` if there are too
+/// many. The other slots have design 0.
 fn own_front<N: TaskNumber>(
     operator: &Operator<N>,
     quantities: &[&Quantity<N>],
@@ -125,7 +126,8 @@ impl<N: TaskNumber> Partial<N> {
     }
 }
 
-/// Returns the non-dominated combinations, in lexicographic order of their designs.
+/// Returns the candidates that no other candidate dominates (see [`pareto_optimal_combinations`]), in
+/// lexicographic order of their designs.
 fn best<N: TaskNumber>(
     mut candidates: Vec<Partial<N>>,
     monotone: bool,
@@ -144,8 +146,8 @@ fn best<N: TaskNumber>(
     for new in candidates {
         let is_equal = |cost: &N, profile: &[N]| all && *cost == new.cost && profile == new.profile;
         let is_dominated = if monotone {
-            // With a single criterion, the last entry of the front has the highest value of all earlier
-            // combinations.
+            // With a single numeric quantity, the last entry of the front has the highest value of all
+            // earlier combinations.
             let first_candidate = if new.profile.len() > 1 { 0 } else { front.len().saturating_sub(1) };
             let mut is_dominated = false;
             for old in &front[first_candidate..] {
@@ -279,7 +281,8 @@ mod tests {
         }
     }
 
-    /// Reference implementation: compares every combination with every other combination.
+    /// Reference implementation of `pareto_optimal_combinations`: compares every combination with every other
+    /// combination.
     fn expected(operator: &Operator, monotone: bool, all: bool) -> Vec<(Vec<u32>, Int)> {
         let sizes = operator.sizes();
         let value = |choice: &Vec<u32>| {
@@ -312,8 +315,8 @@ mod tests {
             let operator = operator(&costs, &uses, &excluded, &numbers);
             let limits = Limits::none();
             prop_assert_eq!(pareto_optimal_combinations(&operator, monotone, true, &limits), Ok(Some(expected(&operator, monotone, true))));
-            // If equal combinations occur, it is not specified which is kept, so costs and quantities are
-            // compared.
+            // Of several combinations with equal cost and quantity, any one may be kept. So the test compares
+            // costs and quantities, not designs.
             let values = |choices: Vec<(Vec<u32>, Int)>| {
                 let sizes = operator.sizes();
                 let remaining = |choice: &[u32]| operator.numeric_effects[0].value.quantity.at(choice, &sizes);

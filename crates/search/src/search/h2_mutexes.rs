@@ -128,7 +128,7 @@ pub struct MutexPairs {
     first: Vec<u32>,
     /// Compatible pairs: pairs that a state on a path from the initial state to the goal may contain.
     alive: Table,
-    /// For each operator: `true` if no plan can use it.
+    /// For each operator: `true` if it is proved that no plan can use it.
     useless: Vec<bool>,
 }
 
@@ -176,7 +176,7 @@ impl MutexPairs {
         Ok(alive.map(|alive| Self { first: builder.first, alive, useless }))
     }
 
-    /// Returns `true` if no plan can use the operator.
+    /// Returns `true` if it is proved that no plan can use the operator.
     pub(crate) fn is_operator_useless(&self, operator: OperatorId) -> bool {
         self.useless[operator.index()]
     }
@@ -253,8 +253,8 @@ impl<N: TaskNumber> H2Builder<'_, N> {
         }
     }
 
-    /// Computes the pairs of facts that a reachable state may contain. Returns `None` if the work limit is
-    /// reached.
+    /// Computes the pairs of facts that a reachable state may contain if `useless` operators are not applied.
+    /// Returns `None` if the work limit is reached.
     fn forwards(
         &mut self,
         rules: &[Rule],
@@ -312,8 +312,9 @@ impl<N: TaskNumber> H2Builder<'_, N> {
         }
     }
 
-    /// Computes the pairs of facts that a state from which the goal is reachable may contain. Only pairs in
-    /// `forwards` are considered. Returns `None` if the work limit is reached.
+    /// Computes the pairs of facts that a state from which the goal is reachable may contain if `useless`
+    /// operators are not applied. Only pairs in `forwards` are considered. Returns `None` if the work limit
+    /// is reached.
     fn backwards(
         &mut self,
         rules: &[Rule],

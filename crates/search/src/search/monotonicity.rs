@@ -4,9 +4,9 @@
 //! A variable is needed upwards if a higher value can make a condition true, and downwards if a lower value
 //! can. The need is propagated to the variables from which the variable is computed: in the same direction
 //! for positive coefficients, in the opposite direction for negative ones. The least fixpoint determines how
-//! labels are compared in a search with resources \[1\]. A variable that is needed in one direction is
-//! compared by ≥ or ≤. A variable that is needed in both directions must be equal, and a variable that is not
-//! needed is ignored.
+//! search nodes (labels) are compared in a search with resources \[1\]. A variable that is needed in one
+//! direction is compared by ≥ or ≤. A variable that is needed in both directions must be equal, and a
+//! variable that is not needed is ignored.
 //!
 //! \[1\] M. Desrochers, F. Soumis: A generalized permanent labelling algorithm for the shortest path problem
 //! with time windows, INFOR 26(3), 1988.

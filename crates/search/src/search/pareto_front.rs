@@ -1,4 +1,5 @@
-//! Pareto front of many labels, stored as a tree of boxes in the space of criteria.
+//! Pareto front of many labels (search nodes with several criteria, such as path cost and resources), stored
+//! as a tree of boxes in the space of criteria.
 //!
 //! Each box stores the best and the worst value of each criterion among its labels, so dominance queries can
 //! skip whole boxes, as in the ND-tree \[1\]. A box is split by the criterion that divides its labels most
@@ -9,13 +10,14 @@
 
 use task::number::dense;
 
-/// Comparison of labels by several criteria. A label has one number for each criterion, which is given by an
-/// index.
+/// Comparison of labels (search nodes) by several criteria. A label has one number for each criterion. Labels
+/// and numbers are given by their indices.
 pub(super) trait Criteria {
     /// Returns `true` if the number with index `one` is at least as good as the number with index `other`.
     fn is_as_good(&self, criterion: usize, one: u32, other: u32) -> bool;
 
-    /// Returns `true` if label `one` is at least as good as label `other` by every criterion.
+    /// Returns `true` if label `one` is at least as good as label `other` by every criterion. It may use
+    /// further tie-breakers.
     fn dominates(&self, one: u32, other: u32) -> bool;
 
     /// Replaces the contents of `to` by the number indices of a label, one for each criterion.

@@ -1,9 +1,11 @@
 //! Tie-breaking among plans of equal cost: selects a canonical plan.
 //!
-//! The canonical plan has the fewest steps, and among these plans the fewest reconfigurations (steps at which
-//! a function changes its design). Remaining ties are broken by model order: step by step, it compares the
-//! position of the action in the domain, the positions of its arguments in the problem, and its designs.
-//! Names are not compared. A design is not selected if a strictly better design exists (cheaper, or with less
+//! The canonical plan has the fewest steps, and among these plans the fewest reconfigurations, i.e. changes
+//! of a function's design. A step at which two functions change their designs counts twice. If there is a
+//! reference plan, the number of steps that are not in it is minimised before the reconfigurations. Remaining
+//! ties are broken by model order: step by step, it compares the position of the action in the domain, the
+//! positions of its arguments in the problem, and its designs. Names are not compared. Unless the reference
+//! plan contains it, a design is not selected if a strictly better design exists (cheaper, or with less
 //! consumption).
 //!
 //! The cost and length of the known plan bound two searches: the first minimises reconfigurations, and the
@@ -29,9 +31,9 @@ use crate::search::design_combinations::pareto_optimal_combinations;
 use crate::search::monotonicity::is_monotone;
 use crate::search::successor_generator::SuccessorGenerator;
 
-/// Maximum number of labels that are stored.
+/// Maximum number of labels (partial plans) that are stored in both searches together.
 const LABEL_LIMIT: usize = 100_000;
-/// Maximum number of comparisons between labels.
+/// Maximum number of comparisons between labels in both searches together.
 const PAIR_LIMIT: usize = 50_000_000;
 
 /// A label of the search: a partial plan, represented by the state that it reaches and by its quality.
@@ -55,7 +57,7 @@ impl Label {
 }
 
 /// Secondary objectives in lexicographic order, summed over the steps: the number of steps that are not in
-/// the reference plan, and the number of functions that change their design.
+/// the reference plan (0 without a reference plan), and the number of changes of a function's design.
 pub type Changes = (usize, usize);
 
 /// A combination of designs for the slots of an operator.
@@ -71,8 +73,8 @@ struct Choice {
 /// Combinations of designs of an operator, in ascending order; `None` if there are too many.
 type Choices = Option<Vec<Choice>>;
 
-/// Key of a Pareto front: values of the basic variables, last designs of the functions and, if the task is
-/// not monotone, numbers.
+/// Key of a Pareto front: values of the basic variables, last designs of the functions and, if more of a
+/// number may be worse (the task is not monotone), numbers.
 type Place = (Box<[u32]>, Vec<Option<ObjectId>>, Vec<Int>);
 
 /// All labels of a search, and their indices by Pareto front.
@@ -85,15 +87,17 @@ struct Labels {
 /// Situation in which the plan begins: the state, and preferences for the remaining plan.
 pub struct PlanPrefix<'a> {
     pub state: &'a State,
-    /// Last design of each function before the plan.
+    /// Last design of each function before the plan, as pairs (function, design).
     pub designs: &'a [(ObjectId, ObjectId)],
-    /// Steps of a reference plan. Among equally good plans, a plan with more of these steps is selected.
+    /// Steps of a reference plan; empty without a reference plan. Among equally good plans, a plan with more
+    /// of these steps is selected.
     pub close_to: &'a FxHashSet<GroundStep>,
 }
 
 /// Tie-breaking data of a task that does not depend on the initial state.
 pub struct TieBreakContext {
-    /// Lower bounds on the number of steps to the goal, by projection and abstract state.
+    /// Lower bounds on the number of steps to the goal, by projection and abstract state; `None` if the goal
+    /// is unreachable.
     steps_to_go: Vec<Vec<Option<Int>>>,
     index: SuccessorGenerator,
     monotone: bool,
@@ -105,7 +109,7 @@ impl TieBreakContext {
     /// Precomputes the data for comparing plans of equal cost.
     ///
     /// # Errors
-    /// Fails when a limit is reached.
+    /// Fails if the deadline has passed or the interrupt flag is set.
     pub fn new(context: Context<'_>, bounds: &Bounds) -> Result<Self, Interrupted> {
         let Context { task, limits } = context;
         let configurations = task.operators.iter().flat_map(|operator| &operator.configuration);
@@ -129,7 +133,7 @@ impl TieBreakContext {
     }
 
     /// Returns the Pareto-optimal combinations of designs of an operator, and the combinations of its steps
-    /// in the reference plan.
+    /// in the reference plan, in ascending order. Returns `None` if there are too many combinations.
     fn choices_of(
         &self,
         context: Context<'_>,
@@ -178,7 +182,7 @@ struct Ties<'a> {
 }
 
 /// Returns the canonical plan among all plans with the cost and the number of steps of `plan`. Returns `plan`
-/// if a limit is reached.
+/// if a limit on labels, comparisons or time is reached.
 pub fn select_canonical_plan(context: Context<'_>, bounds: &Bounds, plan: GroundPlan) -> GroundPlan {
     let close_to = FxHashSet::default();
     let beginning = PlanPrefix { state: &context.task.initial, designs: &[], close_to: &close_to };
@@ -187,9 +191,9 @@ pub fn select_canonical_plan(context: Context<'_>, bounds: &Bounds, plan: Ground
     choose_from((context, bounds, &prepared), plan, max_changes, &beginning).0
 }
 
-/// Selects the canonical plan for a given beginning, for example after steps that are already executed. Also
-/// returns its changes, unless they exceed `max_changes` or the search reached a limit; in these cases, the
-/// plan is `plan`.
+/// Selects the canonical plan for a given beginning, for example after steps that are already executed.
+/// `plan` is the known plan, which sets cost and number of steps. Also returns the changes of the canonical
+/// plan. If they exceed `max_changes` or the search reaches a limit, returns `plan` and `None`.
 pub fn choose_from(
     (context, bounds, prepared): (Context<'_>, &Bounds, &TieBreakContext),
     plan: GroundPlan,
@@ -233,16 +237,16 @@ struct Branch<'a> {
 }
 
 impl Ties<'_> {
-    /// Returns the canonical plan and its changes, or `None` if it needs more than `max_changes` changes or a
-    /// limit is reached.
+    /// Returns the canonical plan and its changes, or `None` if more than `max_changes` are necessary or a
+    /// limit on labels, comparisons or time is reached.
     fn first(&self, start: Label, max_changes: Changes) -> Option<(Vec<GroundStep>, Changes)> {
         let (changes, first_labels) = self.fewest_changes(start.clone(), max_changes)?;
         let steps = self.first_in_order(start, changes, &first_labels)?;
         (steps.len() == self.steps).then_some((steps, changes))
     }
 
-    /// Returns the combinations of designs of an operator. Returns `None` if there are too many, or a limit
-    /// was reached; only the former is cached.
+    /// Returns the combinations of designs of an operator. Returns `None` if there are too many, or the
+    /// computation was interrupted; only the former result is cached.
     fn choices(&self, operator: OperatorId) -> Option<&[Choice]> {
         let choices = &self.choices.as_ref().unwrap_or(&self.prepared.choices)[operator.index()];
         if choices.get().is_none() {
@@ -256,8 +260,8 @@ impl Ties<'_> {
         choices.get()?.as_deref()
     }
 
-    /// Returns the label after a step. Returns `None` if the step is inapplicable or cannot lead to a plan
-    /// within the cost and number of steps of the known plan.
+    /// Returns the label (partial plan) after a step. Returns `None` if the step is inapplicable or cannot
+    /// lead to a plan within the cost and number of steps of the known plan.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "costs are not negative and those of labels at most that of a known plan, so that sums with an operator and an estimate fit"
@@ -292,8 +296,9 @@ impl Ties<'_> {
         Some(next)
     }
 
-    /// Returns the minimum changes of a plan that starts at the label `from`, and all labels that were
-    /// generated. Returns `None` if the minimum exceeds `max_changes` or a limit is reached.
+    /// Returns the minimum changes of a plan that starts at the label `from`, and all labels (partial plans)
+    /// that were stored. Returns `None` if the minimum exceeds `max_changes` or a limit on labels,
+    /// comparisons or time is reached.
     fn fewest_changes(&self, from: Label, max_changes: Changes) -> Option<(Changes, Labels)> {
         let mut open = BinaryHeap::from([Reverse((from.changes, Reverse(from.steps), 0))]);
         let mut labels = Labels { all: vec![from], ..Labels::default() };
@@ -317,14 +322,14 @@ impl Ties<'_> {
         None
     }
 
-    /// Returns the first plan in model order with at most `changes`, which is the minimum. Uses depth-first
-    /// search.
+    /// Returns the first plan in model order with at most `changes`, which must be the minimum. Uses
+    /// depth-first search. Returns `None` if a limit on labels, comparisons or time is reached.
     ///
-    /// A label is pruned if a visited label is at least as good. If the visited label has led to no plan, the
-    /// new label leads to none either. If the visited label is an ancestor of the new label, a plan from the
-    /// new label would imply a shorter plan from the ancestor, which cannot exist. A label is also pruned if
-    /// a label of the first search is strictly better in cost, steps or changes, because the minimum values
-    /// of all three are known.
+    /// A label (partial plan) is pruned if a visited label is at least as good. If the visited label has led
+    /// to no plan, the new label leads to none either. If the visited label is an ancestor of the new label,
+    /// a plan from the new label would imply a shorter plan from the ancestor, which cannot exist. A label is
+    /// also pruned if a label in `first_labels`, from the search for the minimum changes, is strictly better
+    /// in cost, steps or changes, because the minimum values of all three are known.
     fn first_in_order(
         &self,
         start: Label,
@@ -373,8 +378,8 @@ impl Ties<'_> {
         None
     }
 
-    /// Returns `true` if a stored label is at least as good as `next`. If `strictly`, the label must also be
-    /// better in cost, steps or changes.
+    /// Returns `true` if a stored label of the Pareto front of `next` is at least as good as `next`. If
+    /// `strictly`, the label must also be better in cost, steps or changes.
     fn is_beaten(&self, labels: &Labels, next: &Label, strictly: bool) -> bool {
         let is_better =
             |label: &Label| (label.cost, label.steps, label.changes) != (next.cost, next.steps, next.changes);
@@ -385,12 +390,12 @@ impl Ties<'_> {
         })
     }
 
-    /// Polls the limits. Returns `None` if a limit is reached.
+    /// Polls deadline and interrupt flag. Returns `None` if the search must stop.
     fn beat(&self) -> Option<()> {
         self.pulse.borrow_mut().beat().ok()
     }
 
-    /// Stores a label. Returns `None` if the limit on labels or comparisons is reached.
+    /// Stores a label (partial plan). Returns `None` if the limit on labels or comparisons is reached.
     #[expect(clippy::arithmetic_side_effects, reason = "labels are counted up to their limit")]
     fn keep(&self, labels: &mut Labels, label: Label) -> Option<()> {
         labels

@@ -1,10 +1,10 @@
 //! Scheduling of searches: a first plan, an optimal plan, and the closed states that prove its optimality.
 //!
-//! A\* with pattern databases runs first. If it does not finish soon, a greedy best-first search finds some
-//! plan. Then two A\* searches alternate with equal shares of the work: one uses only pattern databases, the
-//! other also LM-cut. The result of the search that finishes first is returned, so the total work is at most
-//! twice the work of the faster search. Work is counted in units instead of time, so the result is
-//! deterministic.
+//! A\* with pattern databases runs first. If it finds no plan soon, a greedy best-first search looks for some
+//! plan. Then two A\* searches alternate: one uses only pattern databases, the other also LM-cut. They get
+//! equal shares of the work, but the LM-cut search gets less at first, and a search that lags behind gets
+//! half. The result of the search that finishes first is returned. Work is counted in units instead of time,
+//! so the result is deterministic.
 
 use std::sync::Arc;
 
@@ -28,15 +28,16 @@ use crate::search::stubborn_sets::{Stubborn, StubbornSetPruning};
 /// Maximum number of stored states of a search that must answer quickly or whose closed states are written to
 /// a certificate.
 pub const STATE_LIMIT: usize = 400_000;
-/// Minimum number of stored states that the greedy best-first search may use.
+/// The greedy best-first search may store at least this number of states, unless `max_states` is lower.
 const LEAST: usize = 100;
 /// Number of work units that correspond to one stored state in the budgets of alternating searches.
 const WORK_PER_STATE: u64 = 2_500;
-/// Number of work units after which the lagging search is abandoned.
+/// Number of work units of a search after which a lagging search is abandoned.
 const ABANDON_WORK: u64 = 100_000_000_000;
 
-/// Searches for an optimal plan. All operators must have non-negative costs. Stops early if a forecast shows
-/// that memory will not suffice for a proof.
+/// Searches for an optimal plan. All operators must have non-negative costs. Ends without a proof if a
+/// forecast shows that memory will not suffice, if the deadline passes or the run is interrupted, or if an
+/// operator has too many combinations of designs.
 pub fn search(context: Context<'_>, bounds: &Bounds) -> SearchOutcome {
     let Ok(Some(prepared)) = SearchTask::new(context) else { return SearchOutcome::Unknown(None) };
     let space = || SearchProblem { context, bounds, prepared: &prepared, orbits: None };
@@ -69,7 +70,9 @@ pub fn search(context: Context<'_>, bounds: &Bounds) -> SearchOutcome {
     }
 }
 
-/// Runs A\* from the initial state until it has stored `max_states` states.
+/// Searches for an optimal plan with A\* from the initial state. Ends without a proof, with the best plan
+/// found, once A\* has stored more than `max_states` states. If A\* finds no plan soon, a greedy search
+/// provides an upper bound.
 pub fn search_states<N: TaskNumber>(
     context: Context<'_, N>,
     bounds: &impl Heuristic<N>,
@@ -84,8 +87,9 @@ pub fn search_states<N: TaskNumber>(
     }
 }
 
-/// Runs A\* from the state `initial` until it has stored `max_states` states. Looks for a plan with a cost of
-/// at most `limit`; `Int::MAX` means no limit.
+/// Searches with A\* from the state `initial` for an optimal plan with a cost of at most `limit`; `Int::MAX`
+/// means no limit. Ends without a proof, with the best plan found, once A\* has stored more than `max_states`
+/// states. If A\* finds no plan soon and there is no limit, a greedy search provides one.
 pub fn search_from(
     space: &SearchProblem<'_, Int, Bounds>,
     initial: &State,
@@ -125,7 +129,8 @@ fn search_within<N: TaskNumber, E: Heuristic<N>>(
     }
 }
 
-/// Runs a greedy best-first search from `initial` and returns the plan that it finds, if any.
+/// Runs a greedy best-first search from `initial` and returns the plan that it finds, if any. The number of
+/// stored states is limited to a threshold and to `max_states`.
 fn greedy_best_first<N: TaskNumber, E: Heuristic<N>>(
     space: &SearchProblem<'_, N, E>,
     initial: &State<N>,
@@ -137,8 +142,8 @@ fn greedy_best_first<N: TaskNumber, E: Heuristic<N>>(
     greedy.best_plan()
 }
 
-/// Two A\* searches of a task that alternate with equal shares of the work. The first uses pattern databases
-/// only; the second, which is added later, also evaluates LM-cut lazily.
+/// Two A\* searches of a task that alternate. The first uses pattern databases only; the second, which is
+/// added if the first call of `run` does not finish, also evaluates LM-cut lazily.
 pub struct InterleavedSearch<'a, N, E> {
     space: SearchProblem<'a, N, E>,
     initial: State<N>,
@@ -146,7 +151,7 @@ pub struct InterleavedSearch<'a, N, E> {
     has_begun: bool,
     /// `true` if searches continue although memory is forecast to run out.
     is_patient: bool,
-    /// Greatest lower bound on the cost of every plan that a search has proved.
+    /// Greatest proved lower bound on the cost of every plan.
     bound: Option<N>,
     /// Best plan of the abandoned searches.
     best: Option<GroundPlan<N>>,
@@ -169,14 +174,15 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
         }
     }
 
-    /// Makes searches continue with half of their work if memory is forecast to run out before they finish.
-    /// Without this setting, such searches end.
+    /// Makes a search continue with half of its work if memory is forecast to run out before it finishes.
+    /// Without this setting, such a search ends.
     #[must_use]
     pub fn continue_without_forecast(self) -> Self {
         Self { is_patient: true, ..self }
     }
 
-    /// Returns `true` if at least one search is forecast to finish within the memory limit.
+    /// Returns `true` unless memory is forecast to run out in every search. Searches without a forecast count
+    /// as hopeful.
     pub fn may_finish(&self) -> bool {
         self.searches.iter().any(|search| search.patience != OutOfMemoryPolicy::Needed)
     }
@@ -192,7 +198,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
         self.searches.iter().fold(self.figures, |sum, search| sum.plus(search.statistics))
     }
 
-    /// Returns the best plan of all searches, including abandoned searches.
+    /// Returns the best plan of all searches, including abandoned searches. Returns `None` if no plan was
+    /// found, or only plans that are not better than one set from outside.
     pub fn best_plan(&self) -> Option<GroundPlan<N>> {
         let plans = self.searches.iter().filter_map(AStar::best_plan);
         plans.fold(self.best.clone(), |best, plan| cheaper(best, Some(plan)))
@@ -200,7 +207,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
 
     /// Resumes all searches until each has done the work of `max_states` states. The first call runs a single
     /// search until it has stored `max_states` states. While `max_states` is small, the LM-cut search gets a
-    /// quarter of the work.
+    /// quarter of the work. A search that lags behind or is forecast to run out of memory gets half.
     ///
     /// Returns `None` if the searches are not finished. `SearchOutcome::Unknown(None)` also means that no
     /// plan is cheaper than the cost set by `set_upper_bound`.
@@ -267,8 +274,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
         self.searches.is_empty().then(|| SearchOutcome::Unknown(self.best.clone()))
     }
 
-    /// Adds the LM-cut search and enables symmetry reduction and stubborn sets. If there are symmetries, the
-    /// first search restarts, because its stored states are not canonical.
+    /// Adds the LM-cut search, if LM-cut is available, and enables symmetry reduction and stubborn sets. If
+    /// there are symmetries, the first search restarts, because its stored states are not canonical.
     fn begin(&mut self) {
         self.has_begun = true;
         let SearchProblem { context, bounds, .. } = self.space;
@@ -297,7 +304,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
 }
 
 /// Returns the index of a search that lags behind: its lower bound, extrapolated over two doublings of its
-/// states, stays below the current lower bound of the other search.
+/// states, stays below the current lower bound of the other search. Returns `None` unless there are two
+/// searches.
 fn lagging_search<N: TaskNumber, E: Heuristic<N>>(searches: &[AStar<'_, N, E>]) -> Option<usize> {
     let [first, second] = searches else { return None };
     let is_behind = |search: &AStar<'_, N, E>, other: &AStar<'_, N, E>| {
@@ -313,9 +321,10 @@ fn cheaper<N: Ord>(first: Option<GroundPlan<N>>, second: Option<GroundPlan<N>>) 
 /// A closed state: values of the basic variables, values of the numeric variables, and path cost.
 pub type ClosedEntry<N> = (Vec<u32>, Vec<N>, N);
 
-/// Runs an exhaustive A\* search and returns the closed states whose f value is below `cost` (all closed
-/// states if `cost` is `None`). Returns `None` if a plan cheaper than `cost` exists (any plan if `cost` is
-/// `None`), or a limit is reached.
+/// Runs an A\* search and returns the closed states whose f value (path cost plus heuristic value) is below
+/// `cost`, which must not exceed the cost of an optimal plan. If `cost` is `None`, no plan must exist, and
+/// all closed states are returned. Returns `None` if these conditions do not hold, or the search has no proof
+/// after `STATE_LIMIT` states.
 pub fn closed_labels<N: TaskNumber>(
     context: Context<'_, N>,
     bounds: &impl Heuristic<N>,

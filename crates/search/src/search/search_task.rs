@@ -1,5 +1,5 @@
-//! Precomputed operator data of a search, independent of the initial state: applicable operators, their
-//! designs and costs.
+//! Precomputed operator data of a search, independent of the initial state: an index for finding applicable
+//! operators, and the designs and costs of each operator.
 
 use task::context::Context;
 use task::limits::Interrupted;
@@ -29,7 +29,7 @@ impl<N: TaskNumber> SearchTask<N> {
     /// total number exceeds `u32`.
     ///
     /// # Errors
-    /// Fails when a limit is reached.
+    /// Fails if the deadline has passed or the interrupt flag is set.
     pub fn new(context: Context<'_, N>) -> Result<Option<Self>, Interrupted> {
         let Context { task, limits } = context;
         let monotone = is_monotone(task);
@@ -60,7 +60,8 @@ impl<N: TaskNumber> SearchTask<N> {
         GroundStep { operator: OperatorId(dense(operator)), choice }
     }
 
-    /// Returns a lower bound on the number of steps that together have this cost.
+    /// Returns a lower bound on the number of steps that together have this cost; 0 if no operator has a
+    /// positive cost.
     pub(super) fn steps_at_least(&self, cost: &N) -> u32 {
         if self.dearest > N::zero() { cost.times_at_least(&self.dearest) } else { 0 }
     }

@@ -31,7 +31,8 @@ struct BitField {
     mask: u32,
 }
 
-/// A numeric variable that is compared by ≥ or ≤ within a place and is not part of its key.
+/// A numeric variable that is not part of the key. States with equal keys are compared by ≥ or ≤ of this
+/// variable, or the variable is ignored.
 struct ComparedVariable {
     variable: usize,
     asked: Polarity,
@@ -69,7 +70,7 @@ struct Node {
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum NodeStatus {
     Open,
-    /// Open, not dominated, and the lazy heuristic has been evaluated.
+    /// Not dominated, and the lazy heuristic has been evaluated.
     Closer,
     Dominated,
 }
@@ -81,10 +82,10 @@ pub(super) struct StateRegistry<N> {
     compared: Vec<ComparedVariable>,
     /// Number of 32-bit words of a key.
     width: usize,
-    /// Keys of all places, with `width` words for each place.
+    /// Keys of all places (sets of states with equal keys), with `width` words for each place.
     keys: Vec<u32>,
-    /// For each place: the first node of its linked front, or the index of its tree combined with
-    /// `TREE_FLAG`.
+    /// For each place (set of states with equal keys): the first node of its linked front, or the index of
+    /// its tree combined with `TREE_FLAG`.
     fronts: Vec<u32>,
     trees: Vec<Front>,
     /// Maximum length of a linked front. A longer front is stored as a tree.
@@ -93,7 +94,7 @@ pub(super) struct StateRegistry<N> {
     tree_bytes: usize,
     table: HashTable<u32>,
     nodes: Vec<Node>,
-    /// For each node: the indices of the numbers that are not part of the key.
+    /// For each node: the indices of the values of its compared variables, which are not part of the key.
     others: Vec<u32>,
     numbers: Numbers<N>,
     /// Scratch buffer: the key of the state that is looked up.
@@ -236,8 +237,8 @@ impl<N: TaskNumber> StateRegistry<N> {
             .fold(nodes.saturating_add(numbers), usize::saturating_add)
     }
 
-    /// Looks up a state. Returns `None` if a stored state dominates it. Cost and steps belong to the path
-    /// that leads to the state.
+    /// Looks up a state that is reached with this path cost and number of steps. Returns `None` if a stored
+    /// state dominates it.
     pub(super) fn look_up(&mut self, state: &State<N>, cost: &N, steps: u32) -> Option<VacantEntry> {
         let words = self.words();
         // The original values are stored in addition to the key. A plan must be extracted from original
@@ -291,7 +292,8 @@ impl<N: TaskNumber> StateRegistry<N> {
         std::iter::successors(some(first), move |node| some(self.nodes[*node as usize].next))
     }
 
-    /// Stores the state of the last lookup and returns its node index.
+    /// Stores the state of the last lookup and returns its node index. Marks the stored nodes that it
+    /// dominates.
     pub(super) fn insert(&mut self, vacancy: &VacantEntry, origin: ParentLink) -> u32 {
         let place = vacancy.place.unwrap_or_else(|| self.add_place(vacancy.hash));
         let id = dense(self.nodes.len());
@@ -395,7 +397,7 @@ impl<N: TaskNumber> StateRegistry<N> {
         &self.numbers.all[self.nodes[node as usize].cost as usize]
     }
 
-    /// Unpacks the state of a node into `state`. Derived variables are not set.
+    /// Unpacks the original (not canonical) state of a node into `state`. Derived variables are not set.
     pub(super) fn unpack(&self, node: u32, state: &mut State<N>) {
         let key = self.key_of(self.nodes[node as usize].place);
         // Canonical keys identify states but must not be expanded, because their steps would not form a plan.

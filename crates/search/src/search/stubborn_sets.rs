@@ -19,8 +19,9 @@
 //! is thus preserved. Pruning of dominated and symmetric states remains sound \[3\]: the stored state has a
 //! plan with the same operators or their images.
 //!
-//! If an operator requires a value of a variable and sets another value, it disturbs only those operators
-//! that change the variable from the required value or from any value.
+//! If o requires a value of a variable and sets another value, fewer operators suffice for this variable:
+//! those that require the same value, those that may set the variable without requiring a value of it, and
+//! those that read it in a clause or in the condition of a conditional effect.
 //!
 //! Pruning is disabled if it removes too few operators to justify its time.
 //!
@@ -36,7 +37,7 @@ use task::lists::Lists;
 use task::number::dense;
 use task::task::{Condition, Fact, Literal, Operator, OperatorId, Task};
 
-/// Pruning stays enabled if at least one of this number of applicable operators is pruned on average.
+/// Pruning stays enabled if, on average, at least one in this number of applicable operators is pruned.
 const MIN_PRUNED_FRACTION: u64 = 5;
 
 /// Indices of a task: the operators that require, set or read each fact or variable.
@@ -58,27 +59,27 @@ pub struct Stubborn {
 /// State of stubborn-set pruning: scratch buffers, and statistics for disabling it.
 pub(super) struct StubbornSetPruning {
     stubborn: Arc<Stubborn>,
-    /// For each operator: whether it is in the set.
+    /// For each operator: whether it is in the stubborn set of the current state.
     is_in: Vec<bool>,
-    /// For each operator: whether it is applicable in the state.
+    /// For each operator: whether it is applicable in the current state.
     can_be_applied: Vec<bool>,
-    /// Operators of the set that are not processed yet.
+    /// Operators of the stubborn set that are not processed yet.
     open: Vec<u32>,
-    /// All operators of the set.
+    /// All operators of the stubborn set.
     all: Vec<u32>,
-    /// For each fact: whether all operators that set it are in the set.
+    /// For each fact: whether all operators that set it are in the stubborn set.
     is_set: Vec<bool>,
     /// Facts for which `is_set` is `true`.
     set: Vec<u32>,
-    /// Number of applicable operators that are not in the set.
+    /// Number of applicable operators that are not in the stubborn set.
     out: usize,
     /// Number of expansions after which pruning is disabled if it has pruned too little.
     trial: u64,
-    /// Number of expanded states.
+    /// Number of states that were expanded with pruning.
     looked: u64,
-    /// Number of applicable operators in all expanded states.
+    /// Sum of the numbers of applicable operators over the states expanded with pruning.
     applicable: u64,
-    /// Number of pruned operators.
+    /// Number of operators that were pruned, over all expanded states.
     left_out: u64,
 }
 
@@ -162,8 +163,8 @@ impl StubbornSetPruning {
         self.looked == self.trial && self.left_out.saturating_mul(MIN_PRUNED_FRACTION) < self.applicable
     }
 
-    /// Computes a stubborn set and removes all other operators from `applicable`. Removes none if the state
-    /// satisfies the goal. Returns the size of the set.
+    /// Computes a stubborn set and removes all other operators from `applicable`. Removes no operator if the
+    /// state satisfies the goal. Returns the size of the set, including inapplicable operators.
     pub(super) fn prune_operators<N>(
         &mut self,
         task: &Task<N>,

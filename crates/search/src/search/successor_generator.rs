@@ -1,4 +1,5 @@
 //! Successor generator: a decision tree over required values that returns the applicable operators \[1\].
+//! Numeric conditions are not tested.
 //!
 //! A node stores the operators that have no further preconditions. It tests one variable and has a child for
 //! each required value, and one child for operators that do not require the variable.
@@ -23,7 +24,7 @@ struct Node {
     others: u32,
 }
 
-/// Index that finds the applicable operators of a task by their required facts.
+/// Index that finds the operators of a task whose propositional conditions hold in a state.
 pub struct SuccessorGenerator {
     nodes: Vec<Node>,
     operators: Vec<OperatorId>,

@@ -29,7 +29,8 @@ pub struct Orbits {
 }
 
 impl Orbits {
-    /// Computes the symmetries of a task. Returns `None` if no objects are interchangeable.
+    /// Computes symmetries of a task. Returns `None` if no interchangeable objects are found; the number of
+    /// comparisons is limited.
     pub(crate) fn new(context: Context<'_, Int>) -> Result<Option<Self>, Interrupted> {
         let mut exchanges = Vec::new();
         for exchange in symmetry_generators(context, false)? {

@@ -15,7 +15,7 @@ use super::syntax_edits::unsupported;
 
 type Key = (Name, Vec<Name>);
 
-/// Facts and numeric values of the initial state, without derived predicates.
+/// Facts and numeric values of the initial state, without derived predicates and timed initial literals.
 pub(super) struct Initial<'t> {
     objects: &'t Objects<'t>,
     domain: &'t Domain,

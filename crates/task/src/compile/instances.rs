@@ -73,8 +73,8 @@ fn following(positions: &[usize], sizes: &[usize]) -> Option<Vec<usize>> {
     None
 }
 
-/// Returns the condition with objects substituted for its variables. Quantified variables get new names that
-/// no action uses; `fresh` is the counter for these names.
+/// Returns the condition with its free variables replaced by their terms in `binding`. Quantified variables
+/// get new names that no action uses; `fresh` is the counter for these names.
 #[expect(clippy::arithmetic_side_effects, reason = "as many bindings were pushed as are taken off")]
 pub(super) fn instance(condition: &Condition, binding: &mut Binding, fresh: &mut u64) -> Condition {
     use Condition as C;

@@ -70,7 +70,8 @@ pub fn is_violation(action: &str) -> bool {
 /// Compiles preferences and trajectory constraints away. Preferences that no objective mentions are dropped.
 ///
 /// # Errors
-/// Returns all unsupported constraints with their source locations, or an error if a limit is reached.
+/// Returns all unsupported constraints with their source locations, or an error if the deadline passes or the
+/// run is interrupted.
 pub fn compile<'t>(
     domain: &'t Domain,
     problem: &'t Problem,

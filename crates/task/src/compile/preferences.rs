@@ -1,9 +1,10 @@
 //! Compiles preferences to hidden actions that evaluate the preferences after the last action of the plan.
 //!
-//! Each preference instance gets two hidden actions. One requires that the instance is satisfied; the other
-//! requires that the instance is violated, and increases the count of violations. Exactly one of the two is
-//! applicable. The instances are evaluated in a fixed order, and the hidden actions change only auxiliary
-//! atoms and the counts. Every plan thus has exactly one evaluation.
+//! Each instance of a preference on the goal or a trajectory constraint gets two hidden actions. One requires
+//! that the instance is satisfied; the other requires that the instance is violated, and increases the count
+//! of violations. Exactly one of the two is applicable. The instances are evaluated in a fixed order, and the
+//! hidden actions change only auxiliary atoms and the counts. Every plan thus has exactly one evaluation.
+//! Preferences in preconditions are counted by conditional effects of their actions instead.
 //!
 //! If actions may overlap, executed hidden actions would extend the makespan. Each instance then gets one
 //! hidden action that is never executed. Its precondition is the violation of the instance, and is evaluated
@@ -41,8 +42,9 @@ fn violate(preference: &Name) -> Effect {
     Effect::Assign(Assignment::Increase, count(preference), unit, Span::default())
 }
 
-/// Adds the hidden actions and violation counts of preferences to the task. Only preferences that the
-/// objectives mention are added.
+/// Adds the hidden actions, violation counts and counting effects of preferences to the task, for the
+/// preferences `used_preferences` that the objectives mention. `wanted` are their instances with conditions
+/// on the last state.
 pub(super) fn install(
     domain: &mut Domain,
     problem: &mut Problem,
@@ -110,7 +112,8 @@ fn look_up(domain: &mut Domain, span: Span, wanted: Vec<PreferenceInstance>) {
     }
 }
 
-/// Adds conditional effects to an action, which count the violations of the preferences in its preconditions.
+/// Moves the preferences in the preconditions of an action to conditional effects that count their
+/// violations. Preferences that are not in `used_preferences` are dropped.
 fn count_preferences(action: &mut Action, used_preferences: &[Name]) {
     let preferences = std::mem::take(&mut action.preferences);
     for preference in

@@ -58,8 +58,9 @@ impl Happening {
             .any(|(own, numeric)| numeric && own.predicate.name == *name)
     }
 
-    /// Returns the condition under which the happening may change the truth value of `condition`, which has
-    /// no free variables.
+    /// Returns a necessary condition, on the state before the happening, for a change of the truth value of
+    /// `condition`, which has no free variables. Conditions of effects are ignored, so the truth value need
+    /// not change.
     pub(super) fn touches(&self, condition: &Condition) -> Condition {
         let mut conditions_of_change = Vec::new();
         self.touching(condition, &mut Vec::new(), &mut conditions_of_change);
@@ -87,8 +88,8 @@ impl Happening {
         }
     }
 
-    /// Adds to `found` the conditions under which an effect changes the atom or function. The variables in
-    /// `inner` may have any value.
+    /// Adds to `found` the conditions under which an effect may change the atom or function. Conditions of
+    /// the effect are ignored. The variables in `inner` may have any value.
     fn touched(&self, atom: &Atom, is_function: bool, inner: &[TypedName], found: &mut Vec<Condition>) {
         for change in &self.changes {
             let (target, numeric) = target(&change.effect);
@@ -109,6 +110,7 @@ impl Happening {
     }
 
     /// Returns the condition on the state before the happening that is equivalent to `condition` after it.
+    /// Fails if a numeric effect is quantified, or a comparison has more than `MAX_CASES` cases.
     pub(super) fn regress(&self, condition: &Condition) -> Result<Condition, NotRegressable> {
         let each =
             |parts: &[Condition]| parts.iter().map(|part| self.regress(part)).collect::<Result<Vec<_>, _>>();
@@ -159,7 +161,7 @@ impl Happening {
     }
 
     /// Returns all cases of a case distinction over the effects on the functions. Each case gives a new value
-    /// for every function.
+    /// for every function. Fails if a numeric effect is quantified, or there are more than `MAX_CASES` cases.
     fn ways(&self, functions: &[Atom]) -> Result<Vec<Way>, NotRegressable> {
         let mut ways = vec![(super::simplify::truth(), Vec::new())];
         for function in functions {

@@ -80,12 +80,13 @@ pub(super) fn exists(variables: &[TypedName], body: Condition) -> Condition {
     Condition::Exists(variables.to_vec(), Box::new(body))
 }
 
-/// Returns the disjuncts of a disjunction. Another condition is its only disjunct.
+/// Returns the disjuncts of a disjunction. A condition that is no disjunction is its only disjunct.
 pub(super) fn ways(condition: Condition) -> Vec<Condition> {
     if let Condition::Or(parts) = condition { parts } else { vec![condition] }
 }
 
-/// Simplifies `condition` under the assumption that `known` holds.
+/// Simplifies `condition` under the assumption that `known` holds: parts that are syntactically equal to
+/// `known` become true.
 pub(super) fn assume(condition: &Condition, known: &Condition) -> Condition {
     if format!("{condition:?}") == format!("{known:?}") {
         return truth();

@@ -31,7 +31,8 @@ impl Monitors<'_> {
         }
     }
 
-    /// Returns an atom that a timed initial literal adds at `time`, which is above 0.
+    /// Returns the condition that `time`, which is above 0, has come: an auxiliary atom that a timed initial
+    /// literal adds at this time.
     fn moment(&mut self, time: BigRational) -> Condition {
         let name = format!("time {time} has come");
         let is_declared = self.moments.iter().any(|(is_declared, _)| *is_declared == name);
@@ -59,7 +60,7 @@ impl Monitors<'_> {
     }
 
     /// Monitors `what`, which must hold in the state at time `from` and in all later states, until time
-    /// `until` if given. Returns the condition on the last state.
+    /// `until` if given. Returns the condition on the last state under which the constraint is satisfied.
     pub(super) fn hold(
         &mut self,
         (from, until): (&BigRational, Option<&BigRational>),
@@ -99,8 +100,9 @@ impl Monitors<'_> {
         Ok(all([satisfied, any([holds(&looked_at), what.clone()])]))
     }
 
-    /// Monitors a deadline and returns the condition on the last state. During search, the constraint counts
-    /// as satisfied while no deadline is pending; the deadlines are checked once the times are known.
+    /// Monitors a deadline and returns a condition on the last state. For a hard constraint, this condition
+    /// is always true; for a soft constraint, it requires that no deadline has begun or that the deadlines
+    /// are noted as kept. The deadlines themselves are checked once the times are known.
     pub(super) fn always_within(
         &mut self,
         within: &BigRational,

@@ -20,7 +20,7 @@ use super::semantics::PlanSemantics;
 use super::simplify::{all, any, assume, flag, holds, is_false, is_true, not, ways};
 use super::syntax_edits::{PreferenceInstance, declare, happen, require, unsupported};
 
-/// Limit on the total number of ground instances of trajectory constraints and preferences.
+/// Limit on the total number of ground instances of trajectory constraints, including those of preferences.
 const INSTANCES: usize = 20_000;
 
 /// Collects the auxiliary atoms, conditions and effects for all trajectory constraints of a task.
@@ -87,7 +87,8 @@ impl<'t> Monitors<'t> {
         self.initial.is_defined(condition, place)
     }
 
-    /// Adds monitors for all instances of a constraint.
+    /// Adds monitors for all instances of a constraint. Their conditions on the last state become goals, or
+    /// preference instances if the constraint has a preference name.
     pub(super) fn add_constraint(&mut self, file: File, constraint: &Constraint) -> Result<(), Error> {
         for binding in self.objects.bindings(&constraint.variables, &Vec::new()) {
             let place = (file, constraint.span);
@@ -180,7 +181,8 @@ impl<'t> Monitors<'t> {
 
     /// Calls `make` for each start or end of an action that may change one of the conditions, and adds the
     /// result to the action. The arguments of `make` are the condition under which a change occurs, and the
-    /// regressed conditions.
+    /// regressed conditions. If start and end may coincide and both may change the conditions, the action
+    /// also gets the condition that its duration is positive. Fails if this or a regression is not possible.
     pub(super) fn after_each(
         &mut self,
         conditions: &[&Condition],
@@ -251,8 +253,8 @@ impl<'t> Monitors<'t> {
         !self.narrows && self.deadlines.is_empty() && self.additions.iter().flatten().all(is_plain)
     }
 
-    /// Checks that only effects of actions can change a condition: it has no derived predicates and no timed
-    /// initial literals.
+    /// Checks that only effects of actions can change a condition. Returns an error if it contains a derived
+    /// predicate or an atom that timed initial literals change.
     pub(super) fn can_be_watched(&self, condition: &Condition, place: (File, Span)) -> Result<(), Error> {
         let mut predicates = FxHashSet::default();
         predicates_of(condition, &mut predicates);
@@ -429,8 +431,8 @@ fn predicates_of<'c>(condition: &'c Condition, found: &mut FxHashSet<&'c pddl::a
     condition.walk(&mut |node| found.extend(node.atom().map(|atom| &atom.predicate.name)));
 }
 
-/// Returns the condition that the fixed duration of an action is above 0. Returns `None` without a fixed
-/// duration.
+/// Returns the condition that the fixed duration of an action is above 0. Returns `None` unless the only
+/// duration constraint is an equality.
 fn positive(action: &Action) -> Option<Condition> {
     let ActionBody::Durative { duration, .. } = &action.body else { return None };
     let [DurationConstraint { operator: Comparison::Equal, expression, span, .. }] = &duration[..] else {
@@ -440,7 +442,8 @@ fn positive(action: &Action) -> Option<Condition> {
     Some(Condition::Compare(Comparison::Greater, expression.clone(), zero, *span))
 }
 
-/// Returns `true` if an action never starts and ends at equal times. The check is conservative.
+/// Returns `true` if an action is instantaneous, or its duration is certainly positive, so that start and end
+/// never coincide. The check is conservative.
 fn takes_time(domain: &Domain, problem: &Problem, action: &Action) -> bool {
     let ActionBody::Durative { duration, .. } = &action.body else { return true };
     let [DurationConstraint { operator, expression, .. }] = &duration[..] else { return false };

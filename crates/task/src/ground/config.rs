@@ -54,7 +54,8 @@ pub struct Generality {
     /// If set, each initial number may be replaced by any multiple of 1/factor. Grounding then infers nothing
     /// from the initial numbers of the problem.
     pub numbers: Option<Int>,
-    /// If set, a factor whose product with each number of the task is an integer.
+    /// If set, each multiple of 1/factor must be an integer after scaling, in addition to the numbers of the
+    /// problem.
     pub precision: Option<Int>,
     /// If set, the metric may contain fluents that effects change by state-dependent amounts. Optimality is
     /// then not provable.

@@ -2,8 +2,9 @@
 //! subconditions.
 //!
 //! Derived atoms stay rules over the state [1]: their truth values are the least fixpoint of the stratified
-//! rules, given the state variables. Constant derived atoms are folded, and a derived atom with a single rule
-//! is replaced by the rule's body.
+//! rules, given the state variables. Constant derived atoms are folded. A derived atom with a single rule
+//! that is not recursive is replaced by the rule's body where the result is still a conjunction of literals,
+//! clauses and comparisons.
 //!
 //! \[1\] S. Thiébaux, J. Hoffmann, B. Nebel: In defense of PDDL axioms, Artificial Intelligence
 //! 168, 2005.
@@ -17,8 +18,8 @@ use crate::ground::vocabulary::task::GroundTask;
 use crate::limits::{Interrupted, Limits};
 use crate::number::dense;
 
-/// Replaces constant derived atoms by their truth values, and derived atoms with a single rule by the rule's
-/// body.
+/// Replaces constant derived atoms by their truth values and, where possible, derived atoms with a single
+/// rule by the rule's body. Removes duplicate rules, and rules and operators whose conditions become false.
 pub fn simplify(task: &mut GroundTask<'_>) -> Result<(), Interrupted> {
     let limits = task.world.limits;
     let mut axioms = std::mem::take(&mut task.axioms);
@@ -46,7 +47,8 @@ pub fn simplify(task: &mut GroundTask<'_>) -> Result<(), Interrupted> {
     Ok(())
 }
 
-/// Keeps the items for which `keep` returns `true`. Returns an error once a limit is reached.
+/// Keeps the items for which `keep` returns `true`. Returns an error if the deadline passes or the run is
+/// interrupted; the remaining items are then kept.
 fn retain<T>(
     items: &mut Vec<T>,
     limits: &Limits,
@@ -61,7 +63,8 @@ fn retain<T>(
     outcome
 }
 
-/// Replaces derived atoms with a constant truth value in all rules, operators and the goal, until a fixpoint.
+/// Finds derived atoms whose truth value is constant, and substitutes the value: in the rules until a
+/// fixpoint, then in the operators and the goal.
 fn fold(task: &mut GroundTask<'_>, axioms: &mut Vec<GroundAxiom>) -> Result<(), Interrupted> {
     let (world, limits) = (&task.world, task.world.limits);
     let derived: Vec<AtomId> =
@@ -77,7 +80,7 @@ fn fold(task: &mut GroundTask<'_>, axioms: &mut Vec<GroundAxiom>) -> Result<(), 
                 truth_values.insert(axiom.head, true);
             }
         }
-        // An atom without a rule is false.
+        // A derived atom without a rule is false.
         for atom in derived.iter().filter(|atom| !has_rule.contains(*atom)) {
             truth_values.entry(*atom).or_insert(false);
         }
@@ -127,7 +130,7 @@ fn substitute(condition: &mut GroundCondition, known: &FxHashMap<AtomId, bool>) 
 }
 
 /// Maps each non-recursive derived atom with exactly one rule to the rule's body. Atoms in the body that also
-/// have a single rule are already inlined.
+/// have a single rule are already inlined. Atoms whose body contradicts itself are omitted.
 #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
 fn single_bodies(
     axioms: &[GroundAxiom],
@@ -154,8 +157,8 @@ fn single_bodies(
     Ok(bodies)
 }
 
-/// Replaces atoms by the bodies of their single rules. Returns `false` if the condition then contradicts
-/// itself.
+/// Replaces atoms by the bodies of their single rules. An atom in a negative literal or clause is replaced
+/// only if the body is a single literal. Returns `false` if the condition then contradicts itself.
 fn inline(condition: &mut GroundCondition, bodies: &FxHashMap<AtomId, GroundCondition>) -> bool {
     let mut literals = Vec::with_capacity(condition.literals.len());
     for mut literal in std::mem::take(&mut condition.literals) {

@@ -3,8 +3,8 @@
 //! A metric is a linear expression over fluents and total time. A fluent whose changes are state-independent
 //! becomes a constant offset plus a sum of operator costs. The final values of other fluents are added to the
 //! cost of a plan at its end; optimality is not claimed for such a metric. A metric to be maximised is
-//! negated. Without a metric, the cost is the total duration if the plan has durative actions, and the number
-//! of actions otherwise.
+//! negated. Without a metric, the cost is the total duration if an operator of the task has a duration, and
+//! the number of actions otherwise.
 use std::collections::BTreeMap;
 use std::convert::Infallible;
 
@@ -74,10 +74,11 @@ fn attach(task: &mut GroundTask<'_>, metric: &Metric, generality: &Generality) -
     Ok(())
 }
 
-/// Removes the fluents with state-dependent changes from a metric and returns them with their factors.
+/// Removes the fluents with state-dependent changes from a metric and returns them with their factors. If
+/// `generality` measures rewards, also removes the fluents with changes that improve the metric.
 ///
 /// # Errors
-/// Such a fluent exists, but `generality` requires costs that are exact.
+/// A fluent has state-dependent changes, but `generality` requires costs that are exact.
 fn rest(
     task: &GroundTask<'_>,
     linear: &mut Linear<Rational>,

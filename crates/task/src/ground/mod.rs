@@ -69,7 +69,8 @@ use vocabulary::world::World;
 /// ```
 ///
 /// # Errors
-/// Returns all unsupported constructs with their source locations, or an error if a limit is reached.
+/// Returns all unsupported constructs with their source locations, or an error if the deadline passes or the
+/// run is interrupted.
 pub fn ground(domain: &Domain, problem: &Problem, config: &GroundConfig) -> Result<Task, Errors> {
     let measures_ends = config.objectives.len() <= 1;
     ground_for(domain, problem, config, &Generality { measures_ends, ..Generality::default() })
@@ -79,7 +80,7 @@ pub fn ground(domain: &Domain, problem: &Problem, config: &GroundConfig) -> Resu
 /// `generality`.
 ///
 /// # Errors
-/// Returns all unsupported constructs, or an error if a limit is reached.
+/// Returns all unsupported constructs, or an error if the deadline passes or the run is interrupted.
 pub fn ground_for<N: TaskNumber>(
     domain: &Domain,
     problem: &Problem,

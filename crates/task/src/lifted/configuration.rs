@@ -3,7 +3,8 @@
 //!
 //! In the explicit form (Metaplan paper, Listings 1 and 2), a schema has parameters `?fd` with a condition
 //! `(fd_solve_f ?fd ?f)`. Such a parameter is *separable* and becomes a slot if no fluent has it as an
-//! argument. The number of designs then does not multiply the number of ground operators.
+//! argument, and it occurs neither in conditions of effects nor in conditions that mix static atoms and
+//! fluents. The number of designs then does not multiply the number of ground operators.
 
 use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
@@ -21,7 +22,8 @@ pub struct SlotParameter {
 }
 
 /// Returns the design parameters of a schema with their functions, in ascending order. `solves` lists the
-/// predicates `(p DESIGN FUNCTION)` which state that a design solves a function.
+/// predicates `(p DESIGN FUNCTION)` which state that a design solves a function. A parameter that also occurs
+/// as a function, or whose function is a design parameter, is omitted.
 pub fn design_parameters(lifted: &Lifted, schema: &Schema, solves: &[Name]) -> Vec<SlotParameter> {
     let conjuncts = conjuncts(&schema.start_condition).into_iter().chain(conjuncts(&schema.middle_condition));
     let mut designs: Vec<SlotParameter> = Vec::new();
@@ -45,7 +47,8 @@ pub fn design_parameters(lifted: &Lifted, schema: &Schema, solves: &[Name]) -> V
     designs
 }
 
-/// Returns the design parameters that are separable: they are not arguments of fluents and become slots.
+/// Returns the design parameters that are separable and become slots: outside static conditions, they occur
+/// only as arguments of static functions in comparisons, assigned values and the duration.
 pub fn slot_parameters(lifted: &Lifted, schema: &Schema, designs: &[SlotParameter]) -> Vec<SlotParameter> {
     designs.iter().filter(|design| is_separable(lifted, schema, design.parameter)).copied().collect()
 }

@@ -32,7 +32,7 @@ pub(super) fn rewards_time(metrics: &[Metric]) -> Option<bool> {
 }
 
 /// Returns the constant coefficient of `total-time` in an expression, or `None` if the coefficient is not
-/// constant.
+/// recognised as constant.
 pub fn time_factor(expression: &Expression) -> Option<Rational> {
     let number = |expression: &Expression| match expression {
         Expression::Number(number) => Some(number.clone()),
@@ -64,9 +64,10 @@ pub fn time_factor(expression: &Expression) -> Option<Rational> {
     }
 }
 
-/// Returns the duration of an action, and conditions that ensure its bounds. A variable duration is replaced
-/// by its longest or shortest value; `longest` is `true` if the metric rewards time. If durations may be
-/// chosen freely, it becomes an auxiliary numeric function.
+/// Returns the duration of an action, and conditions that ensure its bounds. If durations may be chosen
+/// freely, a variable duration becomes an auxiliary numeric function. Otherwise it is replaced by its longest
+/// value if `longest` is `Some(true)` (the metric rewards time) and by its shortest if `Some(false)`. If no
+/// single bound determines the value, an error is recorded in `names`.
 pub(super) fn duration(
     names: &mut Names,
     (constraints, span): (&[ast::DurationConstraint], Span),

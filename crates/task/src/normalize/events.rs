@@ -1,4 +1,4 @@
-//! Applies timed initial literals of time 0.
+//! Applies timed initial literals at or before time 0.
 
 use crate::lifted::{Arguments, Lifted, ObjectId};
 

@@ -17,7 +17,8 @@ pub(super) enum Duration {
     Instantaneous,
     /// The value of an expression.
     Fixed(Expression),
-    /// The planner chooses the duration.
+    /// The duration is variable, and the planner takes its shortest or longest value. Effects must not depend
+    /// on it.
     Open,
 }
 

@@ -112,7 +112,8 @@ fn needs_of_all(effects: &[Effect], guards: &Guards) -> Vec<Formula> {
     effects.iter().filter_map(|effect| needs(effect, guards)).collect()
 }
 
-/// Returns the condition that every value that an effect reads is defined, or `None` if it is always true.
+/// Returns the condition that the effect's condition is defined and, if it is true, every value that the
+/// effect reads is defined. Returns `None` if the condition is always true.
 fn needs(effect: &Effect, guards: &Guards) -> Option<Formula> {
     let mut values = Vec::new();
     if let Change::Assign { assignment, function, terms, expression, .. } = &effect.change {

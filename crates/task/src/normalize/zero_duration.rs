@@ -14,7 +14,8 @@ use pddl::ast::Comparison;
 /// Minimum and maximum of an expression, or `None` if they are unknown.
 type Range = Option<(Rational, Rational)>;
 
-/// Splits every schema whose duration may be 0 into two schemas. The schemas for duration 0 are appended.
+/// Splits every schema whose duration may be 0 into two schemas. The schemas for duration 0 are appended. A
+/// schema whose duration is always 0 is converted instead.
 ///
 /// # Errors
 /// The duration is variable, the planner takes the shortest admissible value, and this value may be 0 or

@@ -12,7 +12,8 @@ pub struct GroundStep {
     pub choice: Vec<u32>,
 }
 
-/// A plan over ground operators, with the sum of its operator costs in the task's integer unit.
+/// A plan over ground operators, with the sum of its operator costs. For `N = Int`, the cost is in the task's
+/// integer unit.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct GroundPlan<N = Int> {
     pub steps: Vec<GroundStep>,
@@ -20,15 +21,15 @@ pub struct GroundPlan<N = Int> {
 }
 
 impl GroundPlan {
-    /// Returns the greatest cost that is strictly less than the cost of this plan.
+    /// Returns the greatest integer that is less than the cost of this plan.
     pub fn below(&self) -> Int {
         self.cost.saturating_sub(1)
     }
 }
 
 /// Executes a plan in the initial state. Returns all states, beginning with the initial state, and the cost
-/// of the plan. Returns `None` if a step is not applicable, the last state is not a goal state, or the cost
-/// overflows.
+/// of the plan. Returns `None` if a step is not applicable, the last state is not a goal state, or a number
+/// or the cost overflows.
 pub fn replay<N: TaskNumber>(task: &Task<N>, plan: &[GroundStep]) -> Option<(Vec<State<N>>, N)> {
     replay_from(task, &task.initial, plan)
 }
@@ -52,7 +53,7 @@ pub fn cost<N: TaskNumber>(task: &Task<N>, plan: &[GroundStep]) -> Option<N> {
 }
 
 /// Executes a plan in the state `initial` and returns all states, beginning with `initial`. Returns `None` if
-/// a step is not applicable or the last state is not a goal state.
+/// a step is not applicable, a number overflows, or the last state is not a goal state.
 pub fn pass<N: TaskNumber>(task: &Task<N>, initial: &State<N>, plan: &[GroundStep]) -> Option<Vec<State<N>>> {
     let mut states = vec![initial.clone()];
     for step in plan {

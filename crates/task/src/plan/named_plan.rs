@@ -152,8 +152,8 @@ pub struct Plan {
     pub cost: Exact,
 }
 
-/// Converts a plan to PDDL names and computes start times. Each action starts as early as rescheduling within
-/// the limits can achieve.
+/// Converts a plan to PDDL names and computes start times. Waits and auxiliary actions are omitted. Each
+/// action starts as early as rescheduling within the limits can achieve.
 pub fn decode<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) -> Plan {
     let (task, plan) = (context.task, earliest(context, plan));
     let mut steps = Vec::new();
@@ -186,8 +186,8 @@ pub fn rest<N: TaskNumber>(task: &Task<N>, state: &State<N>) -> Rational {
     terms.fold(Rational::zero(), |sum, term| sum + term) * &unit
 }
 
-/// Executes the steps and returns their contributions to the state-dependent part of the metric. The second
-/// part is the final value of the state-dependent part. All values are in the task's cost unit.
+/// Executes the steps and returns their contributions to the state-dependent part of the metric, and its
+/// final value. All values are in the task's cost unit; they are 0 if the metric has no such part.
 pub fn measured<'s, N: TaskNumber>(
     task: &Task<N>,
     steps: impl Iterator<Item = (OperatorId, &'s [u32])>,
@@ -210,7 +210,7 @@ pub fn measured<'s, N: TaskNumber>(
 }
 
 impl Plan {
-    /// Returns the end time of the last action, in the domain's time unit.
+    /// Returns the latest end time of an action, in the domain's time unit; 0 for an empty plan.
     pub fn makespan(&self) -> Exact {
         let ends = self.steps.iter().map(|step| step.start.0.clone() + &step.duration.0);
         Exact(ends.max().unwrap_or_default())

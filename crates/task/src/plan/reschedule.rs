@@ -13,7 +13,7 @@ use crate::task::number::TaskNumber;
 use crate::task::{Operator, OperatorId, Task};
 
 /// Returns a plan with the same actions, in which each action starts as early as the other actions allow.
-/// Stops improving once a limit is reached.
+/// Stops improving once the deadline passes or the run is interrupted.
 pub fn earliest<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) -> GroundPlan<N> {
     let Context { task, limits } = context;
     let mut plan = plan.clone();

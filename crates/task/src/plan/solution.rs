@@ -17,7 +17,7 @@ pub enum Status {
     Unsolvable,
     /// It is proved that no plan exists within the requested number of steps.
     UnsolvableWithinHorizon,
-    /// A limit was reached without a result.
+    /// A limit was reached before a plan or a proof was found.
     Unknown,
 }
 
@@ -39,8 +39,8 @@ pub enum Proof {
         /// Number of steps above which no plan can be cheaper.
         step_bound: usize,
     },
-    /// The cost of the plan equals a lower bound on the cost of all plans. The bound is the goal distance in
-    /// a projection or the sum of individual minimum costs.
+    /// The cost of the plan equals a lower bound on the cost of all plans: the goal distance in a projection,
+    /// or the sum of individual minimum costs.
     Bound,
     /// A* with an admissible heuristic has terminated, and every pruned node is dominated by another node.
     Search,
@@ -53,7 +53,7 @@ pub enum Proof {
 pub struct Improvement {
     /// Metric of the best known plan.
     pub cost: Exact,
-    /// Lower bound on the metric of every plan.
+    /// Bound on the metric: no plan has a better value.
     pub lower_bound: Exact,
     /// Number of steps of the current SAT formula.
     pub horizon: usize,
@@ -99,7 +99,7 @@ pub struct Moment {
     pub time: Duration,
     /// Metric of the best known plan; `None` before a plan is found.
     pub cost: Option<Exact>,
-    /// Lower bound on the metric of every plan.
+    /// Bound on the metric: no plan has a better value.
     pub lower_bound: Exact,
 }
 
@@ -154,7 +154,8 @@ pub struct Solution {
     pub plan: Option<Plan>,
     /// The best plan over ground operators, if any.
     pub ground: Option<GroundPlan>,
-    /// Lower bound on the metric of every plan. `None` if the metric may be unbounded or no bound is known.
+    /// Bound on the metric: no plan has a better value. `None` if the metric may be unbounded or no bound is
+    /// known.
     pub lower_bound: Option<Exact>,
     /// Number of steps up to which all plans were considered.
     pub horizon: usize,

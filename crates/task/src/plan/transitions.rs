@@ -45,7 +45,7 @@ impl Task {
         TaskState { state: self.initial.clone(), cost: 0 }
     }
 
-    /// Returns the relevant fluent atoms of the task in PDDL, as `(predicate objects)`.
+    /// Returns the fluent atoms that are values of the task's variables, in PDDL, as `(predicate objects)`.
     pub fn atoms(&self) -> impl Iterator<Item = &str> {
         // The last value of each variable represents "none of its atoms". Names of auxiliary atoms have no
         // parentheses.
@@ -57,7 +57,8 @@ impl Task {
             .filter(|atom| atom.starts_with('('))
     }
 
-    /// Returns all actions with their arguments and designs, including inapplicable actions.
+    /// Returns all actions with their arguments and designs, including inapplicable actions, but without
+    /// waits and auxiliary actions.
     pub fn actions(&self) -> impl Iterator<Item = (String, Vec<String>)> {
         let steps = self.ids().flat_map(move |id| {
             self.operators[id.index()].admitted_combinations().filter_map(move |choice| self.step(id, choice))
@@ -107,7 +108,8 @@ impl Task {
         metric(self, &(situation.cost.to_rational() + rest(self, &situation.state)))
     }
 
-    /// Returns all transitions from a state, or `None` on numeric overflow.
+    /// Returns the transitions from a state by all applicable actions, without waits and auxiliary actions.
+    /// Returns `None` on numeric overflow.
     pub fn transitions(&self, situation: &TaskState) -> Option<Vec<Transition>> {
         let TaskState { state, cost } = situation;
         let mut transitions = Vec::new();

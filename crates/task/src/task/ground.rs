@@ -117,7 +117,7 @@ pub struct Axiom<N = Int> {
 #[derive(Debug, Clone)]
 pub struct Layer<N = Int> {
     pub rules: Vec<Axiom<N>>,
-    /// `true` if a rule depends on a head of this layer.
+    /// `true` if the body of a rule depends on the head of a rule of this layer.
     pub recursive: bool,
 }
 
@@ -347,7 +347,8 @@ impl Operator {
 }
 
 impl<N: TaskNumber> Operator<N> {
-    /// Returns `true` if the operator is applicable with this combination of designs.
+    /// Returns `true` if the condition of the operator holds in a state for this combination of designs.
+    /// Forbidden combinations are not checked, see [`Operator::admits`].
     pub fn applicable(&self, state: &State<N>, choice: &[u32]) -> bool {
         self.condition.holds_propositionally(&state.values)
             && self.condition.holds_numerically(&state.numbers, choice, &self.sizes())
@@ -388,7 +389,8 @@ impl Task {
 }
 
 impl<N: TaskNumber> Task<N> {
-    /// Returns `true` if an operator that is not a wait costs anything but `step`; see [`Task::is_timed`].
+    /// Returns `true` if an operator that is not a wait costs anything but `step`, or a wait costs anything;
+    /// see [`Task::is_timed`].
     pub fn is_measured_by_time(&self, step: &N) -> bool {
         let step = |operator: &Operator<N>| if operator.wait.is_some() { N::zero() } else { step.clone() };
         self.operators.iter().any(|operator| operator.cost != Quantity::constant(step(operator)))

@@ -45,8 +45,8 @@ pub trait TaskNumber: Number + std::fmt::Debug + std::hash::Hash + Default {
     /// is known.
     fn times_at_least(&self, part: &Self) -> u32;
 
-    /// Returns `true` if no value of the quantity can overflow: the sum of the constant's magnitude and the
-    /// greatest magnitude in each table is within the limit.
+    /// Returns `true` if no value of the quantity can overflow. For integers, the sum of the constant's
+    /// magnitude and the greatest magnitude in each table must be within a limit; rationals always fit.
     fn fits(quantity: &Quantity<Self>) -> bool;
 
     /// Returns `true` if the sum of `start` and all products is ≥ 0, or > 0 if `strict`. Intermediate results

@@ -20,12 +20,13 @@ use crate::task::{
 /// Limit on the total number of operators that are compared, over all pairs of objects.
 const WORK_LIMIT: usize = 2_000_000;
 
-/// Returns generators of the symmetry group: exchanges of neighbouring objects within classes of
-/// interchangeable objects. Every exchange preserves the operators and the goal. If `initially` is `true`, it
-/// also preserves the initial state.
+/// Returns exchanges of neighbouring objects within classes of interchangeable objects. Every exchange
+/// preserves the operators and the goal; if `initially` is `true`, it also preserves the initial state. Some
+/// symmetries may be missing, because the number of comparisons is limited. Tasks with derived variables
+/// yield an empty list.
 ///
 /// # Errors
-/// A limit is reached.
+/// The deadline has passed or the run is interrupted.
 #[expect(clippy::arithmetic_side_effects, reason = "work is looked at each time")]
 pub fn symmetry_generators(context: Context<'_>, initially: bool) -> Result<Vec<Exchange>, Interrupted> {
     let Context { task, limits } = context;
@@ -143,8 +144,8 @@ pub struct Exchange {
 }
 
 impl Exchange {
-    /// Creates the exchange of objects `a` and `b`. Returns `None` if the atoms of a variable are not all
-    /// mapped to atoms of one variable.
+    /// Creates the exchange of objects `a` and `b`. Returns `None` unless the atoms of each variable are
+    /// mapped to atoms of a single variable with equally many values.
     fn new(
         parts: &Parts<'_>,
         a: ObjectId,

@@ -92,8 +92,8 @@ impl<N: Number> Quantity<N> {
         }
     }
 
-    /// Adds a table. It is merged with an existing table over the same slots. A table with equal values is
-    /// added to the constant.
+    /// Adds a table. It is merged with an existing table over the same slots. A table whose values are all
+    /// equal is added to the constant instead.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"
@@ -143,6 +143,7 @@ impl<N: Number> Quantity<N> {
     }
 
     /// Returns the sum of the tables whose slots are all contained in `slots`, for a combination of designs.
+    /// The constant is not included.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"
@@ -168,7 +169,7 @@ impl<N: Number> Quantity<N> {
 
 impl<N: Number> Quantity<N> {
     /// Returns the constant plus the minimum of each table. This is a lower bound, and exact if no two tables
-    /// share a slot.
+    /// share a slot and no combination of designs is forbidden.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"

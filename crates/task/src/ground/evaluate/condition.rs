@@ -13,7 +13,7 @@ use crate::lifted::{Bound, Formula};
 /// Evaluates a condition whose slot parameters are bound. A comparison with an undefined value is false.
 ///
 /// # Errors
-/// A limit is reached, or the condition is not supported.
+/// The deadline has passed, the run is interrupted, or the condition is not supported.
 pub fn residual(
     world: &mut World<'_>,
     formula: &Formula,
@@ -25,7 +25,8 @@ pub fn residual(
 /// Evaluates the condition of a conditional effect whose slot parameters are bound.
 ///
 /// # Errors
-/// A comparison has an undefined value, a limit is reached, or the condition is not supported.
+/// A comparison has an undefined value, the deadline has passed, the run is interrupted, or the condition is
+/// not supported.
 pub fn residual_of_effect(
     world: &mut World<'_>,
     formula: &Formula,

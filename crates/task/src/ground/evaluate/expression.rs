@@ -11,7 +11,7 @@ use crate::task::quantity::Linear;
 /// must be bound.
 ///
 /// # Errors
-/// A value is undefined, the expression is not linear, or a limit is reached.
+/// A value is undefined, or the expression is not linear or not supported.
 pub fn ground(
     world: &mut World<'_>,
     expression: &Expression,

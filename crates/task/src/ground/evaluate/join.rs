@@ -9,7 +9,7 @@ use crate::ground::vocabulary::world::World;
 use crate::lifted::{Arguments, Bound, Formula, ObjectId, PredicateId, Term};
 use crate::limits::Interrupted;
 
-/// An atom that must be possibly true for a binding to matter: its predicate and its terms.
+/// Guard of a quantifier: an atom (predicate and terms) that must be possibly true for a binding to matter.
 type Guard<'f> = (PredicateId, &'f [Term]);
 
 /// Returns the atoms that are necessary for the body of an existential quantifier. The body is false for
@@ -38,12 +38,12 @@ pub fn guards_of_forall(body: &Formula) -> Vec<Guard<'_>> {
     guards
 }
 
-/// Calls `visit` with every binding of the variables in `bound` for which all guards can hold, until `visit`
-/// returns `false`. Returns `true` if `visit` always returned `true`. Afterwards the variables are unbound,
-/// unless a limit was reached.
+/// Calls `visit` with every binding of the variables in `bound` for which all guards (necessary atoms) can
+/// hold, until `visit` returns `false`. Returns `true` if `visit` always returned `true`. Afterwards the
+/// variables are unbound, unless the enumeration was interrupted.
 ///
 /// # Errors
-/// A limit is reached.
+/// The deadline has passed or the run is interrupted.
 pub fn each_binding<'a>(
     world: &mut World<'a>,
     bound: &[Bound],
@@ -82,12 +82,12 @@ pub fn each_binding<'a>(
     }
 }
 
-/// The variables and guard atoms of an enumeration of bindings.
+/// The quantified variables and guards (necessary atoms) of an enumeration of bindings.
 struct Join<'j> {
     /// Variables with their candidates, in ascending order of the variables.
     bound: &'j [Bound],
     guards: &'j [Guard<'j>],
-    /// For each guard: `true` while the enumeration is inside a loop over its rows.
+    /// For each guard (necessary atom): `true` while the enumeration is inside a loop over its rows.
     is_used: Vec<bool>,
 }
 
@@ -98,7 +98,7 @@ struct Level {
 }
 
 enum Options {
-    /// The position of a guard, and its remaining rows.
+    /// The position of a guard (necessary atom), and its remaining rows.
     Rows(usize, std::vec::IntoIter<Arguments>),
     /// The position of a variable, and the index of its next candidate.
     Candidates(usize, usize),
@@ -113,8 +113,8 @@ impl Level {
 }
 
 impl Join<'_> {
-    /// Returns the next level of the search: the rows of the guard with the fewest unbound variables, or the
-    /// candidates of the next variable. Returns `None` if all variables are bound.
+    /// Returns the next level of the search: the rows of the guard (necessary atom) with the fewest unbound
+    /// variables, or else the candidates of the next variable. Returns `None` if all variables are bound.
     fn next_level(
         &mut self,
         world: &mut World<'_>,
@@ -122,7 +122,7 @@ impl Join<'_> {
         binding: &Binding,
     ) -> Option<Level> {
         let guard = match last {
-            // Candidates are enumerated only after all guards.
+            // Candidates are enumerated only after the rows of all guards (necessary atoms).
             Some(Level { options: Options::Candidates(..), .. }) => None,
             _ => self.next_guard(binding),
         };
@@ -141,8 +141,9 @@ impl Join<'_> {
         Some(Level { options, fresh: Vec::new() })
     }
 
-    /// Returns the position of the unused guard with the fewest unbound variables. Guards without unbound
-    /// variables, or with unbound variables of other quantifiers, are excluded.
+    /// Returns the position of the unused guard (necessary atom) with the fewest unbound variables, or
+    /// `None`. Guards without unbound variables, with unbound variables of other quantifiers, or with more
+    /// than 64 terms are excluded.
     fn next_guard(&self, binding: &Binding) -> Option<usize> {
         let open_variables = |(position, (_, terms)): (usize, &Guard<'_>)| {
             let open = terms.iter().filter_map(|term| match term {

@@ -27,7 +27,7 @@ pub struct Definitions {
 }
 
 impl Definitions {
-    /// Returns the CNF of the conjunction of `parts`, or `Failure::Undefined` if it is false.
+    /// Returns the CNF of the conjunction of `parts`, or `Failure::Undefined` if it is found to be false.
     pub(crate) fn condition(
         &mut self,
         world: &mut World<'_>,
@@ -102,7 +102,7 @@ impl Definitions {
         atom
     }
 
-    /// Adds rules that make the derived atom `head` true exactly if the residual condition holds.
+    /// Adds rules by which the derived atom `head` is true if the residual condition holds.
     pub(crate) fn define(&mut self, world: &mut World<'_>, head: AtomId, residual: &Residual) {
         if let Residual::Or(parts) = residual {
             for part in parts {

@@ -29,7 +29,7 @@ impl Slots<'_> {
 /// and count as 0.
 ///
 /// # Errors
-/// The expression is not linear, or a limit is reached.
+/// The expression is not linear, the deadline has passed, or the run is interrupted.
 pub fn open(
     world: &mut World<'_>,
     expression: &Expression,
@@ -104,13 +104,13 @@ fn table(
     Ok(Linear { coefficients: Vec::new(), quantity })
 }
 
-/// Callback that receives the binding, and the index of the chosen design for each slot.
+/// Callback that receives the binding, and the index of the chosen design for each slot of the enumeration.
 type Visit<'v> = dyn FnMut(&Binding, &[u32]) -> Result<(), Failure> + 'v;
 
 /// Calls `visit` for every combination of designs of the slots in `mentioned`; the last slot varies fastest.
 ///
 /// # Errors
-/// A limit is reached, or `visit` fails.
+/// The deadline has passed, the run is interrupted, or `visit` fails.
 pub fn for_each_combination(
     mentioned: &[u32],
     slots: &Slots<'_>,

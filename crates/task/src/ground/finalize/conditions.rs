@@ -23,8 +23,8 @@ pub(super) fn condition<N: TaskNumber>(
         let no_value = atoms.none[literal.fact.variable.index()];
         if literal.positive {
             condition.facts.push(literal.fact);
-        // If a variable has only one other value, a negative literal is a fact instead of a clause.
         } else if no_value == 1 {
+            // If a variable has only one other value, a negative literal is a fact instead of a clause.
             condition.facts.push(Fact { variable: literal.fact.variable, value: no_value });
         } else {
             condition.clauses.push(vec![literal]);
@@ -64,6 +64,7 @@ pub(super) fn contradictory<N>(condition: &Condition<N>) -> bool {
 }
 
 /// Sorts the rules of derived variables into layers. Each layer comes after the layers on which it depends.
+/// Rules of atoms that nothing reads are dropped.
 pub(super) fn axioms<N: TaskNumber>(
     axioms: &[GroundAxiom],
     atoms: &Atoms,

@@ -13,7 +13,7 @@ use crate::task::number::TaskNumber;
 use crate::task::quantity::Quantity;
 use crate::task::table_map::TableMap;
 
-/// Accumulates the least common denominator of all numbers of a kind, for example of all durations.
+/// Accumulates the least common denominator of all numbers of one kind, for example of all durations.
 #[derive(Debug)]
 pub(super) struct Denominator {
     what: &'static str,
@@ -58,11 +58,11 @@ impl Denominator {
         }
     }
 
-    /// Returns the conversion of this kind of number to integers, with the accumulated denominator as the
-    /// scale.
+    /// Returns the conversion of this kind of number to the number type `N`. For integers, the scale is the
+    /// accumulated denominator; for rationals, it is 1.
     ///
     /// # Errors
-    /// `Error::Overflow` if the common denominator is too large.
+    /// `Error::Overflow` if `N` is an integer type and the common denominator is too large.
     pub(super) fn integers<N: TaskNumber>(self) -> Result<Integers<N>, Error> {
         let common = if N::SCALED { self.common } else { Some(1) };
         let overflow = || {

@@ -32,7 +32,8 @@ use crate::task::{Condition, Objective, Operator, State, Task};
 /// reason why no plan exists, if known.
 ///
 /// # Errors
-/// `Error::Overflow` if numbers exceed exact integers.
+/// `Error::Overflow` if numbers exceed exact integers, `Error::Interrupted` if the deadline passes or the run
+/// is interrupted.
 pub fn finish<N: TaskNumber>(
     mut task: GroundTask<'_>,
     unreachable: Option<String>,
@@ -98,8 +99,8 @@ pub fn finish<N: TaskNumber>(
     Ok(task)
 }
 
-/// Converts a ground operator. Returns `None` if its condition contradicts itself. The tuple holds the
-/// conversions of numeric fluents, of the costs of each objective, and of durations.
+/// Converts a ground operator. Returns `None` if its condition requires two values of one variable. The tuple
+/// holds the conversions of numeric fluents, of the costs of each objective, and of durations.
 fn operator<N: TaskNumber>(
     ground: GroundOperator,
     atoms: &Atoms,
@@ -163,7 +164,8 @@ impl<N: TaskNumber> Distinct<N> {
     }
 }
 
-/// Converts the objectives. Also returns, for each objective, the conversion of its costs to integers.
+/// Converts the objectives to the number type of the task. Also returns, for each objective, the conversion
+/// of its costs.
 #[expect(clippy::type_complexity, reason = "a list for each of two things")]
 fn objectives<N: TaskNumber>(
     task: &GroundTask<'_>,

@@ -2,10 +2,11 @@
 //! finite-domain variables.
 //!
 //! Invariant synthesis after Helmert [1]. A candidate is a set of predicates with key arguments; at most one
-//! further argument of each predicate is counted, i.e. ignored. An instance of the candidate fixes the
-//! objects of the key. The candidate is an invariant if no operator increases the number of true atoms of any
-//! instance. If an operator violates a candidate, the candidate is extended by a predicate that the operator
-//! deletes. The check uses ground operators, so statically impossible instances do not violate candidates.
+//! further argument of each predicate is counted, i.e. ignored (more for atoms of running actions). An
+//! instance of the candidate fixes the objects of the key. The candidate is an invariant if no operator
+//! increases the number of true atoms of any instance. If an operator violates a candidate, the candidate is
+//! extended by a predicate that the operator deletes. The check uses ground operators, so statically
+//! impossible instances do not violate candidates.
 //!
 //! \[1\] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial
 //! Intelligence 173, 2009, section 5.
@@ -46,7 +47,8 @@ pub struct Group {
     pub(crate) exclusive: Vec<AtomId>,
 }
 
-/// Returns groups with pairwise disjoint `atoms`, the largest group first.
+/// Returns mutex groups of relevant atoms with pairwise disjoint `atoms`, in decreasing number of these
+/// atoms. Not all mutex groups are found.
 #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
 pub fn groups(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Result<Vec<Group>, Interrupted> {
     let limits = task.world.limits;
@@ -108,7 +110,8 @@ fn key_of(task: &GroundTask<'_>, candidate: &Candidate, atom: AtomId) -> Option<
     Some(part.key.iter().map(|position| arguments[*position]).collect())
 }
 
-/// Returns the candidates that are invariants, i.e. that no operator violates.
+/// Returns the candidates that no operator violates. At most `CANDIDATE_LIMIT` candidates are checked. The
+/// initial state is not considered.
 #[expect(clippy::arithmetic_side_effects, reason = "no more than the limit on candidates")]
 fn invariants(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Result<Vec<Candidate>, Interrupted> {
     let mut arities: BTreeMap<PredicateId, usize> = BTreeMap::new();

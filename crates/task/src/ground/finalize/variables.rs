@@ -120,7 +120,7 @@ impl Atoms {
     }
 
     /// Converts conditional effects; deletions precede additions. A deletion is dropped if an unconditional
-    /// effect sets the variable, because only one atom of a variable can be true.
+    /// effect makes another atom of the variable true, because only one atom of a variable can be true.
     pub(super) fn conditional(&self, operator: &GroundOperator) -> Vec<ConditionalEffect> {
         if operator.conditional.is_empty() {
             return Vec::new();

@@ -79,7 +79,7 @@ pub(super) fn way_of(assignment: Assignment) -> u8 {
 
 /// Checks that two simultaneous changes of a number are compatible: both are additions, both are scalings, or
 /// both assign equal values. Otherwise returns `Failure::Undefined`, which makes the action inapplicable
-/// (PDDL 2.1, section 8).
+/// (PDDL 2.1, section 8). Two different assigned values that are not both constant are not supported.
 fn reconcile(earlier: &GroundChange, later: &GroundChange) -> Result<(), Failure> {
     let (
         GroundChange::Number { assignment: kind, operand: first_value, .. },

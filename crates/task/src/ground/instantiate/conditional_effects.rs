@@ -1,5 +1,5 @@
 //! Case distinction: splits an action instance into operators, one for each combination of truth values of
-//! the conditions of its effects.
+//! the conditions of its start effects and numeric effects.
 
 use std::sync::Arc;
 
@@ -21,11 +21,12 @@ use crate::lifted::Schema;
 use crate::limits::Limits;
 use crate::task::ForbiddenCombinations;
 
-/// Limit on the number of operators of one action instance.
+/// Limit on the number of combinations of truth values, separately for the conditions of start effects and of
+/// numeric end effects of an action instance.
 const CASE_LIMIT: usize = 64;
 
-/// One combination of truth values of the effect conditions. All parts are expressed over the state before
-/// the instance.
+/// A case of an action instance: one combination of truth values of the effect conditions. All parts are
+/// expressed over the state before the instance.
 pub(super) struct Case {
     parts: Vec<Residual>,
     start: Start,
@@ -95,9 +96,10 @@ impl Middle<'_> {
     }
 }
 
-/// Returns the cases of an instance. There is a single case unless the start effects or numeric effects have
-/// conditions. Contradictory cases and cases with undefined values are dropped (PDDL 2.1, section 8: an
-/// effect whose condition is false does not occur).
+/// Returns the cases of an instance, i.e. the combinations of truth values of its effect conditions. There is
+/// a single case unless the start effects or numeric effects have conditions. Contradictory cases and cases
+/// with undefined values are dropped (PDDL 2.1, section 8: an effect whose condition is false does not
+/// occur). Fails if there are more than `CASE_LIMIT` combinations.
 pub(super) fn cases(
     schema: &Schema,
     before: &[Residual],
@@ -163,7 +165,8 @@ fn contradictory(parts: &[Residual]) -> bool {
 }
 
 /// Returns all combinations of truth values of the conditions. Each entry holds the conditions or their
-/// negations, and the list of conditions that are true.
+/// negations, and the list of conditions that are true. Fails if there are more than `CASE_LIMIT`
+/// combinations.
 #[allow(clippy::type_complexity)]
 #[expect(clippy::arithmetic_side_effects, reason = "cases are at most twice their limit")]
 fn split<'r>(
@@ -197,8 +200,8 @@ fn split<'r>(
 }
 
 impl Case {
-    /// Returns the forbidden combinations of designs of this case. Returns `Failure::Undefined` if no
-    /// combination remains allowed.
+    /// Returns the forbidden combinations of designs of this case (combination of truth values of the effect
+    /// conditions). Returns `Failure::Undefined` if no combination remains allowed.
     fn forbidden(
         &self,
         template: &GroundOperator,
@@ -220,8 +223,8 @@ impl Case {
         if admit_some(&forbidden, &sizes, limits)? { Ok(forbidden.into()) } else { Err(Failure::Undefined) }
     }
 
-    /// Returns the operator of this case. The `template` provides all its fields except conditions, effects
-    /// and forbidden combinations.
+    /// Returns the operator of this case (combination of truth values of the effect conditions). The
+    /// `template` provides all its fields except conditions, effects and forbidden combinations.
     #[expect(clippy::arithmetic_side_effects, reason = "something was pushed before")]
     pub(super) fn operator(
         self,

@@ -49,11 +49,12 @@ pub(super) fn admit_some(
     Ok(true)
 }
 
-/// A constraint: the positions of its slots within the component, and the forbidden combinations.
+/// A constraint: the positions of its slots in their connected component (a group of [`joined`]), and the
+/// forbidden combinations.
 type Rule<'f> = (Vec<usize>, FxHashSet<&'f SlotSet>);
 
-/// Returns `true` if the designs chosen for the first slots can be extended to all slots. `rules` is indexed
-/// by the last slot that a rule mentions.
+/// Returns `true` if the designs chosen for the first slots of a connected component can be extended to all
+/// its slots. `rules` is indexed by the last slot that a rule mentions.
 fn extends(
     chosen: &mut Vec<u32>,
     sizes: &[usize],

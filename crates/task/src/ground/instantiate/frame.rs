@@ -1,8 +1,9 @@
 //! Design data that several instances of an action schema share.
 //!
-//! Suitable designs, forbidden combinations, costs and consumption depend on only a few parameters of the
-//! schema, the key parameters. For example, the battery use of a route depends on the route, but not on the
-//! battery level. The data are computed once for each combination of objects for the key parameters.
+//! Suitable designs, forbidden combinations, durations and the effects that depend on designs are determined
+//! by only a few parameters of the schema, the key parameters. For example, the battery use of a route
+//! depends on the route, but not on the battery level. The data are computed once for each combination of
+//! objects for the key parameters.
 
 use std::sync::Arc;
 
@@ -23,7 +24,8 @@ use crate::number::dense;
 use crate::task::ForbiddenCombinations;
 use crate::task::quantity::{Linear, Quantity};
 
-/// Data that all instances with equal key parameters share.
+/// Data that all instances of an action schema share if they agree in the objects for the key parameters,
+/// i.e. the parameters that occur together with slots or in the duration.
 pub(super) struct SharedInstanceData<'a> {
     /// Slots of the schema with their suitable designs.
     pub(super) designs: Slots<'a>,
@@ -40,7 +42,7 @@ pub(super) struct SharedInstanceData<'a> {
     pub(super) duration: Quantity<Rational>,
 }
 
-/// Operand of a numeric effect, as far as the key parameters determine it.
+/// Operand of a numeric effect. It is evaluated here, for the key parameters, only if it mentions slots.
 pub(super) enum Operand {
     /// The operand mentions no slot, or the effect has quantified variables. It is evaluated separately for
     /// each instance.
@@ -52,8 +54,8 @@ pub(super) enum Operand {
 }
 
 impl<'a> SharedInstanceData<'a> {
-    /// Computes the shared data for the key parameters in `core`. Returns `None` if no combination of designs
-    /// is possible.
+    /// Computes the shared data for the objects that `core` assigns to the key parameters (those that occur
+    /// together with slots or in the duration). Returns `None` if no combination of designs is possible.
     pub(super) fn new(
         world: &mut World<'_>,
         outline: &SplitSchema<'a>,
@@ -121,8 +123,8 @@ fn operands(build: &mut Build<'_, '_>, effects: &[Effect]) -> Result<Vec<Operand
     Ok(operands)
 }
 
-/// Returns the designs of a slot for which no condition that mentions only this slot is false, and every
-/// expression that mentions only this slot is defined.
+/// Returns the designs of a slot for which no condition that mentions only this slot is false. The duration
+/// and the operands of unconditional effects that mention only this slot must be defined, too.
 fn suitable_designs(
     world: &mut World<'_>,
     outline: &SplitSchema<'_>,

@@ -39,7 +39,8 @@ impl<'a> Instantiation<'a> {
     }
 
     /// Returns the operators of an instance, one for each timeline window and each case of its conditional
-    /// effects. Returns `Failure::Undefined` if the instance is never applicable.
+    /// effects that is possible; possibly none. Returns `Failure::Undefined` if the instance is never
+    /// applicable.
     pub(super) fn operators(
         &mut self,
         outline: &SplitSchema<'_>,
@@ -140,7 +141,8 @@ fn configuration(
         .collect()
 }
 
-/// Returns the conditions under which the simultaneous start and end actions of a joint schema interfere.
+/// Returns the conditions under which the simultaneous start and end of a joint schema (an action with
+/// duration 0) interfere.
 fn joint_clashes(
     build: &mut Build<'_, '_>,
     schema: &Schema,

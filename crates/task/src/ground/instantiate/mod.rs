@@ -49,10 +49,12 @@ use crate::lifted::configuration::{SlotParameter, depends_on_own_start};
 use crate::number::dense;
 
 /// Converts every reached instance to operators, the goal to a condition, and the axioms of all derived atoms
-/// in use to rules. `designs` holds the design parameters of each schema, and `slots` those that are slots.
+/// in use to rules. `designs` holds the design parameters of each schema, and `slots` those of them that are
+/// slots.
 ///
 /// # Errors
-/// Returns all expressions and conditions that the planner does not support.
+/// Returns the first unsupported expression or condition of each action schema and of the goal, or an error
+/// if the deadline passes or the run is interrupted.
 pub fn instantiate<'a>(
     world: World<'a>,
     designs: &[Vec<SlotParameter>],
@@ -84,7 +86,7 @@ pub fn instantiate<'a>(
 /// `errors`.
 ///
 /// # Errors
-/// `Error::Interrupted` at a limit.
+/// `Error::Interrupted` if the deadline passes or the run is interrupted.
 fn operators(
     instantiation: &mut Instantiation<'_>,
     designs: &[Vec<SlotParameter>],

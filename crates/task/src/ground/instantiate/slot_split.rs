@@ -7,14 +7,16 @@ use crate::lifted::configuration::{
 use crate::lifted::{Change, Effect, Expression, Formula, Lifted, Schema, Term};
 use crate::task::quantity::SlotSet;
 
-/// An action schema whose conjuncts are separated by whether they mention slots.
+/// An action schema whose conjuncts are separated by whether they mention slots (design parameters that
+/// selection assigns).
 pub(super) struct SplitSchema<'a> {
     pub(super) schema: &'a Schema,
     /// The parameters that are designs, with their functions.
     pub(super) designs: &'a [SlotParameter],
     /// The design parameters that are slots, i.e. that selection assigns instead of grounding.
     pub(super) parameters: &'a [SlotParameter],
-    /// Key parameters, in ascending order: they determine the data that instances share.
+    /// Key parameters, in ascending order: the parameters that occur together with slots or in the duration.
+    /// They determine the data that instances share.
     key: Vec<u32>,
     pub(super) start: Conjuncts<'a>,
     pub(super) over_all: Conjuncts<'a>,
@@ -46,7 +48,8 @@ impl<'a> Conjuncts<'a> {
     }
 }
 
-/// Returns `true` if relaxed reachability decides the conjunct exactly, i.e. if it is a static literal.
+/// Returns `true` if relaxed reachability decides the conjunct exactly, i.e. if it is a literal of a static
+/// predicate that is not derived.
 fn settled(lifted: &Lifted, conjunct: &Formula) -> bool {
     match conjunct {
         Formula::Literal { predicate, .. } => {
@@ -93,12 +96,14 @@ impl<'a> SplitSchema<'a> {
         Self { schema, designs, parameters, key, start, over_all, at_end }
     }
 
-    /// Returns the objects of the key parameters, which determine the shared data of an instance.
+    /// Returns the objects of the key parameters, i.e. the parameters that occur together with slots or in
+    /// the duration. They determine the shared data of an instance.
     pub(super) fn key(&self, binding: &Binding) -> Row {
         self.key.iter().filter_map(|parameter| binding[*parameter as usize]).collect()
     }
 
-    /// Returns the conditions and expressions that mention the slot at `position` and no other slot.
+    /// Returns the conditions and expressions that mention the slot at `position` and no other slot. The
+    /// expressions are the duration and the operands of unconditional effects.
     pub(super) fn about(&self, position: u32) -> (Vec<&'a Formula>, Vec<&'a Expression>) {
         let only = SlotSet::from_slice(&[position]);
         let open = self.start.open.iter().chain(&self.over_all.open).chain(&self.at_end.open);

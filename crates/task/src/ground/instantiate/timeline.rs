@@ -43,7 +43,8 @@ use crate::task::timing::Timing;
 #[derive(Debug, Clone)]
 pub(super) struct Timeline {
     pub(super) clock: NumericId,
-    /// Placeholder variable for the length of the moment until all durations are known.
+    /// Placeholder variable for the length of the moment (a very short time after an event) until all
+    /// durations are known.
     pub(super) moment: NumericId,
     pub(super) phases: Vec<AtomId>,
     /// Auxiliary atom that is true if the last step was a wait.
@@ -83,12 +84,13 @@ impl Timeline {
         Some(Self { clock, moment, phases, waited, events, first })
     }
 
-    /// Returns an additional goal: the last step of a plan must not be a wait.
+    /// Returns an additional goal: the last step of a plan must not be a wait, i.e. an operator that advances
+    /// the clock to the next event.
     pub(super) fn at_rest(&self) -> Residual {
         Residual::Literal { atom: self.waited, positive: false }
     }
 
-    /// Returns the operators that wait until the next event, one for each phase.
+    /// Returns the operators that wait until the next event, one for each event after time 0.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
@@ -120,8 +122,8 @@ impl Timeline {
         })
     }
 
-    /// Computes the length of the moment from all durations, and substitutes it for the placeholder variable.
-    /// Operators that become impossible are removed.
+    /// Computes the length of the moment (a very short time after an event) from all durations, and
+    /// substitutes it for the placeholder variable. Operators that become impossible are removed.
     pub(super) fn settle(&self, operators: &mut Vec<GroundOperator>) {
         let durations = operators.iter().flat_map(|operator| {
             let tables = operator.duration.tables.iter().flat_map(|table| table.values.iter());

@@ -14,14 +14,15 @@ use crate::lifted::Rational;
 use crate::task::quantity::{Linear, NumericId, Quantity};
 use crate::task::timing::Timing;
 
-/// A possible position of an action relative to the timed events: the phases of its start and end.
+/// A possible position of an action relative to the timed events: the phases of its start and end. A phase is
+/// the time from one event to the next.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TimelineWindow<'t> {
     timeline: &'t Timeline,
     duration: &'t Quantity<Rational>,
-    /// Phase of the start.
+    /// Phase of the start, as the number of events before or at it.
     from: usize,
-    /// Phase of the end.
+    /// Phase of the end, as the number of events before or at it.
     to: usize,
     start: Start,
     end: End,
@@ -34,7 +35,7 @@ enum Start {
     Free,
     /// At the end of the previous action, but later than the event that begins the phase.
     Later,
-    /// A moment after the event that begins the phase.
+    /// A moment (a very short time) after the event that begins the phase.
     AfterEvent,
     /// Computed from the required end of the action.
     ByEnd,
@@ -43,12 +44,12 @@ enum Start {
     LaterByEnd,
 }
 
-/// Position of the end relative to the event that begins its phase.
+/// Position of the end of an action relative to the event that begins the phase of the end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum End {
-    /// Later than this event, or in the phase of the start.
+    /// Later than the event that begins the phase, or in the phase of the start.
     Inside,
-    /// Exactly at the time of this event.
+    /// Exactly at the time of the event that begins the phase.
     AtEvent,
 }
 
@@ -144,7 +145,8 @@ impl<'t> TimelineWindow<'t> {
         }
     }
 
-    /// Returns the time one moment after `time`.
+    /// Returns the time one moment after `time`; the moment is a very short time whose length is not known
+    /// yet.
     fn later(&self, time: &Rational) -> Linear<Rational> {
         let mut later = Linear::variable(self.timeline.moment);
         later.quantity.constant = time.clone();
@@ -188,7 +190,7 @@ impl<'t> TimelineWindow<'t> {
         conditions
     }
 
-    /// Returns the changes of each event strictly between the start and the end, in order.
+    /// Returns the changes of each event after the start and strictly before the end, in order.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
@@ -232,8 +234,8 @@ impl<'t> TimelineWindow<'t> {
         Some((*clock, end))
     }
 
-    /// Returns the earliest times of the start and the end, if the window fixes them. The flag is `true` if
-    /// the time is one moment later.
+    /// Returns the lower bounds on the times of the start and the end that the window implies. The flag is
+    /// `true` if the time is one moment (a very short time) later.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"

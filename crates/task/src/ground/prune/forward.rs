@@ -7,8 +7,9 @@ use crate::ground::vocabulary::condition::GroundLiteral;
 use crate::ground::vocabulary::task::GroundTask;
 use crate::limits::Interrupted;
 
-/// Removes operators and rules that are unreachable in the delete relaxation. `initially` holds the initial
-/// truth value of each atom. Returns, for each atom, whether it is reachable.
+/// Removes operators, rules and conditional effects that are unreachable in the delete relaxation, and
+/// deletions of unreachable atoms. `initially` holds the initial truth value of each atom. Returns, for each
+/// atom, whether it is reachable.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "what is missing is counted before it is reached, each time once; indices of axioms come after those of operators"

@@ -25,7 +25,8 @@ struct Interval {
     high: Option<Rational>,
 }
 
-/// Removes operators and rules whose comparisons are unsatisfiable. Returns `true` if any were removed.
+/// Removes operators and rules whose comparisons are unsatisfiable within the reachable intervals. Returns
+/// `true` if any were removed.
 pub fn prune_by_numbers(task: &mut GroundTask<'_>) -> Result<bool, Interrupted> {
     let conditions = task.operators.iter().map(|operator| &operator.condition);
     let bodies = task.axioms.iter().map(|axiom| &axiom.body);

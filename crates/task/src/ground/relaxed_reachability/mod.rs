@@ -31,7 +31,8 @@ use crate::limits::{Interrupted, Limits};
 /// derived predicates.
 ///
 /// # Errors
-/// `Error::Rules` if the rule engine rejects the program, `Error::Interrupted` at a limit.
+/// `Error::Rules` if the rule engine rejects the program, `Error::Interrupted` if the deadline passes or the
+/// run is interrupted.
 #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
 pub fn reach(
     lifted: &Lifted,

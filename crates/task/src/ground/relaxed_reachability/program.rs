@@ -105,8 +105,9 @@ fn slots_in(formula: &Formula, slots: &[SlotParameter]) -> Vec<u32> {
         .collect()
 }
 
-/// Returns the conjuncts that are necessary for every instance of the schema. Conjuncts of the middle
-/// condition are omitted if a start effect of the schema may add one of their atoms.
+/// Returns the conjuncts that are necessary for every instance of the schema. If a start effect adds atoms,
+/// conjuncts of the middle condition that mention the predicate of such an atom or a derived predicate are
+/// omitted.
 fn needs<'a>(lifted: &Lifted, schema: &'a Schema) -> Vec<&'a Formula> {
     let provided: Vec<_> = schema
         .start_effects

@@ -121,7 +121,8 @@ impl<'a> ReachabilityProgramBuilder<'a> {
     }
 
     /// Appends the rule body for a condition to `out`. If `exact` is `true`, the condition must be static and
-    /// is translated without relaxation; otherwise it is relaxed.
+    /// is translated without relaxation; otherwise the rule body may hold for more bindings, because for
+    /// example negated fluents and numeric comparisons are ignored.
     pub(super) fn body(
         &mut self,
         formula: &Formula,

@@ -17,8 +17,8 @@ pub struct GroundCondition {
 }
 
 impl GroundCondition {
-    /// Sorts literals and clauses and removes duplicates. Returns `false` if two literals contradict each
-    /// other.
+    /// Sorts literals and the list of clauses, and removes duplicates. Returns `false` if two literals
+    /// contradict each other; contradictions with clauses are not detected.
     pub(crate) fn tidy(&mut self) -> bool {
         self.literals.sort_unstable();
         self.literals.dedup();

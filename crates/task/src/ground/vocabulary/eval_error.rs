@@ -8,7 +8,7 @@ use crate::limits::Interrupted;
 pub enum Failure {
     /// A fluent has no value, a divisor is zero, or a condition is false. The instance then has no operator.
     Undefined,
-    /// The expression is not supported.
+    /// The expression or condition is not supported, or the deadline has passed or the run was interrupted.
     Error(Error),
 }
 

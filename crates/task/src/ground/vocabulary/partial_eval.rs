@@ -69,7 +69,8 @@ impl Residual {
     }
 }
 
-/// Converts a comparison to `left - right ≥ 0` or similar, or to a truth value if both sides are constant.
+/// Converts a comparison to a residual of the form `linear ≥ 0` or `linear > 0`, or to a conjunction of two
+/// for an equality. If both sides are constant, the result is a truth value.
 pub fn compare(comparison: Comparison, left: Linear<Rational>, right: Linear<Rational>) -> Residual {
     match comparison {
         Comparison::Less => at_least_zero(right, left, true),

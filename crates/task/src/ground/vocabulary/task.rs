@@ -25,7 +25,7 @@ pub struct GroundTask<'a> {
 /// Parts of a metric that are not operator costs.
 #[derive(Debug, Clone, Default)]
 pub struct GroundObjective {
-    /// Value of the metric in the initial state, negated for maximisation.
+    /// Value of the metric in the initial state without the fluents in `rest`, negated for maximisation.
     pub(crate) offset: Rational,
     pub(crate) maximize: bool,
     /// Fluents with state-dependent changes, with their factors (negated for maximisation). Their final

@@ -163,11 +163,11 @@ impl<'a> World<'a> {
         key.and_then(|(function, arguments)| self.value(*function, arguments)).unwrap_or_else(Rational::zero)
     }
 
-    /// Returns the id of a numeric fluent and creates the id at the first call. `total-cost` needs no initial
-    /// value.
+    /// Returns the id of a numeric fluent and creates the id at the first call. `total-cost` and functions
+    /// that may be undefined (with guard conditions) need no initial value.
     ///
     /// # Errors
-    /// The fluent has no initial value.
+    /// Any other fluent has no initial value.
     pub fn numeric(
         &mut self,
         function: FunctionId,
