@@ -276,7 +276,10 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
             return Some(key);
         }
         let estimate = sharper.estimate(&self.state)?;
-        let total = self.store.cost(id).plus(&estimate)?;
+        let Some(total) = self.store.cost(id).plus(&estimate) else {
+            self.states_dropped = true;
+            return None;
+        };
         if total <= key.0 {
             return Some(key);
         }
