@@ -17,6 +17,7 @@ use crate::semantics::{State, holds_without_numbers};
 use crate::table::{Table, check_need, check_potential};
 
 /// Upper limit on the number of non-dominated combinations of designs, summed over all operators.
+/// Operators with equal tables are counted once.
 const CHOICE_LIMIT: usize = 1 << 20;
 /// Upper limit on the number of pairwise comparisons of design combinations, summed over all
 /// operators; about 1 s of work.
@@ -67,7 +68,8 @@ pub enum Fault {
     /// A label is a goal state with a smaller cost than claimed.
     #[error("label {0} is a goal state, and cheaper than claimed")]
     Goal(usize),
-    /// A successor of a label is neither covered by another label nor pruned by a bound.
+    /// A successor of a label (state of the proof) is neither covered by a label nor pruned by a
+    /// bound.
     #[error("label {label}, operator {operator}: nothing covers the state that follows")]
     Successor {
         /// Position of the label in the argument, from 0.
@@ -316,8 +318,8 @@ fn quantities(operator: &Operator) -> impl Iterator<Item = &Quantity> {
     operator.condition.comparisons.iter().chain(changes).map(|linear| &linear.quantity)
 }
 
-/// Index of the operators by one required fact each; `always` lists the operators without a
-/// required fact.
+/// Index of the operators. `by_fact` lists each operator under one of the facts that it requires;
+/// `always` lists the operators that require no fact.
 struct Index {
     by_fact: FxHashMap<(u32, u32), Vec<usize>>,
     always: Vec<usize>,

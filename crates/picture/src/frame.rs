@@ -98,7 +98,7 @@ impl Span {
         }
     }
 
-    /// Returns the range of a numeric fluent over all plans.
+    /// Returns the range of a numeric fluent over all plans, or (0, 1) for an unknown fluent.
     pub(crate) fn values(&self, name: &str) -> (f64, f64) {
         self.values.get(name).copied().unwrap_or((0.0, 1.0))
     }

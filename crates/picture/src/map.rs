@@ -19,12 +19,12 @@ const MARGIN: f64 = 70.0;
 const MARGIN_PART: f64 = 0.12;
 /// Upper and lower margin, in pixels.
 const UPPER_MARGIN: f64 = 35.0;
-/// Minimum height of a map without its margins, and the height to which a map is scaled at most, in
-/// pixels.
+/// Height of a map of a single place without its margins, and height to which a map is scaled at
+/// most unless its places are then too close, in pixels.
 const LEAST_HEIGHT: f64 = 60.0;
 const HEIGHT: f64 = 420.0;
-/// Upper limits in pixels: on the shortest way, which keeps small maps small, and on the size of a
-/// map that is enlarged to separate its places.
+/// Upper limits in pixels: on the length of short ways (5 % quantile), which keeps small maps
+/// small, and on the size of a map that is enlarged to separate its places.
 const FARTHEST: f64 = 130.0;
 const LARGEST: f64 = 4_000.0;
 /// Radius of the circle of a place, with its surrounding space.
@@ -228,8 +228,9 @@ fn number(
     choose(places, (limits, &other_lines), taken)
 }
 
-/// Finds positions for the names of places, the most important ones first. Returns `None` for a
-/// name without a free position.
+/// Finds positions for the names of places, in the order of start and goal places, places of the
+/// plan's moves, and other places. Returns for each name the left end of its base line, or `None`
+/// if no position is free.
 fn names(
     map: &Map,
     points: &[Point],

@@ -55,7 +55,8 @@ pub struct Inputs<'i> {
 /// plan is cheaper. Returns the formula and T. The claim is interpreted as in [`crate::check`].
 ///
 /// # Errors
-/// An unsupported construct, no provable bound on the number of steps, or an exceeded limit.
+/// A malformed document, a missing claim, an unsupported construct, no provable bound on the number
+/// of steps, or an exceeded limit.
 pub fn formula(
     (task, argument): (&str, &str),
     claim: Option<&BigRational>,

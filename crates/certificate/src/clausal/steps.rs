@@ -24,11 +24,13 @@ pub enum StepBound {
 
 /// Upper limit on the number of steps that a formula encodes.
 const STEP_LIMIT: usize = 64;
-/// Upper limit on the number of transitions between the rows of a potential.
+/// Upper limit on the number of transitions between the rows of a potential. Potentials with more
+/// are not used.
 const EDGE_LIMIT: usize = 1 << 22;
 
-/// Returns the least number of steps T, over all potentials, such that no plan of more than T steps
-/// costs less than `cost`. Returns an error if there is no such T within the limit.
+/// Returns the least number of steps T for which the lower bound `by`, with one of the potentials,
+/// proves that no plan of more than T steps costs less than `cost`. Returns an error if there is no
+/// such T up to [`STEP_LIMIT`].
 pub(super) fn bound(
     model: &Model,
     argument: &Argument,
@@ -47,8 +49,8 @@ pub(super) fn bound(
     bounds.min().ok_or_else(|| format!("a cheaper plan may have more than {STEP_LIMIT} steps"))
 }
 
-/// Checks that no plan of more than `steps` steps costs less than `cost`. Returns the position of a
-/// potential that proves it.
+/// Checks by [`StepBound::Potential`] that no plan of more than `steps` steps costs less than
+/// `cost`. Returns the position of a potential that proves it.
 pub(super) fn check(
     model: &Model,
     argument: &Argument,

@@ -14,8 +14,8 @@ pub(super) struct Axioms {
     pub(super) must: FxHashSet<Key>,
     /// A superset of `may`, from which the candidate objects of variables are taken.
     pub(super) bound: Relation,
-    /// The derived atoms with circular dependencies that are variables of the task. Every other
-    /// derived atom is replaced by its rules.
+    /// The derived atoms on dependency cycles or between cycles that are variables of the task.
+    /// Every other derived atom is replaced by its rules.
     pub(super) linked: FxHashSet<Key>,
     /// For each derived predicate, the predicates and functions in its rules.
     pub(super) reads: FxHashMap<u32, FxHashSet<u32>>,

@@ -1,5 +1,5 @@
-//! Compares the effects of a case of an action instance with the effects of an operator, on the
-//! variables and numbers of the task.
+//! Compares the effects of a case (outcome under a condition) of an action instance with the
+//! effects of an operator, on the variables and numbers of the task.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -29,8 +29,8 @@ pub(super) enum Mismatch {
     Unknown(String),
 }
 
-/// Compares the effects of a case with the effects of an operator, or with no effects if `operator`
-/// is `None`.
+/// Compares the effects of a case (outcome of an action instance) with the effects of an operator,
+/// or with no effects if `operator` is `None`. The clock is not compared.
 pub(super) fn compare(
     task: &Translation<'_>,
     case: &Case,
@@ -119,7 +119,8 @@ impl<'v> Variable<'v> {
     }
 
     /// Returns `Some(true)` if the case and the operator agree in all states that satisfy `known`,
-    /// `Some(false)` if they differ in some state, and `None` if this is undecided.
+    /// `Some(false)` if they differ in a partial state that extends `known`, and `None` if neither
+    /// is proved within [`SPLIT_LIMIT`] case splits.
     fn agrees(&self, known: &Known) -> Option<bool> {
         let structure = &self.task.names.structure;
         let mut open = vec![known.clone()];
@@ -169,7 +170,8 @@ impl<'v> Variable<'v> {
         self.task.invariant.may_hold(key) && known.atom(&self.task.names.structure, key) != Some(false)
     }
 
-    /// Returns the atoms of the variable that may hold before the case, with their values.
+    /// Returns the atoms of the variable that may hold before the case, each with its value
+    /// (number) in the variable.
     fn possible(&self, known: &'v Known) -> impl Iterator<Item = (u32, &'v Key)> {
         // If one atom of the variable holds, the other atoms do not.
         let holding = known.holding(self.own);
@@ -188,8 +190,9 @@ impl<'v> Variable<'v> {
         }
     }
 
-    /// Returns the value after the case according to the PDDL files; `None` if it is unchanged. The
-    /// files must imply that at most one atom of the variable then holds.
+    /// Returns the value after the case according to the PDDL files; `None` if it is unchanged. An
+    /// error names a formula whose truth value is needed, or means that it is not proved that at
+    /// most one atom of the variable then holds.
     fn expected(&self, known: &Known, current: Value) -> Result<Value, Outcome<'_>> {
         let structure = &self.task.names.structure;
         let after = |key: &Key| {

@@ -29,7 +29,8 @@ use crate::integer::MAX_DIGITS;
 
 pub(super) const WITNESS_FORMAT: &str = "metaplan-witness/1";
 
-/// Widening threshold: at this number of moves, an end of an interval becomes unbounded.
+/// Widening threshold: when an end of an interval moves for this number of times, it becomes
+/// unbounded.
 const WIDENING_THRESHOLD: u32 = 8;
 
 /// The JSON format of a witness.
@@ -50,7 +51,8 @@ struct WitnessFile {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Invariant {
     atoms: Relation,
-    /// The interval of each numeric fluent; the interval of a static fluent is a single value.
+    /// The interval of each numeric fluent; a single value for a static fluent. A fluent without an
+    /// entry is unbounded.
     numbers: FxHashMap<Key, Interval>,
     /// Mutex groups: atoms of which at most one holds.
     pub(super) exclusive: Vec<Group>,
@@ -186,7 +188,8 @@ impl Invariant {
         }
     }
 
-    /// Returns the interval of an expression in states that satisfy `known`.
+    /// Returns an interval that contains the values of an expression in all states of the witness
+    /// that satisfy `known`.
     fn range(&self, linear: &Linear, known: &Known) -> Interval {
         let mut range = linear.range(|key| self.numbers.get(key));
         for (own, _) in &known.comparisons {
@@ -203,7 +206,7 @@ impl Invariant {
         range
     }
 
-    /// Iterates over the atoms that a case may make true.
+    /// Iterates over the atoms that a case (outcome of an action instance) may make true.
     pub(super) fn added<'c>(structure: &'c Structure, case: &'c Case) -> impl Iterator<Item = &'c Key> {
         let at_end = case
             .effects
@@ -215,8 +218,8 @@ impl Invariant {
         at_end.map(|(_, key, _)| key).chain(at_start.map(|(key, _)| key))
     }
 
-    /// Checks that the witness contains all successors of a case and that the case preserves the
-    /// mutex groups.
+    /// Checks that the witness contains all states after a case (outcome of an action instance),
+    /// and that the case preserves the mutex groups.
     pub(super) fn admits(
         &self,
         world: &World<'_>,
@@ -258,8 +261,8 @@ impl Widening {
         Self { invariant: Invariant::initial(world), moves: FxHashMap::default() }
     }
 
-    /// Extends the invariant by the successors of a case. Returns `true` if the invariant has
-    /// changed.
+    /// Extends the invariant by the states after a case (outcome of an action instance). Returns
+    /// `true` if the invariant has changed.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer moves than passes over the task")]
     pub(super) fn include(&mut self, structure: &Structure, case: &Case) -> bool {
         let mut news = false;

@@ -7,7 +7,8 @@ use thiserror::Error;
 pub enum Faithful {
     /// The task is faithful: it permits every plan of the PDDL files, at no more cost.
     Yes {
-        /// Number of action instances that may be executable in a state of the witness.
+        /// Number of action instances that may be executable in a state of the witness (the
+        /// over-approximation of the reachable states).
         instances: usize,
         /// Number of instances among them that do not change the task state.
         idle: usize,
@@ -112,7 +113,8 @@ pub enum Cause {
         /// The upper limit on their number.
         limit: usize,
     },
-    /// After an instance, it is not proved that at most one atom of a variable holds.
+    /// It is not proved that at most one atom of a variable holds after an instance, or the
+    /// comparison of its effects needs too many case splits.
     #[error(
         "cannot tell whether the ground task stands for the files: it takes at most one of {atoms} to hold, and neither \
          {instance} nor the witness by itself shows that this stays so; no difference was found"

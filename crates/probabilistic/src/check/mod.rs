@@ -58,7 +58,8 @@ pub struct Report {
     pub outcome: Outcome,
     /// The variables of the model: each with its name, and `true` for a Boolean variable.
     pub variables: Vec<(String, bool)>,
-    /// Number of reachable states.
+    /// Number of explored states: the reachable states, except beyond states at which a single
+    /// property is decided.
     pub states: usize,
     /// Number of choices, summed over all states.
     pub choices: usize,
@@ -217,7 +218,8 @@ struct Processes {
 
 impl Processes {
     /// Explores in rationals up to [`MAX_EXACT_TRANSITIONS`] transitions and continues in doubles
-    /// if the model is larger. With [`Exactness::Always`], only rationals are used.
+    /// if the model is larger. With [`Exactness::Always`], only rationals are used; if `exact` is
+    /// `None`, only doubles.
     fn explore(
         program: &Program<f64>,
         exact: Option<&Program<Fraction>>,
@@ -356,8 +358,8 @@ fn required_rewards(
     Ok(required)
 }
 
-/// Lists the choice of a policy in each state that is reachable from the initial state under the
-/// policy.
+/// Lists the choice of a policy in each state that is reachable from the first initial state under
+/// the policy. States in which the policy has no choice are omitted.
 fn policy_table<N: Number>(
     program: &Program<N>,
     explored: &Explored<Packed, N>,

@@ -28,15 +28,16 @@ pub struct Options<'a> {
     pub bounds: Bounds<'a>,
     /// Choice of arithmetic.
     pub exactness: Exactness,
-    /// Name of the reward structure that breaks ties between optimal policies; `None` breaks ties
-    /// by the number of steps.
+    /// Name of the reward structure that breaks ties between optimal policies if the policy is
+    /// reported; `None` breaks ties by the number of steps.
     pub secondary: Option<String>,
     /// Whether the policy is reported, too.
     pub policy: bool,
     /// A given policy to evaluate; if `None`, an optimal policy is computed.
     pub evaluate: Option<PolicyTable>,
     /// Required width of the bounds on values. If the bounds computed in doubles are wider, the
-    /// model is solved again in rationals, unless `exactness` is [`Exactness::Never`].
+    /// model is solved again in rationals with a larger budget, unless `exactness` is
+    /// [`Exactness::Never`].
     pub precision: Option<Precision>,
     /// Constants, labels and named properties of a property file, in addition to those of the
     /// model.

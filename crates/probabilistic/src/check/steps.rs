@@ -25,8 +25,8 @@ impl<N: Number> Stepped<N> {
     }
 }
 
-/// Applies the Bellman operator `steps` times, starting with `values`. The values of terminal
-/// states do not change. Returns `None` if exact arithmetic exceeds its budget.
+/// Applies the Bellman operator `steps` times, starting with `values`. The values of terminal and
+/// blocked states do not change. Returns `None` if exact arithmetic exceeds its budget.
 ///
 /// All operands are nonnegative, so each step increases the relative error of a value by a
 /// bounded amount.

@@ -133,8 +133,8 @@ impl<N: Number> Rows<N> {
     }
 }
 
-/// Upper limit on the number of entries that elimination in doubles visits. Chains with a
-/// two-dimensional structure have much fill-in and are solved faster by iteration.
+/// Upper limit on the number of entries that elimination in doubles visits for one component.
+/// Chains with a two-dimensional structure have much fill-in and are solved faster by iteration.
 const MAX_ELIMINATION: u64 = 300_000_000;
 
 /// The solution of a Markov chain.
@@ -229,14 +229,14 @@ impl<N: Number> Chain<'_, N> {
     }
 }
 
-/// Upper bound on the relative error after eliminating `states` states in rows of at most `widest`
-/// entries.
+/// Upper bound on the relative error of the values of a component that is solved by eliminating
+/// `states` states, if no row has more than `widest` entries.
 ///
-/// Let n be the number of states, w the number of entries, and u the unit roundoff. With m
-/// remaining states, an elimination step perturbs each entry by a factor of 1 ± (w + 4)u, and a
-/// value contains 2m such factors. All steps together contribute less than n(n + 1)(w + 4)u. The
-/// rounding of the initial entries and the back substitution add less than 4n(w + 4)u. The result
-/// uses the machine epsilon, which is 2u, and is thus twice as large as required.
+/// Let n be the number of states, w the number of entries, and u the unit roundoff. Eliminating a
+/// state while m states remain multiplies each entry by rounding factors within 1 ± (w + 4)u. Each
+/// value of a state depends on at most 2m of these factors. Summed over m = 1, …, n, this is n(n +
+/// 1)(w + 4)u. The rounding of the initial entries and the back substitution add less than 4n(w +
+/// 4)u. The result uses the machine epsilon, which is 2u, and is thus twice as large as required.
 fn rounding<N: Number>(states: usize, widest: usize) -> f64 {
     let n = count(states) + 4.0;
     if N::EXACT { 0.0 } else { n * n * (count(widest) + 8.0) * f64::EPSILON }

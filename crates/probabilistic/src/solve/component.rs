@@ -157,8 +157,9 @@ impl<N: Number> Run<'_, N> {
         }
     }
 
-    /// Computes the values and the policy of the states in `local`. Returns `None` if exact
-    /// arithmetic exceeds its budget.
+    /// Computes the values and the policy of the states in `local`. If no method bounds the values
+    /// in doubles, their errors are set to infinity. Returns `None` if exact arithmetic exceeds its
+    /// budget.
     fn values(&mut self, local: &mut Local<N>) -> Option<()> {
         let costs = self.problem.rewards.is_some();
         let mut ends = end_components(local, |choice| !costs || !local.paid[choice]);
@@ -280,8 +281,9 @@ impl<N: Number> Run<'_, N> {
     }
 }
 
-/// Extends the policy `chosen` to the other states of the end components: they move towards a state
-/// that leaves the end component. `queue` contains the states with a choice.
+/// Extends the policy `chosen` to the states of end components that have no choice yet: they move
+/// towards a state whose choice leaves the end component. `queue` contains the states with a
+/// choice.
 fn route_to_exits<N: Number>(
     local: &Local<N>,
     ends: &EndComponents,

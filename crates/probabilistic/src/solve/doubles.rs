@@ -15,7 +15,8 @@ use crate::solve::work::{TIGHT, Work};
 /// Limits for solving in rationals if the bounds in doubles are insufficient: work units, and
 /// number of blocks.
 const RATIONAL_LIMITS: (u64, usize) = (1_000_000_000, 3000);
-/// Work limit for solving in rationals if the bounds in doubles are sufficient for most purposes.
+/// Work limit for solving in rationals if the bounds in doubles are finite, and bounds narrower
+/// than [`TIGHT`] are not required.
 const IMPROVEMENT_LIMIT: u64 = 100_000_000;
 
 /// Computes bounds on the values of all blocks (merged end components). Returns `None` if no method
@@ -81,7 +82,7 @@ pub fn enclosed<N: Number>(
 }
 
 /// Returns `true` if a uniform error of all blocks, as in a certificate, can be tight even for the
-/// least value.
+/// least positive value.
 fn is_level<N: Number>(quotient: &Quotient<N>, values: &[N], tight: f64) -> bool {
     let values = values.iter().map(Number::to_f64).filter(|value| *value > 0.0);
     let (least, greatest) = values
@@ -96,7 +97,7 @@ fn is_tight<N: Number>(values: &[N], errors: &[f64], tight: f64) -> bool {
 /// Solves the rounded equations exactly in rationals. The error bound accounts for the earlier
 /// rounding of the entries: a value contains a few rounding errors per block, in its numerator and
 /// in its denominator (see `chain`). This holds under every policy and therefore under the optimal
-/// one.
+/// one. Returns `None` if the budget is exceeded.
 fn in_rationals<N: Number>(
     quotient: &Quotient<N>,
     policy: &[u32],

@@ -6,9 +6,9 @@
 //! 735, 2018).
 //!
 //! Each evaluation of an equation is rounded down for the lower and up for the upper bound.
-//! Therefore every value is a bound at any time, in any order of the equations. Each sweep uses the
-//! values that it has already updated (Gauss-Seidel), and starts with the blocks nearest to an
-//! exit.
+//! Therefore the values of the lower bound are valid at any time, in any order of the equations.
+//! Each sweep uses the values that it has already updated (Gauss-Seidel), and starts with the
+//! blocks nearest to an exit.
 
 use std::collections::VecDeque;
 
@@ -46,7 +46,8 @@ pub fn enclose<N: Number>(quotient: &Quotient<N>, direction: Direction, width: f
 }
 
 /// Computes bounds on the values of all blocks around approximate values `near`. Returns `None` if
-/// the approximate values are not close enough.
+/// the approximate values are not close enough to prove bounds with a width of at most `width`
+/// times the value.
 pub fn around<N: Number>(
     quotient: &Quotient<N>,
     near: &[N],
@@ -279,9 +280,10 @@ impl<'a, N: Number> Rows<'a, N> {
         (change, work)
     }
 
-    /// Updates all values of a candidate upper bound. Returns `true` if a value was raised. If no
-    /// value was raised, the values are upper bounds, because each equation used values that are at
-    /// least the final ones.
+    /// Updates all values of a candidate upper bound in place. Results are multiplied by `scale` to
+    /// account for rounding. Returns `true` if a value was raised. If none was raised, the values
+    /// are upper bounds: each was computed from values that are at least those at the end of the
+    /// sweep.
     fn raises(&self, values: &mut [f64], scale: f64) -> bool {
         let mut raised = false;
         for position in 0..values.len() {
@@ -292,9 +294,10 @@ impl<'a, N: Number> Rows<'a, N> {
         raised
     }
 
-    /// Updates all values of a candidate lower bound. Returns `true` if a value was lowered. If no
-    /// value was lowered, the values are lower bounds. The selected rows leave the component with
-    /// probability 1, and under these rows the values only grow towards the values of the policy.
+    /// Updates all values of a candidate lower bound in place. Results are multiplied by `scale` to
+    /// account for rounding. Returns `true` if a value was lowered. If no value was lowered, the
+    /// values are lower bounds. The selected rows leave the component with probability 1, and under
+    /// these rows the values only grow towards the values of the policy.
     fn lowers(&self, values: &mut [f64], scale: f64) -> bool {
         let mut lowered = false;
         for position in 0..values.len() {

@@ -23,7 +23,8 @@ const SWEEP_SPEED: u64 = 4;
 /// Number of blocks from which on several sweeps per round save time.
 const SWEEP_MIN_BLOCKS: usize = 200;
 
-/// A policy that no row clearly improves, with the value of each block.
+/// A policy with the value of each block. No row clearly improves the policy, unless [`MAX_ROUNDS`]
+/// was reached.
 pub struct Iterated<N> {
     pub policy: Vec<u32>,
     pub values: Vec<N>,

@@ -1,4 +1,5 @@
-//! Extracts a strongly connected component of a process and computes its end components.
+//! A set of states extracted from a process, usually a strongly connected component, and its end
+//! components.
 
 use std::collections::VecDeque;
 
@@ -31,7 +32,7 @@ pub struct Local<N> {
 }
 
 impl<N: Number> Local<N> {
-    /// Creates an empty component.
+    /// Creates an empty set of states.
     pub fn new() -> Self {
         Self {
             states: vec![],

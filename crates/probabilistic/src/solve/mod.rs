@@ -62,7 +62,8 @@ pub(crate) fn solve_within<N: Number>(
     outcome.map(|()| run.solution)
 }
 
-/// Computes a good policy without bounding its error; the policy may not be optimal.
+/// Computes a good policy without bounding its error; the policy may not be optimal. Returns `None`
+/// if exact arithmetic exceeds its default budget.
 pub(crate) fn draft<N: Number>(problem: Problem<'_, N>) -> Option<Vec<u32>> {
     let mut run = Run { draft: true, ..begin(problem, None) };
     run.solve_components()?;

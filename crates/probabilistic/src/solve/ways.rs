@@ -1,5 +1,5 @@
-//! Solves components by shortest paths if each choice either leaves the component, or leads to a
-//! single other state and possibly loops.
+//! Solves components by shortest paths if each choice either leaves the component or leads to a
+//! single other state. In both cases, the choice may also loop.
 //!
 //! Reconfigurations that succeed, or that are repeated until they succeed, have this form. Nearly
 //! all components of a co-adaptation process consist of them. The best values are propagated from
@@ -58,11 +58,14 @@ impl<N> Default for PathBuffers<N> {
 }
 
 impl<N: Number> Run<'_, N> {
-    /// Solves a component by shortest paths. Returns `false` without an effect if a choice leaves
-    /// the component and also stays in it, or leads to several other states.
+    /// Solves a component by shortest paths. Returns `false` without an effect if the component
+    /// does not qualify: a choice can both leave the component and lead to another state in it, or
+    /// can lead to several other states in it; there are more than [`MAX_STATES`] states; or
+    /// choices are restricted and all policies have to be considered.
     pub fn shortest_paths(&mut self, component: &[u32], buffers: &mut PathBuffers<N>) -> bool {
         let by_choice = self.sure_by_choice();
-        // With restricted choices, the component may not be connected by the allowed choices.
+        // With restricted choices, the component may not be strongly connected by the allowed
+        // choices.
         if component.len() > MAX_STATES || !by_choice && self.problem.allowed.is_some() {
             return false;
         }
@@ -94,8 +97,9 @@ impl<N: Number> Run<'_, N> {
         true
     }
 
-    /// Collects the steps and exits of the component in `buffers`. Returns `false` if a choice has
-    /// neither form.
+    /// Collects the steps and exits of the component in `buffers`. Returns `false` if a choice can
+    /// both leave the component and lead to another state in it, or can lead to several other
+    /// states in it.
     fn scan(&self, component: &[u32], buffers: &mut PathBuffers<N>) -> bool {
         buffers.steps.clear();
         buffers.exits.clear();
@@ -115,7 +119,7 @@ impl<N: Number> Run<'_, N> {
                     }
                 }
                 match (to, leaves) {
-                    (NONE, false) => {} // It stays where it is.
+                    (NONE, false) => {} // The choice only loops.
                     (NONE, true) => buffers.exits.push((dense(from), dense(choice), sure)),
                     (_, true) => return false,
                     (to, false) => {
