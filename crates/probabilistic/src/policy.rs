@@ -22,7 +22,8 @@ pub fn evaluate<N: Number>(problem: Problem<'_, N>, policy: &[u32]) -> Option<So
     solve(Problem { allowed: Some(&allowed), ..problem }, None)
 }
 
-/// Returns the optimal choices with respect to a solution, in the states of finite value.
+/// Returns the optimal choices with respect to a solution, in the states that have a finite value
+/// and are neither terminal nor blocked.
 ///
 /// In doubles, choices within a tolerance of the optimum count as optimal.
 pub fn conserving<N: Number>(problem: &Problem<'_, N>, solution: &Solution<N>) -> FixedBitSet {

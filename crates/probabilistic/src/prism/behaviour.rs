@@ -26,8 +26,8 @@ const FAILED: u32 = u32::MAX - 1;
 /// A module: its actions and its cached behaviours, i.e. the evaluated commands of local states.
 #[derive(Debug)]
 pub struct Module<N> {
-    /// The actions of the module. The second number is the position of the module's command group in
-    /// `Program::synchronised` for this action.
+    /// The actions of the module: number of the action, and position of the module's command group
+    /// in `Program::synchronised` for this action.
     pub actions: Vec<(usize, usize)>,
     numbers: Option<Numbers>,
     /// For each behaviour, the disabled actions as a bit set.
@@ -44,7 +44,7 @@ pub struct Module<N> {
     cached_lengths: [usize; 4],
 }
 
-/// Index of an evaluated command.
+/// Index into `Module::commands`: a command with its updates evaluated in a local state.
 pub type Chosen = u32;
 
 impl<N: Number> Module<N> {
@@ -73,8 +73,8 @@ impl<N: Number> Module<N> {
         }
     }
 
-    /// Returns the index of the behaviour in a state, or `None` if the evaluation of a command fails. The index is
-    /// valid until the next call.
+    /// Returns the index of the behaviour (the evaluated commands of the local state) in a state,
+    /// or `None` if the evaluation of a command fails. The index is valid until the next call.
     pub fn behaviour(
         &mut self,
         program: &Program<N>,
@@ -173,17 +173,20 @@ impl<N: Number> Module<N> {
         Ok(())
     }
 
-    /// Returns the disabled actions in a behaviour, as a bit set.
+    /// Returns the actions of the module that are disabled in the local state to which the
+    /// behaviour belongs, as a bit set.
     pub fn prevented(&self, behaviour: usize) -> u128 {
         self.prevented[behaviour]
     }
 
-    /// Returns the enabled commands without action in a behaviour.
+    /// Returns the enabled commands without an action in the local state to which the behaviour
+    /// belongs.
     pub fn free(&self, behaviour: usize) -> std::ops::Range<Chosen> {
         self.slot(behaviour, 0)
     }
 
-    /// Returns the enabled commands of a behaviour for one action, given by its position in the module's `actions`.
+    /// Returns the enabled commands for one action in the local state to which the behaviour
+    /// belongs. `at` is the position of the action in [`Self::actions`].
     pub fn acting(&self, behaviour: usize, at: usize) -> std::ops::Range<Chosen> {
         self.slot(behaviour, at.saturating_add(1))
     }
@@ -205,7 +208,8 @@ impl<N: Number> Module<N> {
         })
     }
 
-    /// Returns the total number of updates of consecutive commands.
+    /// Returns the total number of updates of consecutive commands, without updates of probability
+    /// 0.
     pub fn count(&self, commands: std::ops::Range<Chosen>) -> usize {
         commands.map(|command| self.range(command).len()).sum()
     }

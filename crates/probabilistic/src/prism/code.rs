@@ -1,6 +1,7 @@
 //! Typed expressions with resolved names, and their evaluation.
 //!
 //! Arithmetic is exact, so that `1 - 0.7 - 0.3` is zero even if the model is solved in doubles.
+//! Only logarithms, powers with fractional exponents and very large powers are approximated.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
@@ -118,7 +119,8 @@ impl Code {
         })
     }
 
-    /// Evaluates a numeric expression exactly; `values` are the values of the variables.
+    /// Evaluates a numeric expression; `values` are the values of the variables. The result is
+    /// exact, except for logarithms, powers with fractional exponents and very large powers.
     pub fn number(&self, values: &[i64]) -> Result<BigRational> {
         Ok(match self {
             Self::Number(value) => value.clone(),
@@ -191,8 +193,8 @@ pub fn from_whole(value: i64) -> BigRational {
     BigRational::from(BigInt::from(value))
 }
 
-/// Converts a probability or reward to the number type of the solver. Fails if doubles cannot represent its
-/// magnitude.
+/// Converts a probability or reward to the number type of the solver. For doubles, fails if a value
+/// other than 0 has a magnitude outside 10^-250 to 10^250.
 pub fn rounded<N: Number>(value: &BigRational) -> Result<N> {
     crate::number::rounded(value).ok_or(Fault("a number that is too large or too small for doubles"))
 }

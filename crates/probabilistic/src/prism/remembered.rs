@@ -25,7 +25,8 @@ use crate::prism::state::Packed;
 /// A program that caches the evaluated commands of its modules by local state.
 pub struct Remembered<'a, N> {
     program: &'a Program<N>,
-    /// The caches. `None` if caching would save nothing; the program then computes all successors.
+    /// The caches. `None` if caching would save nothing (a single module), or if there are more
+    /// than [`MAX_ACTIONS`] actions; the program then computes all successors.
     memory: Option<RefCell<Memory<N>>>,
 }
 
@@ -261,8 +262,9 @@ impl<N: Number> Team<N> {
         Some(())
     }
 
-    /// Calls `visit` with each combination of one command per module. The command of the first module varies fastest.
-    /// Returns `None` if the combinations have more than [`MAX_COMBINED`] successors.
+    /// Calls `visit` with each combination of one command per module. The command of the first
+    /// module varies fastest. Returns `None` if the combinations of several modules have more than
+    /// [`MAX_COMBINED`] successors.
     fn each_combination(&self, parts: &[Part], mut visit: impl FnMut(&[Chosen])) -> Option<()> {
         if let [(_, commands)] = parts {
             commands.clone().for_each(|command| visit(&[command]));
