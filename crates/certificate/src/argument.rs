@@ -18,7 +18,8 @@ pub struct Argument {
     /// Lower bounds on the value that a numeric variable needs for reaching the goal.
     pub needs: Vec<Need>,
     /// States that cover (dominate) every reachable state with a cost below the claim that no
-    /// potential or need prunes. No label is a goal state with a smaller cost than claimed.
+    /// potential or need prunes. None of these labels is a goal state with a smaller cost than
+    /// claimed.
     pub labels: Vec<Label>,
 }
 

@@ -62,10 +62,11 @@ pub enum Fault {
         /// Description of the entry or operator that violates the bound.
         reason: String,
     },
-    /// The initial state is neither covered by a label nor pruned by a bound.
+    /// The initial state is neither covered by a label (state of the proof) nor pruned by a bound.
     #[error("no label covers the initial state")]
     Initial,
-    /// A label is a goal state with a smaller cost than claimed.
+    /// A label (state of the proof), given by its position in the argument, is a goal state with a
+    /// smaller cost than claimed.
     #[error("label {0} is a goal state, and cheaper than claimed")]
     Goal(usize),
     /// A successor of a label (state of the proof) is neither covered by a label nor pruned by a
@@ -219,8 +220,8 @@ impl Checker<'_> {
         })
     }
 
-    /// Returns `true` if a label or a lower bound proves that every plan through a state, reached
-    /// at cost `paid`, costs at least the claim.
+    /// Returns `true` if a label (state of the proof) or a lower bound proves that every plan
+    /// through a state, reached at cost `paid`, costs at least the claim.
     fn is_covered(&self, state: &State, paid: &Integer) -> bool {
         let too_expensive = self.potentials.iter().any(|potential| match (potential.at(state), &self.cost) {
             (None, _) => true,
@@ -246,8 +247,8 @@ impl Checker<'_> {
 ///
 /// A combination dominates another one under three conditions. It costs no more, it satisfies every
 /// condition that the other satisfies, and it leaves every number at least as high (equal, if
-/// larger numbers may hurt). A label that covers the successor by the dominating combination then
-/// also covers the successor by the dominated combination.
+/// larger numbers may hurt). A label (state of the proof) that covers the successor by the
+/// dominating combination then also covers the successor by the dominated combination.
 fn choices(model: &Model, monotone: bool) -> Result<Vec<Rc<[Choice]>>, Fault> {
     let mut fronts: FxHashMap<_, Rc<[Choice]>> = FxHashMap::default();
     let mut count = 0_usize;

@@ -8,7 +8,8 @@ use crate::model::{self, Condition, Exclusion, Fact, Linear, Literal, Model, Ope
 
 type Found = Result<(), String>;
 
-/// Upper limit on the number of design combinations for a list of slots.
+/// Upper limit on the number of design combinations for a list of slots (parameters that are
+/// designs).
 const CHOICE_LIMIT: usize = 1 << 20;
 /// Upper limit on the number of entries of a table in the argument.
 const TABLE_LIMIT: usize = 1 << 22;

@@ -165,7 +165,8 @@ pub(super) fn check_potential(model: &Model, table: &Table<'_>) -> Result<(), St
     })
 }
 
-/// The effect of an operator on a number, as far as needs are concerned.
+/// The effect of an operator on a number, as far as it matters for needs (lower bounds on the
+/// number).
 enum Use {
     /// Decreases the number by at least this amount (≥ 0). If the amount can be positive, requires
     /// that the result is at least 0.

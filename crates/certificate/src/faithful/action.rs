@@ -97,8 +97,8 @@ pub(super) fn cases<'r>(
     }
 }
 
-/// Returns the conjunction of a condition and two additional ones. Borrows `condition` if both
-/// others are true, the most frequent case.
+/// Returns the conjunction of a condition and two additional ones. Usually both additional
+/// conditions are true; the result then borrows `condition`.
 fn all_of(condition: &Formula, additional: [Formula; 2]) -> Cow<'_, Formula> {
     if additional.iter().all(|extra| extra.is(true)) {
         return Cow::Borrowed(condition);

@@ -178,8 +178,8 @@ impl<'c> Comparison<'c> {
             let Some((variable, _)) = task.names.fact(key) else { continue };
             let files = Reader::new(task.world, task.invariant, task.axioms).unfold(key)?;
             let rules = task.rules(variable);
-            // A derivation must not depend on atoms that are derived later, so there are no case
-            // splits on derived atoms.
+            // A derivation must not depend on atoms that are derived later, so no case splits on
+            // the truth value of derived atoms are made.
             let admits = |leaf: &Formula| match leaf {
                 Formula::Atom(key, _) => task.world.rules(key.0).is_none(),
                 _ => true,
@@ -253,8 +253,9 @@ impl<'c> Comparison<'c> {
         self.find(&waits, case, &instance)
     }
 
-    /// Checks that in every state in which a case can be executed, one of the candidate operators
-    /// simulates the case. Fails if this takes more than [`SPLIT_LIMIT`] case splits.
+    /// Checks that in every state in which a case (outcome of an action instance under a condition)
+    /// can be executed, one of the candidate operators simulates the case. Fails if this takes more
+    /// than [`SPLIT_LIMIT`] case splits.
     fn find(&self, candidates: &[(&Operator, Vec<u32>)], case: &Case, instance: &Instance<'_>) -> Result<()> {
         let structure = &self.task.names.structure;
         let conditions: Vec<Formula> = candidates
@@ -321,9 +322,10 @@ impl<'c> Comparison<'c> {
         Ok(())
     }
 
-    /// Returns `true` if the clock of the task is a lower bound on the time after the case: the
-    /// task has no clock, or the operator leaves it unchanged, advances it by the duration of the
-    /// case, or sets it to a value that represents every possible end time.
+    /// Returns `true` if the clock of the task is a lower bound on the time after the case (outcome
+    /// of an action instance under a condition): the task has no clock, or the operator leaves it
+    /// unchanged, advances it by the duration of the case, or sets it to a value that represents
+    /// every possible end time.
     fn keeps_time(&self, (operator, choice): (&Operator, &[u32]), case: &Case) -> bool {
         let Some(number) = self.task.names.numbers.get(&timeline::clock()) else { return true };
         // Time never decreases, so an unchanged clock is a lower bound on the time.
@@ -342,9 +344,9 @@ impl<'c> Comparison<'c> {
         }
     }
 
-    /// Returns the minimal increase of the metric by a case. Without a metric, returns the minimal
-    /// duration if plans are measured by time, otherwise 1. Fails if the increase depends on the
-    /// state.
+    /// Returns the minimal increase of the metric by a case (outcome of an action instance under a
+    /// condition). Without a metric, returns the minimal duration if plans are measured by time,
+    /// otherwise 1. Fails if the increase depends on the state.
     fn cost(&self, case: &Case) -> Result<BigRational> {
         let one = BigRational::one();
         let time = |factor: &BigRational| match &case.length {

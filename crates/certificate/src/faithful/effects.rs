@@ -24,8 +24,8 @@ pub(super) struct Made<'m> {
 pub(super) enum Mismatch {
     /// The values of this variable or number differ.
     Differs(String),
-    /// The atoms of this variable are not proved to be mutually exclusive after the case, or there
-    /// are too many case splits.
+    /// The atoms of this variable are not proved to be mutually exclusive after the case (outcome
+    /// of an action instance under a condition), or there are too many case splits.
     Unknown(String),
 }
 
@@ -74,14 +74,16 @@ fn numbers(task: &Translation<'_>, case: &Case, operator: Option<Made<'_>>) -> R
     Ok(())
 }
 
-/// Compares the effects of a case and of an operator on one variable.
+/// A comparison of the effects of a case (outcome of an action instance under a condition) and of
+/// an operator on one variable.
 struct Variable<'v> {
     task: &'v Translation<'v>,
     own: u32,
     case: &'v Case,
-    /// The end effects of the case on atoms of the variable.
+    /// The effects of the case on atoms of the variable at the end of the action.
     effects: Vec<&'v (Formula, Key, bool)>,
-    /// The atoms of the variable that the case may change, by value.
+    /// The atoms of the variable that the case may change. The key is the value that represents the
+    /// atom.
     touched: BTreeMap<u32, &'v Key>,
     /// The value that the operator assigns unconditionally.
     certain: Option<u32>,
@@ -170,8 +172,8 @@ impl<'v> Variable<'v> {
         self.task.invariant.may_hold(key) && known.atom(&self.task.names.structure, key) != Some(false)
     }
 
-    /// Returns the atoms of the variable that may hold before the case, each with its value
-    /// (number) in the variable.
+    /// Returns the atoms of the variable that may hold before the case (outcome of an action
+    /// instance under a condition), each with its value (number) in the variable.
     fn possible(&self, known: &'v Known) -> impl Iterator<Item = (u32, &'v Key)> {
         // If one atom of the variable holds, the other atoms do not.
         let holding = known.holding(self.own);
@@ -180,7 +182,8 @@ impl<'v> Variable<'v> {
         possible_atoms.into_iter().flatten().chain(held_atom).filter(|(_, key)| self.may_hold(known, key))
     }
 
-    /// Returns the value before the case, or `None` if it is unknown.
+    /// Returns the value of the variable before the case (outcome of an action instance under a
+    /// condition), or `None` if it is unknown.
     fn current(&self, known: &Known) -> Value {
         let structure = &self.task.names.structure;
         match self.possible(known).next() {
@@ -190,9 +193,10 @@ impl<'v> Variable<'v> {
         }
     }
 
-    /// Returns the value after the case according to the PDDL files; `None` if it is unchanged. An
-    /// error names a formula whose truth value is needed, or means that it is not proved that at
-    /// most one atom of the variable then holds.
+    /// Returns the value of the variable after the case (outcome of an action instance under a
+    /// condition) according to the PDDL files; `None` if it is unchanged. An error names a formula
+    /// whose truth value is needed, or means that it is not proved that at most one atom of the
+    /// variable then holds.
     fn expected(&self, known: &Known, current: Value) -> Result<Value, Outcome<'_>> {
         let structure = &self.task.names.structure;
         let after = |key: &Key| {

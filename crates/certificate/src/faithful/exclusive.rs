@@ -24,7 +24,8 @@ use crate::faithful::world::World;
 
 /// Upper limit on the number of case splits for one instance and group.
 const SPLIT_LIMIT: usize = 1_024;
-/// Upper limit on the number of checks of a group against a case, during the whole search.
+/// Upper limit on the number of checks whether a case (outcome of an action instance under a
+/// condition) preserves a group, during the whole search.
 const SEARCH_LIMIT: usize = 20_000_000;
 /// Upper limit on the number of groups that the search tries for one variable.
 const GROUP_LIMIT: usize = 300;
@@ -77,16 +78,19 @@ pub(super) fn keeps(
 
 /// The effect of a case (outcome of an action instance) on mutex groups.
 pub(super) struct Move {
-    /// The atoms that certainly hold before the case.
+    /// The atoms that certainly hold before the case (outcome of an action instance under a
+    /// condition).
     holding: Vec<Key>,
-    /// The atoms that the case may add.
+    /// The atoms that the case (outcome of an action instance under a condition) may add.
     pub(super) adds: BTreeSet<Key>,
-    /// The atoms that certainly do not hold after the case.
+    /// The atoms that certainly do not hold after the case (outcome of an action instance under a
+    /// condition).
     deletes: Vec<Key>,
 }
 
 impl Move {
-    /// Computes the effect of a case on mutex groups, given the atoms that the case may add.
+    /// Computes the effect of a case (outcome of an action instance under a condition) on mutex
+    /// groups, given the atoms that the case may add.
     pub(super) fn new(structure: &Structure, case: &Case, adds: BTreeSet<Key>) -> Self {
         let at_end = case
             .effects
@@ -102,12 +106,12 @@ impl Move {
         !self.adds.is_empty()
     }
 
-    /// Checks that at most one atom of a group holds after the case, given that at most one holds
-    /// before it.
+    /// Checks that at most one atom of a mutex group holds after the case (outcome of an action
+    /// instance under a condition), given that at most one holds before the case.
     ///
     /// # Errors
-    /// The atoms each of which would repair the group if it were a member; empty if there is no
-    /// such atom.
+    /// The atoms each of which, if added to the group, might make the check succeed: the case
+    /// requires and deletes them. Empty if there is no such atom.
     pub(super) fn keeps(&self, group: &Group, may_hold: &dyn Fn(&Key) -> bool) -> Result<(), Vec<Key>> {
         let mut added = self.adds.iter().filter(|key| group.contains(*key));
         let Some(key) = added.next() else { return Ok(()) };
@@ -180,8 +184,8 @@ pub(super) fn search(
     groups
 }
 
-/// Numbers the mutex groups of a witness consecutively. The first number is `variables`, the number
-/// of variables of the task.
+/// Numbers the mutex groups of a witness (the over-approximation of the reachable states)
+/// consecutively. The first number is `variables`, the number of variables of the task.
 pub(super) fn numbered(variables: usize, groups: &[Group]) -> impl Iterator<Item = (u32, &Group)> {
     (u32::try_from(variables).unwrap_or(u32::MAX)..).zip(groups)
 }

@@ -12,7 +12,7 @@ use crate::faithful::key::Key;
 use crate::faithful::linear::Linear;
 use crate::faithful::verdict::Cause;
 
-/// Upper limit on the number of cases into which a condition is split.
+/// Upper limit on the number of partial states into which a condition is split.
 const CASE_LIMIT: usize = 4_096;
 
 /// Upper limit on the nesting depth of a condition after derived atoms are replaced by their rules.

@@ -33,7 +33,7 @@ pub(super) const WITNESS_FORMAT: &str = "metaplan-witness/1";
 /// unbounded.
 const WIDENING_THRESHOLD: u32 = 8;
 
-/// The JSON format of a witness.
+/// The JSON format of a witness, i.e. of an over-approximation of the reachable states.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct WitnessFile {
@@ -59,7 +59,8 @@ pub(super) struct Invariant {
 }
 
 impl Invariant {
-    /// Creates the witness that contains only the initial state.
+    /// Creates the witness (the over-approximation of the reachable states) that contains only the
+    /// initial state. The clock is unbounded.
     pub(super) fn initial(world: &World<'_>) -> Self {
         let atoms = world.initial_atoms().filter(|key| world.changes(key.0)).collect();
         // The clock is unbounded.
@@ -189,7 +190,7 @@ impl Invariant {
     }
 
     /// Returns an interval that contains the values of an expression in all states of the witness
-    /// that satisfy `known`.
+    /// (the over-approximation of the reachable states) that satisfy `known`.
     fn range(&self, linear: &Linear, known: &Known) -> Interval {
         let mut range = linear.range(|key| self.numbers.get(key));
         for (own, _) in &known.comparisons {
@@ -218,8 +219,8 @@ impl Invariant {
         at_end.map(|(_, key, _)| key).chain(at_start.map(|(key, _)| key))
     }
 
-    /// Checks that the witness contains all states after a case (outcome of an action instance),
-    /// and that the case preserves the mutex groups.
+    /// Checks that the witness (the over-approximation of the reachable states) contains all states
+    /// after a case (outcome of an action instance), and that the case preserves the mutex groups.
     pub(super) fn admits(
         &self,
         world: &World<'_>,
@@ -248,7 +249,8 @@ impl Invariant {
     }
 }
 
-/// Computes a witness by fixpoint iteration with widening.
+/// Computes a witness (the over-approximation of the reachable states) by fixpoint iteration with
+/// widening.
 pub(super) struct Widening {
     pub(super) invariant: Invariant,
     /// For each fluent and end of its interval (`true` for the upper end), the number of times it
@@ -292,7 +294,8 @@ impl Widening {
     }
 }
 
-/// Creates the error that the computation of a witness needs too many rounds.
+/// Creates the error that the computation of a witness (the over-approximation of the reachable
+/// states) needs more than `limit` rounds.
 pub(super) fn too_many_rounds(limit: usize) -> Cause {
     Cause::TooMany { what: "rounds in search of a witness".into(), limit }
 }

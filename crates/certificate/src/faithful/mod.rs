@@ -72,7 +72,8 @@ use verdict::Obstacle;
 pub use verdict::{Cause, Difference, Faithful};
 use world::World;
 
-/// Upper limit on the number of iterations when a witness is computed.
+/// Upper limit on the number of iterations when a witness (the over-approximation of the reachable
+/// states) is computed.
 const ROUND_LIMIT: usize = 10_000;
 
 type Result<T> = std::result::Result<T, Obstacle>;
@@ -174,9 +175,9 @@ impl<'f> Files<'f> {
         if (self.stop)() { Err(Cause::Stopped) } else { Ok(()) }
     }
 
-    /// Returns the cases (outcomes under a condition) of an action instance. They cover all its
-    /// executions in states that satisfy the invariant. An empty list proves that the instance is
-    /// executable in no such state.
+    /// Returns the cases (outcomes under a condition) of an action instance. The cases cover all
+    /// executions of the instance in states that satisfy the invariant. An empty list proves that
+    /// the instance is executable in no such state.
     fn cases(&self, instance: &Instance, invariant: &Invariant, axioms: &Axioms) -> Result<Vec<Case>> {
         self.stopped()?;
         if instance.requires.iter().any(|key| !invariant.may_hold(key)) {
@@ -249,8 +250,8 @@ impl<'f> Files<'f> {
         Ok(exclusive::search(&self.world, &may_hold, broken, &moves, self.stop))
     }
 
-    /// Calls `visit` with the effects on mutex groups of each wait, and of each case of each action
-    /// instance that may add an atom.
+    /// Calls `visit` with the effects on mutex groups of each wait, and of those cases (outcomes
+    /// under a condition) of each action instance that may add an atom.
     fn each_move(&self, invariant: &Invariant, axioms: &Axioms, visit: &mut dyn FnMut(Move)) -> Result<()> {
         let structure = &self.names.structure;
         let waits = action::waits(&self.world.timeline, structure)?;

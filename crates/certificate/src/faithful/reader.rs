@@ -202,8 +202,9 @@ impl<'r> Reader<'r> {
     }
 
     /// Calls `visit` for every binding of the variables `bound`, until `visit` returns `false`.
-    /// Bindings under which `within` is false in every state of the witness may be skipped. Returns
-    /// `false` if `visit` did, otherwise `true`. Fails if a size limit is exceeded.
+    /// Bindings under which `within` is false in every state of the witness (the over-approximation
+    /// of the reachable states) may be skipped. Returns `false` if `visit` did, otherwise `true`.
+    /// Fails if a size limit is exceeded.
     pub(super) fn each(
         &mut self,
         bound: &'r [TypedName],
@@ -291,7 +292,8 @@ impl<'r> Reader<'r> {
     }
 
     /// Returns `true` if a derived predicate depends on start effects or on events during the
-    /// action. The facts of the witness then do not apply to this predicate.
+    /// action. The facts of the witness (the over-approximation of the reachable states) then do
+    /// not apply to this predicate.
     pub(super) fn is_touched(&self, symbol: u32) -> bool {
         let touched = self.applied.truths.keys().chain(self.applied.changes.keys());
         self.axioms.depends(symbol, touched.map(|key| key.0))
@@ -459,7 +461,7 @@ impl<'r> Reader<'r> {
 }
 
 /// Returns the condition that a basic (not derived) atom has the given truth value, simplified by
-/// static facts and the witness.
+/// static facts and the witness (the over-approximation of the reachable states).
 pub(super) fn atom(world: &World<'_>, invariant: &Invariant, key: Key, holds: bool) -> Formula {
     if !world.changes(key.0) {
         return Formula::truth(world.holds_initially(&key) == holds);

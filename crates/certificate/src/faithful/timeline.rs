@@ -104,7 +104,8 @@ impl Timeline {
         self.events.get(phase).map(|event| &event.time)
     }
 
-    /// Returns all possible passages of an action with this duration.
+    /// Returns all possible passages of an action with this duration, i.e. its possible positions
+    /// relative to the events.
     pub(super) fn passages(&self, duration: &BigRational) -> Vec<Passage> {
         if self.is_empty() {
             let end = (duration.clone(), false);
@@ -188,15 +189,16 @@ impl Range {
 }
 
 impl Passage {
-    /// Returns the passage of waiting until the event that begins a phase.
+    /// Returns the passage (position relative to the events) of waiting until the event that begins
+    /// a phase.
     pub(super) fn wait(phase: usize, time: &BigRational) -> Self {
         let end = (time.clone(), false);
         Self { from: phase, to: phase, at_start: false, at_end: false, latest: None, end }
     }
 
-    /// Returns the condition on the state and the clock before an action with this passage: the
-    /// phase matches, and the clock is between 0 and the latest start time. Without events, the
-    /// condition is true.
+    /// Returns the condition on the state and the clock before an action with this passage
+    /// (position relative to the events): the phase matches, and the clock is between 0 and the
+    /// latest start time. Without events, the condition is true.
     pub(super) fn condition(&self, timeline: &Timeline) -> Formula {
         if timeline.is_empty() {
             return Formula::truth(true);
@@ -238,8 +240,8 @@ impl Passage {
         (self.at_end && self.to > self.from).then(|| &timeline.events[self.to - 1])
     }
 
-    /// Returns the effects of an action with this passage on the atoms of the phases and on the
-    /// atom `waited`; none if there are no events.
+    /// Returns the effects of an action with this passage (position relative to the events) on the
+    /// atoms of the phases and on the atom `waited`; none if there are no events.
     pub(super) fn truths(&self, timeline: &Timeline) -> Truths {
         if timeline.is_empty() {
             return Truths::new();

@@ -148,8 +148,8 @@ pub(super) struct Translation<'t> {
     /// For each variable, its values whose atoms may hold in the witness (the over-approximation of
     /// the reachable states): value and atom.
     possible: Vec<Vec<(u32, &'t Key)>>,
-    /// For derived variables that are not linked to a derived atom: the formula that replaces the
-    /// variable.
+    /// For each derived variable whose atom is not in `Axioms::linked`: the formula that replaces
+    /// the variable.
     unfolded: BTreeMap<u32, Formula>,
     /// For each derived variable, the bodies of its rules.
     bodies: FxHashMap<u32, Vec<&'t Condition>>,

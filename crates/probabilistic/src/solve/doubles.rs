@@ -13,7 +13,7 @@ use crate::solve::quotient::Quotient;
 use crate::solve::work::{TIGHT, Work};
 
 /// Limits for solving in rationals if the bounds in doubles are insufficient: work units, and
-/// number of blocks.
+/// number of blocks (merged end components).
 const RATIONAL_LIMITS: (u64, usize) = (1_000_000_000, 3000);
 /// Work limit for solving in rationals if the bounds in doubles are finite, and bounds narrower
 /// than [`TIGHT`] are not required.
@@ -81,8 +81,8 @@ pub fn enclosed<N: Number>(
         .or(Some(rounded))
 }
 
-/// Returns `true` if a uniform error of all blocks, as in a certificate, can be tight even for the
-/// least positive value.
+/// Returns `true` if a uniform error of all blocks (merged end components), as in a certificate,
+/// can be tight even for the least positive value.
 fn is_level<N: Number>(quotient: &Quotient<N>, values: &[N], tight: f64) -> bool {
     let values = values.iter().map(Number::to_f64).filter(|value| *value > 0.0);
     let (least, greatest) = values

@@ -19,7 +19,8 @@ use crate::solve::problem::Direction;
 use crate::solve::quotient::Quotient;
 use crate::solve::users::{Users, owners};
 
-/// An almost optimal policy, with the values of the blocks and bounds on their errors.
+/// An almost optimal policy, with the values of the blocks (merged end components) and bounds on
+/// their errors.
 pub struct Enclosed<N> {
     pub policy: Vec<u32>,
     pub values: Vec<N>,
@@ -36,8 +37,8 @@ const INITIAL_SHARE: f64 = 0.45;
 /// Number of sweeps with the rows of a fixed policy between two sweeps over all rows.
 const POLICY_SWEEPS: usize = 25;
 
-/// Computes bounds on the values of all blocks with a width of at most `width` times the value.
-/// Returns `None` if the work limit is exceeded.
+/// Computes bounds on the values of all blocks (merged end components) with a width of at most
+/// `width` times the value. Returns `None` if the work limit is exceeded.
 pub fn enclose<N: Number>(quotient: &Quotient<N>, direction: Direction, width: f64) -> Option<Enclosed<N>> {
     let sorted = Sorted::new(quotient);
     let rows = sorted.rows(quotient, direction);
@@ -45,9 +46,9 @@ pub fn enclose<N: Number>(quotient: &Quotient<N>, direction: Direction, width: f
     Some(rows.enclosed(quotient, &lower, &upper))
 }
 
-/// Computes bounds on the values of all blocks around approximate values `near`. Returns `None` if
-/// the approximate values are not close enough to prove bounds with a width of at most `width`
-/// times the value.
+/// Computes bounds on the values of all blocks (merged end components) around approximate values
+/// `near`. Returns `None` if the approximate values are not close enough to prove bounds with a
+/// width of at most `width` times the value.
 pub fn around<N: Number>(
     quotient: &Quotient<N>,
     near: &[N],
@@ -59,11 +60,12 @@ pub fn around<N: Number>(
     Some(rows.enclosed(quotient, &lower, &upper))
 }
 
-/// The equations in the order in which sweeps evaluate them.
+/// The equations, in the order in which sweeps evaluate them. A *position* is an index of a block
+/// (merged end component) in this order.
 struct Rows<'a, N> {
     direction: Direction,
-    /// The block at each position of the order, and the number of each row in the quotient. `None`
-    /// if the order is that of the quotient.
+    /// For each position in the order, the block; and for each row, its number in the quotient (the
+    /// unsorted equations). `None` if the equations are not sorted.
     sorted: Option<(&'a [u32], &'a [u32])>,
     /// The first row of each position, followed by the number of rows.
     blocks: &'a [u32],
@@ -139,7 +141,7 @@ fn rounding<N: Number>(quotient: &Quotient<N>) -> f64 {
 }
 
 impl<'a, N: Number> Rows<'a, N> {
-    /// Uses the equations in the order of the quotient. States discovered last come first there;
+    /// Uses the equations without sorting them. In this order, states discovered last come first;
     /// they are usually closest to an exit.
     fn of(quotient: &'a Quotient<N>, direction: Direction) -> Self {
         Self {
