@@ -18,8 +18,9 @@ const HEIGHT: f64 = 300.0;
 const TOP: f64 = 24.0;
 /// Height of a row of a distribution, in pixels.
 const ROW: f64 = 46.0;
-/// Distance below which values are stacked, and upper limit on the height of a stack, in pixels.
+/// Distance on the axis below which the dots of values are stacked, in pixels.
 const NEAR: f64 = 6.0;
+/// Upper limit on the height of a stack of dots, in pixels.
 const HIGHEST: f64 = 28.0;
 
 impl Sheet {

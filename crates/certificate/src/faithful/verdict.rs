@@ -10,7 +10,8 @@ pub enum Faithful {
         /// Number of action instances that may be executable in a state of the witness (the
         /// over-approximation of the reachable states).
         instances: usize,
-        /// Number of instances among them that do not change the task state.
+        /// Number of those instances that need no operator, because they do not change the task
+        /// state and cost nothing.
         idle: usize,
         /// Whether plans are measured by duration, because the problem has no metric.
         timed: bool,

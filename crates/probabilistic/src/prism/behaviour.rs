@@ -15,10 +15,11 @@ use crate::prism::model::{Group, Program};
 use crate::prism::run::{Values, enabled};
 use crate::prism::state::{Edit, Packed};
 
-/// Upper limit on the number of actions, because a behaviour stores its disabled actions in a `u128`.
+/// Upper limit on the number of actions of a cached model, because a behaviour (the evaluated
+/// commands of a local state) stores its disabled actions in a `u128`.
 pub const MAX_ACTIONS: usize = 128;
-/// Upper limits on the number of cached behaviours and of cached edits of each module. Further behaviours are
-/// computed on every request.
+/// Upper limits on the number of cached behaviours (evaluated commands of local states) and of
+/// cached edits of each module. Further behaviours are computed on every request.
 const CACHE_LIMITS: [usize; 2] = [1 << 16, 1 << 20];
 /// Cache entry of a local state in which the evaluation of a command fails.
 const FAILED: u32 = u32::MAX - 1;
@@ -30,7 +31,7 @@ pub struct Module<N> {
     /// in `Program::synchronised` for this action.
     pub actions: Vec<(usize, usize)>,
     numbers: Option<Numbers>,
-    /// For each behaviour, the disabled actions as a bit set.
+    /// For each behaviour, the actions of the module that are disabled, as a bit set.
     prevented: Vec<u128>,
     /// For each behaviour: the start of its commands without action, the start of its commands for each action, and
     /// the end of its commands.

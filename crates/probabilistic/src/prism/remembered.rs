@@ -222,7 +222,8 @@ impl<N: Number> Team<N> {
         Self { behaviours: vec![0; modules.len()], modules, actions, prevented: 0 }
     }
 
-    /// Looks up the behaviour of each module in a state. Returns `None` if an evaluation fails.
+    /// Looks up the behaviour (the evaluated commands) of each module in a state. Returns `None` if
+    /// an evaluation fails.
     fn load_state(
         &mut self,
         program: &Program<N>,

@@ -28,7 +28,8 @@ pub struct Enclosed<N> {
     pub errors: Vec<f64>,
 }
 
-/// Upper limit on the number of transitions evaluated for one component.
+/// Upper limit on the work for one strongly connected component: the number of evaluated
+/// transitions and equations.
 const MAX_WORK: u64 = 30_000_000_000;
 /// Number of sweeps for a candidate upper bound; after them, the lower bound is refined.
 const UPPER_SWEEPS: usize = 40;
@@ -177,8 +178,8 @@ impl<'a, N: Number> Rows<'a, N> {
         })
     }
 
-    /// Returns the best row of the block at a position, with its value. Returns [`NONE`] and 0 for
-    /// a block without rows, which is never left.
+    /// Returns the best row (choice) of the block (merged end component) at a position, with its
+    /// value. Returns [`NONE`] and 0 for a block without rows, which is never left.
     #[expect(clippy::arithmetic_side_effects, reason = "the end is listed, too")]
     fn best(&self, position: usize, values: &[f64]) -> (u32, f64) {
         let mut best = (NONE, 0.0);
@@ -338,8 +339,8 @@ fn grow(old: &mut f64, new: f64) -> f64 {
     change
 }
 
-/// Orders the blocks by the number of rows on a shortest path out of the component (breadth-first
-/// search). Blocks without such a path come last.
+/// Orders the blocks (merged end components) by the number of rows on a shortest path out of the
+/// component (breadth-first search). Blocks without such a path come last.
 fn order<N: Number>(quotient: &Quotient<N>) -> Vec<u32> {
     let blocks = quotient.blocks();
     let mut visited = vec![false; blocks];

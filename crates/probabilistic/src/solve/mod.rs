@@ -93,8 +93,8 @@ fn begin<'a, N: Number>(problem: Problem<'a, N>, hint: Option<&'a [u32]>) -> Run
 }
 
 impl<N: Number> Run<'_, N> {
-    /// Solves all components, each after its successors. Returns `None` if exact arithmetic exceeds
-    /// its budget.
+    /// Solves all strongly connected components, each after its successors. Returns `None` if exact
+    /// arithmetic exceeds its budget.
     fn solve_components(&mut self) -> Option<()> {
         let (mut local, mut path_buffers) = (local::Local::new(), ways::PathBuffers::default());
         let problem = self.problem;

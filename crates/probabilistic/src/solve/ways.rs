@@ -11,8 +11,8 @@ use crate::number::{Number, count, is_whole};
 use crate::solve::local::NONE;
 use crate::solve::problem::{Direction, Run};
 
-/// Upper limit on the number of states of a component, because the best open state is found by
-/// linear search.
+/// Upper limit on the number of states of a component that is solved by shortest paths, because the
+/// best open state is found by linear search.
 const MAX_STATES: usize = 64;
 
 /// The working memory of the shortest-path algorithm, reused for all components.
@@ -195,7 +195,9 @@ impl<N: Number> Run<'_, N> {
         self.write(component, buffers);
     }
 
-    /// Evaluates the choices that leave the component, and stores the best one of each state.
+    /// Evaluates the choices that leave the component, and stores the best such choice of each
+    /// state in `buffers`. With `must_be_sure`, only choices that surely lead to a terminal state
+    /// count.
     fn leave(&mut self, component: &[u32], buffers: &mut PathBuffers<N>, must_be_sure: bool) {
         for (from, choice, _) in &buffers.exits {
             let state = component[*from as usize] as usize;
