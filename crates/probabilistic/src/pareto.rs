@@ -207,8 +207,8 @@ impl<'a, N: Number> Pareto<'a, N> {
 
     /// Returns the vertices of the Pareto front, ordered by increasing first loss. Only the choices
     /// in `allowed` are used. The list is empty if a cost is infinite under every policy. Vertices
-    /// are missing if there are more than [`MAX_VERTICES`], or in doubles if they hardly improve on
-    /// their neighbours.
+    /// are missing if there are more than 2,000, or in doubles if they hardly improve on their
+    /// neighbours.
     ///
     /// # Errors
     /// Exact arithmetic exceeds its budget.

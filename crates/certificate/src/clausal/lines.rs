@@ -8,8 +8,8 @@ use crate::clausal::literal::Literal;
 /// next line.
 const LINE_LIMIT: u64 = 1 << 22;
 
-/// Reads a line of at most [`LINE_LIMIT`] bytes into the buffer `line`. Returns the line without
-/// trailing white space, or `None` at the end of the input.
+/// Reads a line of at most 4 MiB into the buffer `line`; the remainder of a longer line is read by
+/// the next call. Returns the line without trailing white space, or `None` at the end of the input.
 ///
 /// # Errors
 /// I/O errors of the input.

@@ -11,7 +11,7 @@ pub enum Faithful {
         /// over-approximation of the reachable states).
         instances: usize,
         /// Number of those instances that need no operator, because they do not change the task
-        /// state and cost nothing.
+        /// state and their cost is not negative.
         idle: usize,
         /// Whether plans are measured by duration, because the problem has no metric.
         timed: bool,

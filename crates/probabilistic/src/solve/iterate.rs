@@ -33,9 +33,9 @@ pub struct Iterated<N> {
     pub relative: Vec<f64>,
 }
 
-/// Performs policy iteration from the policy `start`, which must leave every block with probability
-/// 1. Returns `None` if the chain of a policy cannot be solved within the limits, or if exact
-/// arithmetic exceeds its budget.
+/// Performs policy iteration from the policy `start`, which must lead from every block (merged end
+/// component) out of the component with probability 1. Returns `None` if the chain of a policy
+/// cannot be solved within the limits, or if exact arithmetic exceeds its budget.
 pub fn iterate<N: Number>(
     quotient: &Quotient<N>,
     start: Vec<u32>,
