@@ -370,7 +370,7 @@ fn keeps<N: Number>(loss: &N, limit: &N) -> bool {
     if N::EXACT { loss <= limit } else { loss.to_f64() <= kept_limit(limit.to_f64()) }
 }
 
-/// Returns the limit plus the tolerance that doubles are granted.
+/// Returns the limit on a loss plus the tolerance for rounding errors of doubles.
 fn kept_limit(limit: f64) -> f64 {
     limit + 1e-12 * limit.max(1.0)
 }
@@ -394,9 +394,9 @@ fn above<N: Number>(vertices: &[Point<N>], segment: Option<(usize, usize)>, limi
     bound + 16.0 * f64::EPSILON * (worst(a, 0) + worst(b, 0))
 }
 
-/// Returns the least first loss of a mixture of vertices within the limit. Also returns the indices
-/// of the two mixed vertices, unless a single vertex is optimal. Returns `None` if no vertex
-/// satisfies the limit.
+/// Returns the least value of the first loss over the mixtures of vertices whose second loss is
+/// within the limit. Also returns the indices of the two mixed vertices, unless a single vertex is
+/// optimal. Returns `None` if no vertex satisfies the limit.
 fn lower_hull<N: Number>(vertices: &[Point<N>], limit: &N) -> Option<(N, Option<(usize, usize)>)> {
     // The vertices are ordered by increasing first and decreasing second loss.
     let right = vertices.iter().position(|vertex| keeps(&vertex.losses[1], limit))?;

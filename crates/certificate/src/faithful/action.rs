@@ -1,5 +1,5 @@
-//! Computes the conditions and effects of a ground action (instance) as a list of cases over the
-//! state before it.
+//! Computes the conditions and effects of a ground action (instance) as a list of cases: outcomes,
+//! each under a condition on the state before the action.
 //!
 //! A durative action is one step: its start effects precede the evaluation of its over-all and
 //! at-end conditions and its end effects. An instantaneous action is one happening. With timed

@@ -29,8 +29,8 @@ pub(super) fn axioms(
     }
     bound::add(world, invariant, &mut axioms, stop)?;
     let bodies = bodies(world, invariant, &axioms)?;
-    // After each iteration, `may` and `must` are correct bounds; the next iteration may make each
-    // tighter with the help of the other.
+    // After each iteration, `may` is an upper and `must` a lower bound on the derived atoms that
+    // hold. The next iteration may tighten each bound with the help of the other one.
     loop {
         let may =
             fixpoint(&bodies, |formula, atoms_so_far| possible(world, formula, atoms_so_far, &axioms.must));

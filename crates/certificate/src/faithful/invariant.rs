@@ -249,8 +249,8 @@ impl Invariant {
     }
 }
 
-/// Computes a witness (the over-approximation of the reachable states) by fixpoint iteration with
-/// widening.
+/// The state of computing a witness (the over-approximation of the reachable states) by fixpoint
+/// iteration with widening.
 pub(super) struct Widening {
     pub(super) invariant: Invariant,
     /// For each fluent and end of its interval (`true` for the upper end), the number of times it

@@ -43,8 +43,8 @@ pub use table::{PolicyTable, Row};
 /// default.
 const MAX_EXACT_TRANSITIONS: usize = 150_000;
 
-/// Returns the default budget of exact arithmetic for a model with this number of transitions, in
-/// work units of about 1 ns.
+/// Returns the default budget of exact arithmetic for one property of a model with this number of
+/// transitions, in work units of about 1 ns.
 fn budget(transitions: usize) -> u64 {
     let transitions = u64::try_from(transitions).unwrap_or(u64::MAX);
     transitions.saturating_mul(500).max(3_000_000)

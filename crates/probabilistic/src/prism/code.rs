@@ -17,7 +17,7 @@ pub enum Code {
     Whole(i64),
     /// A number literal that is not an integer literal.
     Number(BigRational),
-    /// The index of a variable.
+    /// A variable, given by its index.
     Variable(u32),
     /// `!`: negation.
     Not(Box<Self>),

@@ -312,7 +312,8 @@ impl<'a, N: Number> Rows<'a, N> {
     }
 
     fn enclosed(&self, quotient: &Quotient<N>, lower: &[f64], upper: &[f64]) -> Enclosed<N> {
-        // The choices that maintain this bound form a policy whose values are within the bounds.
+        // The choices that maintain the upper bound (for a minimum) or the lower bound (for a
+        // maximum) form a policy whose values are within both bounds.
         let maintained = if self.direction == Direction::Min { upper } else { lower };
         let blocks = quotient.blocks();
         let mut result = Enclosed {

@@ -82,7 +82,8 @@ impl<N: Number> Run<'_, N> {
         match (self.problem.rewards.is_some(), by_choice) {
             (false, true) => self.greatest_probability(component, buffers),
             (true, true) => self.least_reward(component, buffers),
-            // From each state, some policy never leaves the component.
+            // The component is strongly connected, so from each state some policy never leaves it.
+            // The greatest expected reward is infinite then.
             (true, false) => component.iter().for_each(|state| {
                 self.solution.infinite.insert(*state as usize);
             }),
