@@ -187,8 +187,8 @@ impl<'a, N: Number> Pareto<'a, N> {
         Ok(Point { losses, errors, policy })
     }
 
-    /// Returns the lexicographic optimum with `first` as the primary objective; `None` if its loss
-    /// is infinite.
+    /// Returns the lexicographic optimum whose primary objective is the one with the index `first`;
+    /// `None` if the loss in this objective is infinite.
     fn extreme(&self, first: usize, allowed: Option<&FixedBitSet>) -> Result<Option<Point<N>>, Exhausted> {
         let unit = |number: usize| {
             let mut weights = [N::zero(), N::zero()];

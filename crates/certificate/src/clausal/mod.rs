@@ -35,7 +35,7 @@ pub use formula::Formula;
 pub use literal::Literal;
 pub use steps::StepBound;
 
-/// Upper limit on the number of literals of a formula.
+/// Upper limit on the number of literals of a formula, and on the number of its variables.
 const LITERAL_LIMIT: usize = 4_000_000;
 /// The input streams of a refutation.
 pub struct Inputs<'i> {

@@ -36,7 +36,9 @@ struct Occurrence<'w> {
     has_distinct_names: bool,
 }
 
-/// Computes the upper bound on the derived atoms and stores it in `axioms.bound`.
+/// Computes an upper bound on the derived atoms that may hold in states of the witness (the
+/// over-approximation of the reachable states), and stores this bound in `axioms.bound`. Fails if
+/// there are too many atoms, or if `stop` returns `true`.
 pub(super) fn add(
     world: &World<'_>,
     invariant: &Invariant,

@@ -22,7 +22,8 @@ pub enum Exactness {
 #[derive(Clone, Default)]
 #[non_exhaustive]
 pub struct Options<'a> {
-    /// Values of the constants that the model leaves undefined, by name.
+    /// Values of constants, by name. Every undefined constant of the model needs a value; the value
+    /// of a defined constant is overridden.
     pub settings: Settings,
     /// Limits of the exploration, such as the number of states.
     pub bounds: Bounds<'a>,
@@ -45,7 +46,8 @@ pub struct Options<'a> {
 }
 
 impl<'a> Options<'a> {
-    /// Sets the values of all undefined constants.
+    /// Sets the values of constants: of all undefined ones, and of defined ones that are to be
+    /// overridden.
     #[must_use]
     pub fn with_settings(self, settings: Settings) -> Self {
         Self { settings, ..self }

@@ -38,7 +38,7 @@ pub fn declare(names: &mut Names, variable: &ast::Variable) -> Result<Variable, 
 }
 
 /// Compiles a command. `writable` returns `true` if the command may assign the variable with this
-/// name. Returns all errors of the command.
+/// name. On failure, returns all errors in the command.
 pub fn compile_command<N: Number>(
     command: &ast::Command,
     names: &mut Names,

@@ -40,7 +40,7 @@ const MAX_DEPTH: usize = 250;
 /// Upper limits on the number of subexpressions: in one top-level expression, and in all expressions together.
 const MAX_PARTS: [usize; 2] = [200_000, 5_000_000];
 
-/// The constants set by the user: values as text, by name.
+/// The values of constants that the user sets, as text, by name. They override values in the model.
 pub type Settings = BTreeMap<String, String>;
 
 impl Names {

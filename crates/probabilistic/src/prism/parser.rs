@@ -145,7 +145,7 @@ pub fn constant_declaration(cursor: &mut Cursor<'_>) -> Read<Constant> {
         },
         _ => None,
     };
-    // The default type is `int`.
+    // Without a type, the constant is an `int`, and no token has to be skipped.
     if kind.is_some() {
         cursor.advance();
     }

@@ -359,7 +359,8 @@ impl<N: Number> Rewards<N> {
         }
     }
 
-    /// Returns the rewards of an action in a state, by computed structure. Returns `None` if an evaluation fails.
+    /// Returns the rewards of an action in a state: one for each reward structure whose rewards are
+    /// computed. Returns `None` if an evaluation fails.
     fn get(&mut self, program: &Program<N>, action: u32, state: &Packed) -> Option<&Sums<N>> {
         let memo = self.named.get_mut(action as usize).unwrap_or(&mut self.unnamed);
         memo.get(state, || program.action_rewards(action, &program.values_of(state)).ok())

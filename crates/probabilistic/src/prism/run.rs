@@ -20,7 +20,7 @@ use crate::prism::state::{Packed, above_least};
 
 /// The values of the variables in a state.
 pub(super) type Values = SmallVec<[i64; 16]>;
-/// The rewards of a state or choice, by computed structure.
+/// The rewards of a state or choice: one for each reward structure whose rewards are computed.
 pub(super) type Sums<N> = SmallVec<[N; 4]>;
 
 /// Upper limit on the number of successors of the synchronised commands of an action in one state,
@@ -274,7 +274,8 @@ impl<N: Number> Program<N> {
         })
     }
 
-    /// Adds the transitions of a command that does not synchronise to the current choice.
+    /// Adds to the current choice the transitions of a command that is executed without other
+    /// modules.
     fn single_command(
         &self,
         command: &Command<N>,
