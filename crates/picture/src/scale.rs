@@ -75,7 +75,8 @@ pub(crate) fn compact(value: f64) -> String {
 
 /// Returns the estimated width of a text, in pixels.
 pub(crate) fn width(text: &str) -> f64 {
-    // Characters of East Asian scripts are about twice as wide as ASCII characters.
+    // Characters of East Asian scripts are about twice as wide as ASCII characters. Every character
+    // outside of ASCII counts as twice as wide, so the estimate is rather too large.
     text.chars().map(|character| if character.is_ascii() { CHARACTER } else { 2.0 * CHARACTER }).sum()
 }
 

@@ -155,7 +155,8 @@ impl<'c> Comparison<'c> {
         let mut reader = Reader::new(self.task.world, self.task.invariant, self.task.axioms);
         let goal = reader.formula(&self.task.world.problem.goal, true)?;
         let task_goal = self.task.condition(&self.task.model.goal, &[], &[]);
-        // No plan ends with a wait operator.
+        // Plans need not end with a wait, so the goal is required only in states that do not follow
+        // a wait.
         let not_waited = Formula::Atom(timeline::waited(), false);
         for known in Known::default()
             .assume(&self.task.names.structure, &Formula::junction([goal, not_waited], true))?

@@ -252,7 +252,8 @@ impl Processes {
                 rounded.run(&Remembered::new(program), bounds, usize::MAX)?;
                 rounded.explored
             }
-            // The exploration in doubles reports the place of the number.
+            // A number is out of range for doubles. The exploration in doubles reports the place of
+            // this number in the model.
             None => explore(&Remembered::new(program), bounds)?,
         };
         Ok(Self { exact: None, doubles: Some(doubles), budget: 0 })

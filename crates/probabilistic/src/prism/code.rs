@@ -277,14 +277,13 @@ fn number_call(function: Function, arguments: &[Code], values: &[i64]) -> Result
             let (base, exponent) = (number(0)?, number(1)?);
             let whole = exponent.is_integer().then(|| exponent.to_i32()).flatten();
             match whole {
-                // Above the size limit, the power is approximated in doubles, as a power with a fractional exponent
-                // is.
                 Some(whole) if whole < 0 && Zero::is_zero(&base) => Err(Fault("a division by zero")),
                 Some(whole)
                     if base.size().saturating_mul(whole.unsigned_abs().into()) <= MAX_OPERAND_BITS =>
                 {
                     Ok(base.pow(whole))
                 }
+                // Other exponents and powers beyond the size limit: the power is approximated in doubles.
                 _ => irrational(Number::to_f64(&base).powf(Number::to_f64(&exponent))),
             }
         }

@@ -118,7 +118,7 @@ impl<N: Number> Program<N> {
                 Err(problem) => problems.push(problem),
             }
         }
-        // Without the missing variables, further errors would be misleading.
+        // Without the variables whose declarations are invalid, further errors would be misleading.
         if !problems.is_empty() {
             return Err(Error::Model(problems.into()));
         }

@@ -57,8 +57,8 @@ pub fn certify<N: Number>(
         });
         return vec![better + rounding];
     }
-    // A smaller threshold gives a smaller w, but leaves less slack for the rows that exceed the
-    // threshold.
+    // A smaller threshold gives a smaller w (see the head of this file), but leaves less slack for
+    // the rows whose loss exceeds the threshold.
     for threshold in [1e-8, 1e-12] {
         let is_near = |block: usize, row: usize| {
             loss(block, row) <= threshold * v[block].max(1e-12) || policy[block] as usize == row

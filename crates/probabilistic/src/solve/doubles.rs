@@ -66,7 +66,8 @@ pub fn enclosed<N: Number>(
     if is_good {
         return Some(rounded);
     }
-    // Wide bounds are improved if that is cheap, or if narrower bounds were requested.
+    // Finite but wide bounds are improved only if that is cheap. More work is done if an error is
+    // infinite, or if narrower bounds than usual were requested.
     let is_usual = tight >= TIGHT && rounded.errors.iter().all(|error| error.is_finite());
     let limit = if is_usual { IMPROVEMENT_LIMIT } else { RATIONAL_LIMITS.0 };
     let exact = (quotient.blocks() <= RATIONAL_LIMITS.1)
