@@ -17,8 +17,9 @@ pub struct Argument {
     pub potentials: Vec<Potential>,
     /// Lower bounds on the value that a numeric variable needs for reaching the goal.
     pub needs: Vec<Need>,
-    /// States that cover (dominate) all reachable states with a cost below the claim. No label is a
-    /// goal state with a smaller cost than claimed.
+    /// States that cover (dominate) every reachable state with a cost below the claim that no
+    /// potential or need prunes. None of these labels is a goal state with a smaller cost than
+    /// claimed.
     pub labels: Vec<Label>,
 }
 
@@ -43,7 +44,8 @@ pub struct Need {
     pub number: u32,
     /// The variables of the pattern, as in [`Potential::pattern`].
     pub pattern: Vec<u32>,
-    /// The bound for each combination of values; ordered as in [`Potential::values`].
+    /// The bound for each combination of values; ordered as in [`Potential::values`]. `null` means
+    /// that no goal state is reachable.
     pub values: Vec<Option<Integer>>,
 }
 

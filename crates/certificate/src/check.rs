@@ -17,6 +17,7 @@ use crate::semantics::{State, holds_without_numbers};
 use crate::table::{Table, check_need, check_potential};
 
 /// Upper limit on the number of non-dominated combinations of designs, summed over all operators.
+/// Operators with equal tables are counted once.
 const CHOICE_LIMIT: usize = 1 << 20;
 /// Upper limit on the number of pairwise comparisons of design combinations, summed over all
 /// operators; about 1 s of work.
@@ -61,13 +62,15 @@ pub enum Fault {
         /// Description of the entry or operator that violates the bound.
         reason: String,
     },
-    /// The initial state is neither covered by a label nor pruned by a bound.
+    /// The initial state is neither covered by a label (state of the proof) nor pruned by a bound.
     #[error("no label covers the initial state")]
     Initial,
-    /// A label is a goal state with a smaller cost than claimed.
+    /// A label (state of the proof), given by its position in the argument, is a goal state with a
+    /// smaller cost than claimed.
     #[error("label {0} is a goal state, and cheaper than claimed")]
     Goal(usize),
-    /// A successor of a label is neither covered by another label nor pruned by a bound.
+    /// A successor of a label (state of the proof) is neither covered by a label nor pruned by a
+    /// bound.
     #[error("label {label}, operator {operator}: nothing covers the state that follows")]
     Successor {
         /// Position of the label in the argument, from 0.
@@ -217,8 +220,8 @@ impl Checker<'_> {
         })
     }
 
-    /// Returns `true` if a label or a lower bound proves that every plan through a state, reached
-    /// at cost `paid`, costs at least the claim.
+    /// Returns `true` if a label (state of the proof) or a lower bound proves that every plan
+    /// through a state, reached at cost `paid`, costs at least the claim.
     fn is_covered(&self, state: &State, paid: &Integer) -> bool {
         let too_expensive = self.potentials.iter().any(|potential| match (potential.at(state), &self.cost) {
             (None, _) => true,
@@ -244,8 +247,8 @@ impl Checker<'_> {
 ///
 /// A combination dominates another one under three conditions. It costs no more, it satisfies every
 /// condition that the other satisfies, and it leaves every number at least as high (equal, if
-/// larger numbers may hurt). A label that covers the successor by the dominating combination then
-/// also covers the successor by the dominated combination.
+/// larger numbers may hurt). A label (state of the proof) that covers the successor by the
+/// dominating combination then also covers the successor by the dominated combination.
 fn choices(model: &Model, monotone: bool) -> Result<Vec<Rc<[Choice]>>, Fault> {
     let mut fronts: FxHashMap<_, Rc<[Choice]>> = FxHashMap::default();
     let mut count = 0_usize;
@@ -316,8 +319,8 @@ fn quantities(operator: &Operator) -> impl Iterator<Item = &Quantity> {
     operator.condition.comparisons.iter().chain(changes).map(|linear| &linear.quantity)
 }
 
-/// Index of the operators by one required fact each; `always` lists the operators without a
-/// required fact.
+/// Index of the operators. `by_fact` lists each operator under one of the facts that it requires;
+/// `always` lists the operators that require no fact.
 struct Index {
     by_fact: FxHashMap<(u32, u32), Vec<usize>>,
     always: Vec<usize>,

@@ -195,7 +195,7 @@ impl std::fmt::Debug for Integer {
     }
 }
 
-/// Serializes a JSON number with all its digits.
+/// Serialises the integer as a JSON number with all its digits.
 impl Serialize for Integer {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match &self.0 {

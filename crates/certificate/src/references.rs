@@ -1,5 +1,6 @@
-//! Checks that a certificate is well-formed. After this check, no index in the documents is out of
-//! range.
+//! Checks that the task and the argument of a certificate are well-formed. After this check, no
+//! index in them is out of range, except indices of objects and of action schemas, which are not
+//! checked.
 
 use crate::argument::Argument;
 use crate::integer::Integer;
@@ -7,7 +8,8 @@ use crate::model::{self, Condition, Exclusion, Fact, Linear, Literal, Model, Ope
 
 type Found = Result<(), String>;
 
-/// Upper limit on the number of design combinations for a list of slots.
+/// Upper limit on the number of design combinations for a list of slots (parameters that are
+/// designs).
 const CHOICE_LIMIT: usize = 1 << 20;
 /// Upper limit on the number of entries of a table in the argument.
 const TABLE_LIMIT: usize = 1 << 22;
@@ -24,7 +26,7 @@ fn are_distinct(numbers: impl Iterator<Item = u32>) -> bool {
     sorted.len() == count
 }
 
-/// Checks all indices and sizes in a task.
+/// Checks the sizes and indices in a task, except indices of objects and of action schemas.
 pub(super) fn task(model: &Model) -> Found {
     let count = model.variables.len();
     require(model.basic <= count, || "more basic variables than variables".into())?;

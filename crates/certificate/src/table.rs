@@ -2,11 +2,14 @@
 //! check that they are lower bounds.
 //!
 //! A potential is a lower bound on the remaining cost under two conditions: it is at most 0
-//! wherever the goal can hold, and no operator decreases it by more than its cost. A need is a
-//! lower bound on the required value of a number under two conditions. Every operator that
-//! decreases the number requires that it stays at least 0, and every other change of the number
-//! occurs only where the need is 0. An operator may require more: `battery >= 5` suffices for a use
-//! of 4.
+//! wherever the goal can hold, and no operator decreases it by more than its cost.
+//!
+//! A need is a lower bound on the required value of a number under three conditions. Wherever the
+//! goal can hold, the need is at most the value that the goal requires. An operator that decreases
+//! the number, and requires that the number stays at least 0, decreases the need by at most the
+//! same amount. Every other change of the number occurs only where the need is 0, or leads from an
+//! infinite need to an infinite one. An operator may require more than it uses: `battery >= 5`
+//! suffices for a use of 4.
 
 use crate::integer::Integer;
 use crate::model::{Conditional, Fact, Linear, Literal, Model, Operator, Quantity};
@@ -162,10 +165,11 @@ pub(super) fn check_potential(model: &Model, table: &Table<'_>) -> Result<(), St
     })
 }
 
-/// The effect of an operator on a number, as far as needs are concerned.
+/// The effect of an operator on a number, as far as it matters for needs (lower bounds on the
+/// number).
 enum Use {
-    /// Decreases the number by at least this amount (≥ 0), and requires that the result is at least
-    /// 0.
+    /// Decreases the number by at least this amount (≥ 0). If the amount can be positive, requires
+    /// that the result is at least 0.
     Lowers(Integer),
     /// Any other effect.
     Other,

@@ -108,7 +108,7 @@ pub struct Progress {
     pub cost: Option<f64>,
     /// Lower bound on the metric value of every plan.
     pub lower_bound: f64,
-    /// Description with both numbers.
+    /// Description that contains the cost and the lower bound.
     pub text: String,
 }
 
@@ -170,7 +170,7 @@ pub struct Report {
     pub description: String,
     /// Differences of the current situation from the mission's files, each in a few words.
     pub situation: Vec<String>,
-    /// The plan without these differences, if there are differences.
+    /// The plan without the differences in `situation`; `None` to show only the current plan.
     pub before: Option<Plan>,
     /// The plan for the current situation.
     pub plan: Plan,

@@ -81,9 +81,9 @@ pub(crate) struct NamePlace {
 /// Ranges of the axes over several plans. Plans that are shown side by side share these ranges, and
 /// so have the same scales.
 pub(crate) struct Span {
-    /// Greatest number of steps of a plan.
+    /// Greatest number of steps over all plans.
     steps: usize,
-    /// Latest end of a plan.
+    /// Latest end over all plans, as a position on the horizontal axis.
     until: f64,
     /// Minimum and maximum of each numeric fluent over all plans, including bounds of conditions.
     values: BTreeMap<String, (f64, f64)>,
@@ -98,7 +98,7 @@ impl Span {
         }
     }
 
-    /// Returns the range of a numeric fluent over all plans.
+    /// Returns the range of a numeric fluent over all plans, or (0, 1) for an unknown fluent.
     pub(crate) fn values(&self, name: &str) -> (f64, f64) {
         self.values.get(name).copied().unwrap_or((0.0, 1.0))
     }

@@ -7,14 +7,16 @@
 
 use std::collections::VecDeque;
 
-/// Upper limit on the number of pairwise distances. Larger maps keep the start layout.
+/// Upper limit on the number of pairwise distances in a connected component. Larger components keep
+/// the start layout.
 const DISTANCES: usize = 4_000_000;
-/// Upper limit on the total work of majorization, in pairs of places.
+/// Upper limit on the total work of majorization for a connected component, in pairs of places.
 const WORK: usize = 30_000_000;
 /// Upper limit on the number of rounds of majorization; after these the layout hardly changes.
 const ROUNDS: usize = 300;
 
-/// Computes coordinates for the places `0..places`, such that ways have a length of about 1.
+/// Computes coordinates for the places `0..places`. Ways have a length of about 1, except in
+/// components that keep the start layout. Ways with an unknown place are ignored.
 pub(crate) fn layout(places: usize, ways: &[(usize, usize)]) -> Vec<(f64, f64)> {
     let mut neighbours = vec![Vec::new(); places];
     for &(one, other) in ways.iter().filter(|(one, other)| one != other && *one.max(other) < places) {
@@ -126,7 +128,7 @@ fn majorized(points: &[(f64, f64)], distances: &[Vec<f64>]) -> Vec<(f64, f64)> {
 }
 
 /// Rotates the points such that their longest extent is horizontal, and mirrors them such that the
-/// first place is at the upper left.
+/// first place is to the left of and above the centre.
 fn turned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let count = points.len() as f64;
     let sum = points.iter().fold((0.0, 0.0), |(x, y), point| (x + point.0, y + point.1));
@@ -153,9 +155,9 @@ fn turned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     turned
 }
 
-/// Separates points that are closer to each other than `same`: they are moved to a ring around
-/// their common position, with a distance of `apart` between neighbours. All other points are
-/// unchanged.
+/// Separates points that nearly coincide. Each point belongs to the first group whose first point
+/// is closer than `same`. The points of a group are moved to a ring around its first point, with a
+/// distance of `apart` between neighbours. Groups of one point are unchanged.
 pub(crate) fn spread(points: &mut [(f64, f64)], same: f64, apart: f64) {
     let mut groups: Vec<((f64, f64), Vec<usize>)> = Vec::new();
     for (index, (x, y)) in points.iter().enumerate() {

@@ -14,18 +14,21 @@ use crate::palette::{Palette, configuration};
 use crate::scale::{px, range, width};
 use crate::svg::Picture;
 
-/// Side margins for the names of places: upper limit in pixels, and fraction of the width.
+/// Upper limit on the side margins for the names of places, in pixels.
 const MARGIN: f64 = 70.0;
+/// The side margins for the names of places, as a fraction of the width of the picture.
 const MARGIN_PART: f64 = 0.12;
 /// Upper and lower margin, in pixels.
 const UPPER_MARGIN: f64 = 35.0;
-/// Minimum height of a map without its margins, and the height to which a map is scaled at most, in
-/// pixels.
+/// Height of a map of a single place without its margins, in pixels.
 const LEAST_HEIGHT: f64 = 60.0;
+/// Height to which a map is scaled at most, unless its places are then too close to each other, in
+/// pixels.
 const HEIGHT: f64 = 420.0;
-/// Upper limits in pixels: on the shortest way, which keeps small maps small, and on the size of a
-/// map that is enlarged to separate its places.
+/// Upper limit on the length of short ways (5 % quantile) in pixels, which keeps small maps small.
 const FARTHEST: f64 = 130.0;
+/// Upper limit on the width and the height of a map that is enlarged to separate its places, in
+/// pixels.
 const LARGEST: f64 = 4_000.0;
 /// Radius of the circle of a place, with its surrounding space.
 const RADIUS: f64 = 7.0;
@@ -34,12 +37,13 @@ const LINE: f64 = 13.0;
 /// Offset of a move from the line of its way, so that moves in opposite directions are drawn side
 /// by side.
 const ASIDE: f64 = 2.5;
-/// Distances from the centre of an arrow to its tip and to its sides.
+/// Distance from the centre of an arrow to its tip, in pixels.
 const TIP: f64 = 7.0;
+/// Distance from the centre of an arrow to its sides, in pixels.
 const SIDE: f64 = 6.0;
 /// Radius of the loop that represents a move to its origin.
 const LOOP: f64 = 10.0;
-/// Distance in pixels below which two places have the same position.
+/// Distance in pixels below which two places count as coinciding, and are separated.
 const SAME: f64 = 2.0;
 /// Minimum margin of a map that contains loops.
 const LOOP_MARGIN: f64 = 58.0;
@@ -228,8 +232,9 @@ fn number(
     choose(places, (limits, &other_lines), taken)
 }
 
-/// Finds positions for the names of places, the most important ones first. Returns `None` for a
-/// name without a free position.
+/// Finds positions for the names of places, in the order of start and goal places, places of the
+/// plan's moves, and other places. Returns for each name the left end of its base line, or `None`
+/// if no position is free.
 fn names(
     map: &Map,
     points: &[Point],

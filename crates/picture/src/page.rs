@@ -1,5 +1,6 @@
 //! The HTML frame of all pages: a self-contained file whose content security policy forbids network
-//! access.
+//! access. Also renders the common elements of pages: pictures for several widths, tables, and
+//! derivations.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -17,7 +18,8 @@ const DIGEST: &str = "sha256-fZ3YNffJKRqSukU6Y8OoyeJ/9kokzwiOieJxn4wpNoc=";
 /// The CSS classes of the columns in which pictures are shown, in the order of [`PAGE`].
 const COLUMNS: [&str; 3] = ["in-wide", "in-half", "in-narrow"];
 
-/// Upper limit on the depth to which derivations are rendered.
+/// Upper limit on the depth to which derivations are rendered. Deeper premises are replaced by an
+/// ellipsis.
 const DEPTH: usize = 24;
 
 /// Renders a complete HTML page.

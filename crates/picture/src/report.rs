@@ -1,4 +1,5 @@
-//! The page about a plan, or about two plans: without and with the differences of a situation.
+//! The page about a plan. If a situation changes the mission (for example a failed component), the
+//! page shows two plans: before and after the change.
 
 use maud::{Markup, html};
 
@@ -36,8 +37,8 @@ impl Report {
         page(&self.name, &self.description, &body)
     }
 
-    /// Renders the pictures of the page as SVG files. Returns for each its file name and its
-    /// contents.
+    /// Renders the pictures of the page as SVG files. Returns for each file its name and its
+    /// contents; pictures of the plan before the change have the prefix `before-`.
     pub fn pictures(&self) -> Vec<(String, String)> {
         let palette = self.palette();
         let before = self.before.iter().map(|plan| ("before-", plan));

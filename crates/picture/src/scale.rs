@@ -58,7 +58,7 @@ pub(crate) fn px(value: f64) -> String {
     number((value * 10.0).round() / 10.0)
 }
 
-/// Formats a number without superfluous zeros, with up to ten digits.
+/// Formats a number without superfluous zeros, rounded to ten significant digits or to an integer.
 pub(crate) fn number(value: f64) -> String {
     let digits = 9 - value.abs().max(1.0).log10().floor() as i32;
     let text = format!("{value:.*}", digits.clamp(0, 9) as usize);
@@ -75,7 +75,8 @@ pub(crate) fn compact(value: f64) -> String {
 
 /// Returns the estimated width of a text, in pixels.
 pub(crate) fn width(text: &str) -> f64 {
-    // Characters of East Asian scripts are about twice as wide as ASCII characters.
+    // Characters of East Asian scripts are about twice as wide as ASCII characters. Every character
+    // outside of ASCII counts as twice as wide, so the estimate is rather too large.
     text.chars().map(|character| if character.is_ascii() { CHARACTER } else { 2.0 * CHARACTER }).sum()
 }
 

@@ -18,8 +18,9 @@ const HEIGHT: f64 = 300.0;
 const TOP: f64 = 24.0;
 /// Height of a row of a distribution, in pixels.
 const ROW: f64 = 46.0;
-/// Distance below which values are stacked, and upper limit on the height of a stack, in pixels.
+/// Distance on the axis below which the dots of values are stacked, in pixels.
 const NEAR: f64 = 6.0;
+/// Upper limit on the height of a stack of dots, in pixels.
 const HIGHEST: f64 = 28.0;
 
 impl Sheet {
@@ -34,7 +35,8 @@ impl Sheet {
         page(&self.name, &self.description, &body)
     }
 
-    /// Renders the plots of the page as SVG files. Returns for each its file name and its contents.
+    /// Renders the plots of the page as SVG files. Returns for each file its name and its contents;
+    /// plans have no files.
     pub fn pictures(&self) -> Vec<(String, String)> {
         let pictures = self.parts.iter().filter_map(|part| match part {
             Part::Points(own) => Some(points(own, FILE)),
@@ -143,7 +145,8 @@ fn points(own: &Points, canvas: Canvas) -> Picture {
 }
 
 /// Finds a free position for the label of a point, above or below the point, and marks it as
-/// occupied. Returns the left end of the base line and the possibly truncated text.
+/// occupied. Returns the left end of the base line and the possibly truncated text, or `None` if no
+/// position is free.
 fn label(
     x: &str,
     y: &str,
@@ -211,7 +214,8 @@ fn rows(own: &Rows, canvas: Canvas) -> Picture {
     Picture { width: canvas.width, height: bottom + 40.0, title: own.title.clone(), description, body }
 }
 
-/// Returns a height in pixels for each value, such that nearby values are stacked.
+/// Returns the height of each value's dot above the base line, in pixels. Dots of nearby values are
+/// stacked.
 fn heights(values: &[(f64, String)], across: &Scale) -> Vec<f64> {
     let mut counts: BTreeMap<i64, usize> = BTreeMap::new();
     let mut place = |(value, _): &(f64, String)| {

@@ -127,7 +127,8 @@ impl Plan {
         line
     }
 
-    /// Draws the start times of the steps and the end time of the last step.
+    /// Draws the start times of the steps and the end time of the last step. A number that would
+    /// touch the previous one is omitted.
     fn ticks(&self, places: &Columns, room: usize) -> String {
         let last = places.last().map(|(index, (_, to))| (*to, self.steps[*index].end));
         let marks = places.iter().map(|(index, (from, _))| (*from, self.steps[*index].start)).chain(last);

@@ -12,8 +12,9 @@ use crate::palette::Palette;
 use crate::scale::{fit, px, width};
 use crate::svg::{Picture, alternative};
 
-/// Height of a row, and height of the bars in it.
+/// Height of a row of a lane, in pixels.
 const ROW: f64 = 26.0;
+/// Height of the bars in a row, in pixels.
 const BAR: f64 = 20.0;
 /// Gap between lanes.
 const GAP: f64 = 8.0;

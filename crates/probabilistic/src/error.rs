@@ -44,7 +44,7 @@ pub enum Error {
     /// An undefined constant has no value, or a value does not match a constant.
     #[error("{0}")]
     Constant(String),
-    /// The model has more states than allowed.
+    /// The model has more states than allowed, or more choices or transitions than can be numbered.
     #[error("more than {limit} states; {states} were reached")]
     StateLimit {
         /// Number of reached states.

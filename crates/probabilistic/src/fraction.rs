@@ -126,9 +126,9 @@ impl Fraction {
     /// Returns numerator divided by denominator, rounded once. Returns `None` if a part may not be
     /// an exact double.
     ///
-    /// The quotient is an integer only if it is exact. For the denominator d, its magnitude is
-    /// below 2^53 / d, so the rounding error is less than 1 / d. A fraction that is not an integer
-    /// differs from every integer by at least 1 / d.
+    /// The quotient is an integer only if no rounding occurs. For the denominator d, the magnitude
+    /// of the quotient is below 2^53 / d, so the rounding error is less than 1 / d. A fraction that
+    /// is not an integer differs from every integer by at least 1 / d.
     #[expect(clippy::cast_precision_loss, reason = "both are at most 2^53")]
     fn quotient(&self) -> Option<f64> {
         match self {

@@ -2,7 +2,8 @@
 //!
 //! Each module becomes an automaton with a single location. Automata synchronise on their common
 //! actions. Labels become transient Boolean variables; reward structures become transient real
-//! variables. Formulas are expanded; names that collide get a prefix.
+//! variables. Formulas are expanded; names of labels and reward structures that collide with other
+//! names get a prefix.
 
 use std::collections::BTreeMap;
 
@@ -90,8 +91,8 @@ fn label_name(model: &Model, name: &str) -> String {
     if is_taken(model, name) { format!("label_{name}") } else { name.to_owned() }
 }
 
-/// Returns the JANI variable name of a reward structure, with the prefix `reward_` if the name is
-/// used already.
+/// Returns the JANI variable name of a reward structure: its name, with the prefix `reward_` if a
+/// variable, constant or label has the same name. A structure without a name is called `reward`.
 fn reward_name(model: &Model, name: &str) -> String {
     let collides = is_taken(model, name) || model.labels.iter().any(|label| label.name == name);
     match name {
@@ -277,7 +278,7 @@ impl Writer<'_> {
     }
 
     /// Returns the variables whose values are determined by conjuncts `variable = value` of a
-    /// condition.
+    /// condition, each with its value.
     fn fixed<'a>(&self, condition: &'a Expr) -> Vec<(&'a str, i64)> {
         parts(condition).into_iter().filter_map(|part| self.fixes(part)).collect()
     }

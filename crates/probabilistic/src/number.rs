@@ -41,7 +41,7 @@ pub trait Number: Clone + Debug + PartialOrd + Send + Sync + 'static {
     /// Converts a rational to the nearest number of this type. A double is integral only if it is
     /// exact: a value that would be rounded to an integer becomes the adjacent double.
     fn from_rational(value: &BigRational) -> Self;
-    /// Converts a double; infinities and NaN become zero.
+    /// Converts a double to this type; infinities and NaN become zero.
     fn from_f64(value: f64) -> Self;
     /// Converts to the nearest double.
     fn to_f64(&self) -> f64;
@@ -177,8 +177,8 @@ pub(crate) fn rounded<N: Number>(value: &BigRational) -> Option<N> {
     (N::EXACT || Zero::is_zero(value) || (1e-250..=1e250).contains(&magnitude)).then_some(number)
 }
 
-/// Parses a decimal such as `1.25e-3` exactly. Returns `None` if the text is not a decimal or is
-/// too long.
+/// Parses a decimal such as `1.25e-3` exactly. Returns `None` if the text is not a decimal, its
+/// mantissa has more than 400 characters, or the magnitude of its exponent exceeds 400.
 pub fn parse_decimal(text: &str) -> Option<BigRational> {
     let (mantissa, exponent) = match text.split_once(['e', 'E']) {
         Some((mantissa, exponent)) => (mantissa, exponent.parse::<i32>().ok()?),

@@ -50,8 +50,9 @@ pub struct Point<N> {
 pub struct Constrained<N> {
     /// The minimum over randomised policies.
     pub randomised: Bounded<N>,
-    /// The minimum over deterministic policies whose memory is the set of reached targets, and
-    /// `true` if it is proved optimal. `None` if no such policy was found.
+    /// The least loss found over deterministic policies whose memory is the set of reached targets,
+    /// and `true` if it is proved to be the minimum. `None` if no such policy within the limit was
+    /// found.
     pub deterministic: Option<(Bounded<N>, bool)>,
 }
 
@@ -84,7 +85,7 @@ pub struct Pareto<'a, N> {
     alone_errors: [f64; 2],
     /// The states in either target, without the blocked states.
     terminal: FixedBitSet,
-    /// The states from which an expected cost is infinite under every policy.
+    /// The states in which an expected cost is still to be paid and is infinite under every policy.
     blocked: FixedBitSet,
     has_costs: bool,
 }
@@ -167,7 +168,8 @@ impl<'a, N: Number> Pareto<'a, N> {
         Ok((solution, optimal_choices))
     }
 
-    /// Computes both losses of a policy in the initial state.
+    /// Computes both losses of a policy from the first initial state on. After the first target is
+    /// reached, the other objective is pursued optimally.
     fn point(&self, policy: Vec<u32>) -> Result<Point<N>, Exhausted> {
         let allowed = choices_of(self.mdp, &policy);
         let unit = [[N::one(), N::zero()], [N::zero(), N::one()]];
@@ -185,8 +187,8 @@ impl<'a, N: Number> Pareto<'a, N> {
         Ok(Point { losses, errors, policy })
     }
 
-    /// Returns the lexicographic optimum with `first` as the primary objective; `None` if its loss
-    /// is infinite.
+    /// Returns the lexicographic optimum whose primary objective is the one with the index `first`;
+    /// `None` if the loss in this objective is infinite.
     fn extreme(&self, first: usize, allowed: Option<&FixedBitSet>) -> Result<Option<Point<N>>, Exhausted> {
         let unit = |number: usize| {
             let mut weights = [N::zero(), N::zero()];
@@ -204,7 +206,9 @@ impl<'a, N: Number> Pareto<'a, N> {
     }
 
     /// Returns the vertices of the Pareto front, ordered by increasing first loss. Only the choices
-    /// in `allowed` are used. The list is empty if a cost is infinite under every policy.
+    /// in `allowed` are used. The list is empty if a cost is infinite under every policy. Vertices
+    /// are missing if there are more than 2,000, or in doubles if they hardly improve on their
+    /// neighbours.
     ///
     /// # Errors
     /// Exact arithmetic exceeds its budget.
@@ -258,8 +262,9 @@ impl<'a, N: Number> Pareto<'a, N> {
         Ok(Some(Constrained { randomised, deterministic }))
     }
 
-    /// Lower bound on the first loss of every randomised policy within the limit. It follows from
-    /// the minimal weighted loss, with the normal of `segment` as weights.
+    /// Lower bound on the first loss of every randomised policy within the limit. The bound follows
+    /// from the minimal weighted loss, with the normal of `segment` as weights. In exact
+    /// arithmetic, returns 0, which is not used.
     fn below(
         &self,
         vertices: &[Point<N>],
@@ -286,8 +291,9 @@ impl<'a, N: Number> Pareto<'a, N> {
 
     /// Searches for the best deterministic policy within the limit, by branch and bound. A node
     /// branches over the choices of a state in which two neighbouring vertices differ. Its lower
-    /// bound is the randomised optimum over its allowed choices. Returns the best policy's loss,
-    /// and `true` if it is proved optimal.
+    /// bound is the randomised optimum over its allowed choices. Returns the loss of the best
+    /// policy found, and `true` if it is proved optimal; `None` if no policy within the limit was
+    /// found. The search ends after [`MAX_BRANCHES`] nodes.
     fn deterministic(&self, limit: &N) -> Result<Option<(Bounded<N>, bool)>, Exhausted> {
         let mut best: Option<Bounded<N>> = None;
         // Lower bound on the first loss in all pruned nodes.
@@ -328,8 +334,8 @@ impl<'a, N: Number> Pareto<'a, N> {
         Ok(best.map(|best| (Bounded { lower: lower.min(best.upper), ..best }, true)))
     }
 
-    /// Returns the first state, in breadth-first order under `policy`, in which the two policies
-    /// choose differently.
+    /// Returns the first state, in breadth-first order under `policy` before a target is reached,
+    /// in which the two policies choose differently. Returns `None` if there is no such state.
     fn difference(&self, policy: &[u32], other: &[u32]) -> Option<usize> {
         let mut visited = FixedBitSet::with_capacity(self.mdp.states());
         let mut queue = VecDeque::from([0]);
@@ -364,7 +370,7 @@ fn keeps<N: Number>(loss: &N, limit: &N) -> bool {
     if N::EXACT { loss <= limit } else { loss.to_f64() <= kept_limit(limit.to_f64()) }
 }
 
-/// Returns the limit plus the tolerance that doubles are granted.
+/// Returns the limit on a loss plus the tolerance for rounding errors of doubles.
 fn kept_limit(limit: f64) -> f64 {
     limit + 1e-12 * limit.max(1.0)
 }
@@ -388,9 +394,9 @@ fn above<N: Number>(vertices: &[Point<N>], segment: Option<(usize, usize)>, limi
     bound + 16.0 * f64::EPSILON * (worst(a, 0) + worst(b, 0))
 }
 
-/// Returns the least first loss of a mixture of vertices within the limit. Also returns the indices
-/// of the two mixed vertices, unless a single vertex is optimal. Returns `None` if no vertex
-/// satisfies the limit.
+/// Returns the least value of the first loss over the mixtures of vertices whose second loss is
+/// within the limit. Also returns the indices of the two mixed vertices, unless a single vertex is
+/// optimal. Returns `None` if no vertex satisfies the limit.
 fn lower_hull<N: Number>(vertices: &[Point<N>], limit: &N) -> Option<(N, Option<(usize, usize)>)> {
     // The vertices are ordered by increasing first and decreasing second loss.
     let right = vertices.iter().position(|vertex| keeps(&vertex.losses[1], limit))?;

@@ -22,9 +22,11 @@ pub fn evaluate<N: Number>(problem: Problem<'_, N>, policy: &[u32]) -> Option<So
     solve(Problem { allowed: Some(&allowed), ..problem }, None)
 }
 
-/// Returns the optimal choices with respect to a solution, in the states of finite value.
+/// Returns the optimal choices with respect to a solution, in the states that have a finite value
+/// and are neither terminal nor blocked.
 ///
-/// In doubles, choices within a tolerance of the optimum count as optimal.
+/// In doubles, choices within a tolerance of the optimum count as optimal. The choices of the
+/// solution's policy always count.
 pub fn conserving<N: Number>(problem: &Problem<'_, N>, solution: &Solution<N>) -> FixedBitSet {
     let mdp = problem.mdp;
     let mut optimal = FixedBitSet::with_capacity(mdp.choice_count());

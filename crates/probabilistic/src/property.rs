@@ -1,4 +1,4 @@
-//! Parses properties in PRISM's syntax.
+//! Parses properties and property files in PRISM's syntax.
 //!
 //! Examples: `Pmax=? [ F "goal" ]`, `P>=0.9 [ !hit U "goal" ]`, `R{"time"}min=? [ F "goal" ]`,
 //! `R{"time"}min=? [ C<=10 ]`, `multi(R{"time"}min=? [ F "goal" ], Pmax=? [ F "safe" ])`,

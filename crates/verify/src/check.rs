@@ -52,22 +52,22 @@ impl<'a> Verifier<'a> {
         Self { mission: mission.into(), ..self }
     }
 
-    /// Sets a time limit, counted from this call, for the checks that may take long (grounding and
-    /// plan). A check that reaches the limit fails.
+    /// Sets a time limit, counted from this call, for the checks of the ground task and of the
+    /// plan. The other checks do not observe it. A check that reaches the limit fails.
     #[must_use]
     pub fn time_limit(self, time: Duration) -> Self {
         Self { until: Instant::now().checked_add(time), ..self }
     }
 
-    /// Sets a function that is polled by the checks that may take long. When `stop` returns `true`,
-    /// the check fails.
+    /// Sets a function that the checks of the ground task and of the plan poll. When `stop` returns
+    /// `true`, the check fails.
     #[must_use]
     pub fn stop(self, stop: impl Fn() -> bool + 'a) -> Self {
         Self { stop: Box::new(stop), ..self }
     }
 
-    /// Verifies all parts. A defect of the certificate is reported as a failed part, not as an
-    /// error.
+    /// Verifies the parts of the certificate. A defect is reported as a failed part, not as an
+    /// error. Parts that cannot be checked because of an earlier defect are omitted.
     pub fn verify(&self) -> Verification {
         let mut report = Verification { claim: None, subject: None, parts: Vec::new() };
         match read(self.directory) {
@@ -96,8 +96,9 @@ impl<'a> Verifier<'a> {
     /// SMT-LIB 2. The proof itself is not checked.
     ///
     /// # Errors
-    /// M121: the certificate cannot be read or its plan is not as claimed, or its task has derived
-    /// variables, for which there are no verification conditions.
+    /// M121: the certificate cannot be read, its ground task is not faithful to its PDDL files, its
+    /// plan is not as claimed, a limit is reached, or its task has derived variables, for which
+    /// there are no verification conditions.
     pub fn conditions(&self) -> Result<String, Errors> {
         conditions(self.directory, &|| self.is_over()).map_err(Errors::from)
     }

@@ -51,8 +51,8 @@ pub(crate) struct KnowledgeFiles<'w> {
 }
 
 /// Replays the derivations, and fills the mission's problem with the inferred facts. The result
-/// must equal `problem`, the problem of the certificate, except for the metric. Returns the results
-/// of both checks.
+/// must equal `problem`, the problem of the certificate, except for the metric; the mission's
+/// domain must equal `domain`. Returns the results of both checks.
 pub(crate) fn check(
     written: &KnowledgeFiles<'_>,
     domain: &Domain,

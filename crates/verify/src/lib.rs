@@ -9,10 +9,10 @@
 //! | `domain.pddl`, `problem.pddl` | the planned files, with availability and values filled in |
 //! | `plan.txt` | the plan; absent if no plan exists |
 //! | `knowledge.nt`, `origin.json` | the knowledge base, rules, bindings, and the changes since they were read; absent without a knowledge base |
-//! | `derivations.json` | all inferred facts, each with the rule, its bindings and its supports; absent without a knowledge base |
+//! | `derivations.json` | all facts, the inferred ones with the rule, its bindings and its supports; absent without a knowledge base |
 //! | `task.json` | the ground task |
-//! | `witness.json` | the reachable atoms and the ranges of numbers: the reason why other instances of actions need no operator |
-//! | `formula.cnf`, `legend.txt`, `proof.drat`, `hints.txt` | for small tasks: the formula "some plan of at most T steps is cheaper" in DIMACS, the meaning of its variables, its refutation, the antecedents of each line of the refutation |
+//! | `witness.json` | the witness, an over-approximation of the reachable states (possible atoms and ranges of numbers): the reason why other instances of actions need no operator |
+//! | `formula.cnf`, `legend.txt`, `proof.drat`, `hints.txt` | for small tasks: the formula "some plan of at most T steps is cheaper" in DIMACS, the meaning of its variables, its refutation, the antecedents (numbers of clauses) of each line of the refutation |
 //! | `argument.json` | the proof that no plan is cheaper: labels, potentials, needs (see `metaplan-certificate`) |
 //!
 //! Absent: planner code. The crate links none.

@@ -61,7 +61,8 @@ fn main() -> ExitCode {
     })
 }
 
-/// Verifies the certificate under the limits on time and memory.
+/// Verifies the certificate under the limits on time and memory. With `--smt`, writes the
+/// verification conditions first.
 fn run(arguments: &Arguments) -> Result<Verification, Errors> {
     let Arguments { directory, format, smt, time_limit } = arguments.clone();
     let watch = Watch::start(time_limit, move |report| std::process::exit(show(report, format).into()));

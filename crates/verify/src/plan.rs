@@ -54,7 +54,8 @@ pub fn plan(
     Ok((format!("{steps} step{ending}, valid, metric {claimed}"), value))
 }
 
-/// Returns `true` if an action of this name has a duration that its constraints leave open.
+/// Returns `true` if a durative action of this name has duration constraints other than a single
+/// equation.
 fn is_chosen(domain: &Domain, name: &Name) -> bool {
     let mut bodies =
         domain.actions.iter().filter(|action| action.identifier.name == *name).map(|action| &action.body);

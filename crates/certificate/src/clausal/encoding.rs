@@ -7,8 +7,9 @@ use crate::clausal::timeline::Timeline;
 use crate::integer::Integer;
 use crate::model::Model;
 
-/// Encodes that some plan of at most `steps` steps costs less than `cost`. Returns the reason if
-/// the task has an unsupported construct or the formula exceeds `limit` literals.
+/// Encodes that some plan of at most `steps` steps costs less than `cost`. Returns an error if the
+/// task has an unsupported construct, `cost` is not positive, or the formula exceeds `limit`
+/// literals.
 pub(super) fn encode(model: &Model, cost: &Integer, steps: usize, limit: usize) -> Result<Formula, String> {
     if !model.axioms.is_empty() {
         return Err("derived predicates are not covered".into());

@@ -4,10 +4,12 @@ use std::io::{BufRead, Read};
 
 use crate::clausal::literal::Literal;
 
-/// Upper limit on the length of a line, in bytes.
+/// Upper limit on the length of a line, in bytes. The remainder of a longer line is read as the
+/// next line.
 const LINE_LIMIT: u64 = 1 << 22;
 
-/// Reads a line without its line feed into a buffer. Returns `None` at the end of the input.
+/// Reads a line of at most 4 MiB into the buffer `line`; the remainder of a longer line is read by
+/// the next call. Returns the line without trailing white space, or `None` at the end of the input.
 ///
 /// # Errors
 /// I/O errors of the input.
@@ -17,8 +19,8 @@ pub fn read<'l>(input: &mut dyn BufRead, line: &'l mut Vec<u8>) -> std::io::Resu
     Ok((!line.is_empty()).then(|| line.trim_ascii_end()))
 }
 
-/// Parses a line of literals in the DIMACS syntax. Returns `None` if the line is malformed or has a
-/// variable above `variables`.
+/// Parses a line of literals in the DIMACS syntax to `literals`, without the final 0. Returns
+/// `None` if the line is malformed or has a variable above `variables`.
 pub fn literals(line: &[u8], variables: usize, literals: &mut Vec<Literal>) -> Option<()> {
     literals.clear();
     numbers(line, variables, &mut |negative, variable| {
@@ -28,8 +30,8 @@ pub fn literals(line: &[u8], variables: usize, literals: &mut Vec<Literal>) -> O
     })
 }
 
-/// Parses a line of clause numbers from 1 to `clauses`, and converts them to indices from 0.
-/// Returns `None` if the line is malformed or a number is out of range.
+/// Parses a line of clause numbers from 1 to `clauses`, and stores them in `places` as indices from
+/// 0. Returns `None` if the line is malformed or a number is out of range.
 pub(crate) fn places(line: &[u8], clauses: usize, places: &mut Vec<usize>) -> Option<()> {
     places.clear();
     numbers(line, clauses, &mut |negative, number| {
@@ -62,7 +64,7 @@ fn numbers(line: &[u8], limit: usize, visit: &mut dyn FnMut(bool, usize) -> Opti
     }
 }
 
-/// Formats numbers as a line that ends with 0 and a line feed.
+/// Replaces `line` by the numbers, followed by 0 and a line feed.
 pub fn format(line: &mut Vec<u8>, numbers: impl Iterator<Item = i32>) {
     line.clear();
     let mut digits = itoa::Buffer::new();

@@ -35,7 +35,7 @@ pub use formula::Formula;
 pub use literal::Literal;
 pub use steps::StepBound;
 
-/// Upper limit on the number of literals of a formula.
+/// Upper limit on the number of literals of a formula, and on the number of its variables.
 const LITERAL_LIMIT: usize = 4_000_000;
 /// The input streams of a refutation.
 pub struct Inputs<'i> {
@@ -55,7 +55,8 @@ pub struct Inputs<'i> {
 /// plan is cheaper. Returns the formula and T. The claim is interpreted as in [`crate::check`].
 ///
 /// # Errors
-/// An unsupported construct, no provable bound on the number of steps, or an exceeded limit.
+/// A malformed document, a missing claim, an unsupported construct, no provable bound on the number
+/// of steps, or an exceeded limit.
 pub fn formula(
     (task, argument): (&str, &str),
     claim: Option<&BigRational>,

@@ -14,21 +14,23 @@ use crate::table::Table;
 /// The lower bound on the cost of a plan with more than T steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StepBound {
-    /// The cost of the first T + 1 steps alone. T then does not depend on the values of a
-    /// potential.
+    /// The cost of the first T + 1 steps alone. T then does not depend on the values of a potential
+    /// (table of lower bounds on the remaining cost).
     Spent,
-    /// The cost of the first T + 1 steps plus the potential, which gives a smaller T and a smaller
-    /// formula.
+    /// The cost of the first T + 1 steps plus the potential (lower bound on the remaining cost),
+    /// which gives a smaller T and a smaller formula.
     Potential,
 }
 
 /// Upper limit on the number of steps that a formula encodes.
 const STEP_LIMIT: usize = 64;
-/// Upper limit on the number of transitions between the rows of a potential.
+/// Upper limit on the number of transitions between the rows of a potential (table of lower bounds
+/// on the remaining cost). Potentials with more are not used.
 const EDGE_LIMIT: usize = 1 << 22;
 
-/// Returns the least number of steps T, over all potentials, such that no plan of more than T steps
-/// costs less than `cost`. Returns an error if there is no such T within the limit.
+/// Returns the least number of steps T for which the lower bound `by`, with one of the potentials,
+/// proves that no plan of more than T steps costs less than `cost`. Returns an error if there is no
+/// such T up to [`STEP_LIMIT`].
 pub(super) fn bound(
     model: &Model,
     argument: &Argument,
@@ -47,8 +49,8 @@ pub(super) fn bound(
     bounds.min().ok_or_else(|| format!("a cheaper plan may have more than {STEP_LIMIT} steps"))
 }
 
-/// Checks that no plan of more than `steps` steps costs less than `cost`. Returns the position of a
-/// potential that proves it.
+/// Checks by [`StepBound::Potential`] that no plan of more than `steps` steps costs less than
+/// `cost`. Returns the position of a potential that proves it.
 pub(super) fn check(
     model: &Model,
     argument: &Argument,
@@ -68,8 +70,8 @@ pub(super) fn check(
     position.ok_or_else(|| format!("a cheaper plan may have more than {steps} steps"))
 }
 
-/// For each row of a potential, the minimal cost of reaching it in exactly k steps (Bellman-Ford
-/// layers).
+/// For each row of a potential (table of lower bounds on the remaining cost), the minimal cost of
+/// reaching this row in exactly k steps (Bellman-Ford layers).
 struct Layers<'l> {
     table: &'l Table<'l>,
     /// The transitions between rows: (source row, target row, minimal cost).
@@ -127,8 +129,9 @@ impl<'l> Layers<'l> {
         self.costs.iter().flatten().min().cloned()
     }
 
-    /// Returns the minimal sum of the cost of the first k steps and the potential, or `None` if no
-    /// such state can reach the goal.
+    /// Returns the minimal sum, over all rows, of the cost of the first k steps and the potential
+    /// (lower bound on the remaining cost). Returns `None` if no row that is reachable in k steps
+    /// can reach the goal.
     fn least(&self) -> Option<Integer> {
         let rows = self.costs.iter().enumerate();
         rows.filter_map(|(row, cost)| Some(cost.as_ref()? + self.table.at_row(row)?)).min()

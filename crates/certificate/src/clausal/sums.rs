@@ -43,14 +43,14 @@ fn change(operator: &Operator, number: u32) -> Result<Option<Change<'_>>, String
     }
 }
 
-/// Iterates over all numeric comparisons in the conditions and the goal of a task.
+/// Iterates over the numeric comparisons in the conditions of all operators and in the goal.
 fn comparisons(model: &Model) -> impl Iterator<Item = &Linear> {
     let conditions = model.operators.iter().map(|operator| &operator.condition).chain([&model.goal]);
     conditions.flat_map(|condition| &condition.comparisons)
 }
 
-/// Returns the number of bits that a numeric variable needs, including its values after `steps`
-/// steps and the sums in its comparisons.
+/// Returns a number of bits that suffices for a numeric variable: for its values after up to
+/// `steps` steps, and for the sums in comparisons that contain it.
 fn number_width(model: &Model, number: u32, steps: usize) -> Result<usize, String> {
     let initial = &model.numbers[number as usize];
     let (mut least, mut greatest) = (initial.clone(), initial.clone());
@@ -183,8 +183,8 @@ fn compare(
     }
 }
 
-/// Key that identifies a table with its use: the index of the operator's slots, the slots that
-/// select the row, and the table.
+/// A use of a table: the index of an operator's list of slots ([`Model::uses`]), the slots that
+/// select the row, and the index of the table.
 type Kind<'k> = (u32, &'k [u32], u32);
 
 struct Adder<'a> {
@@ -194,7 +194,8 @@ struct Adder<'a> {
 }
 
 impl Adder<'_> {
-    /// Encodes a numeric variable after the step, given its bits before the step.
+    /// Encodes the value of a numeric variable after the step, given its bits before the step.
+    /// Returns its bits after the step.
     fn change(&mut self, formula: &mut Formula, before: &Bits, number: u32) -> Result<Bits, String> {
         let changes: Vec<Option<Change<'_>>> =
             self.model.operators.iter().map(|operator| change(operator, number)).collect::<Result<_, _>>()?;
@@ -227,7 +228,9 @@ impl Adder<'_> {
         Ok(self.sum(formula, &base, &parts, &name))
     }
 
-    /// Encodes comparisons that involve tables: each one as a sum that must not be negative.
+    /// Encodes the operators' comparisons that contain tables, as sums that must not be negative. A
+    /// comparison that equals a change of its operator is omitted, because the sign bit of the
+    /// changed number is tested instead (see [`Sums::advance`]).
     fn tests(&mut self, formula: &mut Formula, before: &[Bits]) {
         let table_comparisons = |operator: &Operator, number: u32| -> Vec<Linear> {
             let linear_conditions = operator.condition.comparisons.iter().filter(|linear| {
@@ -254,8 +257,8 @@ impl Adder<'_> {
         }
     }
 
-    /// Encodes `base` plus the quantity that the operator of this step adds. `parts` contains the
-    /// quantity of each operator.
+    /// Encodes `base` plus the quantity that the operator of this step adds, and returns the bits
+    /// of the sum. `parts` contains the quantity of each operator; `None` adds nothing.
     fn sum(&mut self, formula: &mut Formula, base: &Bits, parts: &[Option<&Quantity>], name: &str) -> Bits {
         let step = self.step;
         let constants = parts.iter().map(|part| part.map_or(&Integer::ZERO, |quantity| &quantity.constant));

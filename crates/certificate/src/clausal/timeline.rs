@@ -19,7 +19,8 @@ pub(super) struct Timeline {
     /// For each operator, the literal that it is the operator of the latest step.
     pub(super) operators: Vec<Literal>,
     pub(super) idle: Option<Literal>,
-    /// For each slot and design, the literal that this design is chosen at the latest step.
+    /// For each slot (parameter that is a design) and each of its designs, the literal that this
+    /// design is chosen at the latest step.
     pub(super) chosen: Vec<Vec<Literal>>,
 }
 
@@ -97,8 +98,8 @@ impl Timeline {
         if *positive { literal } else { -literal }
     }
 
-    /// Encodes that the operator of the step has a suitable design in each of its slots, and that
-    /// the combination of designs is not excluded.
+    /// Encodes that the operator of the step has a suitable design in each of its slots (parameters
+    /// that are designs), and that the combination of designs is not excluded.
     fn choose(&mut self, model: &Model, formula: &mut Formula, number: usize) {
         self.chosen = Vec::new();
         for (slot, designs) in model.slots.iter().enumerate() {

@@ -1,5 +1,5 @@
-//! Computes the conditions and effects of a ground action (instance) as a list of cases over the
-//! state before it.
+//! Computes the conditions and effects of a ground action (instance) as a list of cases: outcomes,
+//! each under a condition on the state before the action.
 //!
 //! A durative action is one step: its start effects precede the evaluation of its over-all and
 //! at-end conditions and its end effects. An instantaneous action is one happening. With timed
@@ -26,7 +26,8 @@ use pddl::ast::{
     Expression,
 };
 
-/// Returns the cases of waiting until an event, for each event that has not happened initially.
+/// Returns the cases (outcomes under a condition) of waiting until the next event, for each event
+/// after time 0.
 #[expect(clippy::arithmetic_side_effects, reason = "the place of an event that is held in memory")]
 pub(super) fn waits(timeline: &Timeline, structure: &Structure) -> Result<Vec<Case>, Cause> {
     let mut cases = Vec::new();
@@ -53,8 +54,10 @@ pub(super) fn waits(timeline: &Timeline, structure: &Structure) -> Result<Vec<Ca
 /// The new values of numeric fluents.
 type Changes = BTreeMap<Key, Linear>;
 
-/// Returns the cases in which an action instance may be executable in a state that satisfies the
-/// reader's invariant. The reader contains the binding of the action's parameters.
+/// Returns the cases of an action instance: conditions on the state before it, each with the
+/// effects under this condition. Together they cover all executions in states of the witness (the
+/// over-approximation of the reachable states). `reader` contains the witness and the binding of
+/// the action's parameters.
 pub(super) fn cases<'r>(
     mut reader: Reader<'r>,
     structure: &Structure,
@@ -94,8 +97,8 @@ pub(super) fn cases<'r>(
     }
 }
 
-/// Returns the conjunction of a condition and two additional ones. Borrows `condition` if both
-/// others are true, the most frequent case.
+/// Returns the conjunction of a condition and two additional ones. Usually both additional
+/// conditions are true; the result then borrows `condition`.
 fn all_of(condition: &Formula, additional: [Formula; 2]) -> Cow<'_, Formula> {
     if additional.iter().all(|extra| extra.is(true)) {
         return Cow::Borrowed(condition);
@@ -136,8 +139,8 @@ impl<'r> Durative<'r> {
         )
     }
 
-    /// Returns the cases of an action with duration 0: start and end are one happening, and
-    /// over-all conditions apply to no state.
+    /// Returns the cases (outcomes under a condition) of an action with duration 0: start and end
+    /// are one happening, and over-all conditions apply to no state.
     fn at_once(&self, mut reader: Reader<'r>, structure: &Structure) -> Result<Vec<Case>, Cause> {
         let mut ends = Vec::new();
         for (condition, effect) in
@@ -210,8 +213,9 @@ impl<'r> Durative<'r> {
         Ok(cases)
     }
 
-    /// Returns the cases after the start effects: considers the events during the action, the
-    /// over-all conditions, and the end.
+    /// Returns the cases (outcomes under a condition) of a durative action whose start effects are
+    /// stored in `reader.applied`. Considers the events during the action, the over-all conditions,
+    /// and the end. `known` are the facts and comparisons that hold before the action.
     fn after_start(
         &self,
         reader: &mut Reader<'r>,
@@ -297,14 +301,16 @@ impl<'r> Reader<'r> {
 }
 
 impl Moment {
-    /// Returns the condition that no effect contradicts an event at the same time.
+    /// Returns the condition that no effect on an atom contradicts a simultaneous event; true if
+    /// there is no event.
     fn leaves(&self, event: Option<&Event>) -> Formula {
         let Some(event) = event else { return Formula::truth(true) };
         let opposite = self.atoms.iter().filter(|(_, key, holds)| event.truths.get(key) == Some(&!holds));
         Formula::junction(opposite.map(|(guard, ..)| guard.negated()), true)
     }
 
-    /// Returns the truth values of the affected atoms, if `known` decides all guards.
+    /// Returns the new truth values of the atoms that the active effects add or delete. `known`
+    /// must decide all guards (conditions of effects).
     fn truths(&self, structure: &Structure, known: &Known) -> BTreeMap<Key, bool> {
         let active = |guard: &Formula| known.decide(structure, guard) == Some(true);
         let mut truths = BTreeMap::new();
@@ -318,7 +324,8 @@ impl Moment {
         truths
     }
 
-    /// Returns the cases of the last happening of an instance, after the start effects `applied`.
+    /// Returns the cases (outcomes under a condition) of an action instance whose last happening
+    /// has these effects. `applied` contains the changes by the start of the action and by events.
     fn last(
         &self,
         structure: &Structure,
@@ -339,9 +346,10 @@ impl Moment {
         Ok(cases)
     }
 
-    /// Returns the new values of numeric fluents, if `known` decides all guards, with the cases in
-    /// which they are consistent. The result is empty if active effects contradict each other or
-    /// are undefined.
+    /// Returns the new values of the numeric fluents. `known` must decide all guards (conditions of
+    /// effects). Each result extends `known` by the assumption that several values assigned to one
+    /// fluent are equal. The result is empty if active effects contradict each other or are
+    /// undefined.
     fn numbers(
         &self,
         structure: &Structure,
@@ -369,8 +377,9 @@ impl Moment {
     }
 }
 
-/// Combines simultaneous effects on one number. Returns `None` if they contradict each other. If
-/// several values are assigned, their equality is appended to `equations`.
+/// Returns the value of a number after simultaneous effects, given the value `before`. Returns
+/// `None` if the effects contradict each other or divide by zero. If several values are assigned,
+/// their equality is appended to `equations`.
 fn together(
     before: Linear,
     effects: &[(Assignment, &Linear)],

@@ -8,14 +8,16 @@ use crate::faithful::relation::Relation;
 
 #[derive(Debug, Default)]
 pub(super) struct Axioms {
-    /// The derived atoms that may hold in a state of the witness.
+    /// The derived atoms that may hold in a state of the witness (the over-approximation of the
+    /// reachable states).
     pub(super) may: FxHashSet<Key>,
-    /// The derived atoms that hold in every state of the witness.
+    /// The derived atoms that hold in every state of the witness (the over-approximation of the
+    /// reachable states).
     pub(super) must: FxHashSet<Key>,
     /// A superset of `may`, from which the candidate objects of variables are taken.
     pub(super) bound: Relation,
-    /// The derived atoms with circular dependencies that are variables of the task. Every other
-    /// derived atom is replaced by its rules.
+    /// The derived atoms on dependency cycles or between cycles that are variables of the task.
+    /// Every other derived atom is replaced by its rules.
     pub(super) linked: FxHashSet<Key>,
     /// For each derived predicate, the predicates and functions in its rules.
     pub(super) reads: FxHashMap<u32, FxHashSet<u32>>,
@@ -23,7 +25,7 @@ pub(super) struct Axioms {
 
 impl Axioms {
     /// Returns the truth value of a derived atom if the atom has the same value in all states of
-    /// the witness.
+    /// the witness (the over-approximation of the reachable states).
     pub(super) fn known(&self, key: &Key) -> Option<bool> {
         match (self.must.contains(key), self.may.contains(key)) {
             (true, _) => Some(true),

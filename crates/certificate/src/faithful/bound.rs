@@ -1,6 +1,7 @@
-//! Computes an upper bound on the derived atoms that may hold in states of the witness, as the
-//! least fixpoint of relaxed rules. Relaxed conditions consist of positive derived atoms, literals
-//! over other atoms, and equalities; all other conditions are assumed to hold.
+//! Computes an upper bound on the derived atoms that may hold in states of the witness (the
+//! over-approximation of the reachable states), as the least fixpoint of relaxed rules. Relaxed
+//! conditions consist of positive derived atoms, literals over other atoms, and equalities; all
+//! other conditions are assumed to hold.
 //!
 //! Evaluation is semi-naive: each new atom is used once in each rule position that reads it.
 
@@ -19,7 +20,8 @@ use pddl::ast::{Atom, Condition, Derived, Name, Term, TypedName};
 /// Upper limit on the number of derived atoms.
 const ATOM_LIMIT: usize = 50_000;
 
-/// Upper limit on the number of conjuncts around an atom that are used for candidates.
+/// Upper limit on the number of conjuncts around an atom that are used to restrict the candidate
+/// objects of variables.
 const CONJUNCT_LIMIT: usize = 64;
 
 /// A positive occurrence of a derived atom in the condition of a rule.
@@ -34,7 +36,9 @@ struct Occurrence<'w> {
     has_distinct_names: bool,
 }
 
-/// Computes the upper bound on the derived atoms and stores it in `axioms.bound`.
+/// Computes an upper bound on the derived atoms that may hold in states of the witness (the
+/// over-approximation of the reachable states), and stores this bound in `axioms.bound`. Fails if
+/// there are too many atoms, or if `stop` returns `true`.
 pub(super) fn add(
     world: &World<'_>,
     invariant: &Invariant,
@@ -83,6 +87,8 @@ fn too_many() -> Cause {
 }
 
 /// Collects the positive occurrences of derived atoms in the condition of a rule, by predicate.
+/// Occurrences inside negations, implications and universal quantifiers are omitted, because these
+/// conditions are assumed to hold.
 fn collect<'w>(
     world: &World<'w>,
     rule: &'w Derived,
@@ -120,8 +126,8 @@ fn has_distinct_names(rule: &Derived, variables: &[&TypedName]) -> bool {
     variables_in_scope.into_iter().all(|variable| names.insert(&variable.identifier.name))
 }
 
-/// Returns the heads of all instances of a rule whose conditions are possible and which are not in
-/// the bound yet.
+/// Returns the heads of all instances of a rule whose conditions are possible, except heads that
+/// are already in `axioms.bound`.
 fn all_heads(
     world: &World<'_>,
     invariant: &Invariant,
@@ -144,8 +150,8 @@ fn all_heads(
 }
 
 impl Occurrence<'_> {
-    /// Returns the new heads that become possible if the derived atom `key` matches this
-    /// occurrence.
+    /// Returns the heads of rule instances in which the derived atom `key` matches this occurrence
+    /// and whose conditions are possible, except heads that are already in `axioms.bound`.
     fn heads(
         &self,
         world: &World<'_>,
@@ -199,7 +205,7 @@ impl Occurrence<'_> {
     }
 
     /// Binds the variables of the atom to the objects of `key`. Returns `false` if the atom does
-    /// not match `key`.
+    /// not match `key`; some variables may be bound then.
     fn unify<'r>(&'r self, reader: &mut Reader<'r>, key: &Key) -> bool {
         let typed = || self.rule.head.parameters.iter().chain(self.variables.iter().copied());
         self.atom.arguments.len() == key.1.len()
@@ -217,8 +223,10 @@ impl Occurrence<'_> {
 }
 
 impl<'r> Reader<'r> {
-    /// Returns `false` if a condition holds in no state of the witness. Implications, universal
-    /// conditions, comparisons and negated compound conditions are assumed to be possible.
+    /// Returns `false` only if a condition holds in no state of the witness (the over-approximation
+    /// of the reachable states) in which at most the derived atoms of `axioms.bound` hold.
+    /// Implications, universal conditions, comparisons and negated compound conditions are assumed
+    /// to be possible.
     fn is_possible(&mut self, condition: &'r Condition) -> Result<bool, Cause> {
         self.count()?;
         match condition {

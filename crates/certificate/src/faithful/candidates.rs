@@ -1,20 +1,21 @@
 //! Candidate objects of a quantified variable in a condition. A candidate is admitted by an
-//! equality, a static fact, an atom of the witness, or a possible derived atom. With any other
-//! object, the condition is false in every state of the witness.
+//! equality, a static fact, an atom of the witness (the over-approximation of the reachable
+//! states), or a possible derived atom. With any other object, the condition is false in every
+//! state of the witness.
 
 use std::collections::BTreeSet;
 
 use crate::faithful::reader::Reader;
 use pddl::ast::{Atom, Condition, Name, Term, TypedName};
 
-/// A conjunct is skipped if it has more rows than this factor times the number of candidates found
-/// so far.
+/// A conjunct is skipped if it has more rows (possible facts) than about this factor times the
+/// number of candidates found so far.
 const WORTHWHILE: usize = 16;
 
 impl Reader<'_> {
-    /// Returns the candidates of the first variable in `bound` under the condition `within`.
-    /// Returns all objects of its type if there is no condition, or if the condition does not
-    /// restrict the variable.
+    /// Returns the candidate objects of the first variable in `bound` under the condition `within`;
+    /// none if `bound` is empty. Returns all objects of its type if there is no condition, or if
+    /// the condition does not restrict the variable.
     pub(super) fn candidates(&self, bound: &[TypedName], within: Option<&Condition>) -> Vec<u32> {
         let Some(first) = bound.first() else { return Vec::new() };
         let hidden: Vec<&Name> = bound.iter().map(|variable| &variable.identifier.name).collect();
@@ -26,8 +27,8 @@ impl Reader<'_> {
         }
     }
 
-    /// Returns the candidates of a variable in a conjunction. Returns all objects of its type if no
-    /// conjunct restricts the variable.
+    /// Returns the candidate objects of a variable in a conjunction. Returns all objects of its
+    /// type if no conjunct restricts the variable.
     pub(super) fn candidates_where(&self, variable: &TypedName, conditions: &[&Condition]) -> Vec<u32> {
         match self.restricted_by_all(&variable.identifier.name, conditions.iter().copied(), &[]) {
             Some(objects) => {
@@ -61,8 +62,9 @@ impl Reader<'_> {
         best
     }
 
-    /// Returns the candidates of a variable in a condition, or `None` if the condition does not
-    /// restrict the variable. The variables in `hidden` have no value yet.
+    /// Returns the candidate objects of a variable in a condition, or `None` if the condition does
+    /// not restrict the variable. The variables in `hidden` count as unbound: a quantifier hides
+    /// their outer values.
     fn restricted(&self, name: &Name, condition: &Condition, hidden: &[&Name]) -> Option<BTreeSet<u32>> {
         match condition {
             Condition::And(parts) => self.restricted_by_all(name, parts.iter(), hidden),
@@ -88,7 +90,8 @@ impl Reader<'_> {
         }
     }
 
-    /// Returns an upper bound on the number of rows that [`Reader::restricted`] visits.
+    /// Returns an upper bound on the number of rows (possible facts) that [`Reader::restricted`]
+    /// visits; `usize::MAX` if the number is not estimated.
     fn size(&self, name: &Name, condition: &Condition, hidden: &[&Name]) -> usize {
         match condition {
             Condition::Equal(..) => 1,
@@ -129,7 +132,9 @@ impl Reader<'_> {
         if !self.world.changes(symbol) {
             return Some(self.world.rows(symbol, key).into_iter().filter_map(|row| of(row)).collect());
         }
-        // Start effects may add atoms that the witness does not contain.
+        // Start effects may add atoms that the witness (the over-approximation of the reachable
+        // states) does not contain, so the witness restricts only conditions on the state before
+        // the start.
         let is_before = self.applied.truths.is_empty();
         is_before.then(|| self.invariant.rows(symbol, key).filter_map(|key| of(&key.1)).collect())
     }

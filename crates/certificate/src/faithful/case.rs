@@ -15,8 +15,8 @@ use pddl::ast::Assignment;
 pub(super) struct Case {
     /// Facts and comparisons that hold in the state before the instance.
     pub(super) known: Known,
-    /// The truth values of the atoms that start effects, events or the passage of time have
-    /// changed.
+    /// The truth values of the atoms that start effects or events change, and of the timeline's own
+    /// atoms (phase and `waited`).
     pub(super) truths: BTreeMap<Key, bool>,
     /// Conditional effects on atoms at the end: (condition, atom, `true` if added). An atom that is
     /// both added and deleted holds.

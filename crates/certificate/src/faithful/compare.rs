@@ -1,6 +1,6 @@
 //! Compares the PDDL files with the ground task: the initial state, the goal, and the rules of
-//! derived predicates. Each case of each action instance is compared with an operator that
-//! simulates it.
+//! derived predicates. Each case (outcome under a condition) of each action instance must be
+//! simulated by an operator, or leave the task state unchanged.
 
 use std::collections::BTreeSet;
 
@@ -42,7 +42,8 @@ pub(super) struct Comparison<'c> {
     /// length.
     metric: Option<Linear>,
     timed: bool,
-    /// A number of which all times of events and all durations are multiples.
+    /// If there are timed events, a number of which all times of events and all durations are
+    /// multiples.
     unit: BigRational,
 }
 
@@ -154,7 +155,8 @@ impl<'c> Comparison<'c> {
         let mut reader = Reader::new(self.task.world, self.task.invariant, self.task.axioms);
         let goal = reader.formula(&self.task.world.problem.goal, true)?;
         let task_goal = self.task.condition(&self.task.model.goal, &[], &[]);
-        // No plan ends with a wait operator.
+        // Plans need not end with a wait, so the goal is required only in states that do not follow
+        // a wait.
         let not_waited = Formula::Atom(timeline::waited(), false);
         for known in Known::default()
             .assume(&self.task.names.structure, &Formula::junction([goal, not_waited], true))?
@@ -167,7 +169,8 @@ impl<'c> Comparison<'c> {
     }
 
     /// Checks that the rules of the task and the rules of the PDDL files are equivalent, for each
-    /// derived atom that is a variable of the task.
+    /// derived atom of `Axioms::linked`: a variable of the task on or between dependency cycles.
+    /// Other derived atoms are replaced by their rules.
     pub(super) fn rules(&self) -> Result<()> {
         let task = self.task;
         let mut linked: Vec<&Key> = task.axioms.linked.iter().collect();
@@ -176,8 +179,8 @@ impl<'c> Comparison<'c> {
             let Some((variable, _)) = task.names.fact(key) else { continue };
             let files = Reader::new(task.world, task.invariant, task.axioms).unfold(key)?;
             let rules = task.rules(variable);
-            // A derivation must not depend on atoms that are derived later, so there are no case
-            // splits on derived atoms.
+            // A derivation must not depend on atoms that are derived later, so no case splits on
+            // the truth value of derived atoms are made.
             let admits = |leaf: &Formula| match leaf {
                 Formula::Atom(key, _) => task.world.rules(key.0).is_none(),
                 _ => true,
@@ -193,8 +196,8 @@ impl<'c> Comparison<'c> {
         Ok(())
     }
 
-    /// Returns `true` if `known` implies the condition `wanted`; uses case splits on the leaves
-    /// that `admits` accepts.
+    /// Returns `true` if `known` implies the condition `wanted`, by case splits on the leaves that
+    /// `admits` accepts. `false` means refuted, or not proved within [`SPLIT_LIMIT`] splits.
     fn follows(&self, known: Known, wanted: &Formula, admits: &dyn Fn(&Formula) -> bool) -> bool {
         let structure = &self.task.names.structure;
         let mut open = vec![known];
@@ -213,9 +216,9 @@ impl<'c> Comparison<'c> {
         open.is_empty()
     }
 
-    /// Checks that an operator simulates a case of an action instance. Returns `false` if no
-    /// operator is needed, because the case does not change the task state and its cost is not
-    /// negative.
+    /// Checks that operators simulate a case (outcome under a condition) of an action instance.
+    /// Returns `false` if no operator is needed, because the case does not change the task state
+    /// and its cost is not negative.
     pub(super) fn case(&self, action: &Action, arguments: &[u32], case: &Case) -> Result<bool> {
         let name = || {
             let words = arguments.iter().map(|object| self.task.world.name(*object));
@@ -231,7 +234,8 @@ impl<'c> Comparison<'c> {
         self.find(&self.candidates(action, arguments), case, &instance).map(|()| true)
     }
 
-    /// Checks that a wait operator of the task simulates a wait until an event.
+    /// Checks that wait operators of the task simulate a wait until an event, or that the wait does
+    /// not change the task state.
     pub(super) fn wait(&self, case: &Case) -> Result<()> {
         let name = || {
             let phases = case.truths.iter().filter(|(key, holds)| key.0 == PHASE && **holds);
@@ -250,8 +254,9 @@ impl<'c> Comparison<'c> {
         self.find(&waits, case, &instance)
     }
 
-    /// Checks that in every state in which a case can be executed, one of the candidate operators
-    /// simulates it.
+    /// Checks that in every state in which a case (outcome of an action instance under a condition)
+    /// can be executed, one of the candidate operators simulates the case. Fails if this takes more
+    /// than [`SPLIT_LIMIT`] case splits.
     fn find(&self, candidates: &[(&Operator, Vec<u32>)], case: &Case, instance: &Instance<'_>) -> Result<()> {
         let structure = &self.task.names.structure;
         let conditions: Vec<Formula> = candidates
@@ -318,8 +323,10 @@ impl<'c> Comparison<'c> {
         Ok(())
     }
 
-    /// Returns `true` if the operator leaves the clock of the task unchanged, or advances it from
-    /// the start time to the end time of the case.
+    /// Returns `true` if the clock of the task is a lower bound on the time after the case (outcome
+    /// of an action instance under a condition): the task has no clock, or the operator leaves it
+    /// unchanged, advances it by the duration of the case, or sets it to a value that represents
+    /// every possible end time.
     fn keeps_time(&self, (operator, choice): (&Operator, &[u32]), case: &Case) -> bool {
         let Some(number) = self.task.names.numbers.get(&timeline::clock()) else { return true };
         // Time never decreases, so an unchanged clock is a lower bound on the time.
@@ -338,7 +345,9 @@ impl<'c> Comparison<'c> {
         }
     }
 
-    /// Returns the minimal increase of the metric by a case.
+    /// Returns the minimal increase of the metric by a case (outcome of an action instance under a
+    /// condition). Without a metric, returns the minimal duration if plans are measured by time,
+    /// otherwise 1. Fails if the increase depends on the state.
     fn cost(&self, case: &Case) -> Result<BigRational> {
         let one = BigRational::one();
         let time = |factor: &BigRational| match &case.length {
@@ -363,8 +372,8 @@ impl<'c> Comparison<'c> {
         }
     }
 
-    /// Returns the operators that can represent an action with these arguments, each with the
-    /// choice of designs for its slots.
+    /// Returns the operators that represent an action with these arguments, each with the choice of
+    /// designs for its slots by which it gets these arguments.
     fn candidates(&self, action: &Action, arguments: &[u32]) -> Vec<(&'c Operator, Vec<u32>)> {
         let name = action.identifier.name.as_str().to_ascii_lowercase();
         let world = self.task.world;

@@ -1,5 +1,6 @@
 //! Analyses the derived atoms: computes which of them hold in all states or in no state of the
-//! witness, and which are variables of the task.
+//! witness (the over-approximation of the reachable states). Also computes which of those that are
+//! variables of the task lie on dependency cycles or between cycles.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -13,8 +14,9 @@ use crate::faithful::verdict::Cause;
 use crate::faithful::world::World;
 use pddl::ast::{Condition, Expression};
 
-/// Computes the facts about derived atoms that hold in all states of the witness. `linked` contains
-/// the derived atoms that are variables of the task.
+/// Computes the facts about derived atoms that hold in all states of the witness (the
+/// over-approximation of the reachable states). `linked` contains the derived atoms that are
+/// variables of the task.
 pub(super) fn axioms(
     world: &World<'_>,
     invariant: &Invariant,
@@ -27,7 +29,8 @@ pub(super) fn axioms(
     }
     bound::add(world, invariant, &mut axioms, stop)?;
     let bodies = bodies(world, invariant, &axioms)?;
-    // Both sets are correct bounds at any time; each iteration may sharpen one by the other.
+    // After each iteration, `may` is an upper and `must` a lower bound on the derived atoms that
+    // hold. The next iteration may tighten each bound with the help of the other one.
     loop {
         let may =
             fixpoint(&bodies, |formula, atoms_so_far| possible(world, formula, atoms_so_far, &axioms.must));
@@ -67,8 +70,8 @@ fn circular<'b>(axioms: &Axioms, bodies: &'b [(Key, Formula)]) -> FxHashSet<&'b 
     remaining
 }
 
-/// Removes atoms without links to remaining atoms, until a fixpoint is reached. `opposite` contains
-/// the reversed links.
+/// Removes from `remaining` the atoms that have no link to a remaining atom, until a fixpoint is
+/// reached. `opposite` contains the reversed links.
 #[expect(clippy::arithmetic_side_effects, reason = "a link is taken away once")]
 fn take_ends_away<'b>(
     remaining: &mut FxHashSet<&'b Key>,
@@ -120,7 +123,8 @@ fn atoms<'f>(formula: &'f Formula, keys: &mut FxHashSet<&'f Key>) {
 }
 
 /// Computes the least set of atoms such that each atom is in the set if its body holds under the
-/// set. Bodies are monotone, so a body is evaluated again only when one of its atoms is added.
+/// set. `holds` must be monotone in the set; so a body is evaluated again only when one of its
+/// atoms is added.
 fn fixpoint(bodies: &[(Key, Formula)], holds: impl Fn(&Formula, &FxHashSet<Key>) -> bool) -> FxHashSet<Key> {
     let mut readers: FxHashMap<&Key, Vec<usize>> = FxHashMap::default();
     for (place, (_, body)) in bodies.iter().enumerate() {

@@ -1,5 +1,5 @@
-//! Compares the effects of a case of an action instance with the effects of an operator, on the
-//! variables and numbers of the task.
+//! Compares the effects of a case (outcome under a condition) of an action instance with the
+//! effects of an operator, on the variables and numbers of the task.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -24,13 +24,13 @@ pub(super) struct Made<'m> {
 pub(super) enum Mismatch {
     /// The values of this variable or number differ.
     Differs(String),
-    /// The atoms of this variable are not proved to be mutually exclusive after the case, or there
-    /// are too many case splits.
+    /// The atoms of this variable are not proved to be mutually exclusive after the case (outcome
+    /// of an action instance under a condition), or there are too many case splits.
     Unknown(String),
 }
 
-/// Compares the effects of a case with the effects of an operator, or with no effects if `operator`
-/// is `None`.
+/// Compares the effects of a case (outcome of an action instance) with the effects of an operator,
+/// or with no effects if `operator` is `None`. The clock is not compared.
 pub(super) fn compare(
     task: &Translation<'_>,
     case: &Case,
@@ -74,14 +74,16 @@ fn numbers(task: &Translation<'_>, case: &Case, operator: Option<Made<'_>>) -> R
     Ok(())
 }
 
-/// Compares the effects of a case and of an operator on one variable.
+/// A comparison of the effects of a case (outcome of an action instance under a condition) and of
+/// an operator on one variable.
 struct Variable<'v> {
     task: &'v Translation<'v>,
     own: u32,
     case: &'v Case,
-    /// The end effects of the case on atoms of the variable.
+    /// The effects of the case on atoms of the variable at the end of the action.
     effects: Vec<&'v (Formula, Key, bool)>,
-    /// The atoms of the variable that the case may change, by value.
+    /// The atoms of the variable that the case may change. The key is the value that represents the
+    /// atom.
     touched: BTreeMap<u32, &'v Key>,
     /// The value that the operator assigns unconditionally.
     certain: Option<u32>,
@@ -119,7 +121,8 @@ impl<'v> Variable<'v> {
     }
 
     /// Returns `Some(true)` if the case and the operator agree in all states that satisfy `known`,
-    /// `Some(false)` if they differ in some state, and `None` if this is undecided.
+    /// `Some(false)` if they differ in a partial state that extends `known`, and `None` if neither
+    /// is proved within [`SPLIT_LIMIT`] case splits.
     fn agrees(&self, known: &Known) -> Option<bool> {
         let structure = &self.task.names.structure;
         let mut open = vec![known.clone()];
@@ -169,7 +172,8 @@ impl<'v> Variable<'v> {
         self.task.invariant.may_hold(key) && known.atom(&self.task.names.structure, key) != Some(false)
     }
 
-    /// Returns the atoms of the variable that may hold before the case, with their values.
+    /// Returns the atoms of the variable that may hold before the case (outcome of an action
+    /// instance under a condition), each with its value (number) in the variable.
     fn possible(&self, known: &'v Known) -> impl Iterator<Item = (u32, &'v Key)> {
         // If one atom of the variable holds, the other atoms do not.
         let holding = known.holding(self.own);
@@ -178,7 +182,8 @@ impl<'v> Variable<'v> {
         possible_atoms.into_iter().flatten().chain(held_atom).filter(|(_, key)| self.may_hold(known, key))
     }
 
-    /// Returns the value before the case, or `None` if it is unknown.
+    /// Returns the value of the variable before the case (outcome of an action instance under a
+    /// condition), or `None` if it is unknown.
     fn current(&self, known: &Known) -> Value {
         let structure = &self.task.names.structure;
         match self.possible(known).next() {
@@ -188,8 +193,10 @@ impl<'v> Variable<'v> {
         }
     }
 
-    /// Returns the value after the case according to the PDDL files; `None` if it is unchanged. The
-    /// files must imply that at most one atom of the variable then holds.
+    /// Returns the value of the variable after the case (outcome of an action instance under a
+    /// condition) according to the PDDL files; `None` if it is unchanged. An error names a formula
+    /// whose truth value is needed, or means that it is not proved that at most one atom of the
+    /// variable then holds.
     fn expected(&self, known: &Known, current: Value) -> Result<Value, Outcome<'_>> {
         let structure = &self.task.names.structure;
         let after = |key: &Key| {

@@ -1,6 +1,7 @@
 //! Mutex groups (atoms of which at most one holds) in addition to the variables of the task. The
-//! witness lists these groups. Every action instance must preserve each group, given that all
-//! variables and groups are exclusive before the instance.
+//! witness (the over-approximation of the reachable states) lists these groups. Every action
+//! instance must preserve each group, given that all variables and groups are exclusive before the
+//! instance.
 //!
 //! The groups are required where several variables of the task come from the same invariant. Of
 //! `{idle, loading, loaded}`, the task may keep `{loading, loaded}` as a variable because another
@@ -23,9 +24,10 @@ use crate::faithful::world::World;
 
 /// Upper limit on the number of case splits for one instance and group.
 const SPLIT_LIMIT: usize = 1_024;
-/// Upper limit on the number of checks of a group against a case, during the whole search.
+/// Upper limit on the number of checks whether a case (outcome of an action instance under a
+/// condition) preserves a group, during the whole search.
 const SEARCH_LIMIT: usize = 20_000_000;
-/// Upper limit on the number of groups that are tried for one variable.
+/// Upper limit on the number of groups that the search tries for one variable.
 const GROUP_LIMIT: usize = 300;
 
 /// A mutex group: atoms of which at most one holds.
@@ -38,8 +40,9 @@ pub(super) fn holds_initially(world: &World<'_>, group: &Group) -> bool {
     group.iter().all(is_basic) && group.iter().filter(|key| world.holds_initially(key)).count() <= 1
 }
 
-/// Returns `true` if at most one atom of a group holds after a case, given that at most one holds
-/// before the case.
+/// Returns `true` if at most one atom of a group holds after a case (outcome of an action
+/// instance), given that at most one holds before the case. `false` means violated or not proved
+/// within the limits on case splits.
 pub(super) fn keeps(
     structure: &Structure,
     may_hold: &dyn Fn(&Key) -> bool,
@@ -73,18 +76,21 @@ pub(super) fn keeps(
     open.is_empty()
 }
 
-/// The effect of a case on mutex groups.
+/// The effect of a case (outcome of an action instance) on mutex groups.
 pub(super) struct Move {
-    /// The atoms that certainly hold before the case.
+    /// The atoms that certainly hold before the case (outcome of an action instance under a
+    /// condition).
     holding: Vec<Key>,
-    /// The atoms that the case may add.
+    /// The atoms that the case (outcome of an action instance under a condition) may add.
     pub(super) adds: BTreeSet<Key>,
-    /// The atoms that certainly do not hold after the case.
+    /// The atoms that certainly do not hold after the case (outcome of an action instance under a
+    /// condition).
     deletes: Vec<Key>,
 }
 
 impl Move {
-    /// Computes the effect of a case on mutex groups, given the atoms that the case may add.
+    /// Computes the effect of a case (outcome of an action instance under a condition) on mutex
+    /// groups, given the atoms that the case may add.
     pub(super) fn new(structure: &Structure, case: &Case, adds: BTreeSet<Key>) -> Self {
         let at_end = case
             .effects
@@ -100,12 +106,12 @@ impl Move {
         !self.adds.is_empty()
     }
 
-    /// Checks that at most one atom of a group holds after the case, given that at most one holds
-    /// before it.
+    /// Checks that at most one atom of a mutex group holds after the case (outcome of an action
+    /// instance under a condition), given that at most one holds before the case.
     ///
     /// # Errors
-    /// The atoms each of which would repair the group if it were a member; empty if there is no
-    /// such atom.
+    /// The atoms each of which, if added to the group, might make the check succeed: the case
+    /// requires and deletes them. Empty if there is no such atom.
     pub(super) fn keeps(&self, group: &Group, may_hold: &dyn Fn(&Key) -> bool) -> Result<(), Vec<Key>> {
         let mut added = self.adds.iter().filter(|key| group.contains(*key));
         let Some(key) = added.next() else { return Ok(()) };
@@ -122,8 +128,9 @@ impl Move {
     }
 }
 
-/// Searches for mutex groups that prove the exclusiveness of variables, for variables whose own
-/// atoms are not an inductive invariant.
+/// Searches for mutex groups that prove the exclusiveness of `variables`, the variables whose own
+/// atoms are not an inductive invariant. A variable gets no group if none is found within the
+/// limits or before `stop` returns `true`.
 #[expect(clippy::arithmetic_side_effects, reason = "no more than the limit")]
 pub(super) fn search(
     world: &World<'_>,
@@ -177,12 +184,13 @@ pub(super) fn search(
     groups
 }
 
-/// Numbers the groups of a witness consecutively, after the variables of the task.
+/// Numbers the mutex groups of a witness (the over-approximation of the reachable states)
+/// consecutively. The first number is `variables`, the number of variables of the task.
 pub(super) fn numbered(variables: usize, groups: &[Group]) -> impl Iterator<Item = (u32, &Group)> {
     (u32::try_from(variables).unwrap_or(u32::MAX)..).zip(groups)
 }
 
-/// Returns the groups to which a case may add an atom.
+/// Returns the mutex groups to which a case (outcome of an action instance) may add an atom.
 pub(super) fn concerned<'g>(case: &Case, groups: &'g [Group]) -> impl Iterator<Item = &'g Group> {
     let at_end = case.effects.iter().filter(|(_, _, holds)| *holds).map(|(_, key, _)| key);
     let added: FxHashSet<&Key> =

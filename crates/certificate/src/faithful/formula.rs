@@ -12,7 +12,7 @@ use crate::faithful::key::Key;
 use crate::faithful::linear::Linear;
 use crate::faithful::verdict::Cause;
 
-/// Upper limit on the number of cases into which a condition is split.
+/// Upper limit on the number of partial states into which a condition is split.
 const CASE_LIMIT: usize = 4_096;
 
 /// Upper limit on the nesting depth of a condition after derived atoms are replaced by their rules.
@@ -126,7 +126,8 @@ impl Known {
         groups.iter().any(|group| self.holding.contains_key(group)).then_some(false)
     }
 
-    /// Returns the truth value of a condition if the partial state implies it, otherwise `None`.
+    /// Returns the truth value of a condition, or `None` if the partial state is not found to imply
+    /// one. The test is incomplete: each comparison is tested against single known comparisons.
     pub(super) fn decide(&self, structure: &Structure, formula: &Formula) -> Option<bool> {
         match formula {
             Formula::All(parts) => self.junction(structure, parts, true),
@@ -179,7 +180,7 @@ impl Known {
     }
 
     /// Extends the partial state by a condition. The resulting partial states together cover all
-    /// states in which the condition holds.
+    /// states in which both hold. Fails if there are more than [`CASE_LIMIT`].
     pub(super) fn assume(&self, structure: &Structure, formula: &Formula) -> Result<Vec<Self>, Cause> {
         match self.decide(structure, formula) {
             Some(true) => return Ok(vec![self.clone()]),
@@ -226,7 +227,8 @@ impl Known {
         }
     }
 
-    /// Splits the partial state into cases in which each of the formulas is decided.
+    /// Splits the partial state into partial states that decide each of the formulas. Fails if
+    /// there are more than [`CASE_LIMIT`].
     pub(super) fn split<'f>(
         self,
         structure: &Structure,
@@ -258,7 +260,8 @@ fn limited(cases: usize) -> Result<(), Cause> {
 }
 
 /// Returns `true` if the comparison `known` implies that `wanted` is at least 0, or greater than 0
-/// if `strict`.
+/// if `strict`. Returns `false` if the two expressions are not proportional apart from their
+/// constants.
 fn implies(structure: &Structure, known: &(Linear, bool), wanted: &Linear, strict: bool) -> bool {
     let Some(ratio) = wanted.ratio_to(&known.0).filter(Signed::is_positive) else { return false };
     // Lower bound on `wanted` without its constant.

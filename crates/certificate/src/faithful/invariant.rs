@@ -29,10 +29,11 @@ use crate::integer::MAX_DIGITS;
 
 pub(super) const WITNESS_FORMAT: &str = "metaplan-witness/1";
 
-/// Widening threshold: at this number of moves, an end of an interval becomes unbounded.
+/// Widening threshold: when an end of an interval moves for this number of times, it becomes
+/// unbounded.
 const WIDENING_THRESHOLD: u32 = 8;
 
-/// The JSON format of a witness.
+/// The JSON format of a witness, i.e. of an over-approximation of the reachable states.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct WitnessFile {
@@ -50,14 +51,16 @@ struct WitnessFile {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Invariant {
     atoms: Relation,
-    /// The interval of each numeric fluent; the interval of a static fluent is a single value.
+    /// The interval of each numeric fluent; a single value for a static fluent. A fluent without an
+    /// entry is unbounded.
     numbers: FxHashMap<Key, Interval>,
     /// Mutex groups: atoms of which at most one holds.
     pub(super) exclusive: Vec<Group>,
 }
 
 impl Invariant {
-    /// Creates the witness that contains only the initial state.
+    /// Creates the witness (the over-approximation of the reachable states) that contains only the
+    /// initial state. The clock is unbounded.
     pub(super) fn initial(world: &World<'_>) -> Self {
         let atoms = world.initial_atoms().filter(|key| world.changes(key.0)).collect();
         // The clock is unbounded.
@@ -186,7 +189,8 @@ impl Invariant {
         }
     }
 
-    /// Returns the interval of an expression in states that satisfy `known`.
+    /// Returns an interval that contains the values of an expression in all states of the witness
+    /// (the over-approximation of the reachable states) that satisfy `known`.
     fn range(&self, linear: &Linear, known: &Known) -> Interval {
         let mut range = linear.range(|key| self.numbers.get(key));
         for (own, _) in &known.comparisons {
@@ -203,7 +207,7 @@ impl Invariant {
         range
     }
 
-    /// Iterates over the atoms that a case may make true.
+    /// Iterates over the atoms that a case (outcome of an action instance) may make true.
     pub(super) fn added<'c>(structure: &'c Structure, case: &'c Case) -> impl Iterator<Item = &'c Key> {
         let at_end = case
             .effects
@@ -215,8 +219,8 @@ impl Invariant {
         at_end.map(|(_, key, _)| key).chain(at_start.map(|(key, _)| key))
     }
 
-    /// Checks that the witness contains all successors of a case and that the case preserves the
-    /// mutex groups.
+    /// Checks that the witness (the over-approximation of the reachable states) contains all states
+    /// after a case (outcome of an action instance), and that the case preserves the mutex groups.
     pub(super) fn admits(
         &self,
         world: &World<'_>,
@@ -245,7 +249,8 @@ impl Invariant {
     }
 }
 
-/// Computes a witness by fixpoint iteration with widening.
+/// The state of computing a witness (the over-approximation of the reachable states) by fixpoint
+/// iteration with widening.
 pub(super) struct Widening {
     pub(super) invariant: Invariant,
     /// For each fluent and end of its interval (`true` for the upper end), the number of times it
@@ -258,8 +263,8 @@ impl Widening {
         Self { invariant: Invariant::initial(world), moves: FxHashMap::default() }
     }
 
-    /// Extends the invariant by the successors of a case. Returns `true` if the invariant has
-    /// changed.
+    /// Extends the invariant by the states after a case (outcome of an action instance). Returns
+    /// `true` if the invariant has changed.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer moves than passes over the task")]
     pub(super) fn include(&mut self, structure: &Structure, case: &Case) -> bool {
         let mut news = false;
@@ -289,7 +294,8 @@ impl Widening {
     }
 }
 
-/// Creates the error that the computation of a witness needs too many rounds.
+/// Creates the error that the computation of a witness (the over-approximation of the reachable
+/// states) needs more than `limit` rounds.
 pub(super) fn too_many_rounds(limit: usize) -> Cause {
     Cause::TooMany { what: "rounds in search of a witness".into(), limit }
 }

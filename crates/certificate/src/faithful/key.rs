@@ -9,7 +9,8 @@ pub(super) type Key = (u32, SmallVec<[u32; 4]>);
 /// Symbol of the atoms `(the phase phase N)`. The argument N is stored as a number; it is the
 /// number of past events.
 pub(super) const PHASE: u32 = u32::MAX - 1;
-/// Symbol of the atom `(has waited)`, which holds if no action has ended since the last event.
+/// Symbol of the atom `(has waited)`, which a wait until an event makes true and every action makes
+/// false.
 pub(super) const WAITED: u32 = u32::MAX - 2;
 /// Symbol of the fluent `(the clock)`, in the time unit of the PDDL files.
 pub(super) const CLOCK: u32 = u32::MAX - 3;

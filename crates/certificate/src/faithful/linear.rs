@@ -77,7 +77,8 @@ impl Linear {
     }
 
     /// Returns the factor r such that this expression without its constant is r times `other`
-    /// without its constant. Returns `None` if there is no such factor.
+    /// without its constant. Returns `None` if there is no such factor, or if this expression is
+    /// constant.
     pub(super) fn ratio_to(&self, other: &Self) -> Option<BigRational> {
         let (key, own) = self.factors.first_key_value()?;
         let ratio = own / other.factors.get(key)?;

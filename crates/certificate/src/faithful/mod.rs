@@ -72,7 +72,8 @@ use verdict::Obstacle;
 pub use verdict::{Cause, Difference, Faithful};
 use world::World;
 
-/// Upper limit on the number of iterations when a witness is computed.
+/// Upper limit on the number of iterations when a witness (the over-approximation of the reachable
+/// states) is computed.
 const ROUND_LIMIT: usize = 10_000;
 
 type Result<T> = std::result::Result<T, Obstacle>;
@@ -100,7 +101,7 @@ pub fn faithful(
 ///
 /// # Errors
 /// The verdict that [`faithful`] would return: the task is malformed, a construct is not supported,
-/// or the computation was stopped.
+/// a limit on sizes is exceeded, or the computation was stopped.
 pub fn witness(
     domain: &Domain,
     problem: &Problem,
@@ -174,8 +175,9 @@ impl<'f> Files<'f> {
         if (self.stop)() { Err(Cause::Stopped) } else { Ok(()) }
     }
 
-    /// Returns the cases in which an instance may be executable in a state that satisfies the
-    /// invariant. An empty list proves that the instance is executable in no such state.
+    /// Returns the cases (outcomes under a condition) of an action instance. The cases cover all
+    /// executions of the instance in states that satisfy the invariant. An empty list proves that
+    /// the instance is executable in no such state.
     fn cases(&self, instance: &Instance, invariant: &Invariant, axioms: &Axioms) -> Result<Vec<Case>> {
         self.stopped()?;
         if instance.requires.iter().any(|key| !invariant.may_hold(key)) {
@@ -226,7 +228,7 @@ impl<'f> Files<'f> {
     }
 
     /// Searches for additional mutex groups, for the variables whose own atoms are not preserved as
-    /// a group.
+    /// a group. Some of these variables may get no group, because the search is limited.
     fn exclusive(&self, invariant: &Invariant, axioms: &Axioms) -> Result<Vec<Group>> {
         let atoms = |variable| self.names.atoms(variable).map(|(_, key)| key.clone()).collect();
         let variables: Vec<Group> = self.model.basic_variables().map(atoms).collect();
@@ -248,7 +250,8 @@ impl<'f> Files<'f> {
         Ok(exclusive::search(&self.world, &may_hold, broken, &moves, self.stop))
     }
 
-    /// Calls `visit` with the effect of each case of each instance on mutex groups.
+    /// Calls `visit` with the effects on mutex groups of each wait, and of those cases (outcomes
+    /// under a condition) of each action instance that may add an atom.
     fn each_move(&self, invariant: &Invariant, axioms: &Axioms, visit: &mut dyn FnMut(Move)) -> Result<()> {
         let structure = &self.names.structure;
         let waits = action::waits(&self.world.timeline, structure)?;
@@ -297,7 +300,8 @@ impl<'f> Files<'f> {
         Ok(Faithful::Yes { instances, idle, timed })
     }
 
-    /// Returns a number of which the times of events and all durations are multiples.
+    /// Returns a number of which the times of events and all durations are multiples. Without timed
+    /// events, returns 1, which is not used.
     fn unit(&self, invariant: &Invariant, axioms: &Axioms) -> Result<BigRational> {
         let mut durations = BTreeSet::new();
         if !self.world.timeline.is_empty() {
@@ -310,7 +314,7 @@ impl<'f> Files<'f> {
         Ok(self.world.timeline.unit(durations.iter()))
     }
 
-    /// Returns `true` if an executable instance has a duration other than 0.
+    /// Returns `true` if an instance that may be executable has a minimal duration other than 0.
     fn takes_time(&self, invariant: &Invariant, axioms: &Axioms) -> Result<bool> {
         for instance in &self.instances {
             if matches!(self.domain.actions[instance.action].body, ActionBody::Durative { .. }) {
@@ -341,7 +345,8 @@ fn is_plain(action: &Action) -> bool {
     }
 }
 
-/// Returns the atoms of changing predicates that are conjuncts of an instance's (start) condition.
+/// Returns the atoms of changing predicates that are conjuncts of an instance's condition (for a
+/// durative action, of its start condition).
 fn requires(world: &World<'_>, action: &Action, arguments: &[u32]) -> std::result::Result<Vec<Key>, Cause> {
     let mut atoms = Vec::new();
     match &action.body {

@@ -26,15 +26,16 @@ const SIZE_LIMIT: usize = 200_000;
 const WORK_LIMIT: usize = 16 * SIZE_LIMIT;
 /// Upper limit on the number of variables of a quantifier or of the head of a rule.
 const VARIABLE_LIMIT: usize = 10_000;
-/// Upper limit on the nesting of conditions up to which derived atoms are recursively replaced by
-/// their rules. The limit bounds the call stack. Atoms at a deeper nesting are evaluated
+/// Maximum nesting depth, counted from the outermost derived atom, at which a derived atom is
+/// replaced by its rules recursively. This bounds the call stack. Deeper atoms are evaluated
 /// separately, with an explicit stack (see [`Reader::unfold`]).
 const UNFOLDING_LIMIT: usize = 100;
 
 /// Key of the fluent `total-time`, which only metrics contain.
 pub(super) const TOTAL_TIME: Key = (u32::MAX, SmallVec::new_const());
 
-/// The truth values and fluents that the start effects of a durative action have changed.
+/// The new truth values of atoms and the new values of fluents that the start effects of a durative
+/// action, and events since its start, have changed.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Applied {
     pub(super) truths: BTreeMap<Key, bool>,
@@ -200,8 +201,10 @@ impl<'r> Reader<'r> {
         Ok(Formula::junction(formulas, all))
     }
 
-    /// Calls `visit` with every binding of the variables `bound` until `visit` returns `false`.
-    /// Bindings for which `within` is false may be skipped. Returns `false` if `visit` did.
+    /// Calls `visit` for every binding of the variables `bound`, until `visit` returns `false`.
+    /// Bindings under which `within` is false in every state of the witness (the over-approximation
+    /// of the reachable states) may be skipped. Returns `false` if `visit` did, otherwise `true`.
+    /// Fails if a size limit is exceeded.
     pub(super) fn each(
         &mut self,
         bound: &'r [TypedName],
@@ -288,8 +291,9 @@ impl<'r> Reader<'r> {
         Ok(if holds { formula } else { formula.negated() })
     }
 
-    /// Returns `true` if a derived predicate depends on start effects. The facts of the witness
-    /// then do not apply to it.
+    /// Returns `true` if a derived predicate depends on start effects or on events during the
+    /// action. The facts of the witness (the over-approximation of the reachable states) then do
+    /// not apply to this predicate.
     pub(super) fn is_touched(&self, symbol: u32) -> bool {
         let touched = self.applied.truths.keys().chain(self.applied.changes.keys());
         self.axioms.depends(symbol, touched.map(|key| key.0))
@@ -380,7 +384,8 @@ impl<'r> Reader<'r> {
         Ok(Formula::junction(bodies, false))
     }
 
-    /// Returns the condition of a comparison, or `None` if one side is undefined.
+    /// Translates a comparison to a condition on fluents. Returns `None` if one side is undefined,
+    /// and fails if this happens in the condition of a conditional effect.
     fn compare(
         &mut self,
         operator: Comparison,
@@ -427,7 +432,9 @@ impl<'r> Reader<'r> {
         Ok(Some(self.invariant.fluent(key)))
     }
 
-    /// Returns the value of an expression after the start effects, or `None` if it is undefined.
+    /// Returns the value of an expression after the start effects, as a linear expression over the
+    /// fluents before them, or `None` if it is undefined. Fails if the value is not linear or
+    /// depends on a chosen duration.
     pub(super) fn expression(&mut self, expression: &'r Expression) -> Result<Option<Linear>, Cause> {
         Ok(match expression {
             Expression::Number(number, _) => Some(Linear::constant(number.clone())),
@@ -454,7 +461,7 @@ impl<'r> Reader<'r> {
 }
 
 /// Returns the condition that a basic (not derived) atom has the given truth value, simplified by
-/// static facts and the witness.
+/// static facts and the witness (the over-approximation of the reachable states).
 pub(super) fn atom(world: &World<'_>, invariant: &Invariant, key: Key, holds: bool) -> Formula {
     if !world.changes(key.0) {
         return Formula::truth(world.holds_initially(&key) == holds);

@@ -1,7 +1,7 @@
-//! The atoms and fluents that a happening reads, as the definition of interference requires. They
-//! are all atoms and fluents in conditions, durations, conditions of effects and right-hand sides
-//! of effects, whether or not they affect the outcome. A quantifier reads all its instances. A
-//! derived predicate reads all predicates and functions on which it depends.
+//! The atoms and fluents that a happening reads, according to the definition of interference: all
+//! atoms and fluents in conditions, durations, conditions of effects and right-hand sides of
+//! effects, whether or not they affect the outcome. A quantifier reads all its instances. A derived
+//! predicate reads all predicates and functions on which it depends.
 
 use rustc_hash::FxHashMap;
 

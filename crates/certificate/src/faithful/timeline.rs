@@ -6,11 +6,10 @@
 //! on its *passage*, i.e. on the phases of its start and end, and on whether start or end coincides
 //! with an event. The plan may start the action at any time within a passage.
 //!
-//! The task has its own clock. The *mark* of a clock value is the greatest multiple of a unit that
-//! is at most the value. The clock represents a plan time t if t is at or after the mark, or
-//! strictly after the mark if the clock value is greater than the mark. All times of events and all
-//! durations are multiples of the unit. Hence the clock may be ahead of t by less than a unit,
-//! which no action can observe.
+//! The task has its own clock. All times of events and all durations are multiples of a *unit*. The
+//! *mark* of a clock value is the value rounded down to a multiple of the unit. If the clock value
+//! equals its mark, it represents all plan times t ≥ mark, otherwise all t > mark. Hence the clock
+//! may be ahead of t, but by less than a unit, which no action can observe.
 
 use std::collections::BTreeMap;
 
@@ -105,7 +104,8 @@ impl Timeline {
         self.events.get(phase).map(|event| &event.time)
     }
 
-    /// Returns all possible passages of an action with this duration.
+    /// Returns all possible passages of an action with this duration, i.e. its possible positions
+    /// relative to the events.
     pub(super) fn passages(&self, duration: &BigRational) -> Vec<Passage> {
         if self.is_empty() {
             let end = (duration.clone(), false);
@@ -189,14 +189,16 @@ impl Range {
 }
 
 impl Passage {
-    /// Returns the passage of waiting until the event that begins a phase.
+    /// Returns the passage (position relative to the events) of waiting until the event that begins
+    /// a phase.
     pub(super) fn wait(phase: usize, time: &BigRational) -> Self {
         let end = (time.clone(), false);
         Self { from: phase, to: phase, at_start: false, at_end: false, latest: None, end }
     }
 
-    /// Returns the condition on the state and the clock before an action with this passage: the
-    /// phase matches, and the clock is between 0 and the latest start time.
+    /// Returns the condition on the state and the clock before an action with this passage
+    /// (position relative to the events): the phase matches, and the clock is between 0 and the
+    /// latest start time. Without events, the condition is true.
     pub(super) fn condition(&self, timeline: &Timeline) -> Formula {
         if timeline.is_empty() {
             return Formula::truth(true);
@@ -238,7 +240,8 @@ impl Passage {
         (self.at_end && self.to > self.from).then(|| &timeline.events[self.to - 1])
     }
 
-    /// Returns the effects of a passage on the atoms of the phase and on the atom `waited`.
+    /// Returns the effects of an action with this passage (position relative to the events) on the
+    /// atoms of the phases and on the atom `waited`; none if there are no events.
     pub(super) fn truths(&self, timeline: &Timeline) -> Truths {
         if timeline.is_empty() {
             return Truths::new();

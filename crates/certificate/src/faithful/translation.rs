@@ -145,10 +145,11 @@ pub(super) struct Translation<'t> {
     pub(super) names: &'t Names,
     pub(super) invariant: &'t Invariant,
     pub(super) axioms: &'t Axioms,
-    /// For each variable, its values whose atoms may hold: value and atom.
+    /// For each variable, its values whose atoms may hold in the witness (the over-approximation of
+    /// the reachable states): value and atom.
     possible: Vec<Vec<(u32, &'t Key)>>,
-    /// For derived variables that are not linked to a derived atom: the formula that replaces the
-    /// variable.
+    /// For each derived variable whose atom is not in `Axioms::linked`: the formula that replaces
+    /// the variable.
     unfolded: BTreeMap<u32, Formula>,
     /// For each derived variable, the bodies of its rules.
     bodies: FxHashMap<u32, Vec<&'t Condition>>,
@@ -178,7 +179,8 @@ impl<'t> Translation<'t> {
         Ok(translation)
     }
 
-    /// Iterates over the values of a variable whose atoms may hold: value and atom.
+    /// Iterates over the values of a variable whose atoms may hold in the witness (the
+    /// over-approximation of the reachable states): value and atom.
     pub(super) fn possible(&self, variable: u32) -> impl Iterator<Item = (u32, &'t Key)> {
         self.possible[variable as usize].iter().copied()
     }

@@ -7,9 +7,11 @@ use thiserror::Error;
 pub enum Faithful {
     /// The task is faithful: it permits every plan of the PDDL files, at no more cost.
     Yes {
-        /// Number of action instances that may be executable in a state of the witness.
+        /// Number of action instances that may be executable in a state of the witness (the
+        /// over-approximation of the reachable states).
         instances: usize,
-        /// Number of instances among them that do not change the task state.
+        /// Number of those instances that need no operator, because they do not change the task
+        /// state and their cost is not negative.
         idle: usize,
         /// Whether plans are measured by duration, because the problem has no metric.
         timed: bool,
@@ -74,19 +76,20 @@ pub enum Difference {
         /// The derived atom.
         atom: String,
     },
-    /// The witness does not contain the initial state, or an instance leads out of it.
+    /// The witness (the over-approximation of the reachable states) does not contain the initial
+    /// state, or an action instance leads out of the witness.
     #[error("the witness leaves out what can become of {what}")]
     Witness {
         /// The atom or number that is outside the witness.
         what: String,
     },
-    /// A mutex group of the witness is not proved to have at most one true atom.
+    /// A mutex group (atoms of which at most one holds) that the witness lists is not proved.
     #[error("nothing shows that at most one of {atoms} holds, as the witness has it")]
     Exclusive {
         /// The atoms of the group.
         atoms: String,
     },
-    /// The witness is malformed.
+    /// The witness (the over-approximation of the reachable states) is malformed.
     #[error("it is not a witness: {reason}")]
     WitnessForm {
         /// Description of the error.
@@ -112,7 +115,8 @@ pub enum Cause {
         /// The upper limit on their number.
         limit: usize,
     },
-    /// After an instance, it is not proved that at most one atom of a variable holds.
+    /// It is not proved that at most one atom of a variable holds after an instance, or the
+    /// comparison of the instance's effects needs too many case splits.
     #[error(
         "cannot tell whether the ground task stands for the files: it takes at most one of {atoms} to hold, and neither \
          {instance} nor the witness by itself shows that this stays so; no difference was found"

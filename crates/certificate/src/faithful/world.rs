@@ -214,7 +214,7 @@ impl<'w> World<'w> {
     }
 
     /// Parses an atom or fluent, including the phase, clock and `waited` of the timeline. Returns
-    /// `None` if a symbol is unknown.
+    /// `None` if the text is malformed or a symbol is unknown.
     pub(super) fn written(&self, text: &str) -> Option<Key> {
         let phases = 0..=self.timeline.events.len();
         let timeline_keys = phases.map(timeline::phase).chain([timeline::waited(), timeline::clock()]);

@@ -28,6 +28,7 @@ pub enum Precision {
 
 impl Precision {
     /// Returns `true` if the bounds of `quantity` satisfy this precision, or if its value is exact.
+    /// A width of a few units in the last place of a double always suffices.
     pub fn holds(self, quantity: &Quantity) -> bool {
         let width = quantity.upper - quantity.lower;
         match self {
@@ -79,7 +80,8 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// Returns `true` if the bounds on all values of this outcome satisfy `precision`.
+    /// Returns `true` if the bounds on all numeric values of this outcome satisfy `precision`;
+    /// `true` for a truth value.
     pub fn is_within(&self, precision: Precision) -> bool {
         let fits = |answer: &Answer| answer.quantity().is_none_or(|quantity| precision.holds(quantity));
         match self {
@@ -106,7 +108,8 @@ pub struct Listed {
 }
 
 impl Answer {
-    /// Creates an answer from an exact number, or from a rounded number and its absolute error.
+    /// Creates an answer from an exact number, or from a nonnegative rounded number and its
+    /// absolute error. The lower bound on a rounded number is at least 0.
     pub fn from_number<N: Number>(value: &N, error: f64) -> Self {
         if let Some(exact) = value.to_rational() {
             return Self::from_exact(exact);
@@ -130,7 +133,8 @@ impl Answer {
         Self::Finite(Quantity { value: Number::to_f64(&exact), lower, upper, exact: Some(exact) })
     }
 
-    /// Returns the complementary probability (1 minus the value), with the bounds exchanged.
+    /// Returns the complementary probability (1 minus the value), with the bounds exchanged. An
+    /// infinite or undefined answer is unchanged.
     #[must_use]
     pub fn complement(self) -> Self {
         match self {

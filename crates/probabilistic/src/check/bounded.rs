@@ -24,8 +24,8 @@ use crate::solve::{Direction, Problem, Work, solve_within};
 const MAX_BUDGET: usize = 100_000;
 
 impl<N: Number> Query<'_, N> {
-    /// Computes for each state the probability of reaching a terminal state of `problem` while the
-    /// reward structure `name` accumulates at most the bound in `steps`.
+    /// Computes for each state the minimal or maximal probability of reaching a terminal state of
+    /// `problem` while the reward structure `name` accumulates at most the bound in `steps`.
     ///
     /// Only upper bounds are supported, and no given policy.
     pub fn until_within_reward(
@@ -96,7 +96,7 @@ impl<N: Number> Query<'_, N> {
             };
             let solution = within_budget(solve_within(layer, None, &mut self.work.borrow_mut()))?;
             let layer_error = solution.errors.iter().fold(0.0_f64, |most, error| most.max(*error));
-            // The sums over the targets round, too.
+            // The sums over the targets of choices with a reward cause rounding errors, too.
             error += layer_error + 256.0 * f64::EPSILON;
             values = solution.values;
             values.truncate(n);

@@ -32,7 +32,8 @@ enum Values<N> {
 
 impl<N: Number> Query<'_, N> {
     /// Evaluates `filter` for the property `inner` over the states that satisfy `states`, or over
-    /// all states if `states` is `None`.
+    /// all states if `states` is `None`. Fails if there is no such state, or if the filter does not
+    /// fit the type of `inner`.
     pub fn filtered(&self, filter: Filter, inner: &Expr, states: Option<&Expr>) -> Checked<Filtered> {
         let chosen = states.map_or_else(|| Ok(self.every()), |states| self.truth(states))?;
         let values = match self.kind_of(inner)? {
@@ -123,7 +124,7 @@ fn whole(number: usize) -> Answer {
     Answer::from_exact(BigRational::from(BigInt::from(number)))
 }
 
-/// Returns the only state of a set, or an error.
+/// Returns the only state of a set, or an error if there are several states or none.
 fn only(chosen: &FixedBitSet) -> Checked<usize> {
     let mut states = chosen.ones();
     match (states.next(), states.next()) {
@@ -132,8 +133,8 @@ fn only(chosen: &FixedBitSet) -> Checked<usize> {
     }
 }
 
-/// Returns the least value over the states in `chosen`, or the greatest if `greatest`. The bounds
-/// enclose the true extreme even if the bounds of several states overlap.
+/// Returns the least value over the states in `chosen`, or the greatest if `greatest`; infinite for
+/// an empty set. The bounds enclose the true extreme even if the bounds of several states overlap.
 pub fn extreme<N: Number>(vector: &Vector<N>, chosen: &FixedBitSet, greatest: bool) -> Answer {
     let mut best: Option<Quantity> = None;
     for state in chosen.ones() {

@@ -43,8 +43,8 @@ pub use table::{PolicyTable, Row};
 /// default.
 const MAX_EXACT_TRANSITIONS: usize = 150_000;
 
-/// Returns the default budget of exact arithmetic for a model with this number of transitions, in
-/// work units of about 1 ns.
+/// Returns the default budget of exact arithmetic for one property of a model with this number of
+/// transitions, in work units of about 1 ns.
 fn budget(transitions: usize) -> u64 {
     let transitions = u64::try_from(transitions).unwrap_or(u64::MAX);
     transitions.saturating_mul(500).max(3_000_000)
@@ -58,7 +58,8 @@ pub struct Report {
     pub outcome: Outcome,
     /// The variables of the model: each with its name, and `true` for a Boolean variable.
     pub variables: Vec<(String, bool)>,
-    /// Number of reachable states.
+    /// Number of explored states: the reachable states, except beyond states at which a single
+    /// property is decided.
     pub states: usize,
     /// Number of choices, summed over all states.
     pub choices: usize,
@@ -217,7 +218,8 @@ struct Processes {
 
 impl Processes {
     /// Explores in rationals up to [`MAX_EXACT_TRANSITIONS`] transitions and continues in doubles
-    /// if the model is larger. With [`Exactness::Always`], only rationals are used.
+    /// if the model is larger. With [`Exactness::Always`], only rationals are used; if `exact` is
+    /// `None`, only doubles.
     fn explore(
         program: &Program<f64>,
         exact: Option<&Program<Fraction>>,
@@ -250,7 +252,8 @@ impl Processes {
                 rounded.run(&Remembered::new(program), bounds, usize::MAX)?;
                 rounded.explored
             }
-            // The exploration in doubles reports the place of the number.
+            // A number is out of range for doubles. The exploration in doubles reports the place of
+            // this number in the model.
             None => explore(&Remembered::new(program), bounds)?,
         };
         Ok(Self { exact: None, doubles: Some(doubles), budget: 0 })
@@ -356,8 +359,8 @@ fn required_rewards(
     Ok(required)
 }
 
-/// Lists the choice of a policy in each state that is reachable from the initial state under the
-/// policy.
+/// Lists the choice of a policy in each state that is reachable from the first initial state under
+/// the policy. States in which the policy has no choice are omitted.
 fn policy_table<N: Number>(
     program: &Program<N>,
     explored: &Explored<Packed, N>,

@@ -22,21 +22,23 @@ pub enum Exactness {
 #[derive(Clone, Default)]
 #[non_exhaustive]
 pub struct Options<'a> {
-    /// Values of the constants that the model leaves undefined, by name.
+    /// Values of constants, by name. Every undefined constant of the model needs a value; the value
+    /// of a defined constant is overridden.
     pub settings: Settings,
     /// Limits of the exploration, such as the number of states.
     pub bounds: Bounds<'a>,
     /// Choice of arithmetic.
     pub exactness: Exactness,
-    /// Name of the reward structure that breaks ties between optimal policies; `None` breaks ties
-    /// by the number of steps.
+    /// Name of the reward structure that breaks ties between optimal policies if the policy is
+    /// reported; `None` breaks ties by the number of steps.
     pub secondary: Option<String>,
     /// Whether the policy is reported, too.
     pub policy: bool,
     /// A given policy to evaluate; if `None`, an optimal policy is computed.
     pub evaluate: Option<PolicyTable>,
     /// Required width of the bounds on values. If the bounds computed in doubles are wider, the
-    /// model is solved again in rationals, unless `exactness` is [`Exactness::Never`].
+    /// model is solved again in rationals with a larger budget, unless `exactness` is
+    /// [`Exactness::Never`].
     pub precision: Option<Precision>,
     /// Constants, labels and named properties of a property file, in addition to those of the
     /// model.
@@ -44,7 +46,8 @@ pub struct Options<'a> {
 }
 
 impl<'a> Options<'a> {
-    /// Sets the values of all undefined constants.
+    /// Sets the values of constants: of all undefined ones, and of defined ones that are to be
+    /// overridden.
     #[must_use]
     pub fn with_settings(self, settings: Settings) -> Self {
         Self { settings, ..self }

@@ -149,7 +149,8 @@ impl<N: Number> Query<'_, N> {
     }
 
     /// Returns the optimisation direction: the requested one, or for a bound the direction of the
-    /// worst case, since the bound must hold for all policies.
+    /// worst case, since the bound must hold for all policies. Fails for a decision process without
+    /// either; for a Markov chain, the direction does not matter.
     fn direction(&self, question: &Question) -> Checked<Direction> {
         match (question.direction, &question.bound) {
             (Some(direction), _) => Ok(direction),

@@ -84,8 +84,8 @@ impl<N: Number> Query<'_, N> {
         }
     }
 
-    /// Computes for each state the probability of reaching `right` through states of `left`, within
-    /// the bounds on steps or on an accumulated reward.
+    /// Computes for each state the minimal or maximal probability of reaching `right` through
+    /// states of `left`, within the bounds on steps or on an accumulated reward.
     fn until(
         &self,
         direction: Direction,

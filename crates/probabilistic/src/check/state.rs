@@ -235,7 +235,8 @@ impl<N: Number> Query<'_, N> {
         Ok(satisfying)
     }
 
-    /// Computes the value of a numeric expression in all states.
+    /// Computes the value of a numeric expression in all states. Values of properties can only be
+    /// negated, added, subtracted, multiplied and divided.
     pub fn numbers(&self, expression: &Expr) -> Checked<Vector<N>> {
         match &expression.kind {
             ExprKind::Property(property) if is_number(property) => self.property_numbers(property),

@@ -3,8 +3,8 @@
 use crate::number::{Number, count};
 use crate::solve::{Direction, Problem, Work};
 
-/// Underflow threshold: positive products below this value lose relative precision. It also bounds
-/// the absolute error that such a loss causes.
+/// Underflow threshold: positive products below this value lose relative precision. The threshold
+/// also bounds the absolute error that such a loss causes.
 const UNDERFLOW_THRESHOLD: f64 = 1e-280;
 
 /// Values after a bounded number of steps, with bounds on their rounding errors.
@@ -25,8 +25,8 @@ impl<N: Number> Stepped<N> {
     }
 }
 
-/// Applies the Bellman operator `steps` times, starting with `values`. The values of terminal
-/// states do not change. Returns `None` if exact arithmetic exceeds its budget.
+/// Applies the Bellman operator `steps` times, starting with `values`. The values of terminal and
+/// blocked states do not change. Returns `None` if exact arithmetic exceeds its budget.
 ///
 /// All operands are nonnegative, so each step increases the relative error of a value by a
 /// bounded amount.

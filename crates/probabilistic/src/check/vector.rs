@@ -110,8 +110,8 @@ impl<N: Number> Vector<N> {
             Answer::Finite(Quantity { exact: Some(exact), .. }) => Some((exact.clone(), exact)),
             Answer::Finite(quantity) => Some((
                 BigRational::from_float(quantity.lower)?,
-                // An infinite upper bound becomes the greatest double, which exceeds all numbers in
-                // comparisons.
+                // An infinite upper bound becomes the greatest double. Numbers with which values
+                // are compared are assumed to be smaller.
                 BigRational::from_float(quantity.upper).or_else(|| BigRational::from_float(f64::MAX))?,
             )),
             _ => None,

@@ -15,10 +15,11 @@ use crate::prism::model::{Group, Program};
 use crate::prism::run::{Values, enabled};
 use crate::prism::state::{Edit, Packed};
 
-/// Upper limit on the number of actions, because a behaviour stores its disabled actions in a `u128`.
+/// Upper limit on the number of actions of a cached model, because a behaviour (the evaluated
+/// commands of a local state) stores its disabled actions in a `u128`.
 pub const MAX_ACTIONS: usize = 128;
-/// Upper limits on the number of cached behaviours and of cached edits of each module. Further behaviours are
-/// computed on every request.
+/// Upper limits on the number of cached behaviours (evaluated commands of local states) and of
+/// cached edits of each module. Further behaviours are computed on every request.
 const CACHE_LIMITS: [usize; 2] = [1 << 16, 1 << 20];
 /// Cache entry of a local state in which the evaluation of a command fails.
 const FAILED: u32 = u32::MAX - 1;
@@ -26,11 +27,11 @@ const FAILED: u32 = u32::MAX - 1;
 /// A module: its actions and its cached behaviours, i.e. the evaluated commands of local states.
 #[derive(Debug)]
 pub struct Module<N> {
-    /// The actions of the module. The second number is the position of the module's command group in
-    /// `Program::synchronised` for this action.
+    /// The actions of the module: number of the action, and position of the module's command group
+    /// in `Program::synchronised` for this action.
     pub actions: Vec<(usize, usize)>,
     numbers: Option<Numbers>,
-    /// For each behaviour, the disabled actions as a bit set.
+    /// For each behaviour, the actions of the module that are disabled, as a bit set.
     prevented: Vec<u128>,
     /// For each behaviour: the start of its commands without action, the start of its commands for each action, and
     /// the end of its commands.
@@ -44,7 +45,7 @@ pub struct Module<N> {
     cached_lengths: [usize; 4],
 }
 
-/// Index of an evaluated command.
+/// Index into `Module::commands`: a command with its updates evaluated in a local state.
 pub type Chosen = u32;
 
 impl<N: Number> Module<N> {
@@ -73,8 +74,8 @@ impl<N: Number> Module<N> {
         }
     }
 
-    /// Returns the index of the behaviour in a state, or `None` if the evaluation of a command fails. The index is
-    /// valid until the next call.
+    /// Returns the index of the behaviour (the evaluated commands of the local state) in a state,
+    /// or `None` if the evaluation of a command fails. The index is valid until the next call.
     pub fn behaviour(
         &mut self,
         program: &Program<N>,
@@ -173,17 +174,20 @@ impl<N: Number> Module<N> {
         Ok(())
     }
 
-    /// Returns the disabled actions in a behaviour, as a bit set.
+    /// Returns the actions of the module that are disabled in the local state to which the
+    /// behaviour belongs, as a bit set.
     pub fn prevented(&self, behaviour: usize) -> u128 {
         self.prevented[behaviour]
     }
 
-    /// Returns the enabled commands without action in a behaviour.
+    /// Returns the enabled commands without an action in the local state to which the behaviour
+    /// belongs.
     pub fn free(&self, behaviour: usize) -> std::ops::Range<Chosen> {
         self.slot(behaviour, 0)
     }
 
-    /// Returns the enabled commands of a behaviour for one action, given by its position in the module's `actions`.
+    /// Returns the enabled commands for one action in the local state to which the behaviour
+    /// belongs. `at` is the position of the action in [`Self::actions`].
     pub fn acting(&self, behaviour: usize, at: usize) -> std::ops::Range<Chosen> {
         self.slot(behaviour, at.saturating_add(1))
     }
@@ -205,7 +209,8 @@ impl<N: Number> Module<N> {
         })
     }
 
-    /// Returns the total number of updates of consecutive commands.
+    /// Returns the total number of updates of consecutive commands, without updates of probability
+    /// 0.
     pub fn count(&self, commands: std::ops::Range<Chosen>) -> usize {
         commands.map(|command| self.range(command).len()).sum()
     }

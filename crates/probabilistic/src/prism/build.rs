@@ -37,7 +37,8 @@ pub fn declare(names: &mut Names, variable: &ast::Variable) -> Result<Variable, 
     Ok(Variable { name: variable.name.clone(), is_bool, least, greatest, initial })
 }
 
-/// Compiles a command. `writable` returns `true` if the command may assign the variable with this name.
+/// Compiles a command. `writable` returns `true` if the command may assign the variable with this
+/// name. On failure, returns all errors in the command.
 pub fn compile_command<N: Number>(
     command: &ast::Command,
     names: &mut Names,

@@ -1,6 +1,7 @@
 //! Typed expressions with resolved names, and their evaluation.
 //!
 //! Arithmetic is exact, so that `1 - 0.7 - 0.3` is zero even if the model is solved in doubles.
+//! Only logarithms, powers with fractional exponents and very large powers are approximated.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
@@ -16,7 +17,7 @@ pub enum Code {
     Whole(i64),
     /// A number literal that is not an integer literal.
     Number(BigRational),
-    /// The index of a variable.
+    /// A variable, given by its index.
     Variable(u32),
     /// `!`: negation.
     Not(Box<Self>),
@@ -118,7 +119,8 @@ impl Code {
         })
     }
 
-    /// Evaluates a numeric expression exactly; `values` are the values of the variables.
+    /// Evaluates a numeric expression; `values` are the values of the variables. The result is
+    /// exact, except for logarithms, powers with fractional exponents and very large powers.
     pub fn number(&self, values: &[i64]) -> Result<BigRational> {
         Ok(match self {
             Self::Number(value) => value.clone(),
@@ -191,8 +193,8 @@ pub fn from_whole(value: i64) -> BigRational {
     BigRational::from(BigInt::from(value))
 }
 
-/// Converts a probability or reward to the number type of the solver. Fails if doubles cannot represent its
-/// magnitude.
+/// Converts a probability or reward to the number type of the solver. For doubles, fails if a value
+/// other than 0 has a magnitude outside 10^-250 to 10^250.
 pub fn rounded<N: Number>(value: &BigRational) -> Result<N> {
     crate::number::rounded(value).ok_or(Fault("a number that is too large or too small for doubles"))
 }
@@ -275,14 +277,13 @@ fn number_call(function: Function, arguments: &[Code], values: &[i64]) -> Result
             let (base, exponent) = (number(0)?, number(1)?);
             let whole = exponent.is_integer().then(|| exponent.to_i32()).flatten();
             match whole {
-                // Above the size limit, the power is approximated in doubles, as a power with a fractional exponent
-                // is.
                 Some(whole) if whole < 0 && Zero::is_zero(&base) => Err(Fault("a division by zero")),
                 Some(whole)
                     if base.size().saturating_mul(whole.unsigned_abs().into()) <= MAX_OPERAND_BITS =>
                 {
                     Ok(base.pow(whole))
                 }
+                // Other exponents and powers beyond the size limit: the power is approximated in doubles.
                 _ => irrational(Number::to_f64(&base).powf(Number::to_f64(&exponent))),
             }
         }

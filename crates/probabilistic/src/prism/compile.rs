@@ -40,7 +40,7 @@ const MAX_DEPTH: usize = 250;
 /// Upper limits on the number of subexpressions: in one top-level expression, and in all expressions together.
 const MAX_PARTS: [usize; 2] = [200_000, 5_000_000];
 
-/// The constants set by the user: values as text, by name.
+/// The values of constants that the user sets, as text, by name. They override values in the model.
 pub type Settings = BTreeMap<String, String>;
 
 impl Names {
@@ -169,7 +169,7 @@ impl Names {
         }
     }
 
-    /// Returns the expression that defines a label.
+    /// Returns the expression that defines a label, or `None` if the label is not declared.
     pub fn label(&self, name: &str) -> Option<&Expr> {
         self.labels.get(name)
     }
@@ -200,7 +200,8 @@ impl Names {
         Err(Diagnostic::new("Q203", expression.place, text))
     }
 
-    /// Compiles an expression and returns it with its inferred type.
+    /// Compiles an expression and returns it with its inferred type. Fails for an unknown name, a
+    /// wrong type, a circular formula, or an expression beyond [`MAX_DEPTH`] or [`MAX_PARTS`].
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "depth and parts are refused as soon as they pass their limits, and each leaves the depth that it entered"

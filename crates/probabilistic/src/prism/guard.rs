@@ -1,4 +1,5 @@
-//! Guards of commands: conjunctions, split into fast tests of single variables and other conjuncts.
+//! Guards of commands and reward items: conjunctions, split into fast tests of single variables and
+//! other conjuncts.
 
 use crate::prism::ast::{BinaryOp, Type};
 use crate::prism::code::{Code, Fault};
@@ -40,7 +41,7 @@ impl Guard {
         &self.fixed
     }
 
-    /// Calls `visit` with the variable of each occurrence in the guard.
+    /// Calls `visit` with each occurrence of a variable in the guard.
     pub fn each_variable(&self, visit: &mut impl FnMut(u32)) {
         self.tests.iter().for_each(|test| visit(test.variable));
         self.remainder.iter().for_each(|part| part.each_variable(visit));

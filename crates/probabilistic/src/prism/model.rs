@@ -1,8 +1,9 @@
 //! Compiles a model to an executable program: resolves names and evaluates constants.
 //!
-//! If guards fix a variable (`l=5 & …`), the commands are indexed by the value of this variable. For each value, the
-//! program also stores the actions that may be enabled. The cost of expanding a state therefore does not grow with
-//! the number of commands for other values.
+//! If guards fix a variable (`l=5 & …`), the commands are indexed by the value of this variable,
+//! unless its range is much larger than the number of commands. For each value, the program also
+//! stores the actions that may be enabled. The cost of expanding a state therefore does not grow
+//! with the number of commands for other values.
 
 use std::cmp::Reverse;
 
@@ -28,8 +29,8 @@ pub(super) struct Group<N> {
     /// The index of the module.
     pub module: usize,
     pub commands: Vec<Command<N>>,
-    /// Index of the commands by the value of a variable: the variable, its least value, and the candidate commands
-    /// for each value.
+    /// Index of the commands by the value of a variable: the variable, its least value, and the
+    /// candidate commands for each value. `None` if all commands are candidates in every state.
     pub index: Option<(u32, i64, Vec<Vec<u32>>)>,
 }
 
@@ -117,7 +118,7 @@ impl<N: Number> Program<N> {
                 Err(problem) => problems.push(problem),
             }
         }
-        // Without the missing variables, further errors would be misleading.
+        // Without the variables whose declarations are invalid, further errors would be misleading.
         if !problems.is_empty() {
             return Err(Error::Model(problems.into()));
         }
@@ -258,7 +259,9 @@ impl<N: Number> Program<N> {
         self.free.push(free);
     }
 
-    /// Indexes each group of commands by the variable that most of its guards fix.
+    /// Indexes each group of commands by the variable that most of its guards fix. A group has no
+    /// index if no guard fixes a variable, or if the range of this variable is much larger than the
+    /// number of commands.
     fn index(&mut self) {
         let variables = &self.variables;
         for group in self.synchronised.iter_mut().flatten().chain(&mut self.free) {

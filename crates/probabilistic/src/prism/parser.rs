@@ -18,7 +18,8 @@ use crate::prism::rename;
 /// ```
 ///
 /// # Errors
-/// All syntax errors; after an error, parsing continues with the next declaration.
+/// All syntax errors; after an error, parsing continues with the next declaration. If the text
+/// contains invalid characters or unclosed quotation marks, only these are reported.
 pub fn parse(text: &str) -> Result<Model, Error> {
     let tokens = tokens(text).map_err(|problems| Error::Model(problems.into()))?;
     let mut cursor = Cursor::new(&tokens);
@@ -144,7 +145,7 @@ pub fn constant_declaration(cursor: &mut Cursor<'_>) -> Read<Constant> {
         },
         _ => None,
     };
-    // The default type is `int`.
+    // Without a type, the constant is an `int`, and no token has to be skipped.
     if kind.is_some() {
         cursor.advance();
     }

@@ -25,7 +25,8 @@ use crate::prism::state::Packed;
 /// A program that caches the evaluated commands of its modules by local state.
 pub struct Remembered<'a, N> {
     program: &'a Program<N>,
-    /// The caches. `None` if caching would save nothing; the program then computes all successors.
+    /// The caches. `None` if caching would save nothing (a single module), or if there are more
+    /// than [`MAX_ACTIONS`] actions; the program then computes all successors.
     memory: Option<RefCell<Memory<N>>>,
 }
 
@@ -221,7 +222,8 @@ impl<N: Number> Team<N> {
         Self { behaviours: vec![0; modules.len()], modules, actions, prevented: 0 }
     }
 
-    /// Looks up the behaviour of each module in a state. Returns `None` if an evaluation fails.
+    /// Looks up the behaviour (the evaluated commands) of each module in a state. Returns `None` if
+    /// an evaluation fails.
     fn load_state(
         &mut self,
         program: &Program<N>,
@@ -261,8 +263,9 @@ impl<N: Number> Team<N> {
         Some(())
     }
 
-    /// Calls `visit` with each combination of one command per module. The command of the first module varies fastest.
-    /// Returns `None` if the combinations have more than [`MAX_COMBINED`] successors.
+    /// Calls `visit` with each combination of one command per module. The command of the first
+    /// module varies fastest. Returns `None` if the combinations of several modules have more than
+    /// [`MAX_COMBINED`] successors.
     fn each_combination(&self, parts: &[Part], mut visit: impl FnMut(&[Chosen])) -> Option<()> {
         if let [(_, commands)] = parts {
             commands.clone().for_each(|command| visit(&[command]));
@@ -356,7 +359,8 @@ impl<N: Number> Rewards<N> {
         }
     }
 
-    /// Returns the rewards of an action in a state, by computed structure. Returns `None` if an evaluation fails.
+    /// Returns the rewards of an action in a state: one for each reward structure whose rewards are
+    /// computed. Returns `None` if an evaluation fails.
     fn get(&mut self, program: &Program<N>, action: u32, state: &Packed) -> Option<&Sums<N>> {
         let memo = self.named.get_mut(action as usize).unwrap_or(&mut self.unnamed);
         memo.get(state, || program.action_rewards(action, &program.values_of(state)).ok())

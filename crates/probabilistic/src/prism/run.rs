@@ -20,10 +20,11 @@ use crate::prism::state::{Packed, above_least};
 
 /// The values of the variables in a state.
 pub(super) type Values = SmallVec<[i64; 16]>;
-/// The rewards of a state or choice, by computed structure.
+/// The rewards of a state or choice: one for each reward structure whose rewards are computed.
 pub(super) type Sums<N> = SmallVec<[N; 4]>;
 
-/// Upper limit on the number of successors of the synchronised commands of an action in one state.
+/// Upper limit on the number of successors of the synchronised commands of an action in one state,
+/// if several modules synchronise on the action.
 pub(super) const MAX_COMBINED: usize = 1_000_000;
 
 /// The enabled commands of the modules that synchronise on an action. A joint step executes one command of each
@@ -41,8 +42,9 @@ struct JointStep<N> {
 }
 
 impl<N: Number> Program<N> {
-    /// Collects the enabled commands of the synchronising modules in `joint`. Returns `false` if a module has no
-    /// enabled command.
+    /// Collects the enabled commands of the synchronising modules in `joint`. Returns `false` if a
+    /// module has no enabled command. Fails if their combinations have more than [`MAX_COMBINED`]
+    /// successors.
     fn synchronise(
         &self,
         joint: &mut JointStep<N>,
@@ -272,7 +274,8 @@ impl<N: Number> Program<N> {
         })
     }
 
-    /// Adds the transitions of a command that does not synchronise to the current choice.
+    /// Adds to the current choice the transitions of a command that is executed without other
+    /// modules.
     fn single_command(
         &self,
         command: &Command<N>,

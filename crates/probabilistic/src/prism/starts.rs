@@ -10,7 +10,9 @@ const MAX_TRIED: usize = 50_000_000;
 
 /// Returns the states that satisfy `condition`, in lexicographic order of the values of the variables.
 ///
-/// The search backtracks over the variables. A conjunct is evaluated as soon as all of its variables have values.
+/// The search backtracks over the variables. A conjunct is evaluated as soon as all of its
+/// variables have values. Fails if more than [`MAX_TRIED`] values have to be tried, or if a
+/// conjunct cannot be evaluated.
 pub fn starts(
     condition: Code,
     place: Place,

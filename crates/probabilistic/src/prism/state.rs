@@ -198,7 +198,8 @@ impl Layout {
         Edit { word: field.word, clear: field.mask << field.shift, set }
     }
 
-    /// Returns the key that concatenates the values of these variables, or `None` if they need more than 64 bits.
+    /// Returns a [`Key`] that selects these variables, or `None` if their values need more than 64
+    /// bits. [`Key::of`] concatenates the values in a state to a number.
     pub fn key(&self, variables: &BTreeSet<u32>) -> Option<Key> {
         let mut key = Key::default();
         for field in variables.iter().map(|variable| &self.fields[*variable as usize]) {

@@ -36,7 +36,8 @@ pub struct Listed {
     pub name: Option<String>,
     /// The parsed property.
     pub property: Property,
-    /// The source text of the property, without its name.
+    /// The source text of the property, without its name and without comments that follow the
+    /// property.
     pub text: String,
     /// Position of the property in the file, after its name.
     pub place: Place,
@@ -45,8 +46,10 @@ pub struct Listed {
 /// Parses a property file, which contains properties, constants and labels.
 ///
 /// # Errors
-/// All syntax errors; after an error, parsing continues after the next `;`. A property of an unsupported kind is not an
-/// error: it becomes [`Property::Refused`], which is reported when the property is checked.
+/// All syntax errors; after an error, parsing continues after the next `;`. If the text contains
+/// invalid characters or unclosed quotation marks, only these are reported. A property of an
+/// unsupported kind is not an error: it becomes [`Property::Refused`], which is reported when the
+/// property is checked.
 pub fn parse_file(text: &str) -> Result<File, Error> {
     let tokens = tokens(text).map_err(|problems| Error::Property(problems.into()))?;
     let mut cursor = Cursor::for_properties(&tokens, PROPERTY_SYNTAX);

@@ -76,7 +76,8 @@ pub fn property(cursor: &mut Cursor<'_>) -> Read<Property> {
     })
 }
 
-/// Parses a property or a unary temporal operator. Returns `None` if the next token begins neither.
+/// Parses a property or a unary temporal operator. Returns `None` if the next token begins neither,
+/// and an error for the CTL quantifiers `A` and `E`.
 fn parse_prefix(cursor: &mut Cursor<'_>) -> Read<Option<ExprKind>> {
     let Kind::Name(word) = cursor.peek() else { return Ok(None) };
     let place = cursor.place();
@@ -321,8 +322,8 @@ fn number_of_steps(cursor: &mut Cursor<'_>) -> Read<Expr> {
     }
 }
 
-/// Converts an expression with temporal operators to a path formula. Returns an error for LTL
-/// formulas that would need an automaton.
+/// Converts an expression to a path formula. Permits negations, a single temporal operator, and the
+/// nested operators of [`nested`]. Returns an error for other LTL formulas.
 fn path(formula: Expr) -> Read<Path> {
     let place = formula.place;
     if !has_temporal(&formula) {

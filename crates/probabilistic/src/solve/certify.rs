@@ -57,8 +57,8 @@ pub fn certify<N: Number>(
         });
         return vec![better + rounding];
     }
-    // A smaller threshold gives a smaller w, but leaves less slack for the rows that exceed the
-    // threshold.
+    // A smaller threshold gives a smaller w (see the head of this file), but leaves less slack for
+    // the rows whose loss exceeds the threshold.
     for threshold in [1e-8, 1e-12] {
         let is_near = |block: usize, row: usize| {
             loss(block, row) <= threshold * v[block].max(1e-12) || policy[block] as usize == row
@@ -94,16 +94,17 @@ pub fn certify<N: Number>(
     vec![f64::INFINITY; blocks]
 }
 
-/// Returns the expected number of steps after taking a row; `steps` contains the expected number
-/// from each block.
+/// Returns the expected number of further steps after a row (choice) is taken; `steps` contains the
+/// expected number from each block (merged end component).
 fn steps_after<N: Number>(quotient: &Quotient<N>, row: usize, steps: &[f64]) -> f64 {
     let range = quotient.rows.range(row);
     let transitions = quotient.rows.columns[range.clone()].iter().zip(&quotient.rows.probabilities[range]);
     transitions.map(|(column, probability)| probability.to_f64() * steps[*column as usize]).sum()
 }
 
-/// Returns the greatest expected number of steps from each block, over policies that use only the
-/// rows in `near`. Returns `None` if it is infinite or not found within the limits.
+/// Returns the greatest expected number of steps from each block (merged end component) until the
+/// component is left, over policies that use only the rows in `near`. Returns `None` if a number is
+/// infinite, or if the numbers are not found within the limits.
 fn greatest_steps<N: Number>(quotient: &Quotient<N>, policy: &[u32], near: &[bool]) -> Option<Vec<f64>> {
     let rows = &quotient.rows;
     let mut policy = policy.to_vec();
@@ -128,8 +129,8 @@ fn greatest_steps<N: Number>(quotient: &Quotient<N>, policy: &[u32], near: &[boo
     None
 }
 
-/// Switches each block to a row with a greater expected number of steps, and updates `steps`.
-/// Returns `true` if a row was switched.
+/// Switches each block to a row of `near` with a greater expected number of steps if there is one,
+/// and updates `steps`. Returns `true` if a row was switched.
 fn lengthen<N: Number>(quotient: &Quotient<N>, near: &[bool], policy: &mut [u32], steps: &mut [f64]) -> bool {
     let mut changed = false;
     for (block, chosen) in policy.iter_mut().enumerate() {

@@ -25,8 +25,8 @@ use crate::solve::work::Work;
 /// Marker for the absence of a row, choice or state.
 pub const NONE: u32 = u32::MAX;
 
-/// The equations of a component as sparse rows: transitions inside the component, cost, and
-/// probability of leaving the component.
+/// The equations of a strongly connected component as sparse rows, one for each choice: transitions
+/// inside the component, cost, and probability of leaving the component.
 #[derive(Debug, Clone, Default)]
 pub struct Rows<N> {
     /// Start of each row in `columns`, followed by the length of `columns`.
@@ -133,8 +133,8 @@ impl<N: Number> Rows<N> {
     }
 }
 
-/// Upper limit on the number of entries that elimination in doubles visits. Chains with a
-/// two-dimensional structure have much fill-in and are solved faster by iteration.
+/// Upper limit on the number of entries that elimination in doubles visits for one component.
+/// Chains with a two-dimensional structure have much fill-in and are solved faster by iteration.
 const MAX_ELIMINATION: u64 = 300_000_000;
 
 /// The solution of a Markov chain.
@@ -191,8 +191,8 @@ impl<N: Number> Chain<'_, N> {
         }
     }
 
-    /// Solves the chain. Returns `None` if a state is never left, or if a limit on the work is
-    /// exceeded.
+    /// Computes the expected cost from each state of the chain until the chain is left. Returns
+    /// `None` if a set of states is never left, or if a limit on the work is exceeded.
     pub fn solve(&self, work: &mut Work) -> Option<Solved<N>> {
         let order = components(self.policy.len(), |state| self.targets(state as usize));
         let mut values = vec![N::zero(); self.policy.len()];
@@ -229,14 +229,14 @@ impl<N: Number> Chain<'_, N> {
     }
 }
 
-/// Upper bound on the relative error after eliminating `states` states in rows of at most `widest`
-/// entries.
+/// Upper bound on the relative error of the values of a component that is solved by eliminating
+/// `states` states, if no row has more than `widest` entries.
 ///
-/// Let n be the number of states, w the number of entries, and u the unit roundoff. With m
-/// remaining states, an elimination step perturbs each entry by a factor of 1 ± (w + 4)u, and a
-/// value contains 2m such factors. All steps together contribute less than n(n + 1)(w + 4)u. The
-/// rounding of the initial entries and the back substitution add less than 4n(w + 4)u. The result
-/// uses the machine epsilon, which is 2u, and is thus twice as large as required.
+/// Let n be the number of states, w the number of entries, and u the unit roundoff. Eliminating a
+/// state while m states remain multiplies each entry by rounding factors within 1 ± (w + 4)u. Each
+/// value of a state depends on at most 2m of these factors. Summed over m = 1, …, n, this is n(n +
+/// 1)(w + 4)u. The rounding of the initial entries and the back substitution add less than 4n(w +
+/// 4)u. The result uses the machine epsilon, which is 2u, and is thus twice as large as required.
 fn rounding<N: Number>(states: usize, widest: usize) -> f64 {
     let n = count(states) + 4.0;
     if N::EXACT { 0.0 } else { n * n * (count(widest) + 8.0) * f64::EPSILON }
@@ -258,8 +258,9 @@ struct Precision {
     lost: bool,
 }
 
-/// Solves the equations of a component by elimination and writes the values of its states. Returns
-/// `None` if a state is never left, or if a limit on the work is exceeded.
+/// Solves the equations of a strongly connected component by elimination and writes the values of
+/// its states. Returns `None` if the component is never left, or if a limit on the work is
+/// exceeded.
 fn eliminate<N: Number>(
     chain: &Chain<'_, N>,
     component: &[u32],
@@ -347,8 +348,9 @@ fn fill<N>(rows: &[Row<N>], users: &[Vec<u32>], state: u32) -> usize {
     rows[state as usize].entries.len().saturating_mul(users[state as usize].len())
 }
 
-/// Eliminates the self-loop of a row by dividing its other entries by their sum. Returns `None` if
-/// the row only loops, or if exact arithmetic exceeds its budget.
+/// Eliminates the self-loop of a row: divides its other entries, its constant and its leaving
+/// probability by the probability of not looping. Returns `None` if the row only loops, or if exact
+/// arithmetic exceeds its budget.
 fn normalise<N: Number>(row: &mut Row<N>, diagonal: u32, budget: &mut Work) -> Option<()> {
     let Ok(at) = row.entries.binary_search_by_key(&diagonal, |(column, _)| *column) else { return Some(()) };
     row.entries.remove(at);

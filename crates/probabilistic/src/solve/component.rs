@@ -15,7 +15,8 @@ use crate::solve::quotient::Quotient;
 use crate::solve::users::Users;
 
 impl<N: Number> Run<'_, N> {
-    /// Solves a component of several states. Returns `None` if exact arithmetic exceeds its budget.
+    /// Solves a strongly connected component of several states. Returns `None` if exact arithmetic
+    /// exceeds its budget.
     pub fn component(&mut self, component: &[u32], local: &mut Local<N>) -> Option<()> {
         let outcome = self.solve_component(component, local);
         for state in component {
@@ -99,8 +100,8 @@ impl<N: Number> Run<'_, N> {
         unsure.into_iter().map(|unsure| !unsure).collect()
     }
 
-    /// Computes a policy for the sure states, under which they reach a terminal state with
-    /// probability 1.
+    /// Computes a policy under which the sure states (those marked in `members`) reach a terminal
+    /// state with probability 1.
     fn reach_surely(&mut self, local: &mut Local<N>, members: &[bool]) {
         let sure = component_part(&local.states, members, true, true);
         if sure.is_empty() {
@@ -157,8 +158,9 @@ impl<N: Number> Run<'_, N> {
         }
     }
 
-    /// Computes the values and the policy of the states in `local`. Returns `None` if exact
-    /// arithmetic exceeds its budget.
+    /// Computes the values and the policy of the states in `local`. If no method bounds the values
+    /// in doubles, their errors are set to infinity. Returns `None` if exact arithmetic exceeds its
+    /// budget.
     fn values(&mut self, local: &mut Local<N>) -> Option<()> {
         let costs = self.problem.rewards.is_some();
         let mut ends = end_components(local, |choice| !costs || !local.paid[choice]);
@@ -232,8 +234,8 @@ impl<N: Number> Run<'_, N> {
         }
     }
 
-    /// Returns the initial policy: the hint if it selects a row for every block that has rows, otherwise a policy
-    /// that leaves the component with probability 1.
+    /// Returns the initial policy: the hint if it selects a row for every block (merged end
+    /// component) that has rows, otherwise a policy that leaves the component with probability 1.
     fn start(&self, local: &Local<N>, quotient: &Quotient<N>) -> Vec<u32> {
         let mut policy = vec![NONE; quotient.blocks()];
         if let Some(hint) = self.hint {
@@ -280,8 +282,9 @@ impl<N: Number> Run<'_, N> {
     }
 }
 
-/// Extends the policy `chosen` to the other states of the end components: they move towards a state
-/// that leaves the end component. `queue` contains the states with a choice.
+/// Extends the policy `chosen` to the states of end components that have no choice yet: they move
+/// towards a state whose choice leaves the end component. `queue` contains the states with a
+/// choice.
 fn route_to_exits<N: Number>(
     local: &Local<N>,
     ends: &EndComponents,
@@ -302,8 +305,9 @@ fn route_to_exits<N: Number>(
     }
 }
 
-/// Selects states by whether they are sure (`members`). Returns the sure states if `only_sure`;
-/// otherwise all states if `include_sure`, or else the states that are not sure.
+/// Selects states by whether they are sure, i.e. reach a terminal state with probability 1
+/// (`members`). Returns the sure states if `only_sure`; otherwise all states if `include_sure`, or
+/// else the states that are not sure.
 fn component_part(states: &[u32], members: &[bool], include_sure: bool, only_sure: bool) -> Vec<u32> {
     let is_selected = |sure: bool| if only_sure { sure } else { include_sure || !sure };
     states.iter().zip(members).filter(|(_, sure)| is_selected(**sure)).map(|(state, _)| *state).collect()
@@ -334,7 +338,8 @@ fn unmerged<N: Number>(local: &mut Local<N>) -> Quotient<N> {
     Quotient { first, rows, choices, widest: local.widest }
 }
 
-/// Sorts the states by block. Returns the start of each block in the sorted list, and the list.
+/// Sorts the states by block (merged end component). Returns the start of each block in the sorted
+/// list, followed by the length of the list, and the list.
 fn members(ends: &EndComponents) -> (Vec<u32>, Vec<u32>) {
     let mut starts = vec![0_u32; ends.blocks.saturating_add(1)];
     for block in &ends.block {

@@ -13,9 +13,10 @@ use crate::solve::quotient::Quotient;
 use crate::solve::work::{TIGHT, Work};
 
 /// Limits for solving in rationals if the bounds in doubles are insufficient: work units, and
-/// number of blocks.
+/// number of blocks (merged end components).
 const RATIONAL_LIMITS: (u64, usize) = (1_000_000_000, 3000);
-/// Work limit for solving in rationals if the bounds in doubles are sufficient for most purposes.
+/// Work limit for solving in rationals if the bounds in doubles are finite, and bounds narrower
+/// than [`TIGHT`] are not required.
 const IMPROVEMENT_LIMIT: u64 = 100_000_000;
 
 /// Computes bounds on the values of all blocks (merged end components). Returns `None` if no method
@@ -65,7 +66,8 @@ pub fn enclosed<N: Number>(
     if is_good {
         return Some(rounded);
     }
-    // Wide bounds are improved if that is cheap, or if narrower bounds were requested.
+    // Finite but wide bounds are improved only if that is cheap. More work is done if an error is
+    // infinite, or if narrower bounds than usual were requested.
     let is_usual = tight >= TIGHT && rounded.errors.iter().all(|error| error.is_finite());
     let limit = if is_usual { IMPROVEMENT_LIMIT } else { RATIONAL_LIMITS.0 };
     let exact = (quotient.blocks() <= RATIONAL_LIMITS.1)
@@ -80,8 +82,8 @@ pub fn enclosed<N: Number>(
         .or(Some(rounded))
 }
 
-/// Returns `true` if a uniform error of all blocks, as in a certificate, can be tight even for the
-/// least value.
+/// Returns `true` if a uniform error of all blocks (merged end components), as in a certificate,
+/// can be tight even for the least positive value.
 fn is_level<N: Number>(quotient: &Quotient<N>, values: &[N], tight: f64) -> bool {
     let values = values.iter().map(Number::to_f64).filter(|value| *value > 0.0);
     let (least, greatest) = values
@@ -96,7 +98,7 @@ fn is_tight<N: Number>(values: &[N], errors: &[f64], tight: f64) -> bool {
 /// Solves the rounded equations exactly in rationals. The error bound accounts for the earlier
 /// rounding of the entries: a value contains a few rounding errors per block, in its numerator and
 /// in its denominator (see `chain`). This holds under every policy and therefore under the optimal
-/// one.
+/// one. Returns `None` if the budget is exceeded.
 fn in_rationals<N: Number>(
     quotient: &Quotient<N>,
     policy: &[u32],

@@ -6,9 +6,9 @@
 //! 735, 2018).
 //!
 //! Each evaluation of an equation is rounded down for the lower and up for the upper bound.
-//! Therefore every value is a bound at any time, in any order of the equations. Each sweep uses the
-//! values that it has already updated (Gauss-Seidel), and starts with the blocks nearest to an
-//! exit.
+//! Therefore the values of the lower bound are valid at any time, in any order of the equations.
+//! Each sweep uses the values that it has already updated (Gauss-Seidel), and starts with the
+//! blocks nearest to an exit.
 
 use std::collections::VecDeque;
 
@@ -19,7 +19,8 @@ use crate::solve::problem::Direction;
 use crate::solve::quotient::Quotient;
 use crate::solve::users::{Users, owners};
 
-/// An almost optimal policy, with the values of the blocks and bounds on their errors.
+/// An almost optimal policy, with the values of the blocks (merged end components) and bounds on
+/// their errors.
 pub struct Enclosed<N> {
     pub policy: Vec<u32>,
     pub values: Vec<N>,
@@ -27,7 +28,8 @@ pub struct Enclosed<N> {
     pub errors: Vec<f64>,
 }
 
-/// Upper limit on the number of transitions evaluated for one component.
+/// Upper limit on the work for one strongly connected component: the number of evaluated
+/// transitions and equations.
 const MAX_WORK: u64 = 30_000_000_000;
 /// Number of sweeps for a candidate upper bound; after them, the lower bound is refined.
 const UPPER_SWEEPS: usize = 40;
@@ -36,8 +38,8 @@ const INITIAL_SHARE: f64 = 0.45;
 /// Number of sweeps with the rows of a fixed policy between two sweeps over all rows.
 const POLICY_SWEEPS: usize = 25;
 
-/// Computes bounds on the values of all blocks with a width of at most `width` times the value.
-/// Returns `None` if the work limit is exceeded.
+/// Computes bounds on the values of all blocks (merged end components) with a width of at most
+/// `width` times the value. Returns `None` if the work limit is exceeded.
 pub fn enclose<N: Number>(quotient: &Quotient<N>, direction: Direction, width: f64) -> Option<Enclosed<N>> {
     let sorted = Sorted::new(quotient);
     let rows = sorted.rows(quotient, direction);
@@ -45,8 +47,9 @@ pub fn enclose<N: Number>(quotient: &Quotient<N>, direction: Direction, width: f
     Some(rows.enclosed(quotient, &lower, &upper))
 }
 
-/// Computes bounds on the values of all blocks around approximate values `near`. Returns `None` if
-/// the approximate values are not close enough.
+/// Computes bounds on the values of all blocks (merged end components) around approximate values
+/// `near`. Returns `None` if the approximate values are not close enough to prove bounds with a
+/// width of at most `width` times the value.
 pub fn around<N: Number>(
     quotient: &Quotient<N>,
     near: &[N],
@@ -58,11 +61,12 @@ pub fn around<N: Number>(
     Some(rows.enclosed(quotient, &lower, &upper))
 }
 
-/// The equations in the order in which sweeps evaluate them.
+/// The equations, in the order in which sweeps evaluate them. A *position* is an index of a block
+/// (merged end component) in this order.
 struct Rows<'a, N> {
     direction: Direction,
-    /// The block at each position of the order, and the number of each row in the quotient. `None`
-    /// if the order is that of the quotient.
+    /// For each position in the order, the block; and for each row, its number in the quotient (the
+    /// unsorted equations). `None` if the equations are not sorted.
     sorted: Option<(&'a [u32], &'a [u32])>,
     /// The first row of each position, followed by the number of rows.
     blocks: &'a [u32],
@@ -138,7 +142,7 @@ fn rounding<N: Number>(quotient: &Quotient<N>) -> f64 {
 }
 
 impl<'a, N: Number> Rows<'a, N> {
-    /// Uses the equations in the order of the quotient. States discovered last come first there;
+    /// Uses the equations without sorting them. In this order, states discovered last come first;
     /// they are usually closest to an exit.
     fn of(quotient: &'a Quotient<N>, direction: Direction) -> Self {
         Self {
@@ -174,8 +178,8 @@ impl<'a, N: Number> Rows<'a, N> {
         })
     }
 
-    /// Returns the best row of the block at a position, with its value. Returns [`NONE`] and 0 for
-    /// a block without rows, which is never left.
+    /// Returns the best row (choice) of the block (merged end component) at a position, with its
+    /// value. Returns [`NONE`] and 0 for a block without rows, which is never left.
     #[expect(clippy::arithmetic_side_effects, reason = "the end is listed, too")]
     fn best(&self, position: usize, values: &[f64]) -> (u32, f64) {
         let mut best = (NONE, 0.0);
@@ -279,9 +283,10 @@ impl<'a, N: Number> Rows<'a, N> {
         (change, work)
     }
 
-    /// Updates all values of a candidate upper bound. Returns `true` if a value was raised. If no
-    /// value was raised, the values are upper bounds, because each equation used values that are at
-    /// least the final ones.
+    /// Updates all values of a candidate upper bound in place. Results are multiplied by `scale` to
+    /// account for rounding. Returns `true` if a value was raised. If none was raised, the values
+    /// are upper bounds: each was computed from values that are at least those at the end of the
+    /// sweep.
     fn raises(&self, values: &mut [f64], scale: f64) -> bool {
         let mut raised = false;
         for position in 0..values.len() {
@@ -292,9 +297,10 @@ impl<'a, N: Number> Rows<'a, N> {
         raised
     }
 
-    /// Updates all values of a candidate lower bound. Returns `true` if a value was lowered. If no
-    /// value was lowered, the values are lower bounds. The selected rows leave the component with
-    /// probability 1, and under these rows the values only grow towards the values of the policy.
+    /// Updates all values of a candidate lower bound in place. Results are multiplied by `scale` to
+    /// account for rounding. Returns `true` if a value was lowered. If no value was lowered, the
+    /// values are lower bounds. The selected rows leave the component with probability 1, and under
+    /// these rows the values only grow towards the values of the policy.
     fn lowers(&self, values: &mut [f64], scale: f64) -> bool {
         let mut lowered = false;
         for position in 0..values.len() {
@@ -306,7 +312,8 @@ impl<'a, N: Number> Rows<'a, N> {
     }
 
     fn enclosed(&self, quotient: &Quotient<N>, lower: &[f64], upper: &[f64]) -> Enclosed<N> {
-        // The choices that maintain this bound form a policy whose values are within the bounds.
+        // The choices that maintain the upper bound (for a minimum) or the lower bound (for a
+        // maximum) form a policy whose values are within both bounds.
         let maintained = if self.direction == Direction::Min { upper } else { lower };
         let blocks = quotient.blocks();
         let mut result = Enclosed {
@@ -333,8 +340,8 @@ fn grow(old: &mut f64, new: f64) -> f64 {
     change
 }
 
-/// Orders the blocks by the number of rows on a shortest path out of the component (breadth-first
-/// search). Blocks without such a path come last.
+/// Orders the blocks (merged end components) by the number of rows on a shortest path out of the
+/// component (breadth-first search). Blocks without such a path come last.
 fn order<N: Number>(quotient: &Quotient<N>) -> Vec<u32> {
     let blocks = quotient.blocks();
     let mut visited = vec![false; blocks];

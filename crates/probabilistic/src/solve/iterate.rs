@@ -20,10 +20,11 @@ const MAX_ROUNDS: usize = 1000;
 const SWEEPS: (u64, u64) = (2, 40);
 /// Number of entries that a sweep evaluates in the time in which elimination processes one entry.
 const SWEEP_SPEED: u64 = 4;
-/// Number of blocks from which on several sweeps per round save time.
+/// Number of blocks (merged end components) from which on several sweeps per round save time.
 const SWEEP_MIN_BLOCKS: usize = 200;
 
-/// A policy that no row clearly improves, with the value of each block.
+/// A policy with the value of each block (merged end component). No row clearly improves the
+/// policy, unless [`MAX_ROUNDS`] was reached.
 pub struct Iterated<N> {
     pub policy: Vec<u32>,
     pub values: Vec<N>,
@@ -32,9 +33,9 @@ pub struct Iterated<N> {
     pub relative: Vec<f64>,
 }
 
-/// Performs policy iteration from the policy `start`, which must leave every block with probability
-/// 1. Returns `None` if the chain of a policy cannot be solved within the limits, or if exact
-/// arithmetic exceeds its budget.
+/// Performs policy iteration from the policy `start`, which must lead from every block (merged end
+/// component) out of the component with probability 1. Returns `None` if the chain of a policy
+/// cannot be solved within the limits, or if exact arithmetic exceeds its budget.
 pub fn iterate<N: Number>(
     quotient: &Quotient<N>,
     start: Vec<u32>,
@@ -73,9 +74,10 @@ fn chain<N: Number>(quotient: &Quotient<N>, policy: &[u32], work: &mut Work) -> 
     Chain { rows: &quotient.rows, policy, costs: None }.solve(work)
 }
 
-/// Switches each block to its best row. With `sweep`, rows are evaluated with the updated values,
-/// otherwise with the values before the call. Returns `true` if a row was switched, and `None` if
-/// exact arithmetic exceeds its budget.
+/// Switches each block (merged end component) to its best row (choice) if this row is clearly
+/// better than the current one. With `sweep`, rows are evaluated with the updated values, otherwise
+/// with the values before the call. Returns `true` if a row was switched, and `None` if exact
+/// arithmetic exceeds its budget.
 fn improve<N: Number>(
     quotient: &Quotient<N>,
     policy: &mut [u32],
@@ -108,8 +110,9 @@ fn improve<N: Number>(
     Some(changed)
 }
 
-/// Returns a policy under which every block from which the component can be left reaches an exit with positive
-/// probability. Rows are chosen by breadth-first search backwards from the exits.
+/// Returns a policy under which every block (merged end component) from which the component can be
+/// left reaches an exit with positive probability. Other blocks get no row ([`NONE`]). Rows are
+/// chosen by breadth-first search backwards from the exits.
 pub fn leave<N: Number>(quotient: &Quotient<N>) -> Vec<u32> {
     let mut policy = vec![NONE; quotient.blocks()];
     let (owners, users) = (owners(&quotient.first), Users::new(&quotient.rows, quotient.blocks()));

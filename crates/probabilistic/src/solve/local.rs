@@ -1,4 +1,5 @@
-//! Extracts a strongly connected component of a process and computes its end components.
+//! A set of states extracted from a process, usually a strongly connected component, and its end
+//! components.
 
 use std::collections::VecDeque;
 
@@ -31,7 +32,7 @@ pub struct Local<N> {
 }
 
 impl<N: Number> Local<N> {
-    /// Creates an empty component.
+    /// Creates an empty set of states.
     pub fn new() -> Self {
         Self {
             states: vec![],
@@ -93,10 +94,11 @@ pub struct EndComponents {
     pub alive: Vec<bool>,
 }
 
-/// Computes the maximal end components of the closed choices that `eligible` accepts (de Alfaro 1997). The graph of
-/// these choices is decomposed into strongly connected components, and choices that leave their component are
-/// removed, until no choice is removed. Before that, choices into states without remaining choices are removed; if
-/// there are no end components, this removes all choices.
+/// Computes the maximal end components (de Alfaro 1997) that consist of choices that `eligible`
+/// accepts. Only closed choices count, i.e. those whose targets are all in `local`. The graph of
+/// these choices is decomposed into strongly connected components, and choices that leave their
+/// component are removed, until no choice is removed. Before that, choices into states without
+/// remaining choices are removed; if there are no end components, this removes all choices.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "the start of the next one is there, because the end is listed, too"

@@ -62,7 +62,8 @@ pub(crate) fn solve_within<N: Number>(
     outcome.map(|()| run.solution)
 }
 
-/// Computes a good policy without bounding its error; the policy may not be optimal.
+/// Computes a good policy without bounding its error; the policy may not be optimal. Returns `None`
+/// if exact arithmetic exceeds its default budget.
 pub(crate) fn draft<N: Number>(problem: Problem<'_, N>) -> Option<Vec<u32>> {
     let mut run = Run { draft: true, ..begin(problem, None) };
     run.solve_components()?;
@@ -92,8 +93,8 @@ fn begin<'a, N: Number>(problem: Problem<'a, N>, hint: Option<&'a [u32]>) -> Run
 }
 
 impl<N: Number> Run<'_, N> {
-    /// Solves all components, each after its successors. Returns `None` if exact arithmetic exceeds
-    /// its budget.
+    /// Solves all strongly connected components, each after its successors. Returns `None` if exact
+    /// arithmetic exceeds its budget.
     fn solve_components(&mut self) -> Option<()> {
         let (mut local, mut path_buffers) = (local::Local::new(), ways::PathBuffers::default());
         let problem = self.problem;

@@ -3,7 +3,8 @@
 use crate::number::Number;
 use crate::solve::chain::Rows;
 
-/// A component with its end components merged into blocks. Each other state is a block by itself.
+/// The equations of a strongly connected component in which each end component is merged into one
+/// block. Each other state is a block by itself.
 pub struct Quotient<N> {
     /// First row of each block, followed by the number of rows.
     pub first: Vec<u32>,
@@ -17,7 +18,7 @@ pub struct Quotient<N> {
 }
 
 impl<N: Number> Quotient<N> {
-    /// Returns the number of blocks.
+    /// Returns the number of blocks (merged end components and other states).
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "the end is listed, too, so that the list is never empty"

@@ -43,8 +43,8 @@ impl Users {
     }
 }
 
-/// Returns the owner of each row. `first` contains the first row of each owner, followed by the
-/// number of rows.
+/// Returns the owner (state or block) of each row, as a number. `first` contains the first row of
+/// each owner, followed by the number of rows.
 pub fn owners(first: &[u32]) -> Vec<u32> {
     let rows = first.last().copied().unwrap_or(0);
     let mut owners = vec![0; rows as usize];

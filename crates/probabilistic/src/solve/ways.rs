@@ -1,5 +1,5 @@
-//! Solves components by shortest paths if each choice either leaves the component, or leads to a
-//! single other state and possibly loops.
+//! Solves components by shortest paths if each choice either leaves the component or leads to a
+//! single other state. In both cases, the choice may also loop.
 //!
 //! Reconfigurations that succeed, or that are repeated until they succeed, have this form. Nearly
 //! all components of a co-adaptation process consist of them. The best values are propagated from
@@ -11,8 +11,8 @@ use crate::number::{Number, count, is_whole};
 use crate::solve::local::NONE;
 use crate::solve::problem::{Direction, Run};
 
-/// Upper limit on the number of states of a component, because the best open state is found by
-/// linear search.
+/// Upper limit on the number of states of a component that is solved by shortest paths, because the
+/// best open state is found by linear search.
 const MAX_STATES: usize = 64;
 
 /// The working memory of the shortest-path algorithm, reused for all components.
@@ -58,11 +58,14 @@ impl<N> Default for PathBuffers<N> {
 }
 
 impl<N: Number> Run<'_, N> {
-    /// Solves a component by shortest paths. Returns `false` without an effect if a choice leaves
-    /// the component and also stays in it, or leads to several other states.
+    /// Solves a component by shortest paths. Returns `false` without an effect if the component
+    /// does not qualify: a choice can both leave the component and lead to another state in it, or
+    /// can lead to several other states in it; there are more than [`MAX_STATES`] states; or
+    /// choices are restricted and all policies have to be considered.
     pub fn shortest_paths(&mut self, component: &[u32], buffers: &mut PathBuffers<N>) -> bool {
         let by_choice = self.sure_by_choice();
-        // With restricted choices, the component may not be connected by the allowed choices.
+        // With restricted choices, the component may not be strongly connected by the allowed
+        // choices.
         if component.len() > MAX_STATES || !by_choice && self.problem.allowed.is_some() {
             return false;
         }
@@ -79,7 +82,8 @@ impl<N: Number> Run<'_, N> {
         match (self.problem.rewards.is_some(), by_choice) {
             (false, true) => self.greatest_probability(component, buffers),
             (true, true) => self.least_reward(component, buffers),
-            // From each state, some policy never leaves the component.
+            // The component is strongly connected, so from each state some policy never leaves it.
+            // The greatest expected reward is infinite then.
             (true, false) => component.iter().for_each(|state| {
                 self.solution.infinite.insert(*state as usize);
             }),
@@ -94,8 +98,9 @@ impl<N: Number> Run<'_, N> {
         true
     }
 
-    /// Collects the steps and exits of the component in `buffers`. Returns `false` if a choice has
-    /// neither form.
+    /// Collects the steps and exits of the component in `buffers`. Returns `false` if a choice can
+    /// both leave the component and lead to another state in it, or can lead to several other
+    /// states in it.
     fn scan(&self, component: &[u32], buffers: &mut PathBuffers<N>) -> bool {
         buffers.steps.clear();
         buffers.exits.clear();
@@ -115,7 +120,7 @@ impl<N: Number> Run<'_, N> {
                     }
                 }
                 match (to, leaves) {
-                    (NONE, false) => {} // It stays where it is.
+                    (NONE, false) => {} // The choice only loops.
                     (NONE, true) => buffers.exits.push((dense(from), dense(choice), sure)),
                     (_, true) => return false,
                     (to, false) => {
@@ -191,7 +196,9 @@ impl<N: Number> Run<'_, N> {
         self.write(component, buffers);
     }
 
-    /// Evaluates the choices that leave the component, and stores the best one of each state.
+    /// Evaluates the choices that leave the component, and stores the best such choice of each
+    /// state in `buffers`. With `must_be_sure`, only choices that surely lead to a terminal state
+    /// count.
     fn leave(&mut self, component: &[u32], buffers: &mut PathBuffers<N>, must_be_sure: bool) {
         for (from, choice, _) in &buffers.exits {
             let state = component[*from as usize] as usize;

@@ -35,7 +35,7 @@ impl Work {
     }
 
     /// Subtracts the cost of operations whose results are about as long as `result`. Returns `None`
-    /// if the budget is exhausted.
+    /// if the budget is exhausted. Operations in doubles cost nothing and always yield `Some(())`.
     ///
     /// The cost is quadratic in the length because fractions are reduced. The constant part is the
     /// cost of allocating long fractions.
