@@ -29,6 +29,8 @@ pub struct Judge {
     /// Whether the last delivered observation of the function's design was outdated on arrival. Observations
     /// have no time stamp, so no loop can detect this.
     is_misled: bool,
+    /// Failed reconfigurations after which the loop has observed the design of the function.
+    observed_failures: BTreeSet<u64>,
     /// Whether an outdated observation determined the design before the last reconfiguration.
     was_misled: bool,
     /// Actions whose start was delivered to the loop.
@@ -92,6 +94,9 @@ impl Judge {
                 self.is_misled = (design.is_some() || self.is_misled) && design != robot.design;
                 let latest = self.requested.last_key_value().map_or(0, |(number, _)| *number);
                 self.belief.observe(design, latest);
+                if self.belief.is_settled() && self.belief.design == robot.design {
+                    self.observed_failures.extend(&robot.refused);
+                }
             }
             "action_started" | "action_progress" => {
                 self.started.extend(action);
@@ -164,7 +169,9 @@ impl Judge {
         let mut robot_then = robot.prospect();
         // The loop cannot know of a failure before its report arrives, unless it has observed the design since.
         let is_observed = self.belief.is_settled() && self.belief.design == robot.design;
-        let is_unknown = |number: &u64| !self.belief.failed.contains(number) && !is_observed;
+        let is_unknown = |number: &u64| {
+            !self.belief.failed.contains(number) && !self.observed_failures.contains(number) && !is_observed
+        };
         let unknown = robot.refused.iter().filter(|number| is_unknown(number));
         for effect in unknown.filter_map(|number| self.requested.get(number)) {
             robot_then.carry_out(effect);
