@@ -1,5 +1,6 @@
 //! Fault injection into journals. After each small damage, the journal is refused, the damage is reported, or
-//! the loop has the undamaged state.
+//! the loop has the undamaged state. Directories with other files, links or pipes, and journals of a changed
+//! mission are refused.
 #![expect(clippy::print_stdout, reason = "figures are what the long test is for")]
 
 use std::collections::BTreeMap;

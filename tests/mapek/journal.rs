@@ -1,5 +1,5 @@
 //! Tests of the journal within one process: after a cut at any byte, the loop is restored, and no
-//! acknowledged effect is repeated.
+//! acknowledged effect is repeated. Damaged journals and journals of another mission are refused.
 
 use std::collections::BTreeMap;
 use std::path::Path;

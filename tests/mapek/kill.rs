@@ -1,5 +1,5 @@
 //! Tests in which the program is killed repeatedly. In the end, its effects and its state equal those of an
-//! undisturbed run.
+//! undisturbed run. A second process cannot open the journal meanwhile.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead as _, BufReader, Write as _};

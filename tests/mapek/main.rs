@@ -1,5 +1,6 @@
-//! Tests of the adaptation loop as a library: the paper's experiments event by event, the journal under
-//! crashes, and random events.
+//! Tests of the adaptation loop and of the configuration loop (without plans) as a library: the paper's
+//! experiments event by event, acknowledgements, faults and noise, the journals under crashes and damage, and
+//! random events.
 
 mod common;
 mod configure;

@@ -1,4 +1,6 @@
-//! Tests of the order "safe first, then optimal": effects before planning, and reports without consequences.
+//! Tests of the order "safe first, then optimal": safe effects before planning, also while a search runs and
+//! within five milliseconds. Further tests: causes of planning, reports without consequences, deadlines, and
+//! the repetition of unfinished searches.
 
 use std::path::Path;
 use std::time::{Duration, Instant};

@@ -1,4 +1,5 @@
-//! Tests of certificates of plans that are computed with fractions, and of formulas with duplicate literals.
+//! Tests of certificates of plans that are computed with fractions, of formulas with duplicate literals, and
+//! of plans whose times are within the tolerance of a timed initial literal.
 
 use crate::certificate::change;
 use crate::common::{metaplan_in, verify_in};

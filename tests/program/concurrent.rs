@@ -1,4 +1,5 @@
-//! Tests of `metaplan plan --concurrent`: output formats, and agreement with `validate`.
+//! Tests of `metaplan plan --concurrent`: output formats, agreement with `validate`, rejected options, claims
+//! about chosen durations, and missions with designs.
 
 use serde_json::json;
 

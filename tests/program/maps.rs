@@ -1,5 +1,5 @@
-//! Tests of `metaplan import camara-map` with maps in the format of 2017, with `coord` and without
-//! measurements. The map is invented.
+//! Tests of `metaplan import camara-map`: maps in the format of 2017 (with `coord` and without measurements)
+//! and in the later format, errors in maps, and coordinates in pictures. The map is invented.
 
 use std::fmt::Write as _;
 use std::path::Path;

@@ -1,4 +1,5 @@
-//! Tests of messages: after random changes to the files of a mission, no message contains internal names or debug output.
+//! Tests of messages: after random changes to the files of a mission or to the arguments, no message contains internal names or debug
+//! output. Also tests when messages are coloured.
 
 use std::path::Path;
 

@@ -1,5 +1,5 @@
-//! Tests of `metaplan report` and of pictures of plans: they contain the whole answer, and hostile names are
-//! escaped.
+//! Tests of `metaplan report`, of pictures of plans and of behaviour trees: they contain the whole answer, and
+//! hostile names are escaped.
 
 use std::time::Instant;
 

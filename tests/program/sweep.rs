@@ -1,4 +1,5 @@
-//! Tests of `metaplan sweep`: interrupted shards yield the same table as an uninterrupted run.
+//! Tests of `metaplan sweep`: interrupted shards yield the same table as an uninterrupted run, results of
+//! different studies are not mixed, and runs have time limits, generated files and pairs of places.
 
 use std::fs;
 use std::path::Path;

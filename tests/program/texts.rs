@@ -1,4 +1,4 @@
-//! Tests of non-ASCII names, byte order marks, and empty documents.
+//! Tests of texts: non-ASCII names, byte order marks, empty documents, and plans in files.
 
 use std::fs;
 use std::path::Path;

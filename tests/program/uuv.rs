@@ -1,4 +1,5 @@
-//! Tests of the UUV mission: with a full and with a low battery, and in murky water.
+//! Tests of the UUV mission: with a full and with a low battery, in murky water, and without designs that it
+//! needs. Brute force shows that the optimal plans are unique.
 
 use crate::common::{metaplan, metaplan_in, root, steps};
 

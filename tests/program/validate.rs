@@ -1,4 +1,5 @@
-//! Tests of `metaplan validate`: the fields of the answer, and the positions of messages.
+//! Tests of `metaplan validate`: the fields of the answer, the positions of messages, and plans in each
+//! format.
 
 use serde_json::{Value, json};
 

@@ -1,4 +1,5 @@
-//! Tests of the dependencies of packages, and of settings in the workspace's manifest.
+//! Tests of the dependencies of packages, of the files that use narrowing, and of overflow checks in the
+//! workspace's manifest.
 
 use std::collections::BTreeSet;
 use std::process::Command;

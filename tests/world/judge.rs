@@ -1,5 +1,6 @@
 //! Oracle of a simulation: checks the demands of [`crate`]. It uses the designs, the delivered messages and
-//! the state of the robot, and is independent of the loop's decisions.
+//! the state of the robot. Except for demands (a) and (f), which also read the beliefs of the loop, it does
+//! not depend on the state of the loop.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,5 +1,5 @@
-//! Generator of random tasks with conditional effects, derived predicates, quantifiers, disjunctions and a
-//! numeric function.
+//! Generator of random tasks with conditional effects, derived predicates, quantifiers, disjunctions, a
+//! numeric function, and action costs. All tasks have finitely many states.
 
 use std::fmt::Write as _;
 
@@ -133,7 +133,7 @@ impl Generator {
         text
     }
 
-    /// Returns a random problem in PDDL for the domain.
+    /// Returns a random problem in PDDL, which fits every domain of [`Self::domain`].
     pub fn problem(&mut self) -> String {
         let mut text =
             String::from("(define (problem p) (:domain d) (:objects o3) (:init (= (n) 1) (= (total-cost) 0)");

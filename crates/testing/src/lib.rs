@@ -72,7 +72,7 @@ pub fn fleet(seed: u64) -> (String, String) {
 }
 
 /// Returns the domain and the problem of a random task in which robots carry parcels. Some parcels
-/// and some designs are interchangeable.
+/// and some designs can be interchangeable. The cost of a step depends on the chosen design.
 pub fn depot(seed: u64) -> (String, String) {
     let mut random = Random(seed);
     let domain = "(define (domain depot)
@@ -114,7 +114,8 @@ pub fn depot(seed: u64) -> (String, String) {
     (domain.to_owned(), problem)
 }
 
-/// Parses and grounds a domain and a problem in PDDL.
+/// Parses and grounds a domain and a problem in PDDL. If the domain has a predicate `solves`, it relates
+/// designs to functions.
 ///
 /// # Panics
 /// Panics if the texts are not a valid task.
@@ -124,7 +125,8 @@ pub fn ground_text((domain, problem): (String, String)) -> Task {
     ground(&domain, &problem, &config).expect("a task")
 }
 
-/// Returns the successors of a state, each with the cost of the step.
+/// Returns the successors of a state, each with the cost of the step. There is one for each operator with each
+/// admitted combination of designs that is applicable, so equal states can occur several times.
 ///
 /// # Panics
 /// Panics on numeric overflow.
@@ -139,8 +141,8 @@ pub fn successors(task: &Task, state: &State) -> Vec<(State, Int)> {
     successors
 }
 
-/// Returns the minimum cost of a plan, by Dijkstra's algorithm over all reachable states. `None` if there is
-/// no plan.
+/// Returns the minimum cost of a plan, by Dijkstra's algorithm over the reachable states. `None` if there is
+/// no plan. Requires costs that are not negative, and finitely many reachable states unless there is a plan.
 pub fn optimum(task: &Task) -> Option<Int> {
     let mut best = FxHashMap::from_iter([(task.initial.clone(), 0)]);
     let mut states = vec![task.initial.clone()];
@@ -166,8 +168,8 @@ pub fn optimum(task: &Task) -> Option<Int> {
     None
 }
 
-/// Returns the minimum cost of a plan with at most n steps, for each n from 0 to `max_steps`.
-/// `None` if there is no such plan.
+/// Returns the minimum cost of a plan with at most n steps, for each n from 0 to `max_steps`. The entry for n
+/// is `None` if there is no such plan.
 pub fn costs_by_steps(task: &Task, max_steps: usize) -> Vec<Option<Int>> {
     let mut best = FxHashMap::from_iter([(task.initial.clone(), 0)]);
     // Only states with a lower cost than before need to be expanded again.

@@ -90,7 +90,8 @@ impl Mission {
         None
     }
 
-    /// Returns the successors of a state, each as cost, waypoint and battery level.
+    /// Returns the successors of the state with waypoint `at` and level `battery`, which is reached at
+    /// path cost `cost`: each as path cost, waypoint and battery level.
     fn next(&self, cost: i64, at: usize, battery: i64) -> Vec<(i64, usize, i64)> {
         let mut next = Vec::new();
         for (from, to, length, safety) in self.corridors.iter().filter(|corridor| corridor.0 == at) {
@@ -111,8 +112,8 @@ impl Mission {
         next
     }
 
-    /// Returns the minimum cost of a plan with at most n steps, for each n from 0 to `max_steps`.
-    /// `None` if there is no such plan.
+    /// Returns the minimum cost of a plan with at most n steps, for each n from 0 to `max_steps`. The
+    /// entry for n is `None` if there is no such plan.
     pub fn oracle_by_steps(&self, max_steps: usize) -> Vec<Option<i64>> {
         let mut costs = Vec::new();
         let mut reached = BTreeMap::from([((0_usize, self.battery), 0_i64)]);

@@ -30,8 +30,9 @@ fn unwritten(error: &io::Error) -> Message {
     Message::error("N313", format!("standard output cannot be written: {error}"))
 }
 
-/// Reads lines `ROBOT EVENT` from standard input and stores the events, until the end of input or
-/// until `stop` becomes true. Returns the number of stored events.
+/// Reads lines `ROBOT EVENT` from standard input until the end of input or until `stop` becomes true,
+/// and waits until the events are stored. Returns the number of stored events. Prints errors about
+/// single lines, and fails at the end if a line could not be parsed.
 async fn feed<S: Store>(store: &S, session: &str, mut stop: watch::Receiver<bool>) -> Result<u64, Message> {
     let mut robots: BTreeMap<String, mpsc::Sender<String>> = BTreeMap::new();
     let mut senders = tokio::task::JoinSet::new();
@@ -99,7 +100,7 @@ fn say(message: &Message) {
     eprint!("{}", message.text());
 }
 
-/// Stores the events in lines `ROBOT EVENT` from standard input.
+/// Stores the events in lines `ROBOT EVENT` from standard input, until the input ends.
 pub(crate) async fn send<S: Store>(store: S, session: &str) -> Result<(), Message> {
     let (_goes_on, stop) = watch::channel(false);
     feed(&store, session, stop).await.map(|_| ())
@@ -120,7 +121,9 @@ fn line(message: &Stored) -> Option<(String, String)> {
     Some((address.robot, line.to_string()))
 }
 
-/// Writes decisions of one robot or of all robots to standard output, until the output is closed.
+/// Writes the decisions of one robot, or of all robots if `robot` is `None`, to standard output,
+/// until the output is closed or the log fails. Begins after the decision `after`, or with the next
+/// new decision if `after` is `None`.
 pub(crate) async fn follow<S: Store>(
     store: S,
     robot: Option<&str>,
@@ -187,7 +190,9 @@ async fn write_decisions<S: Store>(
     }
 }
 
-/// Runs a fleet in a directory: events from standard input, decisions to standard output.
+/// Runs a fleet in a directory: events from standard input, decisions to standard output. Ends when
+/// the input has ended and all events are decided, when `stop` becomes true, or when the output is
+/// closed. `after` is as in [`follow`].
 pub(crate) async fn up(
     shared: Arc<Shared<Local>>,
     after: Option<u64>,

@@ -1,5 +1,6 @@
-//! State of a single robot, which turns an event into a decision. It has no clock, threads or
-//! network, so equal events at equal times lead to equal decisions.
+//! State of a single robot, which turns an event into a decision. It has no network and takes the
+//! time from the events. So equal events at equal times lead to equal decisions, except for plans
+//! that a time limit has cut short.
 
 use std::time::Duration;
 
@@ -144,12 +145,15 @@ impl Robot {
         }
     }
 
-    /// Decides an event. During recovery, `before` is the decision that a former owner has stored:
-    /// its plans are used, and the new answers must be equal. Returns the reason if the event is
-    /// refused.
+    /// Decides an event: enrols the robot, retires it, or lets its loop handle the event. During
+    /// recovery, `before` is the decision about this event that a former owner has stored: its plans
+    /// are used, and the new answers must be equal to its answers except for the wording of
+    /// explanations. Returns a [`Refused`] if the event is refused; the state of the loop is then
+    /// unchanged.
     ///
     /// # Errors
-    /// The robot cannot continue. Its state is unchanged, or is invalid and has to be recovered.
+    /// The robot cannot continue: its mission is missing, its snapshot does not fit the mission, or
+    /// the answers differ from those of `before`. Its state may be invalid and has to be recovered.
     pub fn decide(
         &mut self,
         event: &Stored,

@@ -9,20 +9,22 @@ use crate::store::{Bucket, Entry, Fault, Message, Store, Stream};
 use crate::wire::{Address, Presence, Progress};
 
 /// Appends the events of a robot. Each event is stored before the next one is sent, so events keep
-/// their order, and none is lost or duplicated.
+/// their order, and none is lost unless [`Sender::send`] fails. Repeated attempts store no event
+/// twice (with NATS: for ten minutes).
 #[derive(Debug)]
 pub struct Sender<S> {
     store: S,
     address: Address,
-    /// Part of a message id between the robot's name and the number. It distinguishes senders;
-    /// empty if the robot numbers its events without gaps.
+    /// Part of a message id between the robot's name and the number of the event, which is counted
+    /// from 1 for each sender. It distinguishes the senders of a robot.
     session: String,
     number: u64,
 }
 
 impl<S: Store> Sender<S> {
-    /// Creates a sender for a robot. A second sender with the same session creates the same message
-    /// ids, so it stores no event twice.
+    /// Creates a sender for a robot. `session` becomes a part of the message ids. A second sender
+    /// with the same session that sends the same events in the same order creates the same message
+    /// ids, so it stores no event twice (with NATS: within ten minutes).
     pub fn new(store: S, robot: &str, session: &str) -> Self {
         let address = Address::of(robot, store.partitions());
         Self { store, address, session: session.to_owned(), number: 0 }
@@ -33,8 +35,8 @@ impl<S: Store> Sender<S> {
         &self.address
     }
 
-    /// Appends an event, and retries with growing pauses until it is stored durably. Returns its
-    /// sequence number.
+    /// Appends an event, and retries with growing pauses until it is stored durably. Returns the
+    /// sequence number of the event in the stream of events.
     ///
     /// # Errors
     /// The event is longer than the server accepts.
@@ -102,7 +104,7 @@ pub struct PartitionStatus {
     pub worker: Option<String>,
     /// Number of ownership changes of the partition.
     pub epoch: u64,
-    /// Sequence number up to which all events are contained in snapshots.
+    /// Sequence number up to which the effects of all events are contained in snapshots.
     pub events: u64,
 }
 

@@ -145,9 +145,10 @@ pub struct Presence {
     pub warm: u64,
     /// Number of events that are read but not decided.
     pub waiting: u64,
-    /// Number of decided events since the worker's start.
+    /// Number of events that were decided or replayed since the worker's start.
     pub decided: u64,
-    /// Number of refused events since the worker's start.
+    /// Number of refused events, stopped robots and unreadable stored messages since the worker's
+    /// start.
     pub refused: u64,
     /// Proportion of the threads' time that loops used since the last status, from 0 to 1.
     pub load: f64,

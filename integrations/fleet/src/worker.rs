@@ -1,9 +1,10 @@
 //! A worker: leases partitions and runs their robots.
 //!
 //! A lease is a stored value that expires unless it is renewed. A worker takes free partitions up
-//! to its share, which is the number of partitions divided by the number of workers, rounded up. A
-//! worker with more partitions saves and returns some. Leases affect only efficiency, not
-//! correctness.
+//! to its share, which is the number of partitions divided by the number of workers that are not
+//! shutting down, rounded up. A worker with more partitions saves the surplus partitions and gives
+//! up their leases. Leases affect only efficiency, not correctness. The worker also publishes its
+//! status and metrics, and saves everything when it is shut down.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -21,7 +22,7 @@ use crate::wire::{Presence, partition_of};
 /// A partition that this worker has leased.
 struct Held {
     revision: u64,
-    /// Start of the last successful renewal.
+    /// Time at which the last successful renewal was begun, or the acquisition of the lease.
     renewed: Instant,
     orders: watch::Sender<Order>,
     task: JoinHandle<End>,
@@ -34,11 +35,13 @@ struct Worker<S> {
     held: BTreeMap<u32, Held>,
     /// Revision of the status that this worker has published.
     presence: u64,
-    /// Time of the last status, and the total working time of loops until then in microseconds.
+    /// Time of the last published status, and the working time of all loops in microseconds from the
+    /// worker's start until then.
     looked: (Instant, u64),
 }
 
-/// Runs a worker until `stop` becomes true. Then saves and returns its partitions.
+/// Runs a worker until `stop` becomes true or its sender is dropped. Then saves the partitions and
+/// gives up their leases.
 pub async fn run<S: Store>(shared: Arc<Shared<S>>, mut stop: watch::Receiver<bool>) {
     let lease = shared.store.lease();
     let mut worker =
@@ -57,8 +60,9 @@ pub async fn run<S: Store>(shared: Arc<Shared<S>>, mut stop: watch::Receiver<boo
 }
 
 impl<S: Store> Worker<S> {
-    /// Publishes the status, renews the leases, and handles partitions that have ended. Unless
-    /// `draining`, then takes or returns partitions according to the worker's share.
+    /// Publishes the worker's status, renews its leases, and handles partitions whose task has ended.
+    /// Then, unless `draining`, takes free partitions or gives partitions back, so that the worker
+    /// has its share. Does not change the partitions if the log cannot be read.
     async fn round(&mut self, draining: bool) {
         self.present(draining).await;
         self.renew().await;
@@ -139,8 +143,9 @@ impl<S: Store> Worker<S> {
         }
     }
 
-    /// Removes partitions whose task has ended. A partition in which another worker has written is
-    /// recovered again if the lease is still held.
+    /// Removes partitions whose task has ended, and gives up their leases unless these are lost. A
+    /// partition whose task has ended without an order, because another worker has written in it or
+    /// because of a panic, is recovered again and stays leased.
     async fn collect(&mut self) {
         let ended: Vec<u32> = self
             .held
@@ -154,7 +159,7 @@ impl<S: Store> Worker<S> {
             let end = held.task.await;
             match (end, order) {
                 // Another worker has written data that only the owner writes, although this worker
-                // has the lease. So the partition is recovered again.
+                // has the lease; or there was a panic. The partition is recovered again.
                 (Ok(End::Fenced) | Err(_), Order::Go) => {
                     tracing::warn!(partition, "somebody else has written in it: it is read again");
                     metrics::counter!("metaplan_fleet_fenced_total").increment(1);
@@ -208,7 +213,7 @@ impl<S: Store> Worker<S> {
         Held { revision, renewed, orders, task }
     }
 
-    /// Saves and returns all partitions, and removes the published status.
+    /// Saves all partitions, gives up their leases, and removes the published status.
     async fn drain(&mut self, mut tick: tokio::time::Interval) {
         for held in self.held.values() {
             held.orders.send_if_modified(|order| {
@@ -234,8 +239,9 @@ fn lose(held: &mut Held) {
     held.orders.send_replace(Order::Abandon);
 }
 
-/// Returns the number of partitions that a worker should lease: an equal share of all partitions,
-/// rounded up. Workers that are shutting down do not count.
+/// Returns the number of partitions that the worker `own` should lease: an equal share of all
+/// partitions, rounded up. `own` counts as a worker even if it is not in `workers`. Other workers
+/// that are shutting down do not count.
 fn share(workers: &[Entry], own: &str, partitions: u32) -> usize {
     let takes = |entry: &&Entry| {
         entry.key != own

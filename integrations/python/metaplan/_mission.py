@@ -252,7 +252,7 @@ class Mission:
         :param on_improvement: called with cost, lower bound, gap (0 to 1) and number of steps of each better plan; planning ends when it
             returns ``False``
         :raises metaplan.Error: if the mission cannot be planned for
-        :raises KeyboardInterrupt: after Ctrl-C, if there is no plan yet
+        :raises KeyboardInterrupt: after Ctrl-C, if there is no plan yet, or with ``pareto``
         """
         separation = None
         if concurrent is not False:

@@ -1,8 +1,10 @@
 //! Native part of the Python package. It returns answers of the facade as JSON and text, from which
 //! `metaplan/*.py` creates objects.
 //!
-//! This crate makes no decisions. The interpreter lock is released during work. Signals are checked
-//! every 20 ms; Ctrl-C sets the interrupt flag of the planner.
+//! This crate makes no decisions. The interpreter lock is released during work. While planning,
+//! explaining and verifying, signals are checked every 20 ms, and Ctrl-C sets the interrupt flag of
+//! the work. Other functions (such as `reason`, `check`, `compare` and the loop) handle signals only
+//! at their end.
 
 mod ask;
 mod failure;

@@ -236,8 +236,10 @@ impl Mission {
         self.change(|setup| setup.mission.set(name, value)).map_err(|message| raise_one(py, message))
     }
 
-    /// Computes the best plan, or the Pareto front of two objectives. After Ctrl-C, returns the
-    /// best plan found until then.
+    /// Computes the best plan, or the Pareto front of two objectives. At a limit or when
+    /// `on_improvement` returns `False`, returns the best result found until then. After Ctrl-C,
+    /// returns the best plan found until then; raises `KeyboardInterrupt` if there is none, and for
+    /// a Pareto front.
     #[pyo3(signature = (*, minimize, pareto=None, alternatives=None, concurrent=None, horizon=None, engine=None, strategy=None, confirm=false,
         time_limit=None, memory_limit=None, certificate=None, on_improvement=None))]
     #[allow(clippy::too_many_arguments, reason = "keywords")]
@@ -279,7 +281,7 @@ impl Mission {
         let (found, stopped) = detached(py, &interrupt, || planned(&setup, wanted, on_improvement.as_ref()));
         match (found, stopped) {
             (Ok(planned), None) => Ok(planned),
-            // After Ctrl-C, the best known plan is returned.
+            // After Ctrl-C, the best known plan is returned. A Pareto front has no text, so it is not.
             (Ok(planned), Some(_)) if planned.text.is_some() => Ok(planned),
             (_, Some(error)) | (Err(Stop::Raised(error)), None) => Err(error),
             (Err(Stop::Wrong(messages)), None) => Err(raise(py, &messages)),

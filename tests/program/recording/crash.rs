@@ -1,4 +1,5 @@
-//! Tests of recordings (MCAP files) after a crash of the program.
+//! Tests of recordings (MCAP files) after the program was killed, after a signal, and after truncation of the
+//! file.
 
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::Path;

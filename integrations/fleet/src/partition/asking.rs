@@ -5,8 +5,9 @@ use std::time::Duration;
 
 use crate::store::{Bucket, Fault, Store};
 
-/// Writes a value if the current revision is `after`. Retries until the value is stored, or until
-/// another value is found. Returns the new revision.
+/// Writes a value if the current revision of the key is `after`. Retries until the value is stored,
+/// and returns its revision. Returns [`Fault::Conflict`] if another value with a newer revision is
+/// found.
 pub(super) async fn write<S: Store>(
     store: &S,
     bucket: Bucket,

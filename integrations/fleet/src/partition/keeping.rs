@@ -9,8 +9,9 @@ use crate::store::{Bucket, Store};
 use crate::wire::{Address, Progress};
 
 impl<S: Store> Partition<S> {
-    /// Starts to save those robots that were unsaved for too long, or all robots. Returns `true` if
-    /// a snapshot was started.
+    /// Starts to save the robots that have had unsaved decisions for [`Settings::save_within`], or
+    /// with `all` every robot with unsaved decisions. Omits robots as [`Self::save_robot`] does.
+    /// Returns `true` if a snapshot was started.
     pub(super) fn save(&mut self, all: bool) -> bool {
         let within = self.shared.settings.save_within;
         let is_due = |slot: &Slot| all || slot.since.is_some_and(|since| since.elapsed() >= within);
@@ -20,8 +21,8 @@ impl<S: Store> Partition<S> {
         begun > 0
     }
 
-    /// Starts to save a robot that is idle and has unsaved decisions. Returns `true` if a snapshot
-    /// was started.
+    /// Starts to save a robot. Does nothing if the robot is handling an event, is already being saved,
+    /// is stopped (`faulted`), or has no unsaved decisions. Returns `true` if a snapshot was started.
     pub(super) fn save_robot(&mut self, name: &str) -> bool {
         let Some(slot) = self.slots.get_mut(name) else { return false };
         let (Some(robot), Some(last)) = (&slot.robot, slot.unsaved.back()) else { return false };
@@ -39,8 +40,9 @@ impl<S: Store> Partition<S> {
         true
     }
 
-    /// Starts to write the progress if it has advanced: by at least one event or decision with
-    /// `must`, otherwise by [`Settings::save_every`]. Returns `true` if a write is running.
+    /// Starts to write the progress of the partition if it has advanced: with `must` by at least one
+    /// event or decision, otherwise by at least [`Settings::save_every`]. Starts nothing while an
+    /// earlier write of the progress is running. Returns `true` if a write is running.
     pub(super) fn advance(&mut self, must: bool) -> bool {
         if self.is_progressing {
             return true;

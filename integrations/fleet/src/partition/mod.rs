@@ -32,8 +32,8 @@ use own::Partition;
 pub struct Settings {
     /// Maximum number of loops that run at the same time.
     pub threads: usize,
-    /// Maximum number of robots loaded in memory. Others are kept as compressed snapshots and
-    /// loaded on demand.
+    /// Maximum number of idle robots loaded in memory. Others are kept as compressed snapshots and
+    /// loaded on demand. Robots that are handling events may exceed this number.
     pub warm: usize,
     /// Number of decisions after which a robot is saved, and number of events or decisions after
     /// which the progress is written.
@@ -87,9 +87,9 @@ pub struct Counts {
     pub waiting: AtomicU64,
     /// Number of leased partitions that are running.
     pub partitions: AtomicU64,
-    /// Number of decided events.
+    /// Number of events that were decided or replayed.
     pub decided: AtomicU64,
-    /// Number of refused events.
+    /// Number of refused events, stopped robots and unreadable stored messages.
     pub refused: AtomicU64,
     /// Total working time of loops in microseconds.
     pub busy: AtomicU64,
@@ -112,7 +112,8 @@ pub enum Order {
     Go,
     /// Finish running decisions, save everything and end.
     Drain,
-    /// End immediately, because another worker has the lease.
+    /// End immediately without saving, because the lease is lost: another worker has it, or it could
+    /// not be renewed in time.
     Abandon,
 }
 
@@ -121,11 +122,14 @@ pub enum Order {
 pub enum End {
     /// The worker has ordered the end.
     Ordered,
-    /// Another worker has written data that only the owner writes.
+    /// The partition has to be recovered again: another worker has written data that only the owner
+    /// writes, or the loop of a robot has panicked.
     Fenced,
 }
 
-/// Recovers and runs a partition until it is ordered to end, or until another worker writes in it.
+/// Recovers and runs a partition until it is ordered to end, or until it has to be recovered again
+/// ([`End::Fenced`]). [`Order::Abandon`] ends it immediately, [`Order::Drain`] after everything is
+/// saved.
 pub async fn serve<S: Store>(shared: Arc<Shared<S>>, partition: u32, orders: watch::Receiver<Order>) -> End {
     let mut abandoned = orders.clone();
     let work = async {

@@ -1,4 +1,5 @@
-//! Execution of a partition: reads events, runs the loops of robots, and starts checkpoints.
+//! Execution of a partition: reads events, refuses invalid ones, runs the loops of robots, unloads
+//! robots that were not used recently, and starts checkpoints.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::Ordering;
@@ -23,7 +24,8 @@ pub(super) struct Partition<S> {
     pub(super) progress: Progress,
     pub(super) revision: u64,
     pub(super) slots: BTreeMap<String, Slot>,
-    /// Sequence numbers of the last event that was read, and of the last known decision.
+    /// Sequence numbers of the last event that was read, and of the last known decision, both over all
+    /// robots of the partition.
     pub(super) seen: (u64, u64),
     /// Revision of the last snapshot of a robot.
     pub(super) snapshots: u64,
@@ -96,7 +98,8 @@ impl<S: Store> Partition<S> {
         }
     }
 
-    /// Queues the next event of the stream for its robot, or refuses it.
+    /// Queues the next event of the stream for its robot, or refuses it. Ignores events that were
+    /// read before, events that the robot's snapshot contains, and events of stopped robots.
     fn read(&mut self, event: Stored) {
         if event.sequence <= self.seen.0 {
             return;
@@ -123,8 +126,8 @@ impl<S: Store> Partition<S> {
         }
         let has_slot = self.slots.contains_key(&address.robot);
         if !has_slot {
-            // Events of unknown robots are refused here unless they enrol the robot, so that they
-            // create no state.
+            // Events of unknown robots are refused here unless they enrol the robot with a known
+            // mission, so that they create no state.
             let refused = match enrolment(&event.payload) {
                 Some(mission) if self.shared.missions.get(&mission).is_some() => None,
                 Some(_) => Some(Refused::Mission),
@@ -249,8 +252,8 @@ impl<S: Store> Partition<S> {
         Ok(())
     }
 
-    /// Unloads the least recently used robots until the number of loaded robots is within the
-    /// limit.
+    /// Unloads the least recently used idle robots of this partition until the number of loaded robots
+    /// of the worker is within the limit, or until the partition has no further idle robot.
     fn cool(&mut self) {
         let counts = &self.shared.counts;
         while counts.warm.load(Ordering::Relaxed) > self.shared.settings.warm as u64 {
@@ -263,7 +266,7 @@ impl<S: Store> Partition<S> {
         }
     }
 
-    /// Counts a refused event, and publishes the reason.
+    /// Counts a refused event, and publishes the reason to the sender of the event.
     fn say(&self, event: &Stored, refused: Refused) {
         self.refuse(Some((event.subject.clone(), refused.sentence().to_owned())), refused.name());
     }
@@ -277,8 +280,10 @@ impl<S: Store> Partition<S> {
         }
     }
 
-    /// Marks a robot as faulted, so that it handles no events. Its events stay in the stream for a
-    /// worker that can handle them.
+    /// Marks a robot as faulted, so that it handles no events, and publishes the reason `why`. `event`
+    /// and `decision` are the sequence numbers of the event that failed and of the decision that would
+    /// have followed it. The progress stays before them. So the events of the robot are read again by
+    /// the next owner of the partition.
     pub(super) fn fault(&mut self, robot: &str, event: u64, decision: u64, why: &str) {
         metrics::counter!("metaplan_fleet_faulted_total").increment(1);
         tracing::error!(partition = self.number, robot, "does not go on: {why}");

@@ -17,19 +17,21 @@ pub(super) struct Slot {
     /// decision.
     pub(super) at: Option<(u64, u64)>,
     pub(super) waiting: VecDeque<Stored>,
-    /// Sequence number of the robot's last decision.
+    /// Sequence number of the robot's last decision; 0 if there is none.
     pub(super) chain: u64,
     /// Decisions of former owners that are not replayed yet, with their sequence numbers.
     pub(super) before: VecDeque<(u64, Decided)>,
-    /// Sequence numbers of the events and their decisions since the last snapshot.
+    /// Sequence numbers of the events and their decisions since the last snapshot. If the robot is
+    /// faulted, there is at least one entry, so that the progress stays before it.
     pub(super) unsaved: VecDeque<(u64, u64)>,
     pub(super) since: Option<Instant>,
-    /// Revision of the last snapshot of the robot.
+    /// Revision of the last snapshot of the robot; 0 if there is none.
     pub(super) revision: u64,
     pub(super) is_saving: bool,
     /// `true` if the robot cannot handle events.
     pub(super) faulted: bool,
-    /// Time of the last use in ticks of the partition's clock; 0 if the robot is not loaded.
+    /// Number of events that the partition had handled when the robot was last used; 0 if the robot is
+    /// not loaded.
     pub(super) used: u64,
 }
 

@@ -1,5 +1,5 @@
 //! Handling of a single event: a separate thread runs the loop, then the decision is appended if
-//! the robot's last decision is the expected one.
+//! the robot's last decision is the expected one. A replayed decision is not appended again.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;

@@ -2,7 +2,7 @@
 //! in one file.
 //!
 //! Concurrent writes are combined into one transaction of the database `redb`. The transaction is
-//! on disk before the writes are acknowledged.
+//! on disk before the writes are acknowledged. Expired values are removed by the next write.
 
 use std::collections::{HashMap, VecDeque};
 use std::path::Path;
@@ -83,8 +83,8 @@ fn failed(error: impl std::fmt::Display) -> Fault {
 }
 
 impl Local {
-    /// Opens or creates a log in a directory. `partitions` applies only on creation. Leases expire
-    /// unless they are renewed within `lease`.
+    /// Opens or creates a log in a directory. `partitions` applies only on creation. Leases and
+    /// statuses of workers expire unless they are renewed within `lease`.
     ///
     /// # Errors
     /// The directory cannot be used, or another process uses it.
@@ -109,7 +109,7 @@ impl Local {
         Ok(Self(Arc::new(Inner { database, partitions, lease, requests, appended, notices })))
     }
 
-    /// Subscribes to refused events: subject and reason.
+    /// Subscribes to refused events: subject (`PARTITION.ROBOT`) and reason.
     pub fn notices(&self) -> broadcast::Receiver<(String, String)> {
         self.0.notices.subscribe()
     }
@@ -120,7 +120,7 @@ impl Local {
         answer.await.map_err(failed)?
     }
 
-    /// Reads up to `most` messages of a partition after a sequence number.
+    /// Reads the first messages of a partition after a sequence number, at most `most` of them.
     fn page(&self, stream: Stream, partition: u32, after: u64, most: usize) -> Result<Vec<Stored>, Fault> {
         let (number, transaction) = (stream as u8, self.0.database.begin_read().map_err(failed)?);
         let of_partition = transaction.open_table(OF_PARTITION).map_err(failed)?;
@@ -148,8 +148,9 @@ fn message(
     }))
 }
 
-/// Creates missing tables, and removes old leases. Returns the number of partitions, which is
-/// `partitions` only for a new database.
+/// Creates missing tables, and removes the leases and statuses of workers of earlier processes.
+/// Returns the number of partitions: for a new database `partitions` (at least 1), otherwise the
+/// stored number.
 fn prepare(database: &Database, partitions: u32) -> Result<u32, redb::Error> {
     let transaction = database.begin_write()?;
     transaction.open_table(MESSAGES)?;
@@ -158,7 +159,8 @@ fn prepare(database: &Database, partitions: u32) -> Result<u32, redb::Error> {
     transaction.open_table(IDS)?;
     let known = {
         let mut values = transaction.open_table(VALUES)?;
-        // Only one process uses the file at a time, so leases of earlier processes are invalid.
+        // Only one process uses the file at a time, so leases and statuses of earlier processes are
+        // invalid.
         for bucket in Bucket::ALL.into_iter().filter(|bucket| bucket.expires()) {
             values.retain_in((bucket as u8, "")..(bucket as u8 + 1, ""), |_, _| false)?;
         }

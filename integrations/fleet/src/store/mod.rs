@@ -89,7 +89,8 @@ pub struct Stored {
 pub struct Message<'a> {
     /// Subject without the prefix of the stream.
     pub subject: &'a str,
-    /// Message id. A further message with the same id is not stored. An empty id is not compared.
+    /// Message id. A further message with the same id is not stored (with NATS: for ten minutes). An
+    /// empty id is not compared.
     pub id: &'a str,
     /// For a conditional append: the sequence number that the last message of the subject must
     /// have. 0 requires that the subject has no message.
@@ -122,7 +123,8 @@ pub struct Entry {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Fault {
-    /// The last message or value is not the expected predecessor.
+    /// The last message of the subject or the current value of the key is not the expected
+    /// predecessor.
     #[error("another message or value is there than was expected")]
     Conflict,
     /// The message with this number of bytes is longer than the server accepts.
@@ -163,7 +165,9 @@ pub trait Store: Clone + Send + Sync + 'static {
     /// Returns the sequence number of the last message of a partition, or 0 for an empty partition.
     fn end(&self, stream: Stream, partition: u32) -> impl Future<Output = Result<u64, Fault>> + Send;
 
-    /// Appends a message and waits until it is stored durably.
+    /// Appends a message and waits until it is stored durably. Stores nothing if an earlier message
+    /// has the same id. Fails with [`Fault::Conflict`] if the last message of the subject is not the
+    /// one that [`Message::after`] requires.
     fn append(
         &self,
         stream: Stream,
@@ -184,8 +188,8 @@ pub trait Store: Clone + Send + Sync + 'static {
     /// Returns the value of a key with its revision, or `None` if there is no value.
     fn get(&self, bucket: Bucket, key: &str) -> impl Future<Output = Result<Option<Entry>, Fault>> + Send;
 
-    /// Writes a value if the current revision of the key is `after` (0: no value). Returns the new
-    /// revision.
+    /// Writes a value if the current revision of the key is `after` (0: the key has no value).
+    /// Returns the new revision, or [`Fault::Conflict`] if the current revision is another one.
     fn put(
         &self,
         bucket: Bucket,

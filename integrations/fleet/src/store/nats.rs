@@ -1,9 +1,10 @@
 //! NATS JetStream as a log.
 //!
 //! The streams are called `FLEET-events` and `FLEET-decisions`, and there is a bucket for each
-//! [`Bucket`]. All have the number of replicas with which they were created. Consistent reads are
-//! answered by the stream leader. Consumers may lag behind, so a caller passes the sequence number
-//! up to which a consumer has to read.
+//! [`Bucket`]. All have the number of replicas with which they were created. The last message of a
+//! subject and the message with a sequence number are read from the leader of the stream. Values of
+//! a bucket may be read from a replica that lags behind; conditional writes then fail. Consumers may
+//! lag behind, too, so a caller passes the sequence number up to which a consumer has to read.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -36,7 +37,8 @@ pub struct Access {
     pub certificate: Option<(PathBuf, PathBuf)>,
 }
 
-/// Parameters with which missing streams and buckets are created.
+/// Parameters with which missing streams and buckets are created. Existing ones keep their own
+/// partitions, replicas and lease.
 #[derive(Debug, Clone)]
 pub struct Layout {
     /// Name of the fleet, a prefix of all names: letters, digits, `-` and `_`.
@@ -78,8 +80,8 @@ impl Nats {
     /// Connects to the servers, and creates missing streams and buckets.
     ///
     /// # Errors
-    /// No server can be reached, the server has no JetStream, it refuses access, or a stream of
-    /// this name does not belong to a fleet.
+    /// A file of `access` cannot be read, no server can be reached, the server has no JetStream, it
+    /// refuses access, or a stream of this name does not belong to a fleet.
     pub async fn open(access: &Access, layout: &Layout) -> Result<Self, Diagnostic> {
         let wrong =
             |error: &dyn std::fmt::Display| Diagnostic::error("N311", format!("{}: {error}", access.url));
@@ -166,7 +168,7 @@ impl Nats {
         Ok(self.stream(stream).get_info().await.map_err(failed)?.state.messages)
     }
 
-    /// Subscribes to refused events: subject without `err.`, and reason.
+    /// Subscribes to refused events: subject without `err.` (`PARTITION.ROBOT`), and reason.
     ///
     /// # Errors
     /// The server cannot be reached.
