@@ -308,7 +308,7 @@ class Mission:
 
         :param loss: a component that may fail, and the probability of its failure at each move
         :param battery_unit: battery charge of one level of the process
-        :param penalty: time of a mission that does not reach its goal; by default ten times the time of the plan
+        :param penalty: time that is added for a mission that does not reach its goal; by default ten times the time of the plan
         :param state_limit: maximum number of states of the process
         """
         return Comparison(self._native.compare(loss, battery_unit, penalty, state_limit))

@@ -238,8 +238,8 @@ impl Mission {
 
     /// Computes the best plan, or the Pareto front of two objectives. At a limit or when
     /// `on_improvement` returns `False`, returns the best result found until then. After Ctrl-C,
-    /// returns the best plan found until then; raises `KeyboardInterrupt` if there is none, and for
-    /// a Pareto front.
+    /// returns the best plan found until then; raises `KeyboardInterrupt` without a plan, and for a
+    /// Pareto front.
     #[pyo3(signature = (*, minimize, pareto=None, alternatives=None, concurrent=None, horizon=None, engine=None, strategy=None, confirm=false,
         time_limit=None, memory_limit=None, certificate=None, on_improvement=None))]
     #[allow(clippy::too_many_arguments, reason = "keywords")]

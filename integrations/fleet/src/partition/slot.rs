@@ -17,7 +17,7 @@ pub(super) struct Slot {
     /// decision.
     pub(super) at: Option<(u64, u64)>,
     pub(super) waiting: VecDeque<Stored>,
-    /// Sequence number of the robot's last decision; 0 if there is none.
+    /// Sequence number of the robot's last decision; 0 without a decision.
     pub(super) chain: u64,
     /// Decisions of former owners that are not replayed yet, with their sequence numbers.
     pub(super) before: VecDeque<(u64, Decided)>,
@@ -25,7 +25,7 @@ pub(super) struct Slot {
     /// faulted, there is at least one entry, so that the progress stays before it.
     pub(super) unsaved: VecDeque<(u64, u64)>,
     pub(super) since: Option<Instant>,
-    /// Revision of the last snapshot of the robot; 0 if there is none.
+    /// Revision of the last snapshot of the robot; 0 without a snapshot.
     pub(super) revision: u64,
     pub(super) is_saving: bool,
     /// `true` if the robot cannot handle events.

@@ -1,4 +1,5 @@
-//! Tests with a crash of a worker between any two operations: no event is lost or decided twice.
+//! Tests with a crash of a worker between any two operations, with two owners of one partition, and
+//! with owners that are stopped at any time: no event is lost or decided twice.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -1,4 +1,5 @@
-//! Tests with invalid messages, which change nothing and are counted.
+//! Tests with invalid or forged messages, which change nothing and are counted, with invalid events,
+//! which are answered with an error, and with writes of former owners, which are rejected.
 
 use std::sync::atomic::Ordering;
 

@@ -1,5 +1,6 @@
 //! Tests of fleets in a directory, without a server. The decisions must equal those of `metaplan
-//! run`, whatever the interruptions.
+//! run`, whatever the interruptions. Only one process can use a directory, and all faults of missions
+//! are reported.
 
 mod crashes;
 mod hostile;
