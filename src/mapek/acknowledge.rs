@@ -6,8 +6,8 @@
 //! acknowledged. Before this acknowledgement, its design is not believed, and the design of the function is uncertain.
 //!
 //! A report that an action has started, progressed or succeeded implies the arrival of its request, and nothing else.
-//! Under this rule alone, robots without acknowledgements would never have a believed design. Therefore, until a
-//! reconfiguration is acknowledged by its number, such a report also implies the reconfigurations before the request:
+//! Under this rule alone, robots without acknowledgements would never have a believed design. Therefore, until an
+//! effect is acknowledged by its number, such a report also implies the reconfigurations before the request:
 //! an action starts with the configuration of its request.
 
 use crate::mapek::answer::Command;

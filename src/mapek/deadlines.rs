@@ -1,7 +1,7 @@
 //! Deadlines for unacknowledged effects and for actions without reports.
 //!
 //! Deadlines are checked at each line, including ticks. Messages that a robot never sends have no deadline:
-//! acknowledgements are expected only after the first acknowledgement of a reconfiguration by its number. An action is
+//! acknowledgements are expected only after the first acknowledgement of an effect by its number. An action is
 //! cancelled only if a message about it is overdue that this robot has sent before in similar cases: progress, the
 //! start of an action, or an acknowledgement. The end of a cancelled action is expected from every robot.
 
@@ -106,8 +106,8 @@ fn check_effects(beliefs: &mut Beliefs, deadline: Duration, answers: &mut Vec<An
     expired
 }
 
-/// Returns the outstanding cancellation of the action under way, if the robot has never acknowledged a reconfiguration
-/// by its number. For this robot, the cancellation is repeated until the action ends, because every robot must report
+/// Returns the outstanding cancellation of the action under way, if the robot has never acknowledged an effect by
+/// its number. For this robot, the cancellation is repeated until the action ends, because every robot must report
 /// the end of an action.
 fn open_cancel(beliefs: &Beliefs) -> Option<&Effect> {
     let running = beliefs.running.as_ref().filter(|action| action.cancelling)?;

@@ -1,7 +1,8 @@
 //! React: requests a safe effect for the action under way after changes, before planning.
 //!
 //! If an action has lost a design, or its remainder is not executable, the action is reconfigured to available designs
-//! for which the validator accepts the remainder. If no such designs exist, the action is suspended. This decision
+//! for which the validator accepts the remainder. If no such designs exist, or if there are too many configurations to
+//! try, the action is suspended. This decision
 //! needs no search: each configuration of this one action is simulated once. Planning decides later about the whole
 //! mission.
 

@@ -1,7 +1,7 @@
 //! Portfolio of exact search, satisficing search and SAT, which take turns.
 //!
-//! In each round, all three components get about equal work, and twice the work of the previous round; the
-//! budgets of unsuccessful components are reduced. Work is counted in units instead of time, so results are
+//! The work of a round is twice that of the previous round. Each component gets a share of it, and smaller
+//! shares while it is unsuccessful. Work is counted in units instead of time, so results are
 //! deterministic. The plans and bounds of a component limit the others.
 
 use std::time::Instant;
