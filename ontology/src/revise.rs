@@ -155,7 +155,7 @@ impl Stated {
                 target.dedup();
             }
         }
-        // The lists of an ontology are sorted sets.
+        // The lists of axioms, entities and annotations are sorted sets; rules and sources keep their order.
         merge(&mut self.ontology.axioms, &assertions.axioms);
         merge(&mut self.ontology.entities, &assertions.entities);
         merge(&mut self.ontology.annotations, &assertions.annotations);

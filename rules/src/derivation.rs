@@ -84,8 +84,8 @@ pub enum Cause {
 }
 
 impl Cause {
-    /// Formats the cause as one line, without a line break: the label or identity of a constraint, or a
-    /// sentence.
+    /// Formats the cause of a violation as one line. A constraint is shown by its label, or by its identity
+    /// if it has none; the other causes are sentences.
     pub fn display<'a>(&'a self, symbols: &'a Symbols) -> impl fmt::Display + 'a {
         DisplayCause { cause: self, symbols }
     }

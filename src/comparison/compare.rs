@@ -24,7 +24,8 @@ pub type Listener<'a> = dyn FnMut(&[Candidate], &Costs) + 'a;
 pub struct Config<'a> {
     /// The sources of uncertainty in the common process.
     pub risk: Risk,
-    /// Time added for a failed mission. `None` for ten times the time of the fastest plan.
+    /// Time added for a failed mission. `None` for ten times the time that the first plan takes if nothing
+    /// fails (at least 10; 10,000 if there is no plan).
     pub penalty: Option<f64>,
     /// Priority of the published procedure: time (0), energy (1) or safety (2).
     pub priority: usize,
@@ -62,7 +63,8 @@ pub struct Comparison {
     /// Reason why the plan with replanning cannot be worse than the best policy, if this follows
     /// without computation.
     pub no_price: Option<&'static str>,
-    /// Consequences of losing the component, for each number of moves before the loss.
+    /// Total times if the component is lost, for each number of moves before the loss. `None` if the mission
+    /// defines no loss or has no plan.
     pub loss: Option<LossReport>,
     /// Computational costs of both approaches.
     pub costs: Costs,

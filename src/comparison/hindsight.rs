@@ -13,25 +13,25 @@ use crate::comparison::planned::{NoResult, PlanTable};
 use crate::comparison::process::{Action, Process, Risk, Valuation};
 use crate::comparison::referee::Referee;
 
-/// Consequences of losing a component after a number of moves of the plan's run without failures.
+/// Total times of a mission if a component is lost after a given number of moves and nothing else fails.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct LossAt {
     /// Number of moves before the loss.
     pub moves: usize,
-    /// Total time of the plan, if it can be continued after the loss without a change.
+    /// Total time of the plan. `None` if the plan cannot be continued unchanged after the loss.
     pub open_loop: Option<f64>,
     /// Total time if a new plan is computed after the loss. `None` if there is no plan.
     pub replanned: Option<f64>,
     /// Total time if an optimal policy is computed after the loss. `None` if the goal cannot be
     /// reached.
     pub solved_again: Option<f64>,
-    /// Total time of the policy that takes a possible loss into account from the start, and may
-    /// take another route.
+    /// Total time of the policy that takes a possible loss into account from the start, and may take another
+    /// route. `None` if this policy does not reach the goal.
     pub anticipated: Option<f64>,
 }
 
-/// The consequences of losing a component, for each possible moment on the run without failures.
+/// Total times of a mission in which a component is lost, for each number of moves before the loss.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct LossReport {
@@ -39,7 +39,7 @@ pub struct LossReport {
     pub component: String,
     /// Probability of losing the component at each move.
     pub rate: f64,
-    /// Consequences of the loss, for each number of moves before it.
+    /// One entry for each number of moves before the loss, in ascending order.
     pub steps: Vec<LossAt>,
 }
 

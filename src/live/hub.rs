@@ -22,8 +22,8 @@ const MAX_LINES: usize = 2000;
 /// Maximum total size of the retained lines in bytes. A single line may be longer.
 const MAX_RETAINED_BYTES: usize = 4 << 20;
 
-/// Maximum number of keys whose current state is retained. Above it, the keys that changed longest
-/// ago are dropped.
+/// Maximum number of keys (parts of the loop's state, such as `function f`) whose latest line is retained.
+/// Above it, the keys that changed longest ago are dropped.
 const MAX_KEYS: usize = 10_000;
 
 /// Maximum number of lines that a client receives at once.
@@ -61,8 +61,8 @@ pub(super) enum News {
 }
 
 impl Hub {
-    /// Returns the lines that define the current state and are no longer retained otherwise, in
-    /// order. Also returns the number of the first retained line.
+    /// Returns, in order, the lines that define the current state of a key and are older than the retained
+    /// lines. Also returns the number of the first retained line.
     pub(super) fn state(&self) -> (Vec<Arc<str>>, u64) {
         let state = self.lock();
         let mut visited = BTreeSet::new();

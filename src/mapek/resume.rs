@@ -59,8 +59,9 @@ pub(crate) fn resumed_goal(goal: &Condition) -> Condition {
     Condition::And(vec![goal.clone(), Condition::Atom(gate())])
 }
 
-/// Scales the duration, increases and decreases of a durative action to the share that is not yet `done`. Restores the
-/// values before the action in its conditions, except conditions at the end.
+/// Scales the duration, increases and decreases of a durative action to the share that is not yet `done`. In
+/// its conditions, except those at the end, each fluent that the action increases or decreases is replaced by
+/// its value before the action. Other kinds of actions remain unchanged.
 fn shorten(action: &mut Action, done: &BigRational) {
     let ActionBody::Durative { duration, conditions, effects } = &mut action.body else { return };
     let remaining_share = BigRational::from_integer(1.into()) - done;

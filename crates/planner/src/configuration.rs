@@ -58,9 +58,10 @@ pub struct Assignment {
     pub optimal: bool,
 }
 
-/// Computes the best assignment of designs to functions that respects the budgets. Among equally good
-/// assignments, earlier designs are preferred. At a limit, returns the best known assignment. If no
-/// assignment respects the budgets, no design is selected.
+/// Computes the best assignment of designs to functions that respects the budgets and uses each exclusive
+/// component at most once. The best assignment serves the most functions, then violates the fewest
+/// requirements, then has the greatest utility; among equals, earlier designs are preferred. At a limit,
+/// returns the best known assignment. If no assignment respects the budgets, no design is selected.
 pub fn configure(functions: &[Vec<DesignChoice>], budgets: &[BigRational], limits: &Limits) -> Assignment {
     let problem = Problem::new(functions, budgets);
     let (prices, incumbent) = problem.prices();

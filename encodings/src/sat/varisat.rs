@@ -122,8 +122,8 @@ fn translate(literal: Lit) -> varisat::Lit {
 }
 
 /// Decides DIMACS clauses with Varisat, and writes a DRAT proof to `proof`. The proof is a refutation if the
-/// answer is `Unsatisfiable`. Stops at the deadline, at an interruption, or after more than `budget` added
-/// clauses. The answer is `Interrupted` then, or if the proof cannot be written.
+/// answer is `Unsatisfiable`. Returns `Interrupted` if the deadline has passed, the run is interrupted, the
+/// proof adds more than `budget` clauses, or the proof cannot be written.
 pub fn refute_with_proof(
     clauses: impl Iterator<Item = impl Iterator<Item = i32>>,
     proof: Box<dyn io::Write>,
@@ -256,8 +256,8 @@ impl Steps {
     }
 }
 
-/// Proof sink that counts learnt clauses, and fails at the deadline, at an interruption, or beyond the
-/// conflict budget.
+/// Proof sink that counts learnt clauses in `conflicts` and discards the proof. A write fails if the deadline
+/// has passed, the run is interrupted, or more than `budget` clauses were learnt.
 struct BudgetSink {
     limits: Limits,
     budget: u64,
@@ -280,8 +280,8 @@ impl io::Write for BudgetSink {
     }
 }
 
-/// Proof sink that forwards a DRAT proof and counts added clauses. It fails at the deadline, at an
-/// interruption, or beyond the budget.
+/// Proof sink that forwards a DRAT proof to `proof` and counts the added clauses in `conflicts`. A write
+/// fails if the deadline has passed, the run is interrupted, or more than `budget` clauses were added.
 struct DratSink {
     limits: Limits,
     budget: u64,

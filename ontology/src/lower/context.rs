@@ -146,7 +146,8 @@ impl<'a> Context<'a> {
         T::default()
     }
 
-    /// Returns the reason of the first recorded gap as an error, and clears the gaps.
+    /// Returns an error with the first recorded gap, if any, and clears the gaps. A gap is the reason why a
+    /// part of the current axiom or rule has no rule form.
     pub(crate) fn take_gaps(&mut self) -> Result<(), &'static str> {
         let first = self.gaps.first().copied();
         self.gaps.clear();

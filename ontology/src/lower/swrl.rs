@@ -61,7 +61,8 @@ fn canonical(rule: &rules::Rule) -> (Vec<rules::Atom>, Vec<rules::Atom>) {
     (body, rule.head.iter().map(|atom| renamed(atom, &mut number)).collect())
 }
 
-/// Returns the atom with each variable replaced by the term that `name` returns.
+/// Returns the atom with each variable replaced by the term that `name` returns. Aggregates are returned
+/// unchanged.
 fn renamed(atom: &rules::Atom, name: &mut dyn FnMut(Variable) -> Term) -> rules::Atom {
     use rules::Atom as A;
     let mut term = |term: Term| match term {

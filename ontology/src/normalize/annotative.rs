@@ -1,9 +1,10 @@
 //! Removes axioms that use an annotation property as another kind of property, each with a warning. OWL 2 DL
 //! forbids such axioms, and horned-owl rejects a document that contains one.
 //!
-//! Two forms, which occur in practice, are recognised: `owl:equivalentProperty` between annotation
-//! properties, and restrictions on annotation properties. If a class expression contains such a restriction,
-//! every axiom with this expression is removed.
+//! Two forms, which occur in practice, are recognised: `owl:equivalentProperty` with an annotation property
+//! on at least one side, and restrictions on annotation properties. A property that is also declared as an
+//! object or data property does not count. If a class expression contains such a restriction, every axiom
+//! with this expression is removed.
 
 use oxrdf::{BlankNode, NamedOrBlankNode, Term};
 use rustc_hash::FxHashSet as HashSet;

@@ -1,17 +1,18 @@
 //! Normalises merged triples, so that horned-owl reads them without loss.
 //!
-//! horned-owl's RDF reader matches exact patterns and skips triples that deviate: rules with an IRI,
-//! atoms with an annotation, data atoms about an individual, empty bodies, shared lists,
-//! `AllDisjointClasses`, undeclared properties, blank nodes as individuals. Real knowledge bases contain
-//! most of these. The passes below rewrite such triples, one file each:
+//! horned-owl's RDF reader matches exact patterns and skips triples that deviate: rules and axioms whose node
+//! is an IRI instead of a blank node, atoms with an annotation, data atoms about an individual, empty bodies,
+//! shared lists, `AllDisjointClasses`, undeclared properties, blank nodes as individuals. Real knowledge
+//! bases contain most of these. The passes below rewrite such triples, one file each:
 //!
 //! | pass | rewrites |
 //! |---|---|
-//! | here | headers of imported ontologies (removed) |
+//! | this file | headers of imported ontologies (removed) |
 //! | `bulk` | nothing: detects statements that the other passes can skip |
 //! | `swrl` | every rule to one canonical form |
-//! | `forms` | definitions in the form of OWL 1, expressions without types, axioms with IRIs |
-//! | `lists` | n-ary disjointness to pairs, shared lists to copies; checks property chains |
+//! | `forms` | OWL 1 class definitions, expressions without a type, axiom nodes that are IRIs (to blank nodes) |
+//! | `lists` | small n-ary disjointness to pairs, large groups to axioms (without horned-owl), shared lists to copies |
+//! | `lists` | malformed property chains (removed) |
 //! | `anonymous` | blank-node individuals to IRIs |
 //! | `annotative` | axioms that use an annotation property as another kind of property (removed) |
 //! | `kinds` | undeclared entities to declared ones |

@@ -4,8 +4,8 @@
 use super::text::Text;
 use crate::error::{Error, Position, Warning};
 
-/// Number of warnings, from the first one on, that may get a position, because each search visits all
-/// documents.
+/// Maximum number of warnings, counted from the first, that get a position. The number is limited because
+/// each search visits all documents.
 const MAX_SEARCHES: usize = 100;
 
 /// Sets the position of each warning about an undeclared name to the first occurrence of the name in the
@@ -23,7 +23,7 @@ pub(super) fn locate(warnings: &mut [Warning], texts: &[(String, Text)]) {
         unlocated.retain_mut(|warning| {
             let Warning::Undeclared { iri, position, .. } = &mut **warning else { return false };
             *position = offset(iri, words).map(|offset| Position::of_offset(name, &text, offset));
-            // Located warnings leave the search.
+            // A warning with a position is not searched in further documents.
             position.is_none()
         });
     }
@@ -42,8 +42,8 @@ pub(super) fn placed(error: Error, texts: &[(String, Text)]) -> Error {
     }
 }
 
-/// Returns the position of an IRI in the documents: of the first IRI that `message` contains in angle
-/// brackets.
+/// Returns a position in the documents of the first IRI that `message` contains in angle brackets. `None` if
+/// `message` contains none, or if no document contains this IRI.
 pub(super) fn place(message: &str, texts: &[(String, Text)]) -> Option<Position> {
     let iri = message.split_once('<')?.1.split_once('>')?.0;
     texts.iter().find_map(|(name, text)| {

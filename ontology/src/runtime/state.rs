@@ -20,7 +20,8 @@ pub struct Objective {
     /// The function to provide, if one is stated.
     pub function: Option<Individual>,
     /// Statuses that the rules conclude (`UNGROUNDED`, `IN_ERROR_COMPONENT`, …); empty if there is no problem.
-    /// Two statuses are a contradiction.
+    /// The shipped metamodel allows several; two are a contradiction only if a metamodel declares `o_status`
+    /// functional.
     pub statuses: Vec<String>,
     /// Whether a component has recovered, so that a better design may be available.
     pub updatable: bool,

@@ -196,7 +196,7 @@ fn statuses(ontology: &Ontology) -> Vec<Warning> {
     warnings
 }
 
-/// Returns the kinds of values that the ranges of a property allow.
+/// Returns the kinds of values (boolean, string or number) that the ranges of a property allow.
 fn kinds_of_ranges(ontology: &Ontology, property: &str) -> BTreeSet<&'static str> {
     let mut kinds = BTreeSet::new();
     for annotated in &ontology.axioms {
@@ -217,7 +217,8 @@ fn kinds_of_ranges(ontology: &Ontology, property: &str) -> BTreeSet<&'static str
     kinds
 }
 
-/// Returns the kinds of the constants with which rules compare the values of a property.
+/// Returns the kinds of the literals that atoms of this property in rule bodies require as its value, as in
+/// `p(?x, true)`. Comparisons by built-ins are not considered.
 fn tested_kinds(ontology: &Ontology, property: &str) -> BTreeSet<&'static str> {
     let atoms = ontology.rules.iter().flat_map(|rule| &rule.body);
     let constants = atoms.filter_map(|atom| match atom {

@@ -17,12 +17,13 @@ pub(crate) struct Facts<'a> {
 }
 
 impl<'a> Facts<'a> {
-    /// Creates queries of all facts that hold.
+    /// Creates a view that answers queries from all facts that hold, stated or derived.
     pub(crate) fn new(engine: &'a Engine) -> Self {
         Self { engine, only_stated: false }
     }
 
-    /// Creates queries of only the asserted facts if `only_stated`, otherwise of all facts that hold.
+    /// Creates a view that answers queries from only the stated facts if `only_stated`, otherwise from all
+    /// facts that hold.
     pub(crate) fn stated(engine: &'a Engine, only_stated: bool) -> Self {
         Self { engine, only_stated }
     }

@@ -239,7 +239,8 @@ impl<'a> Builder<'a> {
         let (classes, same_as) = (&self.equality.classes, self.equality.same_as);
         let (from, mut to) = (pair.arguments[0], pair.arguments[1]);
         if from == to {
-            // An individual with several names is equal to itself because of another name.
+            // Rule bodies match `x sameAs x` because `x` has another name. The equalities that lead to this
+            // name explain the match.
             to = classes.class(from).iter().copied().find(|&name| name != from).unwrap_or(to);
         }
         let path = classes.path(from, to, classes.next_edge_id());

@@ -10,7 +10,8 @@ use crate::store::state;
 use crate::symbol::Symbol;
 
 impl Equality {
-    /// Returns `true` if a fact about names holds.
+    /// Returns `true` if a fact holds. Its arguments may be any names of the individuals, not only
+    /// representatives. An `owl:sameAs` pair of a name with itself holds only if it is stated.
     pub fn holds(&self, engine: &Engine, fact: &Fact) -> bool {
         let row = self.classes.normal(fact);
         match self.is_pair(fact, &engine.symbols) && self.is_reflexive(&row) {
@@ -20,7 +21,8 @@ impl Equality {
         }
     }
 
-    /// Returns `true` if a fact about names is stated.
+    /// Returns `true` if a fact is stated with exactly these names. Facts about other names of the same
+    /// individuals do not count.
     pub fn is_stated(&self, engine: &Engine, fact: &Fact) -> bool {
         if self.is_pair(fact, &engine.symbols) {
             return self.is_stated_pair(fact);
@@ -34,7 +36,7 @@ impl Equality {
 
     /// Returns all stated facts.
     pub fn stated(&self, engine: &Engine) -> Vec<Fact> {
-        // A pair is filed under both of its names; the filter takes it once.
+        // A stated `owl:sameAs` pair is stored under both of its names; the filter selects it once.
         let pairs = self
             .pairs
             .iter()
@@ -94,7 +96,8 @@ impl Equality {
         pairs.map(|pair| pair.arguments.clone()).filter(move |pair| fits(pair[0]))
     }
 
-    /// Returns the arguments of the facts of a predicate that agree with a pattern.
+    /// Returns the arguments of the facts of a predicate that match a pattern. `None` in the pattern matches
+    /// every name.
     pub fn matching(&self, engine: &Engine, predicate: Symbol, pattern: &[Option<Symbol>]) -> Vec<Arguments> {
         let normal: SmallVec<[Option<Symbol>; 4]> =
             pattern.iter().map(|wanted| wanted.map(|name| self.classes.find(name))).collect();

@@ -258,12 +258,12 @@ impl Duration {
         Self { months, seconds }
     }
 
-    /// Returns the part in months.
+    /// Returns the years and months of the duration together, in months.
     pub fn months(&self) -> i64 {
         self.months
     }
 
-    /// Returns the part in seconds.
+    /// Returns the days, hours, minutes and seconds of the duration together, in seconds.
     pub fn seconds(&self) -> &Decimal {
         &self.seconds
     }

@@ -1,12 +1,18 @@
-//! Analysis of numeric functions without a value, and of negative durations.
+//! Finds missing values of numeric functions, and negative durations.
 //!
-//! For each numeric function that an action needs, the analysis enumerates the arguments for which
-//! the action is possible, judged by static facts (three-valued evaluation of its conditions, as in
-//! grounding). A mission may omit numbers for impossible cases. So a missing value causes a warning
-//! only in three cases. First, the arguments contain no parameter of the action. Second, at least
-//! three quarters of the enumerated arguments have a value. Third, a static fact in the conditions
-//! mentions all these parameters, and either at least two thirds have a value or the argument is a
-//! design. For example, `(lit_aisle a b)` mentions the parameters of `(distance a b)`.
+//! For each numeric function that an action needs, the analysis enumerates the argument tuples for which the
+//! action may be possible according to the static facts (three-valued evaluation of its conditions, as in
+//! grounding). Tuples with two equal arguments are skipped. A mission may omit values for impossible cases,
+//! so a missing value causes a warning only in three cases:
+//!
+//! - The function has only constants as arguments.
+//! - At least three quarters of the tuples have a value.
+//! - A static fact in the action's conditions holds and mentions all parameters of the function, as
+//!   `(lit_aisle a b)` does for `(distance a b)`. Also, at least two thirds of the tuples have a value, or
+//!   the only argument is a design.
+//!
+//! Functions without any value have a separate warning. Durations are computed from values that no action
+//! changes.
 
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
@@ -52,8 +58,8 @@ pub struct MissingValue {
     pub(super) is_likely: bool,
 }
 
-/// Maps a function with its arguments, without a value, to `true` if it is probably missing by
-/// mistake, and to the actions that need the value.
+/// Maps each function and argument tuple without a value to whether the value is probably missing by mistake,
+/// and to the actions that need the value.
 type Needed = BTreeMap<(Name, Vec<Name>), (bool, BTreeSet<String>)>;
 
 /// A duration of an action that is negative for some arguments.
@@ -186,8 +192,9 @@ impl<'m> Numbers<'m> {
         attribute.strip_prefix("fd_").unwrap_or(attribute).to_owned()
     }
 
-    /// Adds to `missing` the functions, with their arguments, that an action needs and that have no value, as far as
-    /// the action may be possible. Omits `total-cost` and functions that actions set only by assignments.
+    /// Adds to `missing` the functions that an action needs, with the argument tuples that have no value and
+    /// for which the action may be possible. Omits `total-cost` and functions that actions set only by
+    /// assignments.
     fn missing(&self, action: &Action, missing: &mut Needed) {
         let conditions = conditions(&action.body);
         let mut checked = HashSet::new();

@@ -34,8 +34,8 @@ fn one_way(changing: &Moment, (reads, other): Half<'_>, clashes: &mut Vec<Formul
     clashes.extend(numbers.map(|(guard, ..)| guard.clone()));
 }
 
-/// Collects the conditions under which both halves change the same number, unless both increase (or
-/// decrease) it or both scale it.
+/// Collects the conditions under which the start and the end change the same number and the changes do not
+/// commute. Increases and decreases commute with each other; so do scalings.
 fn same_number(left: &Moment, right: &Moment, clashes: &mut Vec<Formula>) {
     let way = |kind: Assignment| match kind {
         Assignment::Assign => None,

@@ -233,14 +233,14 @@ impl Knowledge {
         &mut self.runtime
     }
 
-    /// Returns the designs, actions and measured values that planning queries; the results are
-    /// cached.
+    /// Returns the designs, actions and measured values of the knowledge base for planning. They
+    /// are computed on first use and cached.
     pub fn catalogue(&self) -> &Catalogue {
         self.catalogue.get_or_init(|| Arc::new(Catalogue::new(&self.view())))
     }
 
-    /// Updates the query cache after a change of facts. Discards the cache if the change cannot be
-    /// applied to it.
+    /// Updates the cached designs, actions and measured values after a change of facts. Discards
+    /// the cache if the change cannot be applied to it.
     pub(super) fn follow(&mut self, delta: &Delta) {
         let engine = self.runtime.engine();
         if self.catalogue.get_mut().is_some_and(|own| !Arc::make_mut(own).follow(delta, engine)) {

@@ -40,7 +40,8 @@ pub(super) fn run<'e, 'p>(
         if execution.world.budget.poll() {
             break;
         }
-        // Events happen before or together with the next start or end.
+        // The next event (timed initial literal) is handled now if it is not later than the next start or
+        // end.
         let time = execution.next_timed().filter(|timed| *timed <= next).unwrap_or(next).clone();
         let mut parts = Simultaneous::default();
         if execution.next_timed() == Some(&time)

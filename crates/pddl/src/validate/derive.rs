@@ -40,7 +40,8 @@ struct WaitingInstance {
 }
 
 /// Instances to re-evaluate when a given fact, or any fact of a given predicate, is derived. Each entry
-/// consists of the index in [`Closure::instances`] and the evaluation number.
+/// consists of the index in [`Closure::instances`] and the number of evaluations of the instance when the
+/// entry was added. The entry is obsolete once the instance has been evaluated again.
 #[derive(Default)]
 struct Waiting {
     facts: FxHashMap<Ground, Vec<(usize, u32)>>,
@@ -78,7 +79,7 @@ impl<'p> Closure<'_, 'p> {
             let waiting = self.waiting.facts.remove(&fact).into_iter().flatten();
             let waiting = waiting.chain(self.waiting.predicates.remove(predicate).into_iter().flatten());
             for (number, evaluations) in waiting.collect::<Vec<_>>() {
-                // A later evaluation has replaced this entry by its own.
+                // An entry is obsolete if the instance has been evaluated again since the entry was added.
                 if self.instances[number].evaluations == evaluations {
                     self.evaluate(number);
                 }

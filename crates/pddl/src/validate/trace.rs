@@ -1,4 +1,5 @@
-//! Records the facts on which an evaluation depends.
+//! Records which new facts could change the result of an evaluation: the missing facts, and the predicates of
+//! which all facts were read.
 
 use std::cell::RefCell;
 

@@ -135,8 +135,8 @@ fn fewest_steps(task: &Task<Rational>, config: &Config) -> Solution {
         let solution = answer(Status::UnsolvableWithinHorizon, None, Some(Proof::Search));
         return Solution { horizon: config.horizon.unwrap_or(steps), ..nothing(solution) };
     }
-    // All plans considered have the same number of steps, so adding a constant to each cost only makes the
-    // costs non-negative.
+    // Subtracting the least cost from every cost makes the costs non-negative. This does not change the order
+    // of the plans, because all plans considered have the same number of steps.
     let least = task.operators.iter().map(|operator| operator.cost.minimum()).min().unwrap_or_default();
     let shifted = with_costs(with_horizon(task, steps), |operator| {
         let mut cost = operator.cost.clone();

@@ -35,12 +35,12 @@ pub(super) fn shortest_then_best(original: Run<'_>) -> Solution {
         (Some(_), _) => return unknown(shortest),
         (None, _) => return Solution { lower_bound: None, ..shortest },
     };
-    // All plans within this horizon have exactly this number of steps, so adding a constant to each cost only
-    // makes the costs non-negative.
+    // Subtracting `lowest` from every cost makes the costs non-negative. This does not change the order of
+    // the plans, because all plans within this horizon have the same number of steps.
     let shifted = with_costs(original.task, |operator| {
         let mut cost = operator.cost.clone();
-        // The numbers of a quantity stay below `QUANTITY_LIMIT`, and so does its minimum. The subtraction
-        // therefore never saturates.
+        // Neither the constant of a quantity nor its minimum exceeds `QUANTITY_LIMIT` in magnitude, so the
+        // subtraction never saturates.
         cost.constant = cost.constant.saturating_sub(lowest);
         cost
     });

@@ -8,8 +8,8 @@
 //! search and the tie-breaking remain. The answers equal those of grounding and optimising from scratch,
 //! except that the SAT solver does not confirm them.
 //!
-//! If the previous plan is still valid, its cost is an upper bound for the search. If the time limit is
-//! reached, it is returned unless a better plan was found.
+//! If the previous plan is still valid, its cost is an upper bound for the search. At the time limit, the
+//! previous plan is returned unless a better plan was found.
 //!
 //! No SAT solver with assumptions is used. On maps of 50 to 200 places, the search takes milliseconds and a
 //! SAT proof seconds, and clauses learnt for one cost limit do not help with the next.
@@ -40,14 +40,13 @@ use usage::Usage;
 
 pub use query::{FirstStep, Progress, Query, ReplanOutcome};
 
-/// Denominator up to which numbers of the initial state are supported: each number must be a multiple of
-/// 1/`PRECISION`.
+/// Precision of numbers in the initial state: each number must be a multiple of 1/`PRECISION`.
 const PRECISION: Int = 1_000_000;
 /// Number of sets of available objects for which derived data are cached.
 const MAX_CACHED_SETS: usize = 8;
 
-/// Maximum number of states for each search for blocking objects. The result is only a hint for users, so it
-/// must not take longer than planning.
+/// Maximum number of states of each search that tests whether the absence of certain objects prevents a plan.
+/// The result is only a hint for users, so it must not take longer than planning.
 const BLOCKING_STATES: usize = 5_000;
 
 /// Incremental planner for problems of one domain that differ only in state and availability.

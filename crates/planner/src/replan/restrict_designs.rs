@@ -22,8 +22,8 @@ type KeptDesigns = Arc<[Vec<u32>]>;
 /// restricted to them.
 type RestrictedSlots = (KeptDesigns, Arc<[SlotUse]>);
 
-/// Cache of restricted data that several operators share. Keys are addresses of data in the original task,
-/// which outlives the cache.
+/// Cache of restricted data that several operators share. Keys contain addresses of data in the original
+/// task, which outlives the cache, and of the lists of kept designs, which `slots` keeps alive.
 #[derive(Default)]
 struct SharedTables {
     slots: FxHashMap<(*const SlotUse, u32), RestrictedSlots>,

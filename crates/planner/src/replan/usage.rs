@@ -1,7 +1,8 @@
-//! Usage of the symbols of a domain: which symbols conditions read, which symbols effects change, and which
-//! parameters must be available.
+//! Usage of the symbols of a domain and problem: which symbols conditions read, which symbols effects change,
+//! and which parameters must be available.
 //!
-//! The analysis is syntactic: if a symbol is read anywhere, all its atoms count as read.
+//! The analysis is syntactic: if a symbol is read anywhere, all its atoms count as read. Only the goal is
+//! more precise: outside quantifiers, it reads just the atoms that it mentions.
 
 use rustc_hash::FxHashSet;
 
@@ -41,7 +42,7 @@ impl Usage {
         self.changed.contains(name)
     }
 
-    /// Returns `true` if a condition reads the atom.
+    /// Returns `true` if a condition may read the atom with this predicate and [`key`].
     pub(super) fn is_read(&self, predicate: &Name, key: &str) -> bool {
         self.read.contains(predicate) || self.goal.contains(key)
     }

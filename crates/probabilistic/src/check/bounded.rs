@@ -27,7 +27,8 @@ impl<N: Number> Query<'_, N> {
     /// Computes for each state the minimal or maximal probability of reaching a terminal state of
     /// `problem` while the reward structure `name` accumulates at most the bound in `steps`.
     ///
-    /// Only upper bounds are supported, and no given policy.
+    /// Returns an error for a lower bound on the reward, and if a policy is given. Without any
+    /// bound, solves `problem` itself.
     pub fn until_within_reward(
         &self,
         problem: Problem<'_, N>,
@@ -57,14 +58,16 @@ impl<N: Number> Query<'_, N> {
         let layers = Layers::new(self.mdp(), problem, &earned)?;
         let n = self.mdp().states();
         let greatest = earned.iter().max().copied().unwrap_or(0);
-        // The values for the last `greatest` budgets: a choice refers to at most this many budgets
-        // back.
+        // Values for the last budgets (remaining rewards), the smallest budget first. No choice has
+        // a reward above `greatest`, so older values are not read.
         let mut previous: Vec<Vec<N>> = Vec::new();
         let mut vector = Vector::exactly(vec![N::zero(); n], Span::Probability);
         let mut error = 0.0_f64;
         let sweep = Sweep::new(&layers, problem, &earned);
         for budget in 0..=budgets {
-            // The oldest vector is reused because no choice refers to its budget anymore.
+            // A choice with reward r reads the values for the budget (remaining reward) that is
+            // smaller by r, and r is at most `greatest`. The oldest vector is therefore no longer
+            // read and is reused.
             let mut values = if previous.len() > greatest { previous.remove(0) } else { vec![N::zero(); n] };
             if let Some(sweep) = &sweep {
                 within_budget(sweep.layer(&mut values, &previous, budget, &mut self.work.borrow_mut()))?;

@@ -18,8 +18,9 @@ use crate::prism::state::{Edit, Packed};
 /// Upper limit on the number of actions of a cached model, because a behaviour (the evaluated
 /// commands of a local state) stores its disabled actions in a `u128`.
 pub const MAX_ACTIONS: usize = 128;
-/// Upper limits on the number of cached behaviours (evaluated commands of local states) and of
-/// cached edits of each module. Further behaviours are computed on every request.
+/// Limits for the cache of each module: number of behaviours (evaluated commands of local states),
+/// and number of edits (changes of one word of a packed state, by which the effects are stored). If
+/// one of them is reached, further behaviours are computed on every request.
 const CACHE_LIMITS: [usize; 2] = [1 << 16, 1 << 20];
 /// Cache entry of a local state in which the evaluation of a command fails.
 const FAILED: u32 = u32::MAX - 1;

@@ -79,8 +79,9 @@ impl<N: Number> Run<'_, N> {
         if self.sure_by_choice() {
             return attractor(local, outside_sure).0;
         }
-        // A state is not sure if a policy can stay in an end component, or can reach a state that
-        // is not sure.
+        // Sure under all policies: no policy can stay in the component forever (in an end
+        // component), and none can leave it to a state that is not sure. All other states are
+        // marked here.
         let ends = end_components(local, |_| true);
         let mut unsure = ends.inside;
         let owners = local.owners();

@@ -213,7 +213,8 @@ impl<'a, N: Number> Rows<'a, N> {
         (holds && within).then_some((lower, upper))
     }
 
-    /// Computes lower and upper bounds by iteration from zero. Returns `None` if the work limit is
+    /// Computes lower bounds by iteration from zero, and upper bounds by increasing them slightly
+    /// and checking the result with the inductive argument. Returns `None` if the work limit is
     /// exceeded.
     fn iterated(&self, width: f64) -> Option<(Vec<f64>, Vec<f64>)> {
         let (down, up) = (1.0 - self.rounding, 1.0 + self.rounding);

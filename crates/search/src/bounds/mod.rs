@@ -117,7 +117,8 @@ impl Bounds {
         Ok(Self { projections, resources, partitions: Vec::new(), further })
     }
 
-    /// Returns the heuristic that is 0 everywhere except at dead ends of the projection to no variable.
+    /// Returns the heuristic that is 0 in every state. It consists of the projection to the empty pattern,
+    /// whose only abstract state is a goal state. Used for formulas that must not depend on a heuristic.
     ///
     /// # Errors
     /// Fails if the deadline has passed or the interrupt flag is set.

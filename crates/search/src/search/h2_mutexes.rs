@@ -390,7 +390,8 @@ mod tests {
         let (states, steps) = reachable(&task).filter(|_| task.unreachable.is_none())?;
         let best = to_go(&task, &states, &steps);
         let pairs = MutexPairs::new(&task, &Limits::none()).expect("no limit")?;
-        // No value equals the value in the other state, so all pairs of variables are checked.
+        // `is_dead_end` checks only pairs with a variable whose value has changed. `u32::MAX` is no
+        // variable's value, so every variable counts as changed and all pairs are checked.
         let differing_values: Vec<u32> = vec![u32::MAX; task.variables.len()];
         let mut counts = [0, 0];
         for ((state, successors), goal_distance) in states.iter().zip(&steps).zip(&best) {

@@ -38,7 +38,7 @@ struct ComparedVariable {
     asked: Polarity,
 }
 
-/// Flag of an entry of `fronts` that is the index of a tree instead of a node.
+/// Bit that marks an entry of `fronts` as an index in `trees` instead of the index of a node.
 const TREE_FLAG: u32 = 1 << 31;
 
 /// Interned numbers: equal numbers have equal indices.
@@ -84,11 +84,12 @@ pub(super) struct StateRegistry<N> {
     width: usize,
     /// Keys of all places (sets of states with equal keys), with `width` words for each place.
     keys: Vec<u32>,
-    /// For each place (set of states with equal keys): the first node of its linked front, or the index of
-    /// its tree combined with `TREE_FLAG`.
+    /// For each place (set of states with equal keys), where its non-dominated nodes are stored: the first
+    /// node of a linked list or, for a long front, the index in `trees` combined with `TREE_FLAG`.
     fronts: Vec<u32>,
     trees: Vec<Front>,
-    /// Maximum length of a linked front. A longer front is stored as a tree.
+    /// Maximum number of nodes in a front (non-dominated nodes of a place) that is stored as a linked list. A
+    /// longer front is stored as a tree.
     longest: usize,
     /// Memory use of the trees in bytes.
     tree_bytes: usize,

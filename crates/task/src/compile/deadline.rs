@@ -30,7 +30,8 @@ impl Deadline {
     }
 }
 
-/// Auxiliary atom that is never true. The auxiliary actions add it, so that they have an effect.
+/// Atom that the auxiliary actions add, because actions without effects would be pruned. It is never true,
+/// because these actions are never executed.
 pub(super) const LOOKED_AT: &str = "a deadline was looked at";
 
 /// Adds two auxiliary actions to the domain for each deadline. Returns the deadlines without their conditions

@@ -22,8 +22,9 @@ pub struct SlotParameter {
 }
 
 /// Returns the design parameters of a schema with their functions, in ascending order. `solves` lists the
-/// predicates `(p DESIGN FUNCTION)` which state that a design solves a function. A parameter that also occurs
-/// as a function, or whose function is a design parameter, is omitted.
+/// predicates `(p DESIGN FUNCTION)` which state that a design solves a function. The conjuncts of the
+/// conditions at the start, over all and at the end are read in order. A conjunct is ignored if its design is
+/// already known as a design or function, or if its function is already known as a design.
 pub fn design_parameters(lifted: &Lifted, schema: &Schema, solves: &[Name]) -> Vec<SlotParameter> {
     let conjuncts = conjuncts(&schema.start_condition).into_iter().chain(conjuncts(&schema.middle_condition));
     let mut designs: Vec<SlotParameter> = Vec::new();

@@ -18,7 +18,8 @@ use pddl::ast::{Assignment, Name};
 /// Guard predicate of each numeric function that may be undefined.
 type Guards = FxHashMap<FunctionId, PredicateId>;
 
-/// Adds guards to all numeric fluents except those that a metric reads and `total-cost`.
+/// Adds guards (predicates that are true where the function has a value) to all numeric fluents except
+/// `total-cost` and those that a metric reads.
 pub fn guard(lifted: &mut Lifted) {
     let guards = declare(lifted);
     for schema in &mut lifted.schemas {
@@ -31,7 +32,8 @@ pub fn guard(lifted: &mut Lifted) {
     super::fluents::mark_fluents(lifted);
 }
 
-/// Declares the guard predicates and their initial facts. Returns the guard predicate of each function.
+/// Declares the guard predicates and their initial facts. Returns the guard predicate of each function that
+/// may be undefined.
 fn declare(lifted: &mut Lifted) -> Guards {
     let mut measured = Vec::new();
     for metric in &lifted.metrics {

@@ -19,8 +19,8 @@ const BIT_LIMIT: u64 = 4_096;
 
 /// Number type of a ground task: scaled integers, or exact rationals if integers would overflow.
 pub trait TaskNumber: Number + std::fmt::Debug + std::hash::Hash + Default {
-    /// `true` if all numbers are multiplied by a common factor that makes them integers; `false` if the
-    /// factor is 1.
+    /// Whether numbers of this type are multiplied by a common factor of the task that makes them integers.
+    /// If `false`, the factor is always 1.
     const SCALED: bool;
 
     /// Converts `number * scale`. Returns `None` if this type cannot represent the result.

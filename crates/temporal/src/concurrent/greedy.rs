@@ -5,8 +5,9 @@
 //! states with a fact that is new among the states with the same number of unsatisfied goals \[2\].
 //! In sequential mode, each end directly follows its start in the sequence. Far fewer states
 //! remain, and most tasks still have a plan; actions can still overlap in time. Among states with
-//! the same facts and running actions, only the first one is expanded, so this search may miss
-//! plans and proves nothing.
+//! the same facts, numbers and running actions, only the first one is expanded, or in mode `Sooner`
+//! each one with a smaller lower bound on the makespan. So this search may miss plans and proves
+//! nothing.
 //!
 //! \[1\] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010.
 //! \[2\] N. Lipovetzky, H. Geffner: Best-first width search, AAAI 2017.

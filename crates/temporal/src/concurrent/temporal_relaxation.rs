@@ -205,8 +205,9 @@ impl<'a> RelaxationBuilder<'a> {
             Role::Timed(_) => 0,
             Role::Whole => 1,
             Role::Start(instance) => {
-                // The facts of the condition over all that the start does not set must already hold
-                // before the start. Only simultaneous happenings could establish them otherwise.
+                // Facts of the `over all` condition must already hold before the start, unless the
+                // start sets their variable. Otherwise only a simultaneous happening could add
+                // these facts.
                 let over_all = concurrent.instances[instance as usize].over_all;
                 let required =
                     over_all.into_iter().flat_map(|id| &self.task.operators[id.index()].condition.facts);

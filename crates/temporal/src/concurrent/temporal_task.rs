@@ -32,7 +32,7 @@ pub struct TemporalTask {
     /// Temporal properties of each operator, by operator id.
     pub(super) happenings: Vec<Happening>,
     pub(super) instances: Vec<Instance>,
-    /// Times of the timed initial literals in internal units and their operators, ascending.
+    /// Time (in internal units) and operator of each timed initial literal, in ascending order.
     pub(super) events: Vec<(Int, OperatorId)>,
     /// Per access key: a variable whose latest change shows that all earlier accesses of this kind
     /// are past. Every happening that waits for such an access, except timed initial literals,
@@ -159,11 +159,12 @@ fn keep_runs_apart(
 }
 
 impl TemporalTask {
-    /// Computes `guards`, and the variables that each happening sets.
+    /// Computes `guards` and, for each happening, the variables that it sets (`sets`). Only guards
+    /// and variables of the goal are kept in `sets`.
     fn guard(&mut self, limits: &Limits) -> Result<(), Interrupted> {
         let mut common: Vec<Option<Vec<u32>>> = vec![None; self.guards.len()];
-        // A run may end before another run that precedes it in the sequence has begun, so facts of
-        // running instances are no guards.
+        // A run may end before another run that precedes it in the sequence has begun. So variables
+        // that mark an instance as running are no guards.
         let under_way: FxHashSet<VariableId> =
             self.instances.iter().filter_map(|instance| Some(instance.under_way?.variable)).collect();
         for pair in limits.watch(self.task.operators.iter().zip(&mut self.happenings)) {
@@ -216,7 +217,8 @@ impl TemporalTask {
     /// simultaneous runs has ended.
     pub(super) fn end_last_run(&self, instance: u32, state: &mut State) {
         if let Some(fact) = self.instances[instance as usize].under_way {
-            // The fact has two values; derived variables do not depend on it.
+            // The variable of the running fact has two values, so this is the other one. No derived
+            // variable depends on it, so none is computed again.
             state.values[fact.variable.index()] = u32::from(fact.value == 0);
             if let Some((timer, _)) = self.instances[instance as usize].timer {
                 state.numbers[timer.index()] = 0;

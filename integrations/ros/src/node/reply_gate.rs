@@ -3,7 +3,7 @@
 //! A server discovers the request writer and the reply reader of a client separately. A reply that
 //! is written before the reply reader is matched is lost, and the client waits forever.
 //! `rmw_send_response` of `rmw_fastrtps` and `rmw_cyclonedds` therefore waits up to 100 ms for the
-//! reader. Here, the requests wait instead, so that a server never blocks.
+//! reader. Here, the requests wait instead, each for at most 100 ms, so that a server never blocks.
 
 use std::collections::{BTreeSet, VecDeque};
 use std::time::{Duration, Instant};
@@ -21,7 +21,8 @@ const TIMEOUT: Duration = Duration::from_millis(100);
 /// Interval between two checks of the waiting requests.
 const RECHECK: Duration = Duration::from_millis(1);
 
-/// Upper limit on the number of remembered clients; all clients are forgotten when the limit is reached.
+/// Upper limit on the number of clients in [`ReplyGate::admitted`]. All clients are removed when
+/// the limit is reached.
 const MAX_CLIENTS: usize = 4096;
 
 /// Queue of the requests to one service that wait for the reply reader of their client.
@@ -29,7 +30,7 @@ const MAX_CLIENTS: usize = 4096;
 pub(crate) struct ReplyGate<T> {
     topics: Topics,
     waiting: VecDeque<Waiting<T>>,
-    /// Clients one of whose requests was already removed. Their further requests do not wait.
+    /// Clients of which a request has already left the queue. Their further requests pass at once.
     admitted: BTreeSet<Gid>,
 }
 

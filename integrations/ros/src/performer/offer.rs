@@ -168,7 +168,8 @@ impl Offer {
         }
     }
 
-    /// Reports the progress and the end of the action to the executor.
+    /// Reports the progress and the end of the action to the executor. The end is not reported
+    /// after a cancellation.
     async fn report_progress(&self, running: &Running) {
         loop {
             let progress = running.next().await;

@@ -23,7 +23,8 @@ pub(super) struct SplitSchema<'a> {
     pub(super) at_end: Conjuncts<'a>,
 }
 
-/// The conjuncts of a condition, separated by whether they mention slots.
+/// The conjuncts of a condition, separated by whether they mention slots (design parameters that selection
+/// assigns).
 pub(super) struct Conjuncts<'a> {
     /// Conjuncts that mention no slot. Static literals are omitted, because relaxed reachability has already
     /// decided them.

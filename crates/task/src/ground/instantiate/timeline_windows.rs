@@ -110,7 +110,9 @@ impl<'t> TimelineWindow<'t> {
                     }
                 }
                 if to > from {
-                    // One moment after an event, no other event occurs.
+                    // An action that ends one moment after an event never starts exactly at an event, because
+                    // times composed of events and durations differ by at least two moments. So a single
+                    // window suffices.
                     add(if own.is_empty() { Start::ByEnd } else { Start::LaterByEnd }, End::Inside);
                     add(Start::ByEnd, End::AtEvent);
                     if !own.is_empty() {
@@ -209,7 +211,8 @@ impl<'t> TimelineWindow<'t> {
         (self.end == End::AtEvent).then(|| &self.timeline.events[self.to - 1].1[..])
     }
 
-    /// Returns the changes of the auxiliary time atoms: the phase advances, and the last step is not a wait.
+    /// Returns the changes of the auxiliary time atoms: the phase of the start is replaced by the phase of
+    /// the end, and `waited` (the last step was a wait) becomes false.
     pub(super) fn changes(&self) -> Vec<(AtomId, bool)> {
         let phases = &self.timeline.phases;
         let mut changes = vec![(self.timeline.waited, false)];

@@ -85,9 +85,10 @@ fn is_decimal(concurrent: &TemporalTask, time: &Rational) -> bool {
     to_decimal(&(time.clone() / unit).to_big()).is_some()
 }
 
-/// Rounds the durations to decimals one after another, each to the better feasible neighbouring
-/// value. Plans are written in decimals and must remain valid. Returns `None` if no such durations
-/// are feasible.
+/// Rounds the durations to decimals one after another. Each duration becomes the neighbouring
+/// multiple of [`grain`] that is feasible and gives the better metric; a duration that is already a
+/// decimal is kept. Earlier roundings are not revised. Returns `None` if neither neighbour of some
+/// duration is feasible.
 fn rounded(
     concurrent: &TemporalTask,
     program: &Program,
@@ -111,8 +112,8 @@ fn rounded(
     Some(rounded)
 }
 
-/// Granularity of rounded durations: a negative power of ten of the PDDL time unit, at most a
-/// thousandth of the separation.
+/// Granularity of rounded durations, in internal time units: the greatest 10^-n PDDL time units (n
+/// ≥ 0) that is at most a thousandth of the separation. `None` on overflow.
 fn grain(concurrent: &TemporalTask) -> Option<Rational> {
     let unit = Rational::from_integer(concurrent.task.time_scale);
     let limit = Rational::from_integer(concurrent.separation) / Rational::from_integer(1000);
