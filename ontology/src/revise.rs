@@ -336,7 +336,8 @@ fn revised_program(program: &Program, before: &Program, after: &Program) -> Opti
     let content = |rule: &EngineRule| {
         let mut copy = rule.clone();
         if *copy.identity.source == *AXIOM_SOURCE {
-            // Another axiom may have been inserted in front of this one.
+            // The position of an axiom changes if another axiom is inserted before it, so the comparison
+            // ignores positions.
             copy.identity.position = 0;
         }
         copy

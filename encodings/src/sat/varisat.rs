@@ -5,10 +5,10 @@
 //! sink requests Varisat's own proof format, because DRAT supports neither assumptions nor clauses
 //! that are added later.
 //!
-//! Answers under assumptions are correct. But after the first call that failed under assumptions,
-//! stale marks inside the solver may put wrong assumptions into a core. So each later core is
-//! confirmed by one more call. If this call finds an assignment, a new solver with the same clauses
-//! computes the core.
+//! Answers under assumptions are correct. But after the first call that is unsatisfiable because of its
+//! assumptions, stale marks inside the solver may put wrong assumptions into a core. So each later core is
+//! confirmed by one more call. If this call finds an assignment, a new solver with the same clauses computes
+//! the core.
 //!
 //! \[1\] J. Harder: Varisat, <https://jix.github.io/varisat/>.
 

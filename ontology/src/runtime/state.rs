@@ -20,7 +20,7 @@ pub struct Objective {
     /// The function to provide, if one is stated.
     pub function: Option<Individual>,
     /// Statuses that the rules conclude (`UNGROUNDED`, `IN_ERROR_COMPONENT`, …); empty if there is no problem.
-    /// The shipped metamodel allows several; two are a contradiction only if a metamodel declares `o_status`
+    /// Our metamodel allows several statuses; two are a contradiction only if a metamodel declares `o_status`
     /// functional.
     pub statuses: Vec<String>,
     /// Whether a component has recovered, so that a better design may be available.

@@ -166,8 +166,8 @@ fn kind(value: &Value) -> &'static str {
 }
 
 /// Reports asserted status values of an unexpected kind (boolean, number or string). The expected kind
-/// is given by the ranges of the property or, without a range, by the constants with which rules compare
-/// the property.
+/// is given by the ranges of the property or, without a range, by the literals in the atoms of the property
+/// in rule bodies.
 fn statuses(ontology: &Ontology) -> Vec<Warning> {
     let properties =
         [terms::STATUS, terms::OBJECTIVE_STATUS, terms::GROUNDING_STATUS, terms::REALISABILITY].concat();

@@ -35,7 +35,7 @@ pub(super) fn edge_of(engine: &Engine, equality: &Equality, pair: &Fact) -> Edge
     Edge { left: pair.arguments[0], right: pair.arguments[1], facts, edges: edges.collect(), proof }
 }
 
-/// Reason of a fact. The supports of the reason are indices into `steps`.
+/// Reason of a fact whose supports are indices into `steps`.
 #[derive(Clone)]
 struct Ground<'a> {
     reason: &'a Reason,

@@ -227,7 +227,8 @@ impl Knowledge {
         &self.runtime
     }
 
-    /// Returns the runtime for modification. Cached queries are discarded.
+    /// Returns the runtime for modification. Discards the cached designs, actions and measured
+    /// values.
     pub fn runtime_mut(&mut self) -> &mut Runtime {
         self.catalogue = OnceLock::new();
         &mut self.runtime
@@ -248,8 +249,8 @@ impl Knowledge {
         }
     }
 
-    /// Returns the change of facts of a successful update, after applying the change to the query
-    /// cache. Converts an error to a message.
+    /// Returns the change of facts of a successful update, after applying the change to the cached
+    /// designs, actions and measured values. Converts an error to a message.
     fn changed(&mut self, outcome: Result<Delta, ontology::Error>) -> Result<Delta, Message> {
         let delta = outcome.map_err(|error| Message::from_ontology(&error))?;
         self.follow(&delta);

@@ -45,8 +45,8 @@ const PRECISION: Int = 1_000_000;
 /// Number of sets of available objects for which derived data are cached.
 const MAX_CACHED_SETS: usize = 8;
 
-/// Maximum number of states of each search that tests whether the absence of certain objects prevents a plan.
-/// The result is only a hint for users, so it must not take longer than planning.
+/// Maximum number of states of each search of [`Replanner::blocking`], which tests whether unavailable
+/// objects prevent a plan. The result is only a hint for users, so it must not take longer than planning.
 const BLOCKING_STATES: usize = 5_000;
 
 /// Incremental planner for problems of one domain that differ only in state and availability.

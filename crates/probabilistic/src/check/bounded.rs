@@ -147,7 +147,8 @@ struct Sweep<'a, N> {
 }
 
 impl<'a, N: Number> Sweep<'a, N> {
-    /// Returns `None` if choices without reward form a cycle (other than pure self-loops).
+    /// Sorts the states topologically. Returns `None` if choices without reward form a cycle (other
+    /// than pure self-loops).
     fn new(layers: &Layers<N>, problem: Problem<'a, N>, earned: &'a [usize]) -> Option<Self> {
         let mdp = problem.mdp;
         let n = mdp.states();

@@ -110,7 +110,7 @@ impl<N: Number> Module<N> {
         [self.prevented.len(), self.commands.len(), self.updates.len(), self.edits.len()]
     }
 
-    /// Removes the entries that are behind the cached entries.
+    /// Truncates all lists to `cached_lengths`, which removes an uncached behaviour.
     fn discard_uncached(&mut self) {
         let [behaviours, commands, updates, edits] = self.cached_lengths;
         self.prevented.truncate(behaviours);

@@ -61,8 +61,8 @@ pub fn around<N: Number>(
     Some(rows.enclosed(quotient, &lower, &upper))
 }
 
-/// The equations, in the order in which sweeps evaluate them. A *position* is an index of a block
-/// (merged end component) in this order.
+/// The equations of a component (one row for each choice of a block), in the order in which sweeps
+/// evaluate them. A *position* is an index of a block (merged end component) in this order.
 struct Rows<'a, N> {
     direction: Direction,
     /// For each position in the order, the block; and for each row, its number in the quotient (the
@@ -196,8 +196,9 @@ impl<'a, N: Number> Rows<'a, N> {
         best
     }
 
-    /// Computes lower and upper bounds around approximate values `near`. Returns `None` unless the
-    /// inductive argument proves both bounds and the width is sufficient.
+    /// Computes lower and upper bounds around approximate values `near`. Returns `None` if the
+    /// equations still move the bounds after [`UPPER_SWEEPS`] sweeps, or if their distance exceeds
+    /// `width` times the value.
     fn around(&self, near: &[N], width: f64) -> Option<(Vec<f64>, Vec<f64>)> {
         let scaled = |scale: f64| -> Vec<f64> {
             (0..self.positions()).map(|position| near[self.block(position)].to_f64() * scale).collect()
@@ -213,9 +214,8 @@ impl<'a, N: Number> Rows<'a, N> {
         (holds && within).then_some((lower, upper))
     }
 
-    /// Computes lower bounds by iteration from zero, and upper bounds by increasing them slightly
-    /// and checking the result with the inductive argument. Returns `None` if the work limit is
-    /// exceeded.
+    /// Computes lower bounds by iteration from zero, and upper bounds by increasing these slightly
+    /// until no equation raises the result. Returns `None` if the work limit is exceeded.
     fn iterated(&self, width: f64) -> Option<(Vec<f64>, Vec<f64>)> {
         let (down, up) = (1.0 - self.rounding, 1.0 + self.rounding);
         let sweep_work = self.columns.len().saturating_add(self.constants.len()) as u64;

@@ -26,7 +26,7 @@ type Words = Vec<u64>;
 
 /// An operator in terms of numbered facts of basic variables.
 struct Rule {
-    /// Facts that its condition requires.
+    /// Facts that the condition of the operator requires.
     before: Vec<u32>,
     /// Facts that are known to hold after the operator.
     after: Vec<u32>,
@@ -128,7 +128,7 @@ pub struct MutexPairs {
     first: Vec<u32>,
     /// Compatible pairs: pairs that a state on a path from the initial state to the goal may contain.
     alive: Table,
-    /// For each operator: `true` if it is proved that no plan can use it.
+    /// For each operator: `true` if it is proved that no plan can use the operator.
     useless: Vec<bool>,
 }
 

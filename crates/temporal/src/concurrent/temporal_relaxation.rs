@@ -34,23 +34,25 @@ pub(super) struct TemporalRelaxation {
     /// numbers.
     pub(super) first: Vec<Proposition>,
     pub(super) propositions: usize,
-    /// Conditions of each rule, ascending.
+    /// Propositions that each rule requires (its conditions), ascending.
     pub(super) needs: Lists,
     /// Number of conditions of each rule.
     pub(super) unmet: Vec<u32>,
     /// Indices of the rules without conditions.
     pub(super) free: Vec<u32>,
     pub(super) adds: Lists,
-    /// Numeric conditions that each rule increases, with the amounts.
+    /// Numeric conditions that each rule makes easier to satisfy, with the amounts by which their
+    /// linear expressions grow. An amount is `None` if it depends on the state.
     pub(super) raises: Vec<Box<[NumericEffect]>>,
     /// Weight of each rule in a relaxed plan.
     pub(super) weights: Vec<u32>,
-    /// Happening of each rule. `None` for clauses and derived facts.
+    /// Operator (start, end or instantaneous action) of each rule. `None` for the rules of clauses
+    /// and derived facts.
     pub(super) origins: Vec<Option<OperatorId>>,
     /// Rules that have each proposition as a condition.
     pub(super) needing: Lists,
     pub(super) numeric: Vec<Numeric>,
-    /// Conditions of the goal, ascending.
+    /// Propositions that the goal requires, ascending.
     pub(super) goal: Vec<Proposition>,
     /// Index of the rule for the end of each instance.
     pub(super) ends: Vec<u32>,
@@ -265,7 +267,8 @@ impl<'a> RelaxationBuilder<'a> {
         add_conjunctions(&mut Scope { rules, goal, variables: &variables, propositions })
     }
 
-    /// Determines the numeric conditions that each rule increases, with the amounts.
+    /// Determines `raises`: for each rule, the numeric conditions whose linear expressions can
+    /// grow, with the amounts.
     fn raise(&mut self, task: &Task) {
         let mut mentioning: FxHashMap<u32, Vec<u32>> = FxHashMap::default();
         for (index, numeric) in (0..).zip(&self.numeric) {
@@ -291,7 +294,7 @@ impl<'a> RelaxationBuilder<'a> {
 }
 
 /// Amount that an operator adds to a linear expression. Returns `None` if the amount depends on the
-/// state.
+/// state or overflows.
 fn difference(linear: &Linear<Int>, operator: &Operator) -> Option<Int> {
     let mut sum: Int = 0;
     for effect in &operator.numeric_effects {

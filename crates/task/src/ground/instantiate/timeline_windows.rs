@@ -261,7 +261,8 @@ pub(super) struct Conflicts {
 }
 
 impl Conflicts {
-    /// Computes the conflicts of all events. Each pair holds what the start or end reads, and its effects.
+    /// Computes the conflicts of all events. The two pairs contain the symbols that the start and the end
+    /// read, and the effects of each.
     pub(super) fn new(
         world: &World<'_>,
         timeline: &Timeline,
@@ -277,7 +278,7 @@ impl Conflicts {
 }
 
 /// Returns the conditions under which a start or end interferes with an event, evaluated in the state before
-/// it.
+/// the start or end.
 fn interference(
     world: &World<'_>,
     event: &[(AtomId, bool)],
@@ -299,7 +300,8 @@ fn interference(
     changes.map(|(condition, _)| condition.clone()).collect()
 }
 
-/// Conditions that must be false before the start and before the end if each is at the time of an event.
+/// Conditions under which the start or the end of a window interferes with the event at its time. All must be
+/// false in the state before the start or the end; the lists are empty if there is no such event.
 pub(super) struct Interference {
     pub(super) start: Vec<Residual>,
     pub(super) end: Vec<Residual>,
