@@ -152,7 +152,7 @@ impl<'a> Expansion<'a> {
     }
 }
 
-/// Parses the document type declaration of an XML document. Returns `None` if there is none, if it has no
+/// Parses the document type declaration of an XML document. Returns `None` without a declaration, if it has no
 /// internal subset, or if it is malformed. External entities are ignored.
 fn declarations(text: &[u8]) -> Option<Declarations<'_>> {
     let start = text.windows(9).position(|window| window == b"<!DOCTYPE")?;

@@ -194,7 +194,7 @@ pub(super) fn flattened(text: &[u8]) -> Flattened<'_> {
 }
 
 /// Returns start and end of the next tag, comment, CDATA section or processing instruction after `from`,
-/// or `None` if there is none. The end is `None` if the markup is not closed.
+/// or `None` without one. The end is `None` if the markup is not closed.
 fn next_markup(text: &[u8], from: usize) -> Option<(usize, Option<usize>)> {
     let start = from + text[from..].iter().position(|&byte| byte == b'<')?;
     let markup = &text[start..];

@@ -72,7 +72,7 @@ fn upwards(local: &str) -> Vec<&str> {
     ancestors
 }
 
-/// Returns the primitive datatype that contains a datatype; `None` if there is none.
+/// Returns the primitive datatype that contains a datatype; `None` for a datatype outside all of them.
 fn primitive(local: &str) -> Option<&'static str> {
     let ancestors = upwards(local);
     let is_ancestor = |name: &&&str| ancestors.contains(name) && **name != "integer";

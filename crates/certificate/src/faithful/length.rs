@@ -19,7 +19,7 @@ impl Length {
         self.most.as_ref().filter(|most| **most == self.least)
     }
 
-    /// Returns the greatest lower bound on `factor` times the duration. Fails if there is none.
+    /// Returns the greatest lower bound on `factor` times the duration. Fails without a lower bound.
     pub(super) fn least_times(&self, factor: &BigRational) -> Result<BigRational, Cause> {
         if !factor.is_negative() {
             return Ok(&self.least * factor);

@@ -138,7 +138,7 @@ impl Parser<'_> {
     }
 
     /// Parses an expression without functions, as required in `:init` and for times of trajectory
-    /// constraints, and returns its value. Reports an error if there is none.
+    /// constraints, and returns its value. Reports an error without one.
     pub(super) fn constant(&mut self, item: Item<'_>) -> Option<BigRational> {
         let expression = self.expression(item)?;
         let value = evaluate(&expression);

@@ -65,7 +65,7 @@ impl<'e, 'p> Execution<'e, 'p> {
     }
 
     /// Starts a step as an instance of the first schema whose duration constraints and conditions at start
-    /// hold, and determines the duration. If there is none, returns the violation of the first schema that
+    /// hold, and determines the duration. Without such a schema, returns the violation of the first schema that
     /// fits the step.
     pub(super) fn begin(
         &self,
