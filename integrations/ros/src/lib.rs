@@ -10,4 +10,7 @@ pub mod perform;
 pub mod performer;
 pub mod planner;
 pub mod popf;
+mod procedure;
 pub mod reasoner;
+mod signals;
+mod validated;

@@ -37,6 +37,9 @@ struct Arguments {
     /// How services are mapped: as the discovered participants say, or as this middleware does.
     #[arg(long, value_enum, default_value_t = Rmw::Auto)]
     rmw: Rmw,
+    /// Let the steps of designs in the settings execute commands on this machine.
+    #[arg(long)]
+    allow_commands: bool,
     /// With `--as controller`: whose types PlanSys2's executor has.
     #[arg(long, value_enum, default_value_t)]
     executor: PlanVersion,
@@ -103,7 +106,7 @@ fn start() -> Result<(), Errors> {
     };
     ctrlc::set_handler(handler)
         .map_err(|error| vec![Message::error("N100", format!("signals cannot be heard: {error}"))])?;
-    let Arguments { role, mission, settings, journal, executor, .. } = arguments;
+    let Arguments { role, mission, settings, journal, executor, allow_commands, .. } = arguments;
     if journal.is_some() && matches!(role, Role::Planner | Role::Controller) {
         let text = "`--journal` is for a manager and a reasoner: nothing of a planner has to be known after a restart";
         return Err(vec![Message::error("N100", text)].into());
@@ -114,10 +117,10 @@ fn start() -> Result<(), Errors> {
             controller::run(&node, &controller::Options { mission, version: executor }, &stop)
         }
         (Role::Manager, Some(mission)) => {
-            manager::run(&node, &manager::Options { mission, settings, journal }, &stop)
+            manager::run(&node, &manager::Options { mission, settings, journal, allow_commands }, &stop)
         }
         (Role::Reasoner, Some(mission)) => {
-            reasoner::run(&node, &reasoner::Options { mission, settings, journal }, &stop)
+            reasoner::run(&node, &reasoner::Options { mission, settings, journal, allow_commands }, &stop)
         }
         (_, None) => Err(vec![Message::error("N100", "`--mission` is missing")].into()),
     }

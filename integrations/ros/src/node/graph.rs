@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use futures::StreamExt as _;
 use ros2_client::Gid;
+use ros2_client::dds::rustdds::policy::Durability;
 use ros2_client::dds::rustdds::{
     DomainParticipant, DomainParticipantStatusEvent, EndpointDescription, GUID, StatusEvented as _,
 };
@@ -85,6 +86,17 @@ struct Endpoint {
     topic: String,
     type_name: String,
     hash: Option<String>,
+    /// `true` if late readers receive the last samples: reliable and transient local.
+    is_latched: bool,
+}
+
+/// First publisher of a topic.
+#[derive(Debug, Clone)]
+pub(crate) struct Writer {
+    /// DDS name of the type.
+    pub(crate) type_name: String,
+    /// `true` if late readers receive the last samples.
+    pub(crate) is_latched: bool,
 }
 
 impl Graph {
@@ -149,8 +161,10 @@ impl Graph {
         if guid[..12] == self.own_prefix {
             return;
         }
-        let EndpointDescription { topic_name: topic, type_name, user_data, .. } = description;
-        let endpoint = Endpoint { is_reader, topic, type_name, hash: type_hash(&user_data) };
+        let EndpointDescription { topic_name: topic, type_name, user_data, qos, .. } = description;
+        let is_latched =
+            qos.is_reliable() && qos.durability().is_some_and(|kept| kept != Durability::Volatile);
+        let endpoint = Endpoint { is_reader, topic, type_name, hash: type_hash(&user_data), is_latched };
         let mut state = self.state();
         let complaint = state.expected.get(&endpoint.topic).and_then(|expected| endpoint.complaint(expected));
         state.complaints.extend(complaint);
@@ -198,6 +212,14 @@ impl Graph {
     /// Returns `true` if a topic, given by its DDS name, has a writer.
     pub(crate) fn has_writer(&self, topic: &str) -> bool {
         self.state().endpoints.values().any(|endpoint| !endpoint.is_reader && endpoint.topic == topic)
+    }
+
+    /// Returns a writer of a topic, given by its DDS name.
+    pub(crate) fn writer(&self, topic: &str) -> Option<Writer> {
+        let state = self.state();
+        let writer =
+            state.endpoints.values().find(|endpoint| !endpoint.is_reader && endpoint.topic == topic)?;
+        Some(Writer { type_name: writer.type_name.clone(), is_latched: writer.is_latched })
     }
 
     /// Returns the server of a service if there is one. An endpoint with another type name is an error. A differing type hash is
@@ -378,6 +400,7 @@ mod tests {
             topic: "rt/t".to_owned(),
             type_name: type_name.to_owned(),
             hash: type_hash(data.as_bytes()),
+            is_latched: false,
         };
         let complaint = |name: &str, data: &str| endpoint(name, data).complaint(&expected).is_some();
         assert!(!complaint("a::msg::dds_::B_", ""));

@@ -7,6 +7,7 @@
 //! reveals its mapping of services, see `rmw`.
 
 mod action;
+mod any_topic;
 mod arguments;
 mod graph;
 mod lifecycle;
@@ -32,12 +33,16 @@ use smol::{Task, Timer};
 pub use action::{
     Accepted, ActionCaller, CancelRequest, GoalEnd, GoalError, GoalEvent, Goals, Pursued, Wanted,
 };
+pub(crate) use any_topic::Arrivals;
 pub use arguments::RosArguments;
+pub(crate) use arguments::parameter_value;
+pub(crate) use lifecycle::PrimaryState;
 pub use lifecycle::{Lifecycle, Phase};
 pub use log::Severity;
+pub(crate) use names::valid_name;
 pub use network::Network;
 pub use parameters::Declared;
-pub(crate) use parameters::any_value;
+pub(crate) use parameters::{any_value, fitting, parameter, raw};
 pub use rmw::Rmw;
 pub use service::{CallError, Caller, Responder};
 pub use topic::Publisher;

@@ -236,7 +236,7 @@ impl Node {
 }
 
 /// Converts a value to the type of `current`. An integer is accepted for a double.
-fn fitting(current: &ParameterValue, value: ParameterValue) -> Result<ParameterValue, String> {
+pub(crate) fn fitting(current: &ParameterValue, value: ParameterValue) -> Result<ParameterValue, String> {
     match (current, value) {
         (ParameterValue::Double(_), ParameterValue::Integer(whole)) => {
             Ok(ParameterValue::Double(whole as f64))

@@ -117,7 +117,7 @@ fn mission() -> PathBuf {
 
 fn manager(domain: u16, journal: Option<PathBuf>) -> Running {
     let node = node(domain, "metaplan", "");
-    let options = manager::Options { mission: mission(), settings: None, journal };
+    let options = manager::Options { mission: mission(), settings: None, journal, allow_commands: false };
     Running::new(move |stop| manager::run(&node, &options, stop))
 }
 
@@ -200,7 +200,8 @@ fn a_reasoner_serves_objectives() {
     let domain = domain();
     let robot = Robot::new(domain, None);
     let node = node(domain, "reasoner", "");
-    let options = reasoner::Options { mission: mission(), settings: None, journal: None };
+    let options =
+        reasoner::Options { mission: mission(), settings: None, journal: None, allow_commands: false };
     let running = Running::new(move |stop| reasoner::run(&node, &options, stop));
     let caller = robot.node.action_caller::<ControlQos>("/mros/objective");
     let goal = |function: &str| {

@@ -6,6 +6,7 @@ Each scenario uses a ROS domain of its own and starts the program anew. Exits wi
 """
 
 import contextlib
+import json
 import os
 import pathlib
 import random
@@ -15,7 +16,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 os.environ["ROS_DOMAIN_ID"] = str(random.randrange(1, 100))
@@ -29,10 +30,13 @@ from rclpy.context import Context  # noqa: E402
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from robot import ModeManager, Monitors  # noqa: E402
+from scout import STEPS, Equipment, Localization  # noqa: E402
+from std_msgs.msg import Bool, String  # noqa: E402
 from suave_msgs.srv import Task  # noqa: E402
 
 EXAMPLES = pathlib.Path(__file__).resolve().parents[2] / "examples"
 MISSION = EXAMPLES / "suave" / "suave.toml"
+SCOUT = EXAMPLES / "nav2" / "mission.toml"
 START = 30.0  # s until the program must be ready
 SETTLED = 3.0  # s without another request after which an adaptation is over
 
@@ -203,6 +207,177 @@ def parameters() -> None:
             check(answer.results[0].successful, is_accepted, f"plan_solver_timeout = {seconds}")
 
 
+class Scout:
+    """The robot of `examples/nav2`, with the events of its manager."""
+
+    def __init__(self) -> None:
+        self.amcl, self.visual = Localization("amcl"), Localization("visual_localization")
+        self.equipment = Equipment()
+        self.events: list[dict] = []
+        self.equipment.create_subscription(
+            String, "/metaplan/events", lambda message: self.events.append(json.loads(message.data)), 100
+        )
+
+    def until(self, what: str, is_so: Callable[[], bool], within: float = 20.0) -> None:
+        """Waits for a condition."""
+        until = time.monotonic() + within
+        while not is_so():
+            if time.monotonic() > until:
+                steps = [event for event in self.events if event["answer"] in ("step", "steps_failed", "reconfigure")]
+                raise Failure(f"{what}: not within {within} s; {self.states()}; {steps[-8:]}")
+            time.sleep(0.02)
+
+    def states(self) -> tuple[str, str]:
+        """States of both ways to localize."""
+        return self.amcl.state, self.visual.state
+
+    def until_states(self, amcl: str, visual: str) -> None:
+        """Waits for the states of both ways to localize."""
+        self.until(f"amcl is {amcl}, visual localization is {visual}", lambda: self.states() == (amcl, visual))
+
+    def count(self, answer: str) -> int:
+        """Number of events of a kind."""
+        return sum(event["answer"] == answer for event in self.events)
+
+    @contextlib.contextmanager
+    def managed(self, settings: str = STEPS, *arguments: str) -> Iterator[tempfile._TemporaryFileWrapper]:
+        """Starts the nodes and the manager, and waits until the first move runs; yields the log."""
+        with tempfile.NamedTemporaryFile("w", suffix=".toml") as file:
+            file.write(settings)
+            file.flush()
+            command = ("--as", "manager", "--mission", str(SCOUT), "--settings", file.name, *arguments)
+            with nodes(self.amcl, self.visual, self.equipment), program(*command) as log:
+                yield log
+
+
+def steps() -> None:
+    """Lifecycle transitions and parameters put designs into effect, once for each cause."""
+    scout = Scout()
+    with scout.managed():
+        scout.until_states("active", "inactive")
+        scout.until("the speed is set", lambda: scout.equipment.get_parameter("max_speed").value == 1.0)
+        check(scout.equipment.settings, [(1.0, False)], "parameters, both at once")
+        time.sleep(SETTLED)
+        check(scout.amcl.transitions, ["configure", "activate"], "transitions of amcl")
+        check(scout.visual.transitions, ["configure"], "transitions of visual localization")
+        scout.equipment.lidar(DiagnosticStatus.ERROR, "no scan")
+        scout.until_states("inactive", "active")
+        time.sleep(SETTLED)
+        check(scout.amcl.transitions, ["configure", "activate", "deactivate"], "transitions of amcl")
+        check(scout.visual.transitions, ["configure", "activate"], "transitions of visual localization")
+        check(scout.equipment.settings, [(1.0, False)], "parameters stay")
+        # The move ends, and the inspection needs the lamp and the camera.
+        scout.until("the lamp is on", lambda: arrive(scout) and scout.equipment.lamp == [True])
+        scout.until("the camera is reset", lambda: scout.equipment.resets == 1)
+
+
+def arrive(scout: Scout) -> bool:
+    """Reports that a move has ended."""
+    scout.equipment.arrived.publish(Bool(data=True))
+    time.sleep(0.2)
+    return True
+
+
+def rollback() -> None:
+    """A node that refuses its activation: the steps before are undone, and the design counts as not realisable."""
+    scout = Scout()
+    scout.visual.can_activate = False
+    with scout.managed():
+        scout.until_states("active", "inactive")
+        scout.equipment.lidar(DiagnosticStatus.ERROR, "no scan")
+        scout.until("the failure is reported", lambda: scout.count("steps_failed") == 1)
+        scout.until_states("active", "inactive")
+        undone = [event["step"] for event in scout.events if event.get("outcome") == "undone"]
+        check(undone, ["/visual_localization inactive", "/amcl active"], "undone steps, the last one first")
+        time.sleep(SETTLED)
+        check(scout.count("steps_failed"), 1, "attempts within the minute")
+
+
+def refused_parameters() -> None:
+    """Parameters that a node refuses: another design is used."""
+    scout = Scout()
+    scout.equipment.fastest = 0.6
+    with scout.managed():
+        scout.until("the slow design is used", lambda: scout.equipment.get_parameter("max_speed").value == 0.25)
+        check(scout.equipment.settings, [(0.25, True)], "accepted parameters")
+        failed = [event for event in scout.events if event["answer"] == "steps_failed"]
+        check(["too fast" in event["because"] for event in failed], [True], "reasons of failures")
+
+
+def refused_service() -> None:
+    """A service that refuses after another one was called: the first call is undone by the stated call."""
+    scout = Scout()
+    scout.equipment.can_reset = False
+    with scout.managed():
+        scout.until_states("active", "inactive")
+        scout.until("the lamp is switched back and the other design is used", lambda: arrive(scout) and len(scout.equipment.lamp) == 3)
+        check(scout.equipment.lamp, [True, False, False], "calls of the lamp: step, undo, other design")
+        check(scout.equipment.resets, 1, "calls of the camera")
+
+
+def silent_topic() -> None:
+    """A condition that is not seen afterwards: the steps are undone."""
+    condition = '{ node = "/visual_localization", state = "active" },\n]\nverify = [{ topic = "/visual_localization/pose" }]'
+    settings = STEPS.replace('{ node = "/visual_localization", state = "active" },\n]', condition)
+    scout = Scout()
+    scout.visual.is_mute = True
+    with scout.managed(settings):
+        scout.until_states("active", "inactive")
+        scout.equipment.lidar(DiagnosticStatus.ERROR, "no scan")
+        scout.until("visual localization is tried", lambda: scout.visual.state == "active")
+        scout.until_states("active", "inactive")
+        failed = [event["because"] for event in scout.events if event["answer"] == "steps_failed"]
+        check(failed, ["not seen afterwards: a message on /visual_localization/pose"], "reasons of failures")
+    scout = Scout()
+    with scout.managed(settings):
+        scout.until_states("active", "inactive")
+        scout.equipment.lidar(DiagnosticStatus.ERROR, "no scan")
+        scout.until_states("inactive", "active")
+        time.sleep(SETTLED)
+        check(scout.count("steps_failed"), 0, "failures if messages arrive")
+
+
+def changed_by_others() -> None:
+    """A node that somebody else deactivates is activated again; a restarted node is configured and activated."""
+    scout = Scout()
+    with scout.managed():
+        scout.until_states("active", "inactive")
+        time.sleep(SETTLED)
+        scout.amcl.trigger_deactivate()
+        scout.until_states("active", "inactive")
+        time.sleep(SETTLED)
+        check(scout.amcl.transitions, ["configure", "activate", "deactivate", "activate"], "transitions of amcl")
+        check(scout.count("steps_failed"), 0, "failures")
+
+
+def commands() -> None:
+    """A command is a step if the command line allows it; its failure is undone."""
+    with tempfile.TemporaryDirectory() as directory:
+        made = pathlib.Path(directory) / "started"
+        command = f'{{ command = ["mkdir", "{made}"], undo = {{ command = ["rmdir", "{made}"] }} }}'
+        failing = STEPS.replace(
+            'steps = [{ node = "/controller", parameters = { max_speed = 1,',
+            f'steps = [{command}, {{ command = ["false"] }}, {{ node = "/controller", parameters = {{ max_speed = 1,',
+        )
+        scout = Scout()
+        with scout.managed(failing, "--allow-commands"):
+            scout.until("the slow design is used", lambda: scout.equipment.get_parameter("max_speed").value == 0.25)
+            check(made.exists(), False, "the directory after the rollback")
+            failed = [event["because"] for event in scout.events if event["answer"] == "steps_failed"]
+            check(["`false` has ended with" in because for because in failed], [True], "reasons of failures")
+        succeeding = failing.replace('{ command = ["false"] }, ', "")
+        scout = Scout()
+        with scout.managed(succeeding, "--allow-commands"):
+            scout.until("the fast design is used", lambda: scout.equipment.get_parameter("max_speed").value == 1.0)
+            check(made.exists(), True, "the directory")
+        with tempfile.NamedTemporaryFile("w", suffix=".toml") as file:
+            file.write(failing)
+            file.flush()
+            command = [PROGRAM, "--as", "manager", "--mission", str(SCOUT), "--settings", file.name]
+            ended = subprocess.run(command, capture_output=True, text=True, timeout=START, check=False)
+        check((ended.returncode, "N134" in ended.stderr), (2, True), "status and message without permission")
+
+
 SCENARIOS = {
     "manager": lambda: manager(0.0),
     "manager_50ms": lambda: manager(0.05),
@@ -211,6 +386,13 @@ SCENARIOS = {
     "parameters": parameters,
     "driver": driver,
     "waiting": waiting,
+    "steps": steps,
+    "rollback": rollback,
+    "refused_parameters": refused_parameters,
+    "refused_service": refused_service,
+    "silent_topic": silent_topic,
+    "changed_by_others": changed_by_others,
+    "commands": commands,
 }
 
 
