@@ -185,8 +185,11 @@ impl Robot {
         let logged = |(name, answer): (String, Result<String, String>)| match answer {
             Ok(mode) => (name, Some(mode)),
             Err(because) => {
-                self.event(&json!({"answer": "silent", "function": name, "because": because}));
-                self.node.warn_once(&because);
+                // Service calls and commands cannot be observed, which is no fault of the robot.
+                if !self.procedures.is_unobservable(&name) {
+                    self.event(&json!({"answer": "silent", "function": name, "because": because}));
+                    self.node.warn_once(&because);
+                }
                 (name, None)
             }
         };

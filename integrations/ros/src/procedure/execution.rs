@@ -92,6 +92,11 @@ impl Procedures {
         self.functions.contains_key(function)
     }
 
+    /// Returns `true` if a function has procedures, and none of them sets a state or a parameter.
+    pub(crate) fn is_unobservable(&self, function: &str) -> bool {
+        self.functions.get(function).is_some_and(|procedures| procedures.conditions().next().is_none())
+    }
+
     /// Returns the nodes whose state or parameters show the mode of a function.
     pub(crate) fn nodes(&self, function: &str) -> BTreeSet<String> {
         let conditions = self.functions.get(function).into_iter().flat_map(FunctionProcedures::conditions);

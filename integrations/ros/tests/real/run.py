@@ -29,9 +29,11 @@ from rcl_interfaces.srv import SetParameters  # noqa: E402
 from rclpy.context import Context  # noqa: E402
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor  # noqa: E402
 from rclpy.node import Node  # noqa: E402
+from rclpy.qos import qos_profile_sensor_data  # noqa: E402
 from robot import ModeManager, Monitors  # noqa: E402
 from scout import STEPS, Equipment, Localization  # noqa: E402
-from std_msgs.msg import Bool, String  # noqa: E402
+from sensor_msgs.msg import LaserScan  # noqa: E402
+from std_msgs.msg import Bool, Float64, String  # noqa: E402
 from suave_msgs.srv import Task  # noqa: E402
 
 EXAMPLES = pathlib.Path(__file__).resolve().parents[2] / "examples"
@@ -231,9 +233,9 @@ class Scout:
         """States of both ways to localize."""
         return self.amcl.state, self.visual.state
 
-    def until_states(self, amcl: str, visual: str) -> None:
+    def until_states(self, amcl: str, visual: str, within: float = 20.0) -> None:
         """Waits for the states of both ways to localize."""
-        self.until(f"amcl is {amcl}, visual localization is {visual}", lambda: self.states() == (amcl, visual))
+        self.until(f"amcl is {amcl}, visual localization is {visual}", lambda: self.states() == (amcl, visual), within)
 
     def count(self, answer: str) -> int:
         """Number of events of a kind."""
@@ -299,6 +301,7 @@ def refused_parameters() -> None:
     scout.equipment.fastest = 0.6
     with scout.managed():
         scout.until("the slow design is used", lambda: scout.equipment.get_parameter("max_speed").value == 0.25)
+        scout.until("the failure is reported", lambda: scout.count("steps_failed") == 1)
         check(scout.equipment.settings, [(0.25, True)], "accepted parameters")
         failed = [event for event in scout.events if event["answer"] == "steps_failed"]
         check(["too fast" in event["because"] for event in failed], [True], "reasons of failures")
@@ -325,6 +328,7 @@ def silent_topic() -> None:
         scout.until_states("active", "inactive")
         scout.equipment.lidar(DiagnosticStatus.ERROR, "no scan")
         scout.until("visual localization is tried", lambda: scout.visual.state == "active")
+        scout.until("the failure is reported", lambda: scout.count("steps_failed") == 1)
         scout.until_states("active", "inactive")
         failed = [event["because"] for event in scout.events if event["answer"] == "steps_failed"]
         check(failed, ["not seen afterwards: a message on /visual_localization/pose"], "reasons of failures")
@@ -362,6 +366,7 @@ def commands() -> None:
         scout = Scout()
         with scout.managed(failing, "--allow-commands"):
             scout.until("the slow design is used", lambda: scout.equipment.get_parameter("max_speed").value == 0.25)
+            scout.until("the failure is reported", lambda: scout.count("steps_failed") == 1)
             check(made.exists(), False, "the directory after the rollback")
             failed = [event["because"] for event in scout.events if event["answer"] == "steps_failed"]
             check(["`false` has ended with" in because for because in failed], [True], "reasons of failures")
@@ -376,6 +381,104 @@ def commands() -> None:
             command = [PROGRAM, "--as", "manager", "--mission", str(SCOUT), "--settings", file.name]
             ended = subprocess.run(command, capture_output=True, text=True, timeout=START, check=False)
         check((ended.returncode, "N134" in ended.stderr), (2, True), "status and message without permission")
+
+
+SIGNALS = """
+[[signals]]
+node = "/amcl"
+state = "active"
+component = "c_camera"
+heal_time = 0
+
+[[signals]]
+topic = "/scan"
+component = "c_lidar"
+at_least = 5.0
+period = 1.0
+heal_time = 0.5
+
+[[signals]]
+topic = "/light"
+type = "std_msgs/msg/Float64"
+field = "data"
+attribute = "light"
+scale = 10.0
+period = 1.0
+"""
+
+
+def rate_signal() -> None:
+    """A topic that becomes too slow is a failed component; the other design is put into effect, and back when it is fast again."""
+    settings = STEPS + SIGNALS.replace('node = "/amcl"', 'node = "/controller"').replace('state = "active"\n', "", 1)
+    scout = Scout()
+    period = [0.05]
+    scans = scout.equipment.create_publisher(LaserScan, "/scan", qos_profile_sensor_data)
+    running = threading.Event()
+
+    def scan() -> None:
+        while not running.wait(period[0]):
+            scans.publish(LaserScan(ranges=[1.0] * 100))
+
+    thread = threading.Thread(target=scan, daemon=True)
+    thread.start()
+    light = scout.equipment.create_publisher(Float64, "/light", 10)
+    scout.equipment.create_timer(0.1, lambda: light.publish(Float64(data=30.0)))
+    try:
+        with scout.managed(settings):
+            scout.until_states("active", "inactive")
+            time.sleep(SETTLED)
+            check(scout.visual.transitions, ["configure"], "transitions while scans arrive")
+            period[0] = 0.5
+            scout.until_states("inactive", "active")
+            period[0] = 0.05
+            scout.until_states("active", "inactive", 30.0)
+    finally:
+        running.set()
+        thread.join()
+
+
+def value_signal() -> None:
+    """A value of a topic is a measurement in another unit, and the state of a lifecycle node is a component."""
+    settings = STEPS + SIGNALS.replace('"/amcl"', '"/bumper"').replace('component = "c_camera"', 'component = "c_bumper"')
+    scout, level, bumper = Scout(), [30.0], Localization("bumper")
+    scans = scout.equipment.create_publisher(LaserScan, "/scan", qos_profile_sensor_data)
+    scout.equipment.create_timer(0.05, lambda: scans.publish(LaserScan()))
+    light = scout.equipment.create_publisher(Float64, "/light", 10)
+    scout.equipment.create_timer(0.1, lambda: light.publish(Float64(data=level[0])))
+    bumper.trigger_configure()
+    bumper.trigger_activate()
+    with nodes(bumper), scout.managed(settings):
+        scout.until_states("active", "inactive")
+        scout.until("the fast design is used", lambda: scout.equipment.settings == [(1.0, False)])
+        time.sleep(SETTLED)
+        check(scout.equipment.settings, [(1.0, False)], "designs while nothing changes")
+        # The robot drives slowly while the node of the bumper is not active.
+        bumper.trigger_deactivate()
+        scout.until("the slow design is used", lambda: scout.equipment.settings[-1] == (0.25, True))
+        bumper.trigger_activate()
+        scout.until("the fast design is used", lambda: scout.equipment.settings[-1] == (1.0, False))
+        # It becomes dark: inspections need the thermal camera, which switches the lamp off.
+        level[0] = 5.0
+        scout.until("the dark design is used", lambda: arrive(scout) and scout.equipment.lamp[-1:] == [False])
+        check(scout.count("steps_failed"), 0, "failures")
+
+
+def silent_signal() -> None:
+    """A sensor that falls silent counts with its worst value; one that repeats its value does not."""
+    settings = STEPS + SIGNALS.replace('node = "/amcl"', 'node = "/controller"').replace('state = "active"\n', "", 1)
+    scout = Scout()
+    level = [30.0]
+    scans = scout.equipment.create_publisher(LaserScan, "/scan", qos_profile_sensor_data)
+    scout.equipment.create_timer(0.05, lambda: scans.publish(LaserScan()))
+    light = scout.equipment.create_publisher(Float64, "/light", 10)
+    scout.equipment.create_timer(0.1, lambda: level[0] is not None and light.publish(Float64(data=level[0])))
+    with scout.managed(settings):
+        scout.until_states("active", "inactive")
+        time.sleep(SETTLED)
+        silences = lambda: [event for event in scout.events if event["answer"] == "silent" and "function" not in event]
+        check(silences(), [], "reports of silence while the value is repeated")
+        level[0] = None
+        scout.until("silence is reported", lambda: len(silences()) == 1)
 
 
 SCENARIOS = {
@@ -393,6 +496,9 @@ SCENARIOS = {
     "silent_topic": silent_topic,
     "changed_by_others": changed_by_others,
     "commands": commands,
+    "rate_signal": rate_signal,
+    "value_signal": value_signal,
+    "silent_signal": silent_signal,
 }
 
 

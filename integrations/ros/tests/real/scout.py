@@ -56,7 +56,7 @@ class Localization(LifecycleNode):
     """A lifecycle node that records its transitions. It publishes while it is active unless it is mute."""
 
     def __init__(self, name: str) -> None:
-        super().__init__(name)
+        super().__init__(name, enable_rosout=False)
         self.transitions: list[str] = []
         self.can_activate = True
         self.is_mute = False
@@ -100,7 +100,7 @@ class Equipment(Node):
     """Speed of the controller as parameters, a lamp and a camera as services, and the driver of the lidar."""
 
     def __init__(self) -> None:
-        super().__init__("controller")
+        super().__init__("controller", enable_rosout=False)
         self.declare_parameter("max_speed", 0.5)
         self.declare_parameter("smooth", True)
         self.fastest = 2.0
