@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, HashMap};
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use metaplan::mapek::FilterSettings;
 use metaplan::message::Message;
@@ -13,7 +13,7 @@ use smol::Task;
 use crate::diagnostic_rules::{COMPONENT, DiagnosticRule, MEASUREMENT};
 use crate::interfaces::diagnostic_msgs::msg::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use crate::interfaces::std_msgs::msg::Header;
-use crate::node::{Node, keep_all, now};
+use crate::node::{Clock, Node, keep_all};
 use crate::signals::{self, Signal};
 
 /// Upper limit on the number of warnings about statuses that nothing uses.
@@ -65,6 +65,7 @@ struct Queue {
     repeats: BTreeMap<String, Duration>,
     /// Called when the first status becomes pending.
     waits: Box<dyn Fn() + Send + Sync>,
+    clock: Arc<Clock>,
 }
 
 #[derive(Debug, Default)]
@@ -73,12 +74,13 @@ struct QueueState {
     /// Pending statuses by subject.
     statuses: Vec<(String, DiagnosticStatus)>,
     /// Last values by subject, with their time.
-    last: HashMap<String, (Vec<KeyValue>, Instant)>,
+    last: HashMap<String, (Vec<KeyValue>, Duration)>,
 }
 
 impl Queue {
     /// Adds statuses. Repeated ones are ignored, unless a filter needs them.
     fn add(&self, header: Header, statuses: impl IntoIterator<Item = DiagnosticStatus>) {
+        let now = self.clock.elapsed();
         let mut guard = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let state = &mut *guard;
         let is_first = state.statuses.is_empty();
@@ -88,10 +90,10 @@ impl Queue {
             let subject = format!("{}\u{0}{}", status.message, keys.join("\u{0}"));
             let repeat = keys.iter().filter_map(|key| self.repeats.get(*key)).min();
             let is_known = state.last.get(&subject).is_some_and(|(values, since)| {
-                *values == status.values && repeat.is_none_or(|repeat| since.elapsed() < *repeat)
+                *values == status.values && repeat.is_none_or(|repeat| now.saturating_sub(*since) < *repeat)
             });
             if !is_known {
-                state.last.insert(subject.clone(), (status.values.clone(), Instant::now()));
+                state.last.insert(subject.clone(), (status.values.clone(), now));
                 state.statuses.retain(|(known, _)| *known != subject);
                 state.statuses.push((subject, status));
             }
@@ -114,7 +116,8 @@ impl Diagnosed {
         waits: impl Fn() + Send + Sync + 'static,
     ) -> Result<Self, Message> {
         let Sources { rules, signals, repeats } = sources;
-        let queue = Arc::new(Queue { state: Mutex::default(), repeats, waits: Box::new(waits) });
+        let clock = node.clock();
+        let queue = Arc::new(Queue { state: Mutex::default(), repeats, waits: Box::new(waits), clock });
         let weak = Arc::downgrade(node);
         let own_name = node.full_name().trim_start_matches('/').to_owned();
         let mut unused: Vec<String> = Vec::new();
@@ -136,9 +139,9 @@ impl Diagnosed {
             }
             of_topic.add(array.header, statuses);
         })?;
-        let of_signals = Arc::clone(&queue);
+        let (of_signals, clock) = (Arc::clone(&queue), node.clock());
         let report: signals::Report = Arc::new(move |status| {
-            of_signals.add(Header { stamp: now(), ..Header::default() }, [status]);
+            of_signals.add(Header { stamp: clock.stamp(), ..Header::default() }, [status]);
         });
         let signals = signals::watch(node, &signals, &report)?;
         Ok(Self { queue, _signals: signals })

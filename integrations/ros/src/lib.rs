@@ -3,6 +3,7 @@
 pub mod controller;
 mod diagnosed;
 mod diagnostic_rules;
+pub mod discover;
 pub mod interfaces;
 pub mod manager;
 pub mod node;

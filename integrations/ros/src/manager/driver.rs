@@ -20,7 +20,7 @@ use crate::interfaces::diagnostic_msgs::msg::DiagnosticStatus;
 use crate::manager::machine::{Input, Machine, Output, State};
 use crate::manager::robot::Robot;
 use crate::manager::settings::Settings;
-use crate::node::{Lifecycle, Node, Severity};
+use crate::node::{Clock, Lifecycle, Node, Severity};
 use crate::perform::Perform;
 use crate::performer::performers;
 
@@ -98,7 +98,8 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
         settings,
         active,
         timeout,
-        clock: Instant::now(),
+        clock: node.clock(),
+        origin: node.clock().elapsed(),
         start_time,
     };
     driver.wait_for_functions(&sender, &inputs, stop)?;
@@ -133,7 +134,9 @@ struct Driver {
     active: Arc<AtomicBool>,
     /// Timeout of calls, in milliseconds.
     timeout: Arc<AtomicU64>,
-    clock: Instant,
+    clock: Arc<Clock>,
+    /// Time of the clock when the program started.
+    origin: Duration,
     /// Time of the last line in the journal.
     start_time: Duration,
 }
@@ -226,7 +229,7 @@ impl Driver {
     }
 
     fn drive(&mut self, inputs: &Receiver<Input>, stop: &AtomicBool) -> Result<(), Message> {
-        let mut next = Instant::now();
+        let (mut next, mut next_tick) = (Instant::now(), self.clock.elapsed());
         while !stop.load(Ordering::Relaxed) {
             let wait = next.saturating_duration_since(Instant::now()).min(Duration::from_millis(100));
             if !self.active.load(Ordering::Relaxed) {
@@ -238,9 +241,13 @@ impl Driver {
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return Ok(()),
             }
+            // Simulated time may be faster or slower than that of the network.
+            if self.clock.elapsed() >= next_tick {
+                next_tick = self.clock.elapsed() + PERIOD;
+                self.handle(Input::Tick)?;
+            }
             if Instant::now() >= next {
                 next = Instant::now() + PERIOD;
-                self.handle(Input::Tick)?;
                 self.robot.request_new_modes();
                 self.diagnose();
             }
@@ -267,7 +274,7 @@ impl Driver {
             Input::Diagnosed => Input::Line(self.robot.diagnosed()),
             other => other,
         };
-        let now = self.start_time + self.clock.elapsed();
+        let now = self.start_time + self.clock.elapsed().saturating_sub(self.origin);
         if self.node.is_logged(Severity::Debug) && !matches!(input, Input::Tick) {
             self.node.log(Severity::Debug, &format!("hears {input:?}"));
         }

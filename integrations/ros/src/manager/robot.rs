@@ -406,7 +406,7 @@ impl Robot {
             values,
         };
         let mut array = DiagnosticArray { status: vec![status], ..DiagnosticArray::default() };
-        array.header.stamp = crate::node::now();
+        array.header.stamp = self.node.clock().stamp();
         self.diagnostics.publish(array);
     }
 }

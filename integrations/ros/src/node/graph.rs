@@ -90,6 +90,49 @@ struct Endpoint {
     is_latched: bool,
 }
 
+/// Names and types of the interfaces of the other nodes.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(crate) struct Endpoints {
+    /// Types of the topics that have a publisher, without those that every node has.
+    pub(crate) topics: BTreeMap<String, String>,
+    /// Types of the services.
+    pub(crate) services: BTreeMap<String, String>,
+    /// Types of the actions.
+    pub(crate) actions: BTreeMap<String, String>,
+    /// Nodes with a lifecycle.
+    pub(crate) lifecycle_nodes: Vec<String>,
+    /// Functions of `system_modes`, without slash.
+    pub(crate) systems: Vec<String>,
+}
+
+impl Endpoints {
+    /// Adds an endpoint. Returns `None` if it belongs to no interface of ROS 2.
+    fn add(&mut self, endpoint: &Endpoint) -> Option<()> {
+        let (package, rest) = endpoint.type_name.split_once("::")?;
+        let (kind, rest) = rest.split_once("::dds_::")?;
+        let name = rest.strip_suffix('_')?;
+        if let Some(topic) = endpoint.topic.strip_prefix("rt").filter(|_| !endpoint.is_reader) {
+            let is_common = ["/rosout", "/parameter_events", "/diagnostics"].contains(&topic)
+                || topic.ends_with("/transition_event")
+                || topic.contains("/_action/");
+            if !is_common {
+                self.topics.insert(topic.to_owned(), format!("{package}/{kind}/{name}"));
+            }
+            return Some(());
+        }
+        let service =
+            endpoint.topic.strip_prefix("rq")?.strip_suffix("Request").filter(|_| endpoint.is_reader)?;
+        if let Some(action) = service.strip_suffix("/_action/send_goal") {
+            let name = name.strip_suffix("_SendGoal_Request")?;
+            self.actions.insert(action.to_owned(), format!("{package}/action/{name}"));
+        } else if !service.contains("/_action/") {
+            let name = name.strip_suffix("_Request")?;
+            self.services.insert(service.to_owned(), format!("{package}/{kind}/{name}"));
+        }
+        Some(())
+    }
+}
+
 /// First publisher of a topic.
 #[derive(Debug, Clone)]
 pub(crate) struct Writer {
@@ -212,6 +255,22 @@ impl Graph {
     /// Returns `true` if a topic, given by its DDS name, has a writer.
     pub(crate) fn has_writer(&self, topic: &str) -> bool {
         self.state().endpoints.values().any(|endpoint| !endpoint.is_reader && endpoint.topic == topic)
+    }
+
+    /// Returns the interfaces of the other nodes.
+    pub(crate) fn interfaces(&self) -> Endpoints {
+        let mut found = Endpoints::default();
+        for endpoint in self.state().endpoints.values() {
+            let _ = found.add(endpoint);
+        }
+        let servers = |name: &str, kind: &str| -> Vec<String> {
+            let of_kind = found.services.iter().filter(|(_, served)| *served == kind);
+            of_kind.filter_map(|(service, _)| service.strip_suffix(name)).map(str::to_owned).collect()
+        };
+        found.lifecycle_nodes = servers("/get_state", "lifecycle_msgs/srv/GetState");
+        let systems = servers("/change_mode", "system_modes_msgs/srv/ChangeMode");
+        found.systems = systems.iter().map(|system| system.trim_start_matches('/').to_owned()).collect();
+        found
     }
 
     /// Returns a writer of a topic, given by its DDS name.
@@ -390,7 +449,32 @@ fn prefix(guid: GUID) -> [u8; 12] {
 
 #[cfg(test)]
 mod tests {
-    use super::{Endpoint, Expected, type_hash};
+    use super::{Endpoint, Endpoints, Expected, type_hash};
+
+    #[test]
+    fn interfaces_are_named_as_in_ros() {
+        let mut found = Endpoints::default();
+        for (is_reader, topic, type_name) in [
+            (false, "rt/scan", "sensor_msgs::msg::dds_::LaserScan_"),
+            (true, "rt/cmd", "std_msgs::msg::dds_::Bool_"),
+            (false, "rt/rosout", "rcl_interfaces::msg::dds_::Log_"),
+            (true, "rq/lampRequest", "std_srvs::srv::dds_::SetBool_Request_"),
+            (false, "rr/lampReply", "std_srvs::srv::dds_::SetBool_Response_"),
+            (
+                true,
+                "rq/go/_action/send_goalRequest",
+                "nav2_msgs::action::dds_::NavigateToPose_SendGoal_Request_",
+            ),
+            (false, "Square", "ShapeType"),
+        ] {
+            let (topic, type_name) = (topic.to_owned(), type_name.to_owned());
+            let _ = found.add(&Endpoint { is_reader, topic, type_name, hash: None, is_latched: false });
+        }
+        let pair = |name: &str, kind: &str| [(name.to_owned(), kind.to_owned())].into();
+        assert_eq!(found.topics, pair("/scan", "sensor_msgs/msg/LaserScan"));
+        assert_eq!(found.services, pair("/lamp", "std_srvs/srv/SetBool"));
+        assert_eq!(found.actions, pair("/go", "nav2_msgs/action/NavigateToPose"));
+    }
 
     #[test]
     fn types_and_their_hashes_are_compared() {

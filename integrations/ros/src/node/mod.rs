@@ -9,6 +9,7 @@
 mod action;
 mod any_topic;
 mod arguments;
+mod clock;
 mod graph;
 mod lifecycle;
 mod log;
@@ -36,6 +37,7 @@ pub use action::{
 pub(crate) use any_topic::Arrivals;
 pub use arguments::RosArguments;
 pub(crate) use arguments::parameter_value;
+pub(crate) use clock::Clock;
 pub(crate) use lifecycle::PrimaryState;
 pub use lifecycle::{Lifecycle, Phase};
 pub use log::Severity;
@@ -46,6 +48,8 @@ pub(crate) use parameters::{any_value, fitting, parameter, raw};
 pub use rmw::Rmw;
 pub use service::{CallError, Caller, Responder};
 pub use topic::Publisher;
+
+pub(crate) use graph::Endpoints;
 
 use graph::Graph;
 use names::FullName;
@@ -76,6 +80,7 @@ pub struct Node {
     warned: Mutex<HashSet<String>>,
     /// Background tasks, which end with the node.
     tasks: Mutex<Vec<Task<()>>>,
+    clock: Arc<Clock>,
 }
 
 impl std::fmt::Debug for Node {
@@ -125,6 +130,7 @@ impl Node {
             least,
             warned: Mutex::default(),
             tasks: Mutex::new(vec![watching]),
+            clock: Clock::new(),
         });
         node.report_complaints();
         Ok(node)
@@ -143,6 +149,11 @@ impl Node {
     /// Returns `true` if a topic has a writer.
     pub fn is_written(&self, topic: &str) -> bool {
         self.graph.has_writer(&format!("rt{}", self.resolve(topic)))
+    }
+
+    /// Returns the interfaces of the other nodes that are discovered.
+    pub(crate) fn endpoints(&self) -> Endpoints {
+        self.graph.interfaces()
     }
 
     fn inner(&self) -> MutexGuard<'_, ros2_client::Node> {

@@ -3,7 +3,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use metaplan::message::{Errors, Message};
 use ros2_client::action::GoalId;
@@ -132,10 +132,10 @@ impl Network {
     pub(super) fn run(mut self, stop: &AtomicBool) -> Result<(), Message> {
         self.go_on();
         self.node.log(Severity::Info, "serves /mros/objective");
-        let clock = Instant::now();
-        let mut next = clock;
+        let clock = self.node.clock();
+        let mut next = clock.elapsed();
         while !stop.load(Ordering::Relaxed) {
-            let wait = next.saturating_duration_since(Instant::now()).min(Duration::from_millis(100));
+            let wait = next.saturating_sub(clock.elapsed()).min(Duration::from_millis(100));
             match self.inputs.recv_timeout(wait) {
                 Ok(input) => {
                     self.handle(input, clock.elapsed());
@@ -148,8 +148,8 @@ impl Network {
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return Ok(()),
             }
-            if Instant::now() >= next {
-                next = Instant::now() + Duration::from_millis(self.period.load(Ordering::Relaxed).max(1));
+            if clock.elapsed() >= next {
+                next = clock.elapsed() + Duration::from_millis(self.period.load(Ordering::Relaxed).max(1));
                 self.keeping.tick(clock.elapsed());
             }
             self.carry_out();

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use metaplan::message::Message;
 use serde_json::Value;
@@ -15,7 +15,7 @@ use crate::interfaces::lifecycle_msgs::srv::{GetState, GetStateRequest};
 use crate::interfaces::lyrical::lifecycle_msgs::msg as lyrical;
 use crate::interfaces::rcl_interfaces::srv::GetParameters;
 use crate::interfaces::{MessageVisitor, Msg, visit_message};
-use crate::node::{Caller, Node, PrimaryState, depth, is_lyrical};
+use crate::node::{Caller, Clock, Node, PrimaryState, depth, is_lyrical};
 use crate::signals::settings::{Condition, Signal, Source, Target, number};
 
 /// Period of checks whether nodes exist and topics are silent.
@@ -40,24 +40,26 @@ pub(crate) fn watch(node: &Arc<Node>, signals: &[Signal], report: &Report) -> Re
             Source::State { node: name, state } => tasks.push(watch_state(node, name, *state, reporter)?),
             Source::Presence { node: name } => tasks.push(watch_presence(node, name, reporter)),
             Source::Field { topic, kind, field, period } => {
-                let last = Arc::new(Mutex::new(Instant::now()));
+                let clock = node.clock();
+                let last = Arc::new(Mutex::new(clock.elapsed()));
                 let (noted, field, every) = (Arc::clone(&last), field.clone(), *every);
                 let of_message = reporter.clone();
-                let mut reported: Option<Instant> = None;
+                let mut reported: Option<Duration> = None;
                 let take = move |message: &dyn Fn() -> Value| {
-                    *noted.lock().unwrap_or_else(PoisonError::into_inner) = Instant::now();
+                    let now = clock.elapsed();
+                    *noted.lock().unwrap_or_else(PoisonError::into_inner) = now;
                     // Messages between two reports are not even converted.
-                    if reported.is_some_and(|reported| reported.elapsed() < every) {
+                    if reported.is_some_and(|reported| now.saturating_sub(reported) < every) {
                         return;
                     }
-                    reported = Some(Instant::now());
+                    reported = Some(now);
                     if let Some(value) = field.find(&message()) {
                         of_message.value(value);
                     }
                 };
                 visit_message(kind, Subscribe { node, topic, take: Box::new(take) }).transpose()?;
                 if let (Some(period), Target::Component { .. }) = (period, target) {
-                    tasks.push(watch_silence(last, *period, reporter));
+                    tasks.push(watch_silence(node.clock(), last, *period, reporter));
                 }
             }
             Source::Rate { topic, period } => tasks.push(watch_rate(node, topic, *period, *every, reporter)?),
@@ -140,10 +142,15 @@ impl MessageVisitor for Subscribe<'_> {
 }
 
 /// Reports a component as failed while no message arrives.
-fn watch_silence(last: Arc<Mutex<Instant>>, period: Duration, reporter: Reporter) -> Task<()> {
+fn watch_silence(
+    clock: Arc<Clock>,
+    last: Arc<Mutex<Duration>>,
+    period: Duration,
+    reporter: Reporter,
+) -> Task<()> {
     repeat(CHECK_PERIOD.min(period), move || {
-        let elapsed = last.lock().unwrap_or_else(PoisonError::into_inner).elapsed();
-        if elapsed > period {
+        let last = *last.lock().unwrap_or_else(PoisonError::into_inner);
+        if clock.elapsed().saturating_sub(last) > period {
             reporter.works(false);
         }
     })
@@ -157,27 +164,29 @@ fn watch_rate(
     every: Duration,
     reporter: Reporter,
 ) -> Result<Task<()>, Message> {
-    let arrivals: Arc<Mutex<VecDeque<Instant>>> = Arc::default();
-    let noted = Arc::clone(&arrivals);
+    let clock = node.clock();
+    let arrivals: Arc<Mutex<VecDeque<Duration>>> = Arc::default();
+    let (noted, of_arrivals) = (Arc::clone(&arrivals), node.clock());
     node.subscribe_any(topic, move || {
-        noted.lock().unwrap_or_else(PoisonError::into_inner).push_back(Instant::now());
+        noted.lock().unwrap_or_else(PoisonError::into_inner).push_back(of_arrivals.elapsed());
     })?;
-    let started = Instant::now();
+    let started = clock.elapsed();
     Ok(repeat(every.max(CHECK_PERIOD.min(period)), move || {
+        let now = clock.elapsed();
         let mut arrivals = arrivals.lock().unwrap_or_else(PoisonError::into_inner);
-        while arrivals.front().is_some_and(|arrival| arrival.elapsed() > period) {
+        while arrivals.front().is_some_and(|arrival| now.saturating_sub(*arrival) > period) {
             arrivals.pop_front();
         }
         let count = arrivals.len();
         drop(arrivals);
         // Within the first period the rate is not known yet.
-        if started.elapsed() < period {
+        if now.saturating_sub(started) < period {
             return;
         }
         let rate = count as f64 / period.as_secs_f64();
         match &reporter.target {
             Target::Component { condition, .. } if *condition == Condition::default() => {
-                reporter.works(count > 0)
+                reporter.works(count > 0);
             }
             _ => reporter.value(&Value::from((rate * 100.0).round() / 100.0)),
         }

@@ -22,6 +22,7 @@ os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 os.environ["ROS_DOMAIN_ID"] = str(random.randrange(1, 100))
 
 import rclpy  # noqa: E402  (reads the environment)
+from builtin_interfaces.msg import Time  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
 from lifecycle_msgs.srv import GetState  # noqa: E402
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue  # noqa: E402
@@ -31,6 +32,7 @@ from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor  # noq
 from rclpy.node import Node  # noqa: E402
 from rclpy.qos import qos_profile_sensor_data  # noqa: E402
 from robot import ModeManager, Monitors  # noqa: E402
+from rosgraph_msgs.msg import Clock  # noqa: E402
 from scout import STEPS, Equipment, Localization  # noqa: E402
 from sensor_msgs.msg import LaserScan  # noqa: E402
 from std_msgs.msg import Bool, Float64, String  # noqa: E402
@@ -481,6 +483,86 @@ def silent_signal() -> None:
         scout.until("silence is reported", lambda: len(silences()) == 1)
 
 
+def simulated_time() -> None:
+    """With `use_sim_time`, a filter waits for simulated seconds: the recovery of a component takes effect when the simulation says so."""
+    scout, now, step = Scout(), [1000.0], [0.01]
+    clock = scout.equipment.create_publisher(Clock, "/clock", qos_profile_sensor_data)
+    stopped = threading.Event()
+
+    def simulate() -> None:
+        while not stopped.wait(0.01):
+            now[0] += step[0]
+            seconds = int(now[0])
+            clock.publish(Clock(clock=Time(sec=seconds, nanosec=int((now[0] - seconds) * 1e9))))
+
+    threading.Thread(target=simulate, daemon=True).start()
+    stamps: list[int] = []
+    scout.equipment.create_subscription(
+        DiagnosticArray,
+        "/diagnostics",
+        lambda array: stamps.extend(
+            array.header.stamp.sec for status in array.status if status.name == "metaplan: manager"
+        ),
+        10,
+    )
+    try:
+        with scout.managed(STEPS, "--ros-args", "-p", "use_sim_time:=true"):
+            scout.until_states("active", "inactive")
+            scout.until("its status has a simulated stamp", lambda: any(999 < stamp < 3000 for stamp in stamps))
+            scout.equipment.lidar(DiagnosticStatus.ERROR, "no scan")
+            scout.until_states("inactive", "active")
+            # The clock stands still: 2 s of `heal_time` and 5 s of `settle` do not pass.
+            step[0] = 0.0
+            scout.equipment.lidar(DiagnosticStatus.OK, "scans")
+            time.sleep(9.0)
+            check(scout.states(), ("inactive", "active"), "states while the clock stands still")
+            # Ten times as fast: both pass within about a second.
+            step[0] = 0.1
+            resumed = time.monotonic()
+            scout.until_states("active", "inactive")
+            elapsed = time.monotonic() - resumed
+            if elapsed > 5.0:
+                raise Failure(f"the recovery took {elapsed:.1f} s at tenfold speed, 7 simulated seconds are expected")
+    finally:
+        stopped.set()
+
+
+def discover() -> None:
+    """The settings that are written name what the robot has, and can be used as they are."""
+    scout = Scout()
+    scans = scout.equipment.create_publisher(LaserScan, "/scan", qos_profile_sensor_data)
+    scout.equipment.create_timer(0.1, lambda: scans.publish(LaserScan()))
+    scout.equipment.create_publisher(Float64, "/light", 10)
+    scout.equipment.create_timer(0.5, lambda: scout.equipment.lidar(DiagnosticStatus.ERROR, "no scan"))
+    with tempfile.TemporaryDirectory() as directory, nodes(scout.amcl, scout.visual, scout.equipment):
+        file = pathlib.Path(directory) / "ros.toml"
+        command = [PROGRAM, "--as", "discover", "--mission", SCOUT, "--seconds", "6", "--output", file]
+        ended = subprocess.run(command, capture_output=True, text=True, timeout=START, check=False)
+        check(ended.returncode, 0, f"the status\n{ended.stderr}")
+        text = file.read_text()
+        for part in (
+            '# name = "lidar: driver"\n# component = "c_lidar"',
+            '# node = "/amcl"\n# state = "active"  # now unconfigured',
+            '# topic = "/scan"',
+            '# topic = "/light"\n# type = "std_msgs/msg/Float64"',
+            "# [functions.f_localize.designs.fd_lidar_localization]",
+            'service = "/lamp", type = "std_srvs/srv/SetBool"',
+        ):
+            check(part in text, True, f"{part} in the settings\n{text}")
+        again = subprocess.run(command, capture_output=True, text=True, timeout=START, check=False)
+        check((again.returncode, "not overwritten" in again.stderr), (2, True), "the existing file is kept")
+        # The rule for the lidar adapts the robot at once.
+        start = text.index("# [[diagnostics]]")
+        rule = "\n".join(line.removeprefix("# ") for line in text[start:].split("\n\n")[0].splitlines())
+        settings = STEPS.replace('[[diagnostics]]\nname = "lidar: *"\ncomponent = "c_lidar"\n', rule + "\n")
+        check("lidar: *" in settings, False, "the rule is replaced")
+    scout = Scout()
+    with scout.managed(settings):
+        scout.until_states("active", "inactive")
+        scout.equipment.lidar(DiagnosticStatus.ERROR, "no scan")
+        scout.until_states("inactive", "active")
+
+
 SCENARIOS = {
     "manager": lambda: manager(0.0),
     "manager_50ms": lambda: manager(0.05),
@@ -499,6 +581,8 @@ SCENARIOS = {
     "rate_signal": rate_signal,
     "value_signal": value_signal,
     "silent_signal": silent_signal,
+    "simulated_time": simulated_time,
+    "discover": discover,
 }
 
 
