@@ -29,7 +29,7 @@ const COMPONENT: &str = "COMPONENT";
 /// Placeholder for an attribute that has to be filled in.
 const ATTRIBUTE: &str = "ATTRIBUTE";
 
-/// Types of sensors whose rate is measured. Images and point clouds are left out, because they would load the network.
+/// Types of sensors whose rate is measured. Images and point clouds are not, because they would load the network.
 const RATED: [&str; 5] = [
     "sensor_msgs/msg/Imu",
     "sensor_msgs/msg/LaserScan",

@@ -62,7 +62,7 @@ enum Role {
     Planner,
     /// Of whoever has PlanSys2's executor carry out what its experts want: with a knowledge base, and again when a design is lost.
     Controller,
-    /// Of nobody: observes the robot and writes settings to start from.
+    /// Observation of a robot: writes settings to start from.
     Discover,
 }
 
@@ -126,6 +126,10 @@ fn start() -> Result<(), Errors> {
         arguments;
     if journal.is_some() && matches!(role, Role::Planner | Role::Controller | Role::Discover) {
         let text = "`--journal` is for a manager and a reasoner: nothing of a planner has to be known after a restart";
+        return Err(vec![Message::error("N100", text)].into());
+    }
+    if output.is_some() && role != Role::Discover {
+        let text = "`--output` is for the discovery: no other role writes settings";
         return Err(vec![Message::error("N100", text)].into());
     }
     match (role, mission) {

@@ -262,10 +262,10 @@ impl Robot {
                 Means::Steps => self.procedures.servers(name),
             };
             let is_changed = match &function.means {
-                Means::Modes { .. } => !servers.is_subset(&function.servers),
+                Means::Modes { .. } => !function.servers.is_empty() && !servers.is_subset(&function.servers),
                 Means::Steps => servers != function.servers,
             };
-            if !function.servers.is_empty() && is_changed {
+            if is_changed {
                 function.remaining_requests = MAX_MODE_REQUESTS;
             }
             if !servers.is_empty() || matches!(function.means, Means::Steps) {

@@ -259,18 +259,18 @@ impl Graph {
 
     /// Returns the interfaces of the other nodes.
     pub(crate) fn interfaces(&self) -> Endpoints {
-        let mut found = Endpoints::default();
+        let mut interfaces = Endpoints::default();
         for endpoint in self.state().endpoints.values() {
-            let _ = found.add(endpoint);
+            let _ = interfaces.add(endpoint);
         }
         let servers = |name: &str, kind: &str| -> Vec<String> {
-            let of_kind = found.services.iter().filter(|(_, served)| *served == kind);
+            let of_kind = interfaces.services.iter().filter(|(_, served)| *served == kind);
             of_kind.filter_map(|(service, _)| service.strip_suffix(name)).map(str::to_owned).collect()
         };
-        found.lifecycle_nodes = servers("/get_state", "lifecycle_msgs/srv/GetState");
+        interfaces.lifecycle_nodes = servers("/get_state", "lifecycle_msgs/srv/GetState");
         let systems = servers("/change_mode", "system_modes_msgs/srv/ChangeMode");
-        found.systems = systems.iter().map(|system| system.trim_start_matches('/').to_owned()).collect();
-        found
+        interfaces.systems = systems.iter().map(|system| system.trim_start_matches('/').to_owned()).collect();
+        interfaces
     }
 
     /// Returns a writer of a topic, given by its DDS name.
@@ -453,7 +453,7 @@ mod tests {
 
     #[test]
     fn interfaces_are_named_as_in_ros() {
-        let mut found = Endpoints::default();
+        let mut interfaces = Endpoints::default();
         for (is_reader, topic, type_name) in [
             (false, "rt/scan", "sensor_msgs::msg::dds_::LaserScan_"),
             (true, "rt/cmd", "std_msgs::msg::dds_::Bool_"),
@@ -468,12 +468,12 @@ mod tests {
             (false, "Square", "ShapeType"),
         ] {
             let (topic, type_name) = (topic.to_owned(), type_name.to_owned());
-            let _ = found.add(&Endpoint { is_reader, topic, type_name, hash: None, is_latched: false });
+            let _ = interfaces.add(&Endpoint { is_reader, topic, type_name, hash: None, is_latched: false });
         }
         let pair = |name: &str, kind: &str| [(name.to_owned(), kind.to_owned())].into();
-        assert_eq!(found.topics, pair("/scan", "sensor_msgs/msg/LaserScan"));
-        assert_eq!(found.services, pair("/lamp", "std_srvs/srv/SetBool"));
-        assert_eq!(found.actions, pair("/go", "nav2_msgs/action/NavigateToPose"));
+        assert_eq!(interfaces.topics, pair("/scan", "sensor_msgs/msg/LaserScan"));
+        assert_eq!(interfaces.services, pair("/lamp", "std_srvs/srv/SetBool"));
+        assert_eq!(interfaces.actions, pair("/go", "nav2_msgs/action/NavigateToPose"));
     }
 
     #[test]

@@ -273,14 +273,14 @@ impl Clients {
         before: impl FnOnce(Vec<(String, ParameterValue)>),
     ) -> Result<(), Failure> {
         let present = self.parameters(node, values, remaining(deadline)).await?;
-        let wanted = fitted(values, &present);
-        if wanted == present {
+        let values_to_set = fitted(values, &present);
+        if values_to_set == present {
             return Ok(());
         }
         before(values.iter().map(|(name, _)| name.clone()).zip(present).collect());
         let parameters = values
             .iter()
-            .zip(&wanted)
+            .zip(&values_to_set)
             .map(|((name, _), value)| msg::Parameter { name: name.clone(), value: raw(value.clone()) })
             .collect();
         let request = SetParametersAtomicallyRequest { parameters };
@@ -290,13 +290,16 @@ impl Clients {
             return Err(Failure::Refused(format!("{node} has refused the parameters: {reason}")));
         }
         let present = self.parameters(node, values, remaining(deadline)).await?;
-        let differs =
-            values.iter().zip(&wanted).zip(&present).find(|((_, wanted), present)| wanted != present);
+        let differs = values
+            .iter()
+            .zip(&values_to_set)
+            .zip(&present)
+            .find(|((_, values_to_set), present)| values_to_set != present);
         match differs {
             None => Ok(()),
-            Some((((name, _), wanted), present)) => Err(Failure::Refused(format!(
+            Some((((name, _), values_to_set), present)) => Err(Failure::Refused(format!(
                 "{node} has accepted the parameter {name} = {}, and has {}",
-                text(wanted),
+                text(values_to_set),
                 text(present)
             ))),
         }

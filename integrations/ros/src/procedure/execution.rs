@@ -157,9 +157,9 @@ impl Procedures {
                 matching.push((lasting.len(), mode));
             }
         }
-        let most = matching.iter().map(|(count, _)| *count).max().unwrap_or_default();
-        matching.retain(|(count, _)| *count == most);
-        let seen = match matching.as_slice() {
+        let greatest_count = matching.iter().map(|(count, _)| *count).max().unwrap_or_default();
+        matching.retain(|(count, _)| *count == greatest_count);
+        let observed_mode = match matching.as_slice() {
             [] if procedures.modes.keys().any(is_unobservable) && present.is_none() => return Seen::Unknown,
             [] => {
                 procedures.set_present(None);
@@ -171,8 +171,8 @@ impl Procedures {
                 None => return Seen::Unknown,
             },
         };
-        procedures.set_present(Some(seen.clone()));
-        Seen::Mode(seen)
+        procedures.set_present(Some(observed_mode.clone()));
+        Seen::Mode(observed_mode)
     }
 
     /// Returns whether a condition holds; `None` if its node is silent. A node that does not exist meets no condition.
@@ -342,8 +342,8 @@ impl Run<'_> {
         // although they were accepted, and to set their earlier values once more has no effect.
         if matches!(outcome, Err(Failure::Refused(_))) {
             let is_kept = |undo: &Undo| matches!(undo, Undo::Operation(Operation::Parameters { .. }));
-            let kept = undos.split_off(count).into_iter().filter(is_kept);
-            undos.extend(kept);
+            let undone = undos.split_off(count);
+            undos.extend(undone.into_iter().filter(is_kept));
         }
         outcome
     }

@@ -218,17 +218,17 @@ fn watch_state(
         node.subscribe::<TransitionEvent>(&topic, depth(10), move |event| take(&event.goal_state))?;
     }
     let service: Caller<GetState> = node.caller(&format!("{name}/get_state"));
-    let mut known = None;
+    let mut last_servers = None;
     Ok(smol::spawn(async move {
         loop {
             let servers = service.servers();
-            if known.as_ref() != Some(&servers) {
+            if last_servers.as_ref() != Some(&servers) {
                 if servers.is_empty() {
                     reporter.works(false);
-                    known = Some(servers);
+                    last_servers = Some(servers);
                 } else if let Ok(answer) = service.call(GetStateRequest::default(), STATE_TIMEOUT).await {
                     reporter.works(PrimaryState::of(&answer.current_state) == Some(state));
-                    known = Some(servers);
+                    last_servers = Some(servers);
                 }
             }
             Timer::after(CHECK_PERIOD).await;

@@ -217,6 +217,7 @@ class Scout:
     def __init__(self) -> None:
         self.amcl, self.visual = Localization("amcl"), Localization("visual_localization")
         self.equipment = Equipment()
+        self.started = [self.amcl, self.visual, self.equipment]
         self.events: list[dict] = []
         self.equipment.create_subscription(
             String, "/metaplan/events", lambda message: self.events.append(json.loads(message.data)), 100
@@ -250,7 +251,7 @@ class Scout:
             file.write(settings)
             file.flush()
             command = ("--as", "manager", "--mission", str(SCOUT), "--settings", file.name, *arguments)
-            with nodes(self.amcl, self.visual, self.equipment), program(*command) as log:
+            with nodes(*self.started), program(*command) as log:
                 yield log
 
 
@@ -344,7 +345,7 @@ def silent_topic() -> None:
 
 
 def changed_by_others() -> None:
-    """A node that somebody else deactivates is activated again; a restarted node is configured and activated."""
+    """A node that another client deactivates is activated again."""
     scout = Scout()
     with scout.managed():
         scout.until_states("active", "inactive")
@@ -354,6 +355,21 @@ def changed_by_others() -> None:
         time.sleep(SETTLED)
         check(scout.amcl.transitions, ["configure", "activate", "deactivate", "activate"], "transitions of amcl")
         check(scout.count("steps_failed"), 0, "failures")
+
+
+def restarted() -> None:
+    """A node that starts late is waited for; one that is started again is configured and activated again."""
+    scout = Scout()
+    scout.started.remove(scout.amcl)
+    scout.started.remove(scout.visual)
+    with scout.managed(), nodes(scout.visual):
+        with nodes(scout.amcl):
+            scout.until_states("active", "inactive")
+            time.sleep(SETTLED)
+        scout.amcl = Localization("amcl")
+        with nodes(scout.amcl):
+            scout.until_states("active", "inactive", 40.0)
+            check(scout.amcl.transitions, ["configure", "activate"], "transitions of the new node")
 
 
 def commands() -> None:
@@ -577,6 +593,7 @@ SCENARIOS = {
     "refused_service": refused_service,
     "silent_topic": silent_topic,
     "changed_by_others": changed_by_others,
+    "restarted": restarted,
     "commands": commands,
     "rate_signal": rate_signal,
     "value_signal": value_signal,
