@@ -436,7 +436,7 @@ mod tests {
     #[test]
     fn components_of_the_mission_are_suggested_by_name() {
         let text = settings(&robot(), &names());
-        assert!(text.contains("name = \"lidar: \\\"front\\\"\"\n# component = \"c_lidar\""), "{text}");
+        assert!(text.contains("name = 'lidar: \"front\"'\n# component = \"c_lidar\""), "{text}");
         assert!(text.contains("[functions.f_see.designs.fd_camera]"), "{text}");
         assert!(text.contains("at_least = 5.0"), "{text}");
     }

@@ -152,7 +152,7 @@ impl Settings {
             (Some(name), _) if !components.iter().any(|component| component == name) => {
                 let suggestion = did_you_mean(name, components.iter().map(String::as_str));
                 Some(format!(
-                    "the knowledge base has no component `{name}`{suggestion}; it has {}",
+                    "the knowledge base has no component `{name}`; it has {}{suggestion}",
                     components.join(", ")
                 ))
             }
