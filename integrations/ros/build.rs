@@ -16,7 +16,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let interfaces = definition::read(Path::new("interfaces"))?;
     let hashes = description::hashes(&interfaces)?;
     let out = PathBuf::from(std::env::var("OUT_DIR")?);
-    std::fs::write(out.join("interfaces.rs"), rust::modules(&interfaces, &hashes)?)?;
+    let modules = rust::modules(&interfaces, &hashes)?;
+    std::fs::write(out.join("interfaces.rs"), modules + &rust::dispatch(&interfaces))?;
     std::fs::write(out.join("table.rs"), rust::table(&interfaces, &hashes))?;
     Ok(())
 }

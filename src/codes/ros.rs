@@ -69,6 +69,24 @@ pub const CODES: &[[&str; 4]] = &[
         "Name the modes under `[functions.F.modes]` of the settings.",
     ],
     [
+        "N133",
+        "Steps of designs do not fit the mission.",
+        "A table `[functions.F.designs.D]` of the settings names no design of the function, or a design has no steps.",
+        "Correct the name, or add the steps.",
+    ],
+    [
+        "N134",
+        "A command is not allowed.",
+        "The steps of a design execute a command, and the program was started without `--allow-commands`.",
+        "Add `--allow-commands` if you trust the settings, or remove the command.",
+    ],
+    [
+        "N135",
+        "A diagnostic or a signal reports what the mission does not have.",
+        "`component` or `attribute` of a table `[[diagnostics]]` or `[[signals]]` is not in the knowledge base.",
+        "Correct the name.",
+    ],
+    [
         "N140",
         "There are no designs to choose from.",
         "The mission of a reasoner has no knowledge base.",

@@ -48,6 +48,26 @@ pub fn modules(interfaces: &[Interface], hashes: &Hashes) -> Result<String, Box<
     Ok(text)
 }
 
+/// Returns the functions that find a message type by its name.
+pub fn dispatch(interfaces: &[Interface]) -> String {
+    let messages =
+        || interfaces.iter().filter(|interface| interface.folder == "msg" && interface.variant.is_none());
+    let arm = |interface: &Interface| {
+        let path = path(interface, &interface.parts[0]);
+        format!("{:?} => visitor.visit::<{path}>(),", interface.full_name())
+    };
+    let arms: Vec<String> = messages().map(arm).collect();
+    let names: Vec<String> = messages().map(|interface| format!("{:?},", interface.full_name())).collect();
+    format!(
+        "/// Names of all messages.\npub(crate) const MESSAGE_NAMES: &[&str] = &[{}];\n\
+         /// Visits a message type by its name, such as `std_msgs/msg/Bool`.\n\
+         pub(crate) fn visit_message<V: MessageVisitor>(name: &str, visitor: V) -> Option<V::Output> {{\n\
+         Some(match name {{\n{}\n_ => return None,\n}})\n}}\n",
+        names.join(" "),
+        arms.join("\n")
+    )
+}
+
 /// A slice of entries, one for each structure (`Entry::of::<T>(variant, name)`) and one for each other type that has a hash
 /// (`Entry::hash(variant, name, hash)`).
 pub fn table(interfaces: &[Interface], hashes: &Hashes) -> String {

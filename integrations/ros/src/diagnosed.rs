@@ -1,56 +1,132 @@
 //! Translates `/diagnostics` to input lines of the loop: statuses of the monitors of MROS, ROSA and
-//! PLANTA, and diagnostics of drivers by the rules of `ros.toml`.
+//! PLANTA, diagnostics of drivers by the rules of `ros.toml`, and signals.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
+use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
+use metaplan::mapek::FilterSettings;
 use metaplan::message::Message;
+use smol::Task;
 
 use crate::diagnostic_rules::{COMPONENT, DiagnosticRule, MEASUREMENT};
 use crate::interfaces::diagnostic_msgs::msg::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use crate::interfaces::std_msgs::msg::Header;
-use crate::node::{Node, keep_all};
+use crate::node::{Clock, Node, keep_all};
+use crate::signals::{self, Signal};
 
 /// Upper limit on the number of warnings about statuses that nothing uses.
 const MAX_UNUSED: usize = 20;
 
-/// Diagnostics that are not handled yet. Only the latest status of each subject is kept, so that a
+/// Diagnostics and signals that are not handled yet. Only the latest status of each subject is kept, so that a
 /// slow loop does not fall behind.
-#[derive(Debug, Clone, Default)]
 pub(crate) struct Diagnosed {
-    waiting: Arc<Mutex<Waiting>>,
+    queue: Arc<Queue>,
+    /// Observations of signals, which end with this value.
+    _signals: Vec<Task<()>>,
 }
 
-/// Pending statuses by subject, with the header of the last message.
+impl fmt::Debug for Diagnosed {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.debug_struct("Diagnosed").finish_non_exhaustive()
+    }
+}
+
+/// Translation of diagnostics and signals to statuses of the loop.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Sources {
+    /// Rules for diagnostics of drivers.
+    pub(crate) rules: Vec<DiagnosticRule>,
+    /// Other signals.
+    pub(crate) signals: Vec<Signal>,
+    /// Greatest time between two reports of equal values, by attributes.
+    pub(crate) repeats: BTreeMap<String, Duration>,
+}
+
+/// Returns the time after which an equal value must be reported again, by attributes: a filter that counts samples or waits
+/// for them would otherwise treat a constant value as silence.
+pub(crate) fn repeats(filters: &FilterSettings) -> BTreeMap<String, Duration> {
+    let mut repeats = BTreeMap::new();
+    for (attribute, measured) in &filters.measured {
+        let debounce = Some(measured.debounce).filter(|debounce| !debounce.is_zero());
+        let times = [measured.period, debounce].into_iter().flatten().map(|time| time / 4);
+        let all_samples = (measured.agree > 0 || measured.jump.is_some()).then_some(Duration::ZERO);
+        if let Some(time) = times.chain(all_samples).min() {
+            repeats.insert(attribute.clone(), time);
+        }
+    }
+    repeats
+}
+
+/// Pending statuses, and the last status of each subject.
+struct Queue {
+    state: Mutex<QueueState>,
+    repeats: BTreeMap<String, Duration>,
+    /// Called when the first status becomes pending.
+    waits: Box<dyn Fn() + Send + Sync>,
+    clock: Arc<Clock>,
+}
+
 #[derive(Debug, Default)]
-struct Waiting {
+struct QueueState {
     header: Header,
+    /// Pending statuses by subject.
     statuses: Vec<(String, DiagnosticStatus)>,
+    /// Last values by subject, with their time.
+    last: HashMap<String, (Vec<KeyValue>, Duration)>,
+}
+
+impl Queue {
+    /// Adds statuses. Repeated ones are ignored, unless a filter needs them.
+    fn add(&self, header: Header, statuses: impl IntoIterator<Item = DiagnosticStatus>) {
+        let now = self.clock.elapsed();
+        let mut guard = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let state = &mut *guard;
+        let is_first = state.statuses.is_empty();
+        state.header = header;
+        for status in statuses {
+            let keys: Vec<&str> = status.values.iter().map(|pair| pair.key.as_str()).collect();
+            let subject = format!("{}\u{0}{}", status.message, keys.join("\u{0}"));
+            let repeat = keys.iter().filter_map(|key| self.repeats.get(*key)).min();
+            let is_known = state.last.get(&subject).is_some_and(|(values, since)| {
+                *values == status.values && repeat.is_none_or(|repeat| now.saturating_sub(*since) < *repeat)
+            });
+            if !is_known {
+                state.last.insert(subject.clone(), (status.values.clone(), now));
+                state.statuses.retain(|(known, _)| *known != subject);
+                state.statuses.push((subject, status));
+            }
+        }
+        let waits = is_first && !state.statuses.is_empty();
+        drop(guard);
+        if waits {
+            (self.waits)();
+        }
+    }
 }
 
 impl Diagnosed {
-    /// Subscribes to diagnostics and calls `waits` when the first status becomes pending. Repeated
+    /// Subscribes to diagnostics and signals, and calls `waits` when the first status becomes pending. Repeated
     /// statuses are ignored. An unused status at level WARN or above is reported once, with a rule
     /// that would use it.
     pub(crate) fn subscribe(
         node: &Arc<Node>,
-        rules: &[DiagnosticRule],
-        waits: impl Fn() + Send + 'static,
+        sources: Sources,
+        waits: impl Fn() + Send + Sync + 'static,
     ) -> Result<Self, Message> {
-        let diagnosed = Self::default();
-        let waiting = Arc::clone(&diagnosed.waiting);
-        let rules = rules.to_vec();
+        let Sources { rules, signals, repeats } = sources;
+        let clock = node.clock();
+        let queue = Arc::new(Queue { state: Mutex::default(), repeats, waits: Box::new(waits), clock });
         let weak = Arc::downgrade(node);
         let own_name = node.full_name().trim_start_matches('/').to_owned();
         let mut unused: Vec<String> = Vec::new();
-        let mut last: HashMap<String, Vec<KeyValue>> = HashMap::new();
+        let of_topic = Arc::clone(&queue);
         node.subscribe::<DiagnosticArray>("/diagnostics", keep_all(), move |array| {
-            let mut waiting = waiting.lock().unwrap_or_else(PoisonError::into_inner);
-            let nobody_waits = waiting.statuses.is_empty();
-            waiting.header = array.header;
+            let mut statuses = Vec::new();
             for status in array.status {
-                let statuses = translated(&rules, &status);
-                let is_new = statuses.is_empty()
+                let translated = translated(&rules, &status);
+                let is_new = translated.is_empty()
                     && status.level >= DiagnosticStatus::WARN
                     && !status.name.starts_with(&own_name)
                     && unused.len() < MAX_UNUSED
@@ -59,26 +135,23 @@ impl Diagnosed {
                     node.warn_once(&suggestion(&status));
                     unused.push(status.name.clone());
                 }
-                for status in statuses {
-                    let keys: Vec<&str> = status.values.iter().map(|pair| pair.key.as_str()).collect();
-                    let key = format!("{}\u{0}{}", status.message, keys.join("\u{0}"));
-                    if last.insert(key.clone(), status.values.clone()).as_ref() != Some(&status.values) {
-                        waiting.statuses.retain(|(known, _)| *known != key);
-                        waiting.statuses.push((key, status));
-                    }
-                }
+                statuses.extend(translated);
             }
-            if nobody_waits && !waiting.statuses.is_empty() {
-                waits();
-            }
+            of_topic.add(array.header, statuses);
         })?;
-        Ok(diagnosed)
+        let (of_signals, clock) = (Arc::clone(&queue), node.clock());
+        let report: signals::Report = Arc::new(move |status| {
+            of_signals.add(Header { stamp: clock.stamp(), ..Header::default() }, [status]);
+        });
+        let signals = signals::watch(node, &signals, &report)?;
+        Ok(Self { queue, _signals: signals })
     }
 
     /// Returns the pending statuses as an input line and clears them.
     pub(crate) fn line(&self) -> String {
-        let Waiting { header, statuses } =
-            std::mem::take(&mut *self.waiting.lock().unwrap_or_else(PoisonError::into_inner));
+        let mut state = self.queue.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let (header, statuses) = (state.header.clone(), std::mem::take(&mut state.statuses));
+        drop(state);
         let status = statuses.into_iter().map(|(_, status)| status).collect();
         // Serialisation cannot fail: the message consists of texts and numbers.
         serde_json::to_string(&DiagnosticArray { header, status }).unwrap_or_default()

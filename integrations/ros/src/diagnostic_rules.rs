@@ -3,9 +3,10 @@
 //! A driver publishes `diagnostic_msgs/DiagnosticStatus` with a level and a text of its own. A rule selects such statuses by patterns, and
 //! names the component whose status the level is, or the attribute whose value one of the key/value pairs is.
 
-use serde::Deserialize;
+use serde::{Deserialize, Deserializer};
 
 use crate::interfaces::diagnostic_msgs::msg::{DiagnosticStatus, KeyValue};
+use crate::validated::validated;
 
 /// Message of a status that measures attributes, in the spelling of MROS.
 pub(crate) const MEASUREMENT: &str = "QA status";
@@ -14,8 +15,7 @@ pub(crate) const MEASUREMENT: &str = "QA status";
 pub(crate) const COMPONENT: &str = "Component status";
 
 /// Selects diagnostics and translates them.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(try_from = "Entry")]
+#[derive(Debug, Clone, PartialEq)]
 pub struct DiagnosticRule {
     name: Pattern,
     hardware_id: Pattern,
@@ -68,6 +68,12 @@ struct Entry {
     offset: Option<f64>,
 }
 
+impl<'de> Deserialize<'de> for DiagnosticRule {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        validated::<Entry, _, _>(deserializer)
+    }
+}
+
 impl TryFrom<Entry> for DiagnosticRule {
     type Error = &'static str;
 
@@ -99,6 +105,14 @@ impl TryFrom<Entry> for DiagnosticRule {
 }
 
 impl DiagnosticRule {
+    /// Returns the component or the attribute.
+    pub(crate) fn target(&self) -> (Option<&str>, Option<&str>) {
+        match &self.target {
+            Target::Component { component, .. } => (Some(component), None),
+            Target::Attribute { attribute, .. } => (None, Some(attribute)),
+        }
+    }
+
     /// Translates a status that the rule selects.
     pub(crate) fn translate(&self, status: &DiagnosticStatus) -> Option<DiagnosticStatus> {
         let is_selected = self.name.matches(&status.name)

@@ -3,6 +3,7 @@
 pub mod controller;
 mod diagnosed;
 mod diagnostic_rules;
+pub mod discover;
 pub mod interfaces;
 pub mod manager;
 pub mod node;
@@ -10,4 +11,7 @@ pub mod perform;
 pub mod performer;
 pub mod planner;
 pub mod popf;
+mod procedure;
 pub mod reasoner;
+mod signals;
+mod validated;

@@ -8,12 +8,13 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use clap::{Parser, ValueEnum};
 use metaplan::message::{Errors, Message};
 use metaplan_ros::node::{Network, Node, Opening, Rmw, RosArguments, Severity};
 use metaplan_ros::performer::PlanVersion;
-use metaplan_ros::{controller, manager, planner, reasoner};
+use metaplan_ros::{controller, discover, manager, planner, reasoner};
 
 /// Metaplan on a ROS 2 robot, over DDS and without a ROS installation.
 ///
@@ -34,9 +35,18 @@ struct Arguments {
     /// Write events and decisions there first, and go on from there after a crash.
     #[arg(long, value_name = "DIR")]
     journal: Option<PathBuf>,
+    /// With `--as discover`: how long the robot is observed, in seconds.
+    #[arg(long, value_name = "SECONDS", default_value_t = 30.0, value_parser = seconds)]
+    seconds: f64,
+    /// With `--as discover`: the new file for the settings; standard output without it.
+    #[arg(long, value_name = "FILE")]
+    output: Option<PathBuf>,
     /// How services are mapped: as the discovered participants say, or as this middleware does.
     #[arg(long, value_enum, default_value_t = Rmw::Auto)]
     rmw: Rmw,
+    /// Let the steps of designs in the settings execute commands on this machine.
+    #[arg(long)]
+    allow_commands: bool,
     /// With `--as controller`: whose types PlanSys2's executor has.
     #[arg(long, value_enum, default_value_t)]
     executor: PlanVersion,
@@ -52,6 +62,14 @@ enum Role {
     Planner,
     /// Of whoever has PlanSys2's executor carry out what its experts want: with a knowledge base, and again when a design is lost.
     Controller,
+    /// Observation of a robot: writes settings to start from.
+    Discover,
+}
+
+/// Parses a time that is greater than 0.
+fn seconds(text: &str) -> Result<f64, String> {
+    let time = text.parse().ok().filter(|seconds| (f64::MIN_POSITIVE..=86_400.0).contains(seconds));
+    time.ok_or_else(|| "a number of seconds from 0 to 86400 is expected".to_owned())
 }
 
 impl Role {
@@ -60,6 +78,7 @@ impl Role {
         match self {
             Self::Manager | Self::Reasoner | Self::Controller => "metaplan",
             Self::Planner => "planner",
+            Self::Discover => "metaplan_discover",
         }
     }
 }
@@ -103,21 +122,30 @@ fn start() -> Result<(), Errors> {
     };
     ctrlc::set_handler(handler)
         .map_err(|error| vec![Message::error("N100", format!("signals cannot be heard: {error}"))])?;
-    let Arguments { role, mission, settings, journal, executor, .. } = arguments;
-    if journal.is_some() && matches!(role, Role::Planner | Role::Controller) {
+    let Arguments { role, mission, settings, journal, executor, allow_commands, seconds, output, .. } =
+        arguments;
+    if journal.is_some() && matches!(role, Role::Planner | Role::Controller | Role::Discover) {
         let text = "`--journal` is for a manager and a reasoner: nothing of a planner has to be known after a restart";
         return Err(vec![Message::error("N100", text)].into());
     }
+    if output.is_some() && role != Role::Discover {
+        let text = "`--output` is for the discovery: no other role writes settings";
+        return Err(vec![Message::error("N100", text)].into());
+    }
     match (role, mission) {
+        (Role::Discover, mission) => {
+            let duration = Duration::from_secs_f64(seconds);
+            discover::run(&node, &discover::Options { duration, output, mission }, &stop)
+        }
         (Role::Planner, mission) => planner::run(&node, &planner::Options { mission, settings }, &stop),
         (Role::Controller, Some(mission)) => {
             controller::run(&node, &controller::Options { mission, version: executor }, &stop)
         }
         (Role::Manager, Some(mission)) => {
-            manager::run(&node, &manager::Options { mission, settings, journal }, &stop)
+            manager::run(&node, &manager::Options { mission, settings, journal, allow_commands }, &stop)
         }
         (Role::Reasoner, Some(mission)) => {
-            reasoner::run(&node, &reasoner::Options { mission, settings, journal }, &stop)
+            reasoner::run(&node, &reasoner::Options { mission, settings, journal, allow_commands }, &stop)
         }
         (_, None) => Err(vec![Message::error("N100", "`--mission` is missing")].into()),
     }

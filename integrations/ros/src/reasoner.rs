@@ -12,6 +12,7 @@ mod keeping;
 mod memory;
 mod network;
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -20,7 +21,8 @@ use metaplan::configure::{Configurator, Keeper, Wishes};
 use metaplan::message::{Errors, Message};
 use metaplan::setup::Setup;
 
-use crate::manager::Settings;
+use crate::diagnosed::Sources;
+use crate::manager::{Settings, components};
 use crate::node::{Node, Severity};
 
 use keeping::Keeping;
@@ -40,6 +42,8 @@ pub struct Options {
     pub settings: Option<PathBuf>,
     /// Directory of the state that must survive a restart.
     pub journal: Option<PathBuf>,
+    /// `true` if the steps of designs may execute commands.
+    pub allow_commands: bool,
 }
 
 /// Serves objectives until `stop` is set.
@@ -59,8 +63,22 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
     for warning in knowledge.warnings() {
         node.log(Severity::Warn, warning.text().trim_end());
     }
+    let mut designs: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for design in knowledge.view().function_designs() {
+        for function in design.solves {
+            designs.entry(function.name).or_default().push(design.individual.name.clone());
+        }
+    }
+    settings.check_steps(&designs, options.allow_commands)?;
+    let attribute = |name: &str| match knowledge.has_attribute(name) {
+        true => Ok(()),
+        false => Err(format!("the knowledge base has no quality attribute `{name}`")),
+    };
+    settings.check_targets(&components(Some(&knowledge)), attribute)?;
     let configurator = Configurator::new(knowledge, Wishes::default())?;
+    let procedures = settings.functions.procedures();
+    let sources = Sources { rules: settings.rules(), signals: settings.signals(), ..Sources::default() };
     let keeping = Keeping::new(Keeper::new(configurator, Some(SELECTION_TIME_LIMIT)), settings.functions);
     let memory = options.journal.as_deref().map(MemoryFile::open).transpose().map_err(to_errors)?;
-    Network::connect(node, keeping, &settings.diagnostics, memory)?.run(stop).map_err(to_errors)
+    Network::connect(node, keeping, procedures, sources, memory)?.run(stop).map_err(to_errors)
 }

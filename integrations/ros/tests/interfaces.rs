@@ -185,6 +185,36 @@ fn hashes_of_messages_are_those_of_rosidl() {
             mros2_msgs::action::ControlQos::FEEDBACK_RIHS01,
             "509605b09dd6de7514326e102088aa11d10a16f133ae7ceb76c81b021e0b776e",
         ),
+        (
+            sensor_msgs::msg::BatteryState::RIHS01,
+            "4bee5dfce981c98faa6828b868307a0a73f992ed0789f374ee96c8f840e69741",
+        ),
+        (
+            sensor_msgs::msg::LaserScan::RIHS01,
+            "64c191398013af96509d518dac71d5164f9382553fce5c1f8cca5be7924bd828",
+        ),
+        (
+            sensor_msgs::msg::NavSatFix::RIHS01,
+            "62223ab3fe210a15976021da7afddc9e200dc9ec75231c1b6a557fc598a65404",
+        ),
+        (sensor_msgs::msg::Range::RIHS01, "b42b62562e93cbfe9d42b82fe5994dfa3d63d7d5c90a317981703f7388adff3a"),
+        (
+            sensor_msgs::msg::Temperature::RIHS01,
+            "72514a14126ab9f8a9abec974c78e5610a367b59db5da355ff1fb982d5bad4b8",
+        ),
+        (
+            sensor_msgs::msg::Illuminance::RIHS01,
+            "b954b25f452fcf81a91c9c2a7e3b3fd85c4c873d452aecb3cfd8fd1da732a22d",
+        ),
+        (std_msgs::msg::Float64::RIHS01, "705ba9c3d1a09df43737eb67095534de36fd426c0587779bda2bc51fe790182a"),
+        (
+            rosgraph_msgs::msg::Clock::RIHS01,
+            "692f7a66e93a3c83e71765d033b60349ba68023a8c689a79e48078bcb5c58564",
+        ),
+        (
+            std_srvs::srv::SetBoolRequest::RIHS01,
+            "c62fbb99d94e1b25e8ef9e109f9581956bb1b3361a45a4e5810c36a90d29932e",
+        ),
     ];
     for (hash, expected) in cases {
         assert_eq!(hash, format!("RIHS01_{expected}"));

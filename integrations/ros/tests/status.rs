@@ -30,3 +30,25 @@ fn the_status_says_if_a_restart_can_help() {
         assert_eq!(found, Some(status), "{messages}");
     }
 }
+
+#[test]
+fn wrong_settings_are_reported_with_their_positions() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let file = directory.path().join("ros.toml");
+    let text = "[[signals]]\nnode = \"/amcl\"\ncomponent = \"c_lidr\"\n\n[[diagnostics]]\nname = \"x\"\nattribute = \"lite\"\nkey = \"k\"\n";
+    std::fs::write(&file, text).expect("written");
+    let settings = file.to_str().expect("a path");
+    let mission = "examples/nav2/mission.toml";
+    for role in ["manager", "reasoner"] {
+        let words = ["--as", role, "--mission", mission, "--settings", settings];
+        let (status, messages) = run(256, &words, "78");
+        assert_eq!(status, Some(2), "{messages}");
+        for part in ["error[N135]", "ros.toml:1:1", "did you mean `c_lidar`?", "ros.toml:5:1", "`lite`"] {
+            assert!(messages.contains(part), "{part} is not in: {messages}");
+        }
+    }
+    let (status, messages) = run(256, &["--as", "planner", "--output", settings], "78");
+    assert!(status == Some(2) && messages.contains("error[N100]"), "{messages}");
+    let (status, messages) = run(256, &["--as", "discover", "--output", settings], "78");
+    assert!(status == Some(2) && messages.contains("not overwritten"), "{messages}");
+}

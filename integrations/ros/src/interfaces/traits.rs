@@ -22,6 +22,15 @@ pub trait Msg: Structure {
     const NAME: &'static str;
 }
 
+/// Operation on a message type that is known by its name only.
+pub(crate) trait MessageVisitor {
+    /// Result of the operation.
+    type Output;
+
+    /// Executes the operation.
+    fn visit<M: Msg>(self) -> Self::Output;
+}
+
 /// A service.
 pub trait Service {
     /// Request of the client.

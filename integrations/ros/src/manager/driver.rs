@@ -9,16 +9,18 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
 
 use metaplan::journal::{Journal, Policy};
+use metaplan::knowledge::Knowledge;
 use metaplan::mapek::Loop;
 use metaplan::message::{Errors, Message, did_you_mean};
 use metaplan::setup::Setup;
 use serde_json::json;
 
+use crate::diagnosed::repeats;
 use crate::interfaces::diagnostic_msgs::msg::DiagnosticStatus;
 use crate::manager::machine::{Input, Machine, Output, State};
 use crate::manager::robot::Robot;
 use crate::manager::settings::Settings;
-use crate::node::{Lifecycle, Node, Severity};
+use crate::node::{Clock, Lifecycle, Node, Severity};
 use crate::perform::Perform;
 use crate::performer::performers;
 
@@ -47,6 +49,8 @@ pub struct Options {
     pub settings: Option<PathBuf>,
     /// Directory of the journal.
     pub journal: Option<PathBuf>,
+    /// `true` if the steps of designs may execute commands.
+    pub allow_commands: bool,
 }
 
 /// Manages the tasks of a robot until `stop` is set.
@@ -54,8 +58,13 @@ pub struct Options {
 /// # Errors
 /// The mission, its settings or the journal are wrong, or the journal can no longer be written.
 pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(), Errors> {
-    let Setup { mission, settings: adaptation, .. } = Setup::read(&options.mission)?;
+    let Setup { mission, settings: mut adaptation, .. } = Setup::read(&options.mission)?;
     let settings = Settings::read(options.settings.as_deref(), &options.mission)?;
+    let designs = mission.functions().into_iter().map(|function| {
+        let designs = mission.designs_of(&function);
+        (function, designs)
+    });
+    settings.check_steps(&designs.collect(), options.allow_commands)?;
     for warning in mission.warnings() {
         node.log(Severity::Warn, warning.text().trim_end());
     }
@@ -64,6 +73,15 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
         "How long a function may take to change its mode before it is asked once more, in seconds.",
         5.0,
     )?;
+    let attribute = |name: &str| {
+        // The value is of no importance: the change is tried on a copy.
+        mission.clone().set(name, "0").map_err(|message| message.message.clone())
+    };
+    settings.check_targets(&components(mission.knowledge()), attribute)?;
+    for signal in settings.signals() {
+        signal.add_filter(&mut adaptation.filters);
+    }
+    let repeats = repeats(&adaptation.filters);
     let mut control = Loop::new(mission, adaptation)?;
     let journal = journal(node, options, &mut control)?;
     let start_time = control.beliefs().now();
@@ -71,7 +89,7 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
         performers(node, &settings.actions, &settings.poses)?;
     let machine = Machine::new(control, journal, settings.clone());
     let (sender, inputs) = mpsc::channel();
-    let robot = Robot::connect(node, &settings, machine.functions(), performers, sender.clone())?;
+    let robot = Robot::connect(node, &settings, machine.functions(), performers, repeats, sender.clone())?;
     let active = Lifecycle::activated(node)?;
     let mut driver = Driver {
         node: Arc::clone(node),
@@ -80,11 +98,18 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
         settings,
         active,
         timeout,
-        clock: Instant::now(),
+        clock: node.clock(),
+        origin: node.clock().elapsed(),
         start_time,
     };
     driver.wait_for_functions(&sender, &inputs, stop)?;
     driver.drive(&inputs, stop).map_err(Errors::from)
+}
+
+/// Returns the names of the components of a knowledge base.
+pub(crate) fn components(knowledge: Option<&Knowledge>) -> Vec<String> {
+    let components = knowledge.map(|knowledge| knowledge.view().components()).unwrap_or_default();
+    components.into_iter().map(|component| component.individual.name).collect()
 }
 
 fn journal(node: &Node, options: &Options, control: &mut Loop) -> Result<Option<Journal>, Message> {
@@ -109,7 +134,9 @@ struct Driver {
     active: Arc<AtomicBool>,
     /// Timeout of calls, in milliseconds.
     timeout: Arc<AtomicU64>,
-    clock: Instant,
+    clock: Arc<Clock>,
+    /// Time of the clock when the program started.
+    origin: Duration,
     /// Time of the last line in the journal.
     start_time: Duration,
 }
@@ -202,7 +229,7 @@ impl Driver {
     }
 
     fn drive(&mut self, inputs: &Receiver<Input>, stop: &AtomicBool) -> Result<(), Message> {
-        let mut next = Instant::now();
+        let (mut next, mut next_tick) = (Instant::now(), self.clock.elapsed());
         while !stop.load(Ordering::Relaxed) {
             let wait = next.saturating_duration_since(Instant::now()).min(Duration::from_millis(100));
             if !self.active.load(Ordering::Relaxed) {
@@ -214,9 +241,13 @@ impl Driver {
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return Ok(()),
             }
+            // Simulated time may be faster or slower than that of the network.
+            if self.clock.elapsed() >= next_tick {
+                next_tick = self.clock.elapsed() + PERIOD;
+                self.handle(Input::Tick)?;
+            }
             if Instant::now() >= next {
                 next = Instant::now() + PERIOD;
-                self.handle(Input::Tick)?;
                 self.robot.request_new_modes();
                 self.diagnose();
             }
@@ -243,7 +274,7 @@ impl Driver {
             Input::Diagnosed => Input::Line(self.robot.diagnosed()),
             other => other,
         };
-        let now = self.start_time + self.clock.elapsed();
+        let now = self.start_time + self.clock.elapsed().saturating_sub(self.origin);
         if self.node.is_logged(Severity::Debug) && !matches!(input, Input::Tick) {
             self.node.log(Severity::Debug, &format!("hears {input:?}"));
         }

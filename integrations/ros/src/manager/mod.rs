@@ -22,5 +22,6 @@ mod machine;
 mod robot;
 mod settings;
 
+pub(crate) use driver::components;
 pub use driver::{Options, run};
 pub use settings::{Functions, Settings};

@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::Sender;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
@@ -12,7 +12,7 @@ use metaplan::message::Message;
 use serde_json::{Value, json};
 use smol::{Task, Timer};
 
-use crate::diagnosed::Diagnosed;
+use crate::diagnosed::{Diagnosed, Sources};
 use crate::interfaces::diagnostic_msgs::msg::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use crate::interfaces::lifecycle_msgs::msg::TransitionEvent;
 use crate::interfaces::lyrical::lifecycle_msgs::msg as lyrical;
@@ -23,12 +23,12 @@ use crate::interfaces::suave_msgs::srv::{Task as TaskService, TaskResponse};
 use crate::interfaces::system_modes_msgs::msg::ModeEvent;
 use crate::interfaces::system_modes_msgs::srv::{
     ChangeMode, ChangeModeRequest, GetAvailableModes, GetAvailableModesRequest, GetMode, GetModeRequest,
-    GetModeResponse,
 };
 use crate::manager::machine::{Change, Ended, Input, Outcome};
 use crate::manager::settings::Settings;
 use crate::node::{CallError, Caller, Node, Publisher, Responder, depth, is_lyrical, keep_all, latched};
 use crate::perform::{Call, End, Perform, Progress, Running};
+use crate::procedure::{self, Procedures, Seen};
 
 /// Timeout of a function's reply with its mode.
 const MODE_TIMEOUT: Duration = Duration::from_secs(2);
@@ -37,12 +37,22 @@ const MODE_TIMEOUT: Duration = Duration::from_secs(2);
 /// has discovered this node.
 const MAX_MODE_REQUESTS: u32 = 3;
 
-/// Services of a function.
+/// Means by which the modes of a function are changed.
+#[derive(Clone)]
+enum Means {
+    /// Services of `system_modes`.
+    Modes { change: Arc<Caller<ChangeMode>>, get_mode: Arc<Caller<GetMode>> },
+    /// Steps of the settings.
+    Steps,
+}
+
+/// A function of the robot.
 struct Function {
-    change: Arc<Caller<ChangeMode>>,
-    get_mode: Arc<Caller<GetMode>>,
+    means: Means,
     /// Running call. A new call replaces it.
     calling: Option<Task<()>>,
+    /// Ends the running steps before their next one.
+    is_replaced: Arc<AtomicBool>,
     mode_request: Option<Task<()>>,
     /// Servers of the mode.
     servers: BTreeSet<[u8; 16]>,
@@ -55,12 +65,13 @@ pub(super) struct Robot {
     node: Arc<Node>,
     inputs: Sender<Input>,
     functions: BTreeMap<String, Function>,
+    procedures: Arc<Procedures>,
     performers: BTreeMap<String, Box<dyn Perform>>,
     performing: HashMap<u64, (Running, Task<()>)>,
     diagnosed: Diagnosed,
     replies: Arc<Mutex<HashMap<u64, Responder<TaskService>>>>,
     plans: Publisher<std_msgs::msg::String>,
-    events: Publisher<std_msgs::msg::String>,
+    events: Arc<Publisher<std_msgs::msg::String>>,
     diagnostics: Publisher<DiagnosticArray>,
 }
 
@@ -71,29 +82,43 @@ impl Robot {
         settings: &Settings,
         functions: &[String],
         performers: BTreeMap<String, Box<dyn Perform>>,
+        repeats: BTreeMap<String, Duration>,
         inputs: Sender<Input>,
     ) -> Result<Self, Message> {
         let queue = inputs.clone();
-        let diagnosed =
-            Diagnosed::subscribe(node, &settings.diagnostics, move || drop(queue.send(Input::Diagnosed)))?;
+        let sources = Sources { rules: settings.rules(), signals: settings.signals(), repeats };
+        let diagnosed = Diagnosed::subscribe(node, sources, move || drop(queue.send(Input::Diagnosed)))?;
+        let events = Arc::new(node.publisher("~/events", depth(100))?);
+        let publisher = Arc::clone(&events);
+        let report =
+            move |event: &Value| publisher.publish(std_msgs::msg::String { data: event.to_string() });
+        let procedures = Arc::new(Procedures::new(node, settings.functions.procedures(), report)?);
         let mut services = BTreeMap::new();
         for function in functions {
-            subscribe_function(node, settings, function, &inputs)?;
-            let system = settings.functions.system(function);
-            let service = |name: &str| format!("/{system}/{name}");
+            let means = if procedures.contains(function) {
+                Means::Steps
+            } else {
+                subscribe_function(node, settings, function, &inputs)?;
+                let system = settings.functions.system(function);
+                let service = |name: &str| format!("/{system}/{name}");
+                Means::Modes {
+                    change: Arc::new(node.caller(&service("change_mode"))),
+                    get_mode: Arc::new(node.caller(&service("get_mode"))),
+                }
+            };
             services.insert(
                 function.clone(),
                 Function {
-                    change: Arc::new(node.caller(&service("change_mode"))),
-                    get_mode: Arc::new(node.caller(&service("get_mode"))),
+                    means,
                     calling: None,
+                    is_replaced: Arc::default(),
                     mode_request: None,
                     servers: BTreeSet::new(),
                     remaining_requests: 0,
                 },
             );
         }
-        subscribe_parameters(node, settings, functions, inputs.clone())?;
+        subscribe_nodes(node, settings, functions, &procedures, &inputs)?;
         if let Some(autopilot) = &settings.autopilot {
             let inputs = inputs.clone();
             node.subscribe::<mavros_msgs::msg::State>(&autopilot.topic, depth(10), move |state| {
@@ -106,50 +131,72 @@ impl Robot {
             node: Arc::clone(node),
             inputs,
             functions: services,
+            procedures,
             performers,
             performing: HashMap::new(),
             diagnosed,
             replies,
             plans: node.publisher("~/plan", latched(1))?,
-            events: node.publisher("~/events", depth(100))?,
+            events,
             diagnostics: node.publisher("/diagnostics", depth(10))?,
         })
     }
 
-    /// Waits until every function has a server and diagnostics have a writer, or the time is up.
+    /// Waits until every function has its servers and diagnostics have a writer, or the time is up.
     /// Returns the missing ones.
     pub(super) async fn wait(&self, within: Duration) -> Vec<String> {
-        let calls = self.functions.values().map(|function| function.change.ready(within));
-        let answers = futures::future::join_all(calls).await;
+        let missing = self.functions.iter().map(|(name, function)| async move {
+            match &function.means {
+                Means::Modes { change, .. } => {
+                    change.ready(within).await.err().map(|error| error.to_string()).into_iter().collect()
+                }
+                Means::Steps => self.procedures.missing(name, within).await,
+            }
+        });
         let mut missing: Vec<String> =
-            answers.into_iter().filter_map(Result::err).map(|error| error.to_string()).collect();
+            futures::future::join_all(missing).await.into_iter().flatten().collect();
         if !self.node.is_written("/diagnostics") {
             missing.push("nobody writes on /diagnostics".to_owned());
         }
         missing
     }
 
-    /// Returns the mode of each function, if it replies. Missing replies are logged and published
+    /// Returns the mode of each function, if it is known. Missing replies are logged and published
     /// as events.
     pub(super) async fn modes(&self) -> Vec<(String, Option<String>)> {
         let request = |(name, function): (&String, &Function)| {
-            let (name, get_mode) = (name.clone(), Arc::clone(&function.get_mode));
-            async move { (name, get_mode.call(GetModeRequest::default(), MODE_TIMEOUT).await) }
+            let (name, means) = (name.clone(), function.means.clone());
+            async move {
+                let answer = match means {
+                    Means::Modes { get_mode, .. } => {
+                        let answer = get_mode.call(GetModeRequest::default(), MODE_TIMEOUT).await;
+                        answer.map(|answer| answer.current_mode).map_err(|error| error.to_string())
+                    }
+                    Means::Steps => match self.procedures.observe(&name).await {
+                        Seen::Mode(mode) => Ok(mode),
+                        Seen::Nothing => Ok(String::new()),
+                        Seen::Unknown => Err(format!("the nodes of {name} do not show which design it has")),
+                    },
+                };
+                (name, answer)
+            }
         };
         let answers = futures::future::join_all(self.functions.iter().map(request)).await;
-        let logged = |(name, answer): (String, Result<GetModeResponse, CallError>)| match answer {
-            Ok(answer) => (name, Some(answer.current_mode)),
-            Err(error) => {
-                let because = error.to_string();
-                self.event(&json!({"answer": "silent", "function": name, "because": because}));
-                self.node.warn_once(&because);
+        let logged = |(name, answer): (String, Result<String, String>)| match answer {
+            Ok(mode) => (name, Some(mode)),
+            Err(because) => {
+                // Service calls and commands cannot be observed, which is no fault of the robot.
+                if !self.procedures.is_unobservable(&name) {
+                    self.event(&json!({"answer": "silent", "function": name, "because": because}));
+                    self.node.warn_once(&because);
+                }
                 (name, None)
             }
         };
         answers.into_iter().map(logged).collect()
     }
 
-    /// Returns the possible modes of each function, if it replies.
+    /// Returns the possible modes of each function of `system_modes`, if it replies.
     pub(super) async fn available(&self, settings: &Settings) -> Vec<(String, Vec<String>)> {
         let request = |name: &String| {
             let service = format!("/{}/get_available_modes", settings.functions.system(name));
@@ -159,36 +206,69 @@ impl Robot {
                 answer.map(|answer| (name, answer.available_modes))
             }
         };
-        futures::future::join_all(self.functions.keys().map(request)).await.into_iter().flatten().collect()
+        let with_modes =
+            self.functions.iter().filter(|(_, function)| matches!(function.means, Means::Modes { .. }));
+        let answers = with_modes.map(|(name, _)| request(name));
+        futures::future::join_all(answers).await.into_iter().flatten().collect()
     }
 
-    /// Calls `change_mode`. A running call of the function is cancelled.
+    /// Calls `change_mode`, or executes the steps of the mode. A running call of the function is cancelled; running steps
+    /// are undone first.
     pub(super) fn change(&mut self, change: Change, within: Duration) {
         let Some(function) = self.functions.get_mut(&change.function) else { return };
-        let (caller, inputs) = (Arc::clone(&function.change), self.inputs.clone());
-        // The running call must end first, because it holds the client.
-        function.calling = None;
-        function.calling = Some(smol::spawn(async move {
-            let answer = caller.call(ChangeModeRequest { mode_name: change.mode.clone() }, within).await;
-            let outcome = match answer {
-                Ok(answer) if answer.success => Outcome::Done,
-                Ok(_) => Outcome::Refused,
-                Err(error) => Outcome::Failed(error.to_string()),
-            };
-            let _ = inputs.send(Input::Changed(change, outcome));
-        }));
+        let inputs = self.inputs.clone();
+        match function.means.clone() {
+            Means::Modes { change: caller, .. } => {
+                // The running call must end first, because it holds the client.
+                function.calling = None;
+                function.calling = Some(smol::spawn(async move {
+                    let request = ChangeModeRequest { mode_name: change.mode.clone() };
+                    let outcome = match caller.call(request, within).await {
+                        Ok(answer) if answer.success => Outcome::Done,
+                        Ok(_) => Outcome::Refused,
+                        Err(error) => Outcome::Failed(error.to_string()),
+                    };
+                    let _ = inputs.send(Input::Changed(change, outcome));
+                }));
+            }
+            Means::Steps => {
+                function.is_replaced.store(true, Ordering::Relaxed);
+                let is_replaced = Arc::new(AtomicBool::new(false));
+                function.is_replaced = Arc::clone(&is_replaced);
+                let procedures = Arc::clone(&self.procedures);
+                // The task is not cancelled, so that it can undo its steps.
+                smol::spawn(async move {
+                    let outcome =
+                        procedures.apply(&change.function, &change.mode, within, &is_replaced).await;
+                    let outcome = match outcome {
+                        procedure::Outcome::Done => Outcome::Done,
+                        procedure::Outcome::Failed(because) => Outcome::StepFailed(because),
+                        procedure::Outcome::Silent(because) => Outcome::Failed(because),
+                    };
+                    let _ = inputs.send(Input::Changed(change, outcome));
+                })
+                .detach();
+            }
+        }
     }
 
     /// Requests the modes of functions with new servers, because a restarted server has lost its
-    /// mode.
+    /// mode. The loss of a node that steps use also changes the mode.
     pub(super) fn request_new_modes(&mut self) {
         let mut names = Vec::new();
         for (name, function) in &mut self.functions {
-            let servers = function.get_mode.servers();
-            if !function.servers.is_empty() && !servers.is_subset(&function.servers) {
+            let servers = match &function.means {
+                Means::Modes { get_mode, .. } => get_mode.servers(),
+                Means::Steps => self.procedures.servers(name),
+            };
+            let is_changed = match &function.means {
+                Means::Modes { .. } => !function.servers.is_empty() && !servers.is_subset(&function.servers),
+                Means::Steps => servers != function.servers,
+            };
+            if is_changed {
                 function.remaining_requests = MAX_MODE_REQUESTS;
             }
-            if !servers.is_empty() {
+            if !servers.is_empty() || matches!(function.means, Means::Steps) {
                 function.servers = servers;
             }
             if function.remaining_requests > 0 {
@@ -204,26 +284,47 @@ impl Robot {
     /// Requests the mode of a function.
     pub(super) fn request_mode(&mut self, name: &str) {
         let Some(function) = self.functions.get_mut(name) else { return };
-        let (get_mode, inputs, name) = (Arc::clone(&function.get_mode), self.inputs.clone(), name.to_owned());
-        function.mode_request = Some(smol::spawn(async move {
-            if let Ok(answer) = get_mode.call(GetModeRequest::default(), MODE_TIMEOUT).await {
-                let _ = inputs.send(Input::Mode(name, answer.current_mode));
+        let (inputs, name) = (self.inputs.clone(), name.to_owned());
+        function.mode_request = Some(match &function.means {
+            Means::Modes { get_mode, .. } => {
+                let get_mode = Arc::clone(get_mode);
+                smol::spawn(async move {
+                    if let Ok(answer) = get_mode.call(GetModeRequest::default(), MODE_TIMEOUT).await {
+                        let _ = inputs.send(Input::Mode(name, answer.current_mode));
+                    }
+                })
             }
-        }));
+            Means::Steps => {
+                let procedures = Arc::clone(&self.procedures);
+                smol::spawn(async move {
+                    let mode = match procedures.observe(&name).await {
+                        Seen::Mode(mode) => mode,
+                        Seen::Nothing => String::new(),
+                        Seen::Unknown => return,
+                    };
+                    let _ = inputs.send(Input::Mode(name, mode));
+                })
+            }
+        });
     }
 
     /// Checks later whether a function replies. A function without a mode service counts as
     /// replying while it has a server.
     pub(super) fn probe(&mut self, name: &str, after: Duration) {
         let Some(function) = self.functions.get(name) else { return };
-        let (change, get_mode) = (Arc::clone(&function.change), Arc::clone(&function.get_mode));
+        let (means, procedures) = (function.means.clone(), Arc::clone(&self.procedures));
         let (inputs, name) = (self.inputs.clone(), name.to_owned());
         smol::spawn(async move {
             Timer::after(after).await;
-            let answers = match get_mode.call(GetModeRequest::default(), MODE_TIMEOUT).await {
-                Ok(_) => true,
-                Err(CallError::Absent { .. }) => change.is_served(),
-                Err(_) => false,
+            let answers = match means {
+                Means::Modes { change, get_mode } => {
+                    match get_mode.call(GetModeRequest::default(), MODE_TIMEOUT).await {
+                        Ok(_) => true,
+                        Err(CallError::Absent { .. }) => change.is_served(),
+                        Err(_) => false,
+                    }
+                }
+                Means::Steps => procedures.answers(&name).await,
             };
             let _ = inputs.send(Input::Probed(name, answers));
         })
@@ -305,7 +406,7 @@ impl Robot {
             values,
         };
         let mut array = DiagnosticArray { status: vec![status], ..DiagnosticArray::default() };
-        array.header.stamp = crate::node::now();
+        array.header.stamp = self.node.clock().stamp();
         self.diagnostics.publish(array);
     }
 }
@@ -324,28 +425,55 @@ fn subscribe_function(
     })?;
     let (name, sender) = (function.to_owned(), inputs.clone());
     let topic = format!("/{}/transition_event", settings.functions.node(function));
-    let touched = move || drop(sender.send(Input::Touched(name.clone())));
-    if is_lyrical() {
-        node.subscribe::<lyrical::TransitionEvent>(&topic, depth(10), move |_| touched())
-    } else {
-        node.subscribe::<TransitionEvent>(&topic, depth(10), move |_| touched())
-    }
+    subscribe_transitions(node, &topic, move || drop(sender.send(Input::Touched(name.clone()))))
 }
 
-/// Subscribes to parameter changes of a function's node.
-fn subscribe_parameters(
+/// Subscribes to parameter changes of the functions' nodes, and to the lifecycle of the nodes that steps use.
+fn subscribe_nodes(
     node: &Arc<Node>,
     settings: &Settings,
     functions: &[String],
-    inputs: Sender<Input>,
+    procedures: &Procedures,
+    inputs: &Sender<Input>,
 ) -> Result<(), Message> {
-    let nodes: HashMap<String, String> =
-        functions.iter().map(|function| (settings.functions.node(function), function.clone())).collect();
+    let mut of_node: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for function in functions {
+        for name in procedures.nodes(function) {
+            of_node.entry(node.resolve(&name)).or_default().push(function.clone());
+        }
+    }
+    for (name, functions) in &of_node {
+        let (functions, sender) = (functions.clone(), inputs.clone());
+        subscribe_transitions(node, &format!("{name}/transition_event"), move || {
+            for function in &functions {
+                let _ = sender.send(Input::Touched(function.clone()));
+            }
+        })?;
+    }
+    for function in functions.iter().filter(|function| !procedures.contains(function)) {
+        let name = format!("/{}", settings.functions.node(function));
+        of_node.entry(name).or_default().push(function.clone());
+    }
+    let inputs = inputs.clone();
     node.subscribe::<ParameterEvent>("/parameter_events", keep_all(), move |event| {
-        if let Some(function) = nodes.get(event.node.trim_start_matches('/')) {
+        let name = format!("/{}", event.node.trim_start_matches('/'));
+        for function in of_node.get(&name).into_iter().flatten() {
             let _ = inputs.send(Input::Touched(function.clone()));
         }
     })
+}
+
+/// Subscribes to the transition events of a node, in the message type of the distribution.
+fn subscribe_transitions(
+    node: &Arc<Node>,
+    topic: &str,
+    touched: impl Fn() + Send + 'static,
+) -> Result<(), Message> {
+    if is_lyrical() {
+        node.subscribe::<lyrical::TransitionEvent>(topic, depth(10), move |_| touched())
+    } else {
+        node.subscribe::<TransitionEvent>(topic, depth(10), move |_| touched())
+    }
 }
 
 type Replies = Arc<Mutex<HashMap<u64, Responder<TaskService>>>>;

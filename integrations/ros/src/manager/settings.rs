@@ -3,11 +3,14 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use metaplan::message::Message;
+use metaplan::message::{Errors, Message, did_you_mean};
 use serde::Deserialize;
+use toml::Spanned;
 
 use crate::diagnostic_rules::DiagnosticRule;
 use crate::performer::{By, Offered, Poses};
+use crate::procedure::Procedure;
+use crate::signals::Signal;
 
 /// Default mode of a function that is not needed.
 const UNGROUND: &str = "fd_unground";
@@ -24,7 +27,10 @@ pub struct Settings {
     pub functions: Functions,
     /// Diagnostics of drivers that report a component or measure an attribute.
     #[serde(default)]
-    pub diagnostics: Vec<DiagnosticRule>,
+    pub diagnostics: Vec<Spanned<DiagnosticRule>>,
+    /// Other signals that report components and measure attributes.
+    #[serde(default)]
+    pub(crate) signals: Vec<Spanned<Signal>>,
     /// The autopilot, if there is one.
     pub autopilot: Option<Autopilot>,
     /// Performers by action names. Other actions end immediately.
@@ -36,6 +42,24 @@ pub struct Settings {
     /// Performers of actions for PlanSys2's executor, by action names.
     #[serde(default)]
     pub offers: BTreeMap<String, Offered>,
+    /// The file, for errors that are found later.
+    #[serde(skip)]
+    source: Source,
+}
+
+/// Name and text of the settings file.
+#[derive(Debug, Clone, Default)]
+struct Source {
+    name: String,
+    text: String,
+}
+
+impl Source {
+    /// Creates an error at a key or a table.
+    fn error<T>(&self, code: &str, key: &Spanned<T>, text: impl Into<String>) -> Message {
+        let place = position(&self.text, key.span().start);
+        Message::at(code, &self.name, Some(place), text).with_source(&self.text)
+    }
 }
 
 /// A task.
@@ -59,13 +83,13 @@ pub struct Autopilot {
     pub mode: String,
 }
 
-/// Names of functions and designs in `system_modes`. The defaults are the names in the knowledge
-/// base.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize)]
+/// Functions on the robot: their names and designs in `system_modes`, by default those of the knowledge base, or the steps
+/// that put their designs into effect.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(transparent)]
-pub struct Functions(BTreeMap<String, FunctionSettings>);
+pub struct Functions(BTreeMap<Spanned<String>, FunctionSettings>);
 
-#[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct FunctionSettings {
     /// Name of the system, without slash.
@@ -77,6 +101,9 @@ struct FunctionSettings {
     /// Modes of designs.
     #[serde(default)]
     modes: BTreeMap<String, String>,
+    /// Steps by designs. If there are any, `system_modes` is not used.
+    #[serde(default)]
+    designs: BTreeMap<Spanned<String>, Procedure>,
 }
 
 impl Settings {
@@ -94,10 +121,130 @@ impl Settings {
         let name = file.display().to_string();
         let text = std::fs::read_to_string(file)
             .map_err(|error| Message::at("N130", &name, None, format!("the file cannot be read: {error}")))?;
-        toml::from_str(&text).map_err(|error| {
+        let settings: Result<Self, Message> = toml::from_str(&text).map_err(|error| {
             let place = error.span().map(|span| position(&text, span.start));
             Message::at("N130", &name, place, error.message()).with_source(&text)
-        })
+        });
+        Ok(Self { source: Source { name, text }, ..settings? })
+    }
+
+    /// Returns the rules for diagnostics.
+    pub(crate) fn rules(&self) -> Vec<DiagnosticRule> {
+        self.diagnostics.iter().map(|rule| rule.get_ref().clone()).collect()
+    }
+
+    /// Returns the other signals.
+    pub(crate) fn signals(&self) -> Vec<Signal> {
+        self.signals.iter().map(|signal| signal.get_ref().clone()).collect()
+    }
+
+    /// Checks that the mission has the components and attributes of diagnostics and signals. `attribute` returns the reason
+    /// why a name cannot be measured.
+    ///
+    /// # Errors
+    /// All names that the mission does not have.
+    pub(crate) fn check_targets(
+        &self,
+        components: &[String],
+        attribute: impl Fn(&str) -> Result<(), String>,
+    ) -> Result<(), Errors> {
+        let fault = |(component, measured): (Option<&str>, Option<&str>)| match (component, measured) {
+            (Some(name), _) if !components.iter().any(|component| component == name) => {
+                let suggestion = did_you_mean(name, components.iter().map(String::as_str));
+                Some(format!(
+                    "the knowledge base has no component `{name}`; it has {}{suggestion}",
+                    components.join(", ")
+                ))
+            }
+            (_, Some(name)) => attribute(name).err(),
+            _ => None,
+        };
+        let help = "use a component, or an attribute that is measured, of the knowledge base";
+        let of_rules = self.diagnostics.iter().filter_map(|rule| {
+            fault(rule.get_ref().target()).map(|text| self.source.error("N135", rule, text).with_help(help))
+        });
+        let of_signals = self.signals.iter().filter_map(|signal| {
+            fault(signal.get_ref().target())
+                .map(|text| self.source.error("N135", signal, text).with_help(help))
+        });
+        let errors: Vec<Message> = of_rules.chain(of_signals).collect();
+        if errors.is_empty() { Ok(()) } else { Err(errors.into()) }
+    }
+
+    /// Checks the steps of designs against the designs of the mission, by functions.
+    ///
+    /// # Errors
+    /// A function or a design does not exist, a design has no steps, or a command is not allowed.
+    pub(crate) fn check_steps(
+        &self,
+        designs: &BTreeMap<String, Vec<String>>,
+        are_commands_allowed: bool,
+    ) -> Result<(), Errors> {
+        let mut errors = Vec::new();
+        for (function, settings) in self.functions.0.iter().filter(|(_, settings)| settings.has_steps()) {
+            let mut error = |code, key, text: String, help: &str| {
+                errors.push(self.source.error(code, key, text).with_help(help));
+            };
+            let name = function.get_ref();
+            if settings.system.is_some() || settings.node.is_some() || !settings.modes.is_empty() {
+                error(
+                    "N133",
+                    function,
+                    format!("the function {name} has steps for its designs, and names for `system_modes`"),
+                    "remove `system`, `node` and `modes`, or remove `designs`",
+                );
+            }
+            let Some(known) = designs.get(name) else {
+                let suggestion = did_you_mean(name, designs.keys().map(String::as_str));
+                let text = format!("the mission has no function `{name}`{suggestion}");
+                error("N133", function, text, "use the name of a function of the knowledge base");
+                continue;
+            };
+            let unground = settings.unground.as_deref().unwrap_or(UNGROUND);
+            for (design, procedure) in &settings.designs {
+                let written = design.get_ref();
+                if written != unground && !known.contains(written) {
+                    let suggestion = did_you_mean(written, known.iter().map(String::as_str));
+                    error(
+                        "N133",
+                        design,
+                        format!("the function {name} has no design `{written}`{suggestion}"),
+                        &format!(
+                            "its designs are {}; `{unground}` is used while it is not needed",
+                            known.join(", ")
+                        ),
+                    );
+                }
+                if procedure.has_command() && !are_commands_allowed {
+                    error(
+                        "N134",
+                        design,
+                        format!("the steps of {written} execute a command, which is not allowed"),
+                        "start the program with --allow-commands if you trust this file, or remove the command",
+                    );
+                }
+            }
+            let missing: Vec<&str> = known
+                .iter()
+                .map(String::as_str)
+                .filter(|design| !settings.designs.contains_key(*design))
+                .collect();
+            if !missing.is_empty() {
+                error(
+                    "N133",
+                    function,
+                    format!("the function {name} has no steps for {}", missing.join(", ")),
+                    &format!("add a table `[functions.{name}.designs.{}]` with `steps`", missing[0]),
+                );
+            }
+        }
+        if errors.is_empty() { Ok(()) } else { Err(errors.into()) }
+    }
+}
+
+impl FunctionSettings {
+    fn has_steps(&self) -> bool {
+        !self.designs.is_empty()
     }
 }
 
@@ -125,9 +272,30 @@ impl Functions {
         self.0.get(function).and_then(|settings| settings.modes.get(design)).map_or(design, String::as_str)
     }
 
-    /// Returns the mode of a function that is not needed.
-    pub fn unground(&self, function: &str) -> &str {
-        self.0.get(function).and_then(|settings| settings.unground.as_deref()).unwrap_or(UNGROUND)
+    /// Returns the mode of a function that is not needed. `None` if the function then keeps its design, because it has
+    /// steps for its designs and none for this mode.
+    pub fn unground(&self, function: &str) -> Option<&str> {
+        let Some(settings) = self.0.get(function) else { return Some(UNGROUND) };
+        let mode = settings.unground.as_deref().unwrap_or(UNGROUND);
+        (!settings.has_steps() || settings.designs.contains_key(mode)).then_some(mode)
+    }
+
+    /// Returns `true` if steps put the designs of a function into effect, instead of `system_modes`.
+    pub(crate) fn has_steps(&self, function: &str) -> bool {
+        self.0.get(function).is_some_and(FunctionSettings::has_steps)
+    }
+
+    /// Returns all steps, by functions and modes.
+    pub(crate) fn procedures(&self) -> BTreeMap<String, BTreeMap<String, Procedure>> {
+        let of_function = |settings: &FunctionSettings| {
+            settings
+                .designs
+                .iter()
+                .map(|(mode, procedure)| (mode.get_ref().clone(), procedure.clone()))
+                .collect()
+        };
+        let with_steps = self.0.iter().filter(|(_, settings)| settings.has_steps());
+        with_steps.map(|(function, settings)| (function.get_ref().clone(), of_function(settings))).collect()
     }
 
     /// Returns the design of a mode, among the designs of a function.
@@ -166,5 +334,67 @@ mod tests {
         std::fs::write(&file, "[tasks.a]\ngoal = 1\n").expect("written");
         let message = Settings::read(Some(&file), Path::new("m.toml")).expect_err("wrong");
         assert!(message.text().contains("ros.toml:2:8"), "{}", message.text());
+    }
+
+    /// Reads settings and returns the first error of the file, or of the check against two functions.
+    fn wrong(text: &str, are_commands_allowed: bool) -> String {
+        let directory = tempfile::tempdir().expect("a directory");
+        let file = directory.path().join("ros.toml");
+        std::fs::write(&file, text).expect("written");
+        let designs = [("f_go", vec!["fd_fast", "fd_slow"]), ("f_see", vec!["fd_camera"])];
+        let designs = designs.map(|(function, designs)| {
+            (function.to_owned(), designs.into_iter().map(str::to_owned).collect())
+        });
+        let settings = match Settings::read(Some(&file), Path::new("m.toml")) {
+            Ok(settings) => settings,
+            Err(message) => return message.text().to_owned(),
+        };
+        match settings.check_steps(&designs.into(), are_commands_allowed) {
+            Ok(()) => String::new(),
+            Err(errors) => errors.iter().map(|error| error.text()).collect(),
+        }
+    }
+
+    #[test]
+    fn steps_that_do_not_fit_have_source_locations_and_remedies() {
+        let table =
+            |design: &str, step: &str| format!("[functions.f_go.designs.{design}]\nsteps = [{step}]\n");
+        let active = r#"{ node = "/a", state = "active" }"#;
+        let (fast, slow) = (table("fd_fast", active), table("fd_slow", active));
+        assert_eq!(wrong(&format!("{fast}{slow}"), false), "");
+        assert_eq!(wrong(&format!("{fast}{slow}{}", table("fd_unground", active)), false), "");
+        for (text, parts) in [
+            (fast.clone(), ["ros.toml:1:12", "no steps for fd_slow", "[functions.f_go.designs.fd_slow]"]),
+            (
+                format!("{fast}{slow}{}", table("fd_slw", active)),
+                ["ros.toml:5:25", "no design `fd_slw`; did you mean `fd_slow`?", "its designs are"],
+            ),
+            (
+                format!("{fast}{slow}").replace("f_go", "f_gu"),
+                ["ros.toml:1:12", "no function `f_gu`; did you mean `f_go`?", "knowledge base"],
+            ),
+            (
+                format!("[functions.f_go]\nsystem = \"go\"\n{fast}{slow}"),
+                ["ros.toml:1:12", "names for `system_modes`", "remove `system`"],
+            ),
+            (
+                format!("{fast}{}", table("fd_slow", r#"{ command = ["x"] }"#)),
+                ["N134", "ros.toml:3:25", "--allow-commands"],
+            ),
+            (
+                format!("{fast}{}", table("fd_slow", r#"{ node = "/a" }"#)),
+                ["N130", "ros.toml:4:10", "either a `state` or `parameters`"],
+            ),
+            (
+                format!("{fast}{}", table("fd_slow", r#"{ node = "/a", state = "on" }"#)),
+                ["N130", "ros.toml:4:33", "expected one of"],
+            ),
+        ] {
+            let message = wrong(&text, false);
+            for part in parts {
+                assert!(message.contains(part), "{part} is not in: {message}");
+            }
+        }
+        assert_eq!(wrong(&format!("{fast}{}", table("fd_slow", r#"{ command = ["x"] }"#)), true), "");
     }
 }

@@ -207,7 +207,7 @@ fn flatten(name: &str, value: &Value, nodes: &str, found: &mut Vec<Assigned>, me
 
 /// Converts a YAML value to a parameter. Returns `None` for mappings, null, and lists of mixed
 /// types.
-fn parameter_value(value: &Value) -> Option<ParameterValue> {
+pub(crate) fn parameter_value(value: &Value) -> Option<ParameterValue> {
     Some(match value {
         Value::Bool(truth) => ParameterValue::Boolean(*truth),
         Value::Number(number) => match number.as_i64() {

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use futures::StreamExt as _;
 use ros2_client::Gid;
+use ros2_client::dds::rustdds::policy::Durability;
 use ros2_client::dds::rustdds::{
     DomainParticipant, DomainParticipantStatusEvent, EndpointDescription, GUID, StatusEvented as _,
 };
@@ -85,6 +86,60 @@ struct Endpoint {
     topic: String,
     type_name: String,
     hash: Option<String>,
+    /// `true` if late readers receive the last samples: reliable and transient local.
+    is_latched: bool,
+}
+
+/// Names and types of the interfaces of the other nodes.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(crate) struct Endpoints {
+    /// Types of the topics that have a publisher, without those that every node has.
+    pub(crate) topics: BTreeMap<String, String>,
+    /// Types of the services.
+    pub(crate) services: BTreeMap<String, String>,
+    /// Types of the actions.
+    pub(crate) actions: BTreeMap<String, String>,
+    /// Nodes with a lifecycle.
+    pub(crate) lifecycle_nodes: Vec<String>,
+    /// Functions of `system_modes`, without slash.
+    pub(crate) systems: Vec<String>,
+}
+
+impl Endpoints {
+    /// Adds an endpoint. Returns `None` if it belongs to no interface of ROS 2.
+    fn add(&mut self, endpoint: &Endpoint) -> Option<()> {
+        let (package, rest) = endpoint.type_name.split_once("::")?;
+        let (kind, rest) = rest.split_once("::dds_::")?;
+        let name = rest.strip_suffix('_')?;
+        if let Some(topic) = endpoint.topic.strip_prefix("rt").filter(|_| !endpoint.is_reader) {
+            let is_common = ["/rosout", "/parameter_events", "/diagnostics"].contains(&topic)
+                || topic.ends_with("/transition_event")
+                || topic.contains("/_action/");
+            if !is_common {
+                self.topics.insert(topic.to_owned(), format!("{package}/{kind}/{name}"));
+            }
+            return Some(());
+        }
+        let service =
+            endpoint.topic.strip_prefix("rq")?.strip_suffix("Request").filter(|_| endpoint.is_reader)?;
+        if let Some(action) = service.strip_suffix("/_action/send_goal") {
+            let name = name.strip_suffix("_SendGoal_Request")?;
+            self.actions.insert(action.to_owned(), format!("{package}/action/{name}"));
+        } else if !service.contains("/_action/") {
+            let name = name.strip_suffix("_Request")?;
+            self.services.insert(service.to_owned(), format!("{package}/{kind}/{name}"));
+        }
+        Some(())
+    }
+}
+
+/// First publisher of a topic.
+#[derive(Debug, Clone)]
+pub(crate) struct Writer {
+    /// DDS name of the type.
+    pub(crate) type_name: String,
+    /// `true` if late readers receive the last samples.
+    pub(crate) is_latched: bool,
 }
 
 impl Graph {
@@ -149,8 +204,10 @@ impl Graph {
         if guid[..12] == self.own_prefix {
             return;
         }
-        let EndpointDescription { topic_name: topic, type_name, user_data, .. } = description;
-        let endpoint = Endpoint { is_reader, topic, type_name, hash: type_hash(&user_data) };
+        let EndpointDescription { topic_name: topic, type_name, user_data, qos, .. } = description;
+        let is_latched =
+            qos.is_reliable() && qos.durability().is_some_and(|kept| kept != Durability::Volatile);
+        let endpoint = Endpoint { is_reader, topic, type_name, hash: type_hash(&user_data), is_latched };
         let mut state = self.state();
         let complaint = state.expected.get(&endpoint.topic).and_then(|expected| endpoint.complaint(expected));
         state.complaints.extend(complaint);
@@ -198,6 +255,30 @@ impl Graph {
     /// Returns `true` if a topic, given by its DDS name, has a writer.
     pub(crate) fn has_writer(&self, topic: &str) -> bool {
         self.state().endpoints.values().any(|endpoint| !endpoint.is_reader && endpoint.topic == topic)
+    }
+
+    /// Returns the interfaces of the other nodes.
+    pub(crate) fn interfaces(&self) -> Endpoints {
+        let mut interfaces = Endpoints::default();
+        for endpoint in self.state().endpoints.values() {
+            let _ = interfaces.add(endpoint);
+        }
+        let servers = |name: &str, kind: &str| -> Vec<String> {
+            let of_kind = interfaces.services.iter().filter(|(_, served)| *served == kind);
+            of_kind.filter_map(|(service, _)| service.strip_suffix(name)).map(str::to_owned).collect()
+        };
+        interfaces.lifecycle_nodes = servers("/get_state", "lifecycle_msgs/srv/GetState");
+        let systems = servers("/change_mode", "system_modes_msgs/srv/ChangeMode");
+        interfaces.systems = systems.iter().map(|system| system.trim_start_matches('/').to_owned()).collect();
+        interfaces
+    }
+
+    /// Returns a writer of a topic, given by its DDS name.
+    pub(crate) fn writer(&self, topic: &str) -> Option<Writer> {
+        let state = self.state();
+        let writer =
+            state.endpoints.values().find(|endpoint| !endpoint.is_reader && endpoint.topic == topic)?;
+        Some(Writer { type_name: writer.type_name.clone(), is_latched: writer.is_latched })
     }
 
     /// Returns the server of a service if there is one. An endpoint with another type name is an error. A differing type hash is
@@ -368,7 +449,32 @@ fn prefix(guid: GUID) -> [u8; 12] {
 
 #[cfg(test)]
 mod tests {
-    use super::{Endpoint, Expected, type_hash};
+    use super::{Endpoint, Endpoints, Expected, type_hash};
+
+    #[test]
+    fn interfaces_are_named_as_in_ros() {
+        let mut interfaces = Endpoints::default();
+        for (is_reader, topic, type_name) in [
+            (false, "rt/scan", "sensor_msgs::msg::dds_::LaserScan_"),
+            (true, "rt/cmd", "std_msgs::msg::dds_::Bool_"),
+            (false, "rt/rosout", "rcl_interfaces::msg::dds_::Log_"),
+            (true, "rq/lampRequest", "std_srvs::srv::dds_::SetBool_Request_"),
+            (false, "rr/lampReply", "std_srvs::srv::dds_::SetBool_Response_"),
+            (
+                true,
+                "rq/go/_action/send_goalRequest",
+                "nav2_msgs::action::dds_::NavigateToPose_SendGoal_Request_",
+            ),
+            (false, "Square", "ShapeType"),
+        ] {
+            let (topic, type_name) = (topic.to_owned(), type_name.to_owned());
+            let _ = interfaces.add(&Endpoint { is_reader, topic, type_name, hash: None, is_latched: false });
+        }
+        let pair = |name: &str, kind: &str| [(name.to_owned(), kind.to_owned())].into();
+        assert_eq!(interfaces.topics, pair("/scan", "sensor_msgs/msg/LaserScan"));
+        assert_eq!(interfaces.services, pair("/lamp", "std_srvs/srv/SetBool"));
+        assert_eq!(interfaces.actions, pair("/go", "nav2_msgs/action/NavigateToPose"));
+    }
 
     #[test]
     fn types_and_their_hashes_are_compared() {
@@ -378,6 +484,7 @@ mod tests {
             topic: "rt/t".to_owned(),
             type_name: type_name.to_owned(),
             hash: type_hash(data.as_bytes()),
+            is_latched: false,
         };
         let complaint = |name: &str, data: &str| endpoint(name, data).complaint(&expected).is_some();
         assert!(!complaint("a::msg::dds_::B_", ""));

@@ -1,6 +1,7 @@
 //! Managed node (ROS 2 design article "Managed nodes"): primary states, and the services for
 //! transitions between them.
 
+use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
@@ -25,6 +26,57 @@ pub enum Phase {
     Active,
     /// The node is shutting down.
     Finalized,
+}
+
+/// Primary state that a client requests of a lifecycle node.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum PrimaryState {
+    /// The node is not configured.
+    Unconfigured,
+    /// The node is configured and does not work.
+    Inactive,
+    /// The node works.
+    Active,
+}
+
+impl PrimaryState {
+    /// Converts the answer of `get_state`. Returns `None` in a transition, and for a finalized node.
+    pub(crate) fn of(state: &State) -> Option<Self> {
+        match state.id {
+            State::PRIMARY_STATE_UNCONFIGURED => Some(Self::Unconfigured),
+            State::PRIMARY_STATE_INACTIVE => Some(Self::Inactive),
+            State::PRIMARY_STATE_ACTIVE => Some(Self::Active),
+            _ => None,
+        }
+    }
+
+    /// Returns the next transition on the way to another state. Active and unconfigured nodes pass through the
+    /// inactive state.
+    pub(crate) fn toward(self, target: Self) -> Option<Transition> {
+        let (id, label) = match (self, target) {
+            (Self::Unconfigured, Self::Inactive | Self::Active) => {
+                (Transition::TRANSITION_CONFIGURE, "configure")
+            }
+            (Self::Inactive, Self::Active) => (Transition::TRANSITION_ACTIVATE, "activate"),
+            (Self::Active, Self::Inactive | Self::Unconfigured) => {
+                (Transition::TRANSITION_DEACTIVATE, "deactivate")
+            }
+            (Self::Inactive, Self::Unconfigured) => (Transition::TRANSITION_CLEANUP, "cleanup"),
+            _ => return None,
+        };
+        Some(Transition { id, label: label.to_owned() })
+    }
+}
+
+impl fmt::Display for PrimaryState {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::Unconfigured => "unconfigured",
+            Self::Inactive => "inactive",
+            Self::Active => "active",
+        })
+    }
 }
 
 /// Transition between primary states.
@@ -158,8 +210,8 @@ pub struct Lifecycle {
     change: Box<dyn Fn(Phase) -> bool + Send + Sync>,
 }
 
-impl std::fmt::Debug for Lifecycle {
-    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl fmt::Debug for Lifecycle {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.debug_tuple("Lifecycle").field(&self.phase()).finish()
     }
 }

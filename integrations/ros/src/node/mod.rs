@@ -7,7 +7,9 @@
 //! reveals its mapping of services, see `rmw`.
 
 mod action;
+mod any_topic;
 mod arguments;
+mod clock;
 mod graph;
 mod lifecycle;
 mod log;
@@ -32,15 +34,22 @@ use smol::{Task, Timer};
 pub use action::{
     Accepted, ActionCaller, CancelRequest, GoalEnd, GoalError, GoalEvent, Goals, Pursued, Wanted,
 };
+pub(crate) use any_topic::Arrivals;
 pub use arguments::RosArguments;
+pub(crate) use arguments::parameter_value;
+pub(crate) use clock::Clock;
+pub(crate) use lifecycle::PrimaryState;
 pub use lifecycle::{Lifecycle, Phase};
 pub use log::Severity;
+pub(crate) use names::valid_name;
 pub use network::Network;
 pub use parameters::Declared;
-pub(crate) use parameters::any_value;
+pub(crate) use parameters::{any_value, fitting, parameter, raw};
 pub use rmw::Rmw;
 pub use service::{CallError, Caller, Responder};
 pub use topic::Publisher;
+
+pub(crate) use graph::Endpoints;
 
 use graph::Graph;
 use names::FullName;
@@ -71,6 +80,7 @@ pub struct Node {
     warned: Mutex<HashSet<String>>,
     /// Background tasks, which end with the node.
     tasks: Mutex<Vec<Task<()>>>,
+    clock: Arc<Clock>,
 }
 
 impl std::fmt::Debug for Node {
@@ -120,6 +130,7 @@ impl Node {
             least,
             warned: Mutex::default(),
             tasks: Mutex::new(vec![watching]),
+            clock: Clock::new(),
         });
         node.report_complaints();
         Ok(node)
@@ -138,6 +149,11 @@ impl Node {
     /// Returns `true` if a topic has a writer.
     pub fn is_written(&self, topic: &str) -> bool {
         self.graph.has_writer(&format!("rt{}", self.resolve(topic)))
+    }
+
+    /// Returns the interfaces of the other nodes that are discovered.
+    pub(crate) fn endpoints(&self) -> Endpoints {
+        self.graph.interfaces()
     }
 
     fn inner(&self) -> MutexGuard<'_, ros2_client::Node> {

@@ -47,6 +47,21 @@ impl fmt::Display for FullName {
     }
 }
 
+/// Checks the name of a node, topic or service in the settings.
+pub(crate) fn valid_name(kind: &str, name: &str) -> Result<String, String> {
+    let is_part = |part: &str| {
+        part.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_')
+            && part.chars().all(|character| character.is_ascii_alphanumeric() || character == '_')
+    };
+    let below = name.strip_prefix("~/").or_else(|| name.strip_prefix('/')).unwrap_or(name);
+    if below.split('/').all(is_part) {
+        return Ok(name.to_owned());
+    }
+    Err(format!(
+        "`{name}` is not the name of a {kind}: use letters, digits and `_` between slashes, and no digit after a slash"
+    ))
+}
+
 /// Returns `true` if a pattern of a parameter file matches a node: `*` matches a part of a name,
 /// `**` any number of parts. A pattern without namespace matches a node name in every namespace.
 pub(crate) fn is_match(pattern: &str, full: &str, name: &str) -> bool {

@@ -76,7 +76,7 @@ impl Node {
             "use_sim_time".to_owned(),
             Declared {
                 name: "use_sim_time",
-                description: "accepted as by every node; times are those of the system",
+                description: "Use the simulated time on /clock.",
                 value: ParameterValue::Boolean(false),
                 is_dynamic: true,
                 check: any_value,
@@ -108,6 +108,20 @@ impl Node {
             // of this module.
             let _ = self.inner().set_parameter(parameter.name, parameter.value.clone());
         }
+        let is_simulated = |value: &ParameterValue| *value == ParameterValue::Boolean(true);
+        if table.get("use_sim_time").is_some_and(|parameter| is_simulated(&parameter.value)) {
+            self.use_simulated_time(true)?;
+        }
+        let weak = Arc::downgrade(self);
+        let changed = move |name: &str, value: &ParameterValue| {
+            if name == "use_sim_time"
+                && let Some(node) = weak.upgrade()
+                && let Err(error) = node.use_simulated_time(is_simulated(value))
+            {
+                node.log(Severity::Error, &error.message);
+            }
+            changed(name, value);
+        };
         self.serve_parameters(Arc::new(Mutex::new(table)), Arc::new(changed))?;
         Ok(warnings)
     }
@@ -236,7 +250,7 @@ impl Node {
 }
 
 /// Converts a value to the type of `current`. An integer is accepted for a double.
-fn fitting(current: &ParameterValue, value: ParameterValue) -> Result<ParameterValue, String> {
+pub(crate) fn fitting(current: &ParameterValue, value: ParameterValue) -> Result<ParameterValue, String> {
     match (current, value) {
         (ParameterValue::Double(_), ParameterValue::Integer(whole)) => {
             Ok(ParameterValue::Double(whole as f64))

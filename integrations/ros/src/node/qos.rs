@@ -17,6 +17,11 @@ pub fn latched(depth: usize) -> QosProfile {
     self::depth(depth).durability(Durability::TransientLocal)
 }
 
+/// Best effort and volatile: receives new samples of every publisher.
+pub(crate) fn sensor_data() -> QosProfile {
+    QosProfile::default().reliability_best_effort().history(History::KeepLast { depth: 5 })
+}
+
 /// Profile of services.
 pub(crate) fn service() -> QosProfile {
     depth(10)

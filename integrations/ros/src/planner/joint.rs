@@ -8,7 +8,7 @@ use metaplan::message::Errors;
 use metaplan::mission::Mission;
 use metaplan::planner::Exact;
 
-use crate::diagnosed::Diagnosed;
+use crate::diagnosed::{Diagnosed, Sources};
 use crate::node::Node;
 
 /// The mission, and the diagnostics since its last use.
@@ -24,7 +24,7 @@ impl Joint {
     /// # Errors
     /// The topic cannot be created.
     pub(crate) fn listen(node: &Arc<Node>, mission: Mission) -> Result<Arc<Self>, Errors> {
-        let diagnosed = Diagnosed::subscribe(node, &[], || {})?;
+        let diagnosed = Diagnosed::subscribe(node, Sources::default(), || {})?;
         Ok(Arc::new(Self { mission: Mutex::new(mission), diagnosed }))
     }
 

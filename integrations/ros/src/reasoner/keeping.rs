@@ -49,7 +49,10 @@ pub(super) struct Wanted {
 pub(super) enum Outcome {
     Done,
     Refused,
+    /// There was no answer.
     Failed(String),
+    /// A step has failed, and the steps before it are undone.
+    StepFailed(String),
 }
 
 /// An objective of a client.
@@ -208,8 +211,11 @@ impl Keeping {
         };
         pursued.cancelling = true;
         let function = pursued.function.clone();
-        let mode = self.functions.unground(&function).to_owned();
-        self.request_mode(Wanted { function, mode, effect: None }, None);
+        match self.functions.unground(&function).map(str::to_owned) {
+            Some(mode) => self.request_mode(Wanted { function, mode, effect: None }, None),
+            // The function keeps its design.
+            None => self.end(goal),
+        }
     }
 
     fn request_mode(&mut self, wanted: Wanted, design: Option<String>) {
@@ -331,7 +337,7 @@ impl Keeping {
 
     fn complain(&mut self, wanted: &Wanted, outcome: &Outcome) {
         let because = match outcome {
-            Outcome::Failed(because) => because.clone(),
+            Outcome::Failed(because) | Outcome::StepFailed(because) => because.clone(),
             Outcome::Done | Outcome::Refused => "it was refused".to_owned(),
         };
         self.outputs.push(Output::Warn(format!("{} {}: {because}", wanted.function, wanted.mode)));
@@ -346,7 +352,7 @@ impl Keeping {
         let times = self.failed.get(design).map_or(0, |(_, times)| *times);
         let (wait, times) = match outcome {
             Outcome::Failed(_) => (SILENT_DELAY.saturating_mul(1 << times.min(5)), times.saturating_add(1)),
-            Outcome::Done | Outcome::Refused => (REFUSED_DELAY, 0),
+            Outcome::Done | Outcome::Refused | Outcome::StepFailed(_) => (REFUSED_DELAY, 0),
         };
         self.failed.insert(design.to_owned(), (now + wait, times));
         self.handle_line(

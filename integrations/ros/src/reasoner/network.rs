@@ -3,14 +3,14 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use metaplan::message::{Errors, Message};
 use ros2_client::action::GoalId;
+use serde_json::Value;
 use smol::Task;
 
-use crate::diagnosed::Diagnosed;
-use crate::diagnostic_rules::DiagnosticRule;
+use crate::diagnosed::{Diagnosed, Sources};
 use crate::interfaces::mros2_msgs::action::{ControlQos, ControlQosFeedback, ControlQosResult};
 use crate::interfaces::mros2_msgs::msg::QoS;
 use crate::interfaces::mros2_msgs::srv::{MetacontrolFD, MetacontrolFDRequest};
@@ -20,6 +20,7 @@ use crate::node::{
     CallError, Caller, CancelRequest, GoalEnd, GoalEvent, Goals, Lifecycle, Node, Publisher, Severity,
     Wanted as Offer, depth,
 };
+use crate::procedure::{self, Procedure, Procedures, Seen};
 use crate::reasoner::keeping::{Keeping, Outcome, Output, Wanted};
 use crate::reasoner::memory::{MemoryFile, Remembered};
 
@@ -47,8 +48,11 @@ pub(super) struct Network {
     bridge: Arc<Caller<MetacontrolFD>>,
     systems: BTreeMap<String, Arc<Caller<ChangeMode>>>,
     calling: BTreeMap<String, Task<()>>,
+    procedures: Arc<Procedures>,
+    /// Ends running steps before their next one, by function.
+    replaced: BTreeMap<String, Arc<AtomicBool>>,
     diagnosed: Diagnosed,
-    events: Publisher<std_msgs::msg::String>,
+    events: Arc<Publisher<std_msgs::msg::String>>,
     /// Period of status messages in milliseconds.
     period: Arc<AtomicU64>,
     /// `true` while the lifecycle state is active.
@@ -62,7 +66,8 @@ impl Network {
     pub(super) fn connect(
         node: &Arc<Node>,
         keeping: Keeping,
-        rules: &[DiagnosticRule],
+        procedures: BTreeMap<String, BTreeMap<String, Procedure>>,
+        sources: Sources,
         memory: Option<MemoryFile>,
     ) -> Result<Self, Errors> {
         let to_errors = |message: Message| vec![message];
@@ -74,7 +79,7 @@ impl Network {
         let (sender, inputs) = mpsc::channel();
         let diagnostic_sender = sender.clone();
         let diagnosed =
-            Diagnosed::subscribe(node, rules, move || drop(diagnostic_sender.send(Input::Diagnosed)))
+            Diagnosed::subscribe(node, sources, move || drop(diagnostic_sender.send(Input::Diagnosed)))
                 .map_err(to_errors)?;
         let goal_sender = sender.clone();
         let goals = node.serve_action::<ControlQos>("/mros/objective", move |event| {
@@ -94,6 +99,11 @@ impl Network {
         let client = Arc::clone(&bridge);
         // Connects in advance, so that the first call need not wait for discovery.
         smol::spawn(async move { while client.ready(CHANGE_TIMEOUT).await.is_err() {} }).detach();
+        let events = Arc::new(node.publisher("~/events", depth(100)).map_err(to_errors)?);
+        let publisher = Arc::clone(&events);
+        let report =
+            move |event: &Value| publisher.publish(std_msgs::msg::String { data: event.to_string() });
+        let procedures = Arc::new(Procedures::new(node, procedures, report).map_err(to_errors)?);
         let active = Lifecycle::activated(node).map_err(to_errors)?;
         Ok(Self {
             node: Arc::clone(node),
@@ -103,8 +113,10 @@ impl Network {
             bridge,
             systems,
             calling: BTreeMap::new(),
+            procedures,
+            replaced: BTreeMap::new(),
             diagnosed,
-            events: node.publisher("~/events", depth(100)).map_err(to_errors)?,
+            events,
             period,
             active,
             memory,
@@ -120,10 +132,10 @@ impl Network {
     pub(super) fn run(mut self, stop: &AtomicBool) -> Result<(), Message> {
         self.go_on();
         self.node.log(Severity::Info, "serves /mros/objective");
-        let clock = Instant::now();
-        let mut next = clock;
+        let clock = self.node.clock();
+        let mut next = clock.elapsed();
         while !stop.load(Ordering::Relaxed) {
-            let wait = next.saturating_duration_since(Instant::now()).min(Duration::from_millis(100));
+            let wait = next.saturating_sub(clock.elapsed()).min(Duration::from_millis(100));
             match self.inputs.recv_timeout(wait) {
                 Ok(input) => {
                     self.handle(input, clock.elapsed());
@@ -136,8 +148,8 @@ impl Network {
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return Ok(()),
             }
-            if Instant::now() >= next {
-                next = Instant::now() + Duration::from_millis(self.period.load(Ordering::Relaxed).max(1));
+            if clock.elapsed() >= next {
+                next = clock.elapsed() + Duration::from_millis(self.period.load(Ordering::Relaxed).max(1));
                 self.keeping.tick(clock.elapsed());
             }
             self.carry_out();
@@ -158,7 +170,15 @@ impl Network {
             let function = remembered.wanted.objective_type.clone();
             let service = format!("/{}/get_mode", self.keeping.system(&function));
             let caller = self.node.caller::<GetMode>(&service);
+            let procedures = Arc::clone(&self.procedures);
             async move {
+                if procedures.contains(&function) {
+                    return match procedures.observe(&function).await {
+                        Seen::Mode(mode) => Some((function, mode)),
+                        Seen::Nothing => Some((function, String::new())),
+                        Seen::Unknown => None,
+                    };
+                }
                 let answer = caller.call(GetModeRequest::default(), MODE_TIMEOUT).await.ok()?;
                 Some((function, answer.current_mode))
             }
@@ -216,8 +236,13 @@ impl Network {
         }
     }
 
-    /// Requests a mode from MROS's bridge, or from the function itself if there is no bridge.
+    /// Executes the steps of a mode, if the settings have some. Otherwise requests the mode from MROS's bridge, or from the
+    /// function itself if there is no bridge.
     fn configure(&mut self, wanted: Wanted) {
+        if self.procedures.contains(&wanted.function) {
+            self.execute(wanted);
+            return;
+        }
         let bridge = Arc::clone(&self.bridge);
         let Some(system) = self.systems.get(&wanted.function).map(Arc::clone) else { return };
         let (sender, name) = (self.sender.clone(), wanted.function.clone());
@@ -243,5 +268,25 @@ impl Network {
             let _ = sender.send(Input::Answered(wanted, outcome));
         });
         self.calling.insert(name, call);
+    }
+
+    /// Executes the steps of a mode. Running steps of the function are undone first.
+    fn execute(&mut self, wanted: Wanted) {
+        let is_replaced = Arc::new(AtomicBool::new(false));
+        if let Some(earlier) = self.replaced.insert(wanted.function.clone(), Arc::clone(&is_replaced)) {
+            earlier.store(true, Ordering::Relaxed);
+        }
+        let (procedures, sender) = (Arc::clone(&self.procedures), self.sender.clone());
+        smol::spawn(async move {
+            let applied =
+                procedures.apply(&wanted.function, &wanted.mode, CHANGE_TIMEOUT, &is_replaced).await;
+            let outcome = match applied {
+                procedure::Outcome::Done => Outcome::Done,
+                procedure::Outcome::Failed(because) => Outcome::StepFailed(because),
+                procedure::Outcome::Silent(because) => Outcome::Failed(because),
+            };
+            let _ = sender.send(Input::Answered(wanted, outcome));
+        })
+        .detach();
     }
 }

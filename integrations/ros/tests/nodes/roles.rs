@@ -15,8 +15,9 @@ use metaplan_ros::interfaces::suave_msgs::srv::{Task, TaskRequest};
 use metaplan_ros::interfaces::system_modes_msgs::srv::{
     ChangeMode, ChangeModeResponse, GetAvailableModes, GetAvailableModesResponse, GetMode, GetModeResponse,
 };
-use metaplan_ros::node::{Accepted, GoalEnd, Node, Publisher, depth, keep_all};
+use metaplan_ros::node::{Accepted, Declared, GoalEnd, Node, Publisher, depth, keep_all};
 use metaplan_ros::{manager, reasoner};
+use ros2_client::ParameterValue;
 use smol::block_on;
 
 use crate::common::{domain, node, until};
@@ -117,7 +118,7 @@ fn mission() -> PathBuf {
 
 fn manager(domain: u16, journal: Option<PathBuf>) -> Running {
     let node = node(domain, "metaplan", "");
-    let options = manager::Options { mission: mission(), settings: None, journal };
+    let options = manager::Options { mission: mission(), settings: None, journal, allow_commands: false };
     Running::new(move |stop| manager::run(&node, &options, stop))
 }
 
@@ -200,7 +201,8 @@ fn a_reasoner_serves_objectives() {
     let domain = domain();
     let robot = Robot::new(domain, None);
     let node = node(domain, "reasoner", "");
-    let options = reasoner::Options { mission: mission(), settings: None, journal: None };
+    let options =
+        reasoner::Options { mission: mission(), settings: None, journal: None, allow_commands: false };
     let running = Running::new(move |stop| reasoner::run(&node, &options, stop));
     let caller = robot.node.action_caller::<ControlQos>("/mros/objective");
     let goal = |function: &str| {
@@ -228,5 +230,75 @@ fn a_reasoner_serves_objectives() {
         matches!(block_on(pursued.events.recv()), Ok(Accepted::Ended(GoalEnd::Canceled, _)))
     });
     assert_eq!(robot.mode("f_generate_search_path"), "fd_unground");
+    running.end().expect("it ends as it should");
+}
+
+/// A node of the robot with a parameter that designs set.
+fn spiral(domain: u16) -> (Arc<Node>, Arc<Mutex<Vec<f64>>>) {
+    let (node, values) = (node(domain, "spiral", ""), Arc::new(Mutex::new(Vec::new())));
+    let noted = Arc::clone(&values);
+    let altitude = Declared {
+        name: "altitude",
+        description: "metres above the ground",
+        value: ParameterValue::Double(0.0),
+        is_dynamic: true,
+        check: |value| match value {
+            ParameterValue::Double(altitude) if *altitude > 2.5 => Err("is too high"),
+            _ => Ok(()),
+        },
+    };
+    node.declare(vec![altitude], move |name, value| {
+        if let ("altitude", ParameterValue::Double(altitude)) = (name, value) {
+            noted.lock().expect("no panic").push(*altitude);
+        }
+    })
+    .expect("parameters");
+    (node, values)
+}
+
+#[test]
+fn a_reasoner_executes_steps_and_avoids_a_design_that_is_refused() {
+    let domain = domain();
+    let robot = Robot::new(domain, None);
+    let (_spiral, altitudes) = spiral(domain);
+    let directory = tempfile::tempdir().expect("a directory");
+    let settings = directory.path().join("ros.toml");
+    let mut text = String::new();
+    for (design, altitude) in [("fd_spiral_high", 3.0), ("fd_spiral_medium", 2.0), ("fd_spiral_low", 1.0)] {
+        text += &format!(
+            "[functions.f_generate_search_path.designs.{design}]\nsteps = [{{ node = \"/spiral\", parameters = {{ altitude = {altitude:?} }} }}]\n"
+        );
+    }
+    std::fs::write(&settings, text).expect("written");
+    let node = node(domain, "reasoner", "");
+    let options = reasoner::Options {
+        mission: mission(),
+        settings: Some(settings),
+        journal: None,
+        allow_commands: false,
+    };
+    let running = Running::new(move |stop| reasoner::run(&node, &options, stop));
+    let caller = robot.node.action_caller::<ControlQos>("/mros/objective");
+    let mut goal = ControlQosGoal::default();
+    "f_generate_search_path".clone_into(&mut goal.qos_expected.objective_type);
+    let pursued = block_on(caller.pursue(goal, LONG)).expect("accepted");
+    // The high spiral is refused by the node.
+    until("the medium spiral is flown", || altitudes.lock().expect("no panic").last() == Some(&2.0));
+    until(
+        "the feedback has the mode",
+        || matches!(block_on(pursued.events.recv()), Ok(Accepted::Feedback(told)) if told.qos_status.selected_mode == "fd_spiral_medium"),
+    );
+    until("diagnostics are heard", || {
+        robot.measure("water_visibility", "1.5");
+        std::thread::sleep(Duration::from_millis(20));
+        altitudes.lock().expect("no panic").last() == Some(&1.0)
+    });
+    // The function has no steps for the time when it is not needed, and keeps its design.
+    pursued.cancel();
+    until("the goal is cancelled", || {
+        matches!(block_on(pursued.events.recv()), Ok(Accepted::Ended(GoalEnd::Canceled, _)))
+    });
+    assert_eq!(*altitudes.lock().expect("no panic"), [2.0, 1.0]);
+    assert!(robot.asked.lock().expect("no panic").is_empty(), "system_modes is not called");
     running.end().expect("it ends as it should");
 }

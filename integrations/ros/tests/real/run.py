@@ -6,6 +6,7 @@ Each scenario uses a ROS domain of its own and starts the program anew. Exits wi
 """
 
 import contextlib
+import json
 import os
 import pathlib
 import random
@@ -15,12 +16,13 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 os.environ["ROS_DOMAIN_ID"] = str(random.randrange(1, 100))
 
 import rclpy  # noqa: E402  (reads the environment)
+from builtin_interfaces.msg import Time  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
 from lifecycle_msgs.srv import GetState  # noqa: E402
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue  # noqa: E402
@@ -28,11 +30,17 @@ from rcl_interfaces.srv import SetParameters  # noqa: E402
 from rclpy.context import Context  # noqa: E402
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor  # noqa: E402
 from rclpy.node import Node  # noqa: E402
+from rclpy.qos import qos_profile_sensor_data  # noqa: E402
 from robot import ModeManager, Monitors  # noqa: E402
+from rosgraph_msgs.msg import Clock  # noqa: E402
+from scout import STEPS, Equipment, Localization  # noqa: E402
+from sensor_msgs.msg import LaserScan  # noqa: E402
+from std_msgs.msg import Bool, Float64, String  # noqa: E402
 from suave_msgs.srv import Task  # noqa: E402
 
 EXAMPLES = pathlib.Path(__file__).resolve().parents[2] / "examples"
 MISSION = EXAMPLES / "suave" / "suave.toml"
+SCOUT = EXAMPLES / "nav2" / "mission.toml"
 START = 30.0  # s until the program must be ready
 SETTLED = 3.0  # s without another request after which an adaptation is over
 
@@ -203,6 +211,374 @@ def parameters() -> None:
             check(answer.results[0].successful, is_accepted, f"plan_solver_timeout = {seconds}")
 
 
+class Scout:
+    """The robot of `examples/nav2`, with the events of its manager."""
+
+    def __init__(self) -> None:
+        self.amcl, self.visual = Localization("amcl"), Localization("visual_localization")
+        self.equipment = Equipment()
+        self.started = [self.amcl, self.visual, self.equipment]
+        self.events: list[dict] = []
+        self.equipment.create_subscription(
+            String, "/metaplan/events", lambda message: self.events.append(json.loads(message.data)), 100
+        )
+
+    def until(self, what: str, is_so: Callable[[], bool], within: float = 20.0) -> None:
+        """Waits for a condition."""
+        until = time.monotonic() + within
+        while not is_so():
+            if time.monotonic() > until:
+                steps = [event for event in self.events if event["answer"] in ("step", "steps_failed", "reconfigure")]
+                raise Failure(f"{what}: not within {within} s; {self.states()}; {steps[-8:]}")
+            time.sleep(0.02)
+
+    def states(self) -> tuple[str, str]:
+        """States of both ways to localize."""
+        return self.amcl.state, self.visual.state
+
+    def until_states(self, amcl: str, visual: str, within: float = 20.0) -> None:
+        """Waits for the states of both ways to localize."""
+        self.until(f"amcl is {amcl}, visual localization is {visual}", lambda: self.states() == (amcl, visual), within)
+
+    def count(self, answer: str) -> int:
+        """Number of events of a kind."""
+        return sum(event["answer"] == answer for event in self.events)
+
+    @contextlib.contextmanager
+    def managed(self, settings: str = STEPS, *arguments: str) -> Iterator[tempfile._TemporaryFileWrapper]:
+        """Starts the nodes and the manager, and waits until the first move runs; yields the log."""
+        with tempfile.NamedTemporaryFile("w", suffix=".toml") as file:
+            file.write(settings)
+            file.flush()
+            command = ("--as", "manager", "--mission", str(SCOUT), "--settings", file.name, *arguments)
+            with nodes(*self.started), program(*command) as log:
+                yield log
+
+
+def steps() -> None:
+    """Lifecycle transitions and parameters put designs into effect, once for each cause."""
+    scout = Scout()
+    with scout.managed():
+        scout.until_states("active", "inactive")
+        scout.until("the speed is set", lambda: scout.equipment.get_parameter("max_speed").value == 1.0)
+        check(scout.equipment.settings, [(1.0, False)], "parameters, both at once")
+        time.sleep(SETTLED)
+        check(scout.amcl.transitions, ["configure", "activate"], "transitions of amcl")
+        check(scout.visual.transitions, ["configure"], "transitions of visual localization")
+        scout.equipment.lidar(DiagnosticStatus.ERROR, "no scan")
+        scout.until_states("inactive", "active")
+        time.sleep(SETTLED)
+        check(scout.amcl.transitions, ["configure", "activate", "deactivate"], "transitions of amcl")
+        check(scout.visual.transitions, ["configure", "activate"], "transitions of visual localization")
+        check(scout.equipment.settings, [(1.0, False)], "parameters stay")
+        # The move ends, and the inspection needs the lamp and the camera.
+        scout.until("the lamp is on", lambda: arrive(scout) and scout.equipment.lamp == [True])
+        scout.until("the camera is reset", lambda: scout.equipment.resets == 1)
+
+
+def arrive(scout: Scout) -> bool:
+    """Reports that a move has ended."""
+    scout.equipment.arrived.publish(Bool(data=True))
+    time.sleep(0.2)
+    return True
+
+
+def rollback() -> None:
+    """A node that refuses its activation: the steps before are undone, and the design counts as not realisable."""
+    scout = Scout()
+    scout.visual.can_activate = False
+    with scout.managed():
+        scout.until_states("active", "inactive")
+        scout.equipment.lidar(DiagnosticStatus.ERROR, "no scan")
+        scout.until("the failure is reported", lambda: scout.count("steps_failed") == 1)
+        scout.until_states("active", "inactive")
+        undone = [event["step"] for event in scout.events if event.get("outcome") == "undone"]
+        check(undone, ["/visual_localization inactive", "/amcl active"], "undone steps, the last one first")
+        time.sleep(SETTLED)
+        check(scout.count("steps_failed"), 1, "attempts within the minute")
+
+
+def refused_parameters() -> None:
+    """Parameters that a node refuses: another design is used."""
+    scout = Scout()
+    scout.equipment.fastest = 0.6
+    with scout.managed():
+        scout.until("the slow design is used", lambda: scout.equipment.get_parameter("max_speed").value == 0.25)
+        scout.until("the failure is reported", lambda: scout.count("steps_failed") == 1)
+        check(scout.equipment.settings, [(0.25, True)], "accepted parameters")
+        failed = [event for event in scout.events if event["answer"] == "steps_failed"]
+        check(["too fast" in event["because"] for event in failed], [True], "reasons of failures")
+
+
+def refused_service() -> None:
+    """A service that refuses after another one was called: the first call is undone by the stated call."""
+    scout = Scout()
+    scout.equipment.can_reset = False
+    with scout.managed():
+        scout.until_states("active", "inactive")
+        scout.until("the lamp is switched back and the other design is used", lambda: arrive(scout) and len(scout.equipment.lamp) == 3)
+        check(scout.equipment.lamp, [True, False, False], "calls of the lamp: step, undo, other design")
+        check(scout.equipment.resets, 1, "calls of the camera")
+
+
+def silent_topic() -> None:
+    """A condition that is not seen afterwards: the steps are undone."""
+    condition = '{ node = "/visual_localization", state = "active" },\n]\nverify = [{ topic = "/visual_localization/pose" }]'
+    settings = STEPS.replace('{ node = "/visual_localization", state = "active" },\n]', condition)
+    scout = Scout()
+    scout.visual.is_mute = True
+    with scout.managed(settings):
+        scout.until_states("active", "inactive")
+        scout.equipment.lidar(DiagnosticStatus.ERROR, "no scan")
+        scout.until("visual localization is tried", lambda: scout.visual.state == "active")
+        scout.until("the failure is reported", lambda: scout.count("steps_failed") == 1)
+        scout.until_states("active", "inactive")
+        failed = [event["because"] for event in scout.events if event["answer"] == "steps_failed"]
+        check(failed, ["not seen afterwards: a message on /visual_localization/pose"], "reasons of failures")
+    scout = Scout()
+    with scout.managed(settings):
+        scout.until_states("active", "inactive")
+        scout.equipment.lidar(DiagnosticStatus.ERROR, "no scan")
+        scout.until_states("inactive", "active")
+        time.sleep(SETTLED)
+        check(scout.count("steps_failed"), 0, "failures if messages arrive")
+
+
+def changed_by_others() -> None:
+    """A node that another client deactivates is activated again."""
+    scout = Scout()
+    with scout.managed():
+        scout.until_states("active", "inactive")
+        time.sleep(SETTLED)
+        scout.amcl.trigger_deactivate()
+        scout.until_states("active", "inactive")
+        time.sleep(SETTLED)
+        check(scout.amcl.transitions, ["configure", "activate", "deactivate", "activate"], "transitions of amcl")
+        check(scout.count("steps_failed"), 0, "failures")
+
+
+def restarted() -> None:
+    """A node that starts late is waited for; one that is started again is configured and activated again."""
+    scout = Scout()
+    scout.started.remove(scout.amcl)
+    scout.started.remove(scout.visual)
+    with scout.managed(), nodes(scout.visual):
+        with nodes(scout.amcl):
+            scout.until_states("active", "inactive")
+            time.sleep(SETTLED)
+        scout.amcl = Localization("amcl")
+        with nodes(scout.amcl):
+            scout.until_states("active", "inactive", 40.0)
+            check(scout.amcl.transitions, ["configure", "activate"], "transitions of the new node")
+
+
+def commands() -> None:
+    """A command is a step if the command line allows it; its failure is undone."""
+    with tempfile.TemporaryDirectory() as directory:
+        made = pathlib.Path(directory) / "started"
+        command = f'{{ command = ["mkdir", "{made}"], undo = {{ command = ["rmdir", "{made}"] }} }}'
+        failing = STEPS.replace(
+            'steps = [{ node = "/controller", parameters = { max_speed = 1,',
+            f'steps = [{command}, {{ command = ["false"] }}, {{ node = "/controller", parameters = {{ max_speed = 1,',
+        )
+        scout = Scout()
+        with scout.managed(failing, "--allow-commands"):
+            scout.until("the slow design is used", lambda: scout.equipment.get_parameter("max_speed").value == 0.25)
+            scout.until("the failure is reported", lambda: scout.count("steps_failed") == 1)
+            check(made.exists(), False, "the directory after the rollback")
+            failed = [event["because"] for event in scout.events if event["answer"] == "steps_failed"]
+            check(["`false` has ended with" in because for because in failed], [True], "reasons of failures")
+        succeeding = failing.replace('{ command = ["false"] }, ', "")
+        scout = Scout()
+        with scout.managed(succeeding, "--allow-commands"):
+            scout.until("the fast design is used", lambda: scout.equipment.get_parameter("max_speed").value == 1.0)
+            check(made.exists(), True, "the directory")
+        with tempfile.NamedTemporaryFile("w", suffix=".toml") as file:
+            file.write(failing)
+            file.flush()
+            command = [PROGRAM, "--as", "manager", "--mission", str(SCOUT), "--settings", file.name]
+            ended = subprocess.run(command, capture_output=True, text=True, timeout=START, check=False)
+        check((ended.returncode, "N134" in ended.stderr), (2, True), "status and message without permission")
+
+
+SIGNALS = """
+[[signals]]
+node = "/amcl"
+state = "active"
+component = "c_camera"
+heal_time = 0
+
+[[signals]]
+topic = "/scan"
+component = "c_lidar"
+at_least = 5.0
+period = 1.0
+heal_time = 0.5
+
+[[signals]]
+topic = "/light"
+type = "std_msgs/msg/Float64"
+field = "data"
+attribute = "light"
+scale = 10.0
+period = 1.0
+"""
+
+
+def rate_signal() -> None:
+    """A topic that becomes too slow is a failed component; the other design is put into effect, and back when it is fast again."""
+    settings = STEPS + SIGNALS.replace('node = "/amcl"', 'node = "/controller"').replace('state = "active"\n', "", 1)
+    scout = Scout()
+    period = [0.05]
+    scans = scout.equipment.create_publisher(LaserScan, "/scan", qos_profile_sensor_data)
+    running = threading.Event()
+
+    def scan() -> None:
+        while not running.wait(period[0]):
+            scans.publish(LaserScan(ranges=[1.0] * 100))
+
+    thread = threading.Thread(target=scan, daemon=True)
+    thread.start()
+    light = scout.equipment.create_publisher(Float64, "/light", 10)
+    scout.equipment.create_timer(0.1, lambda: light.publish(Float64(data=30.0)))
+    try:
+        with scout.managed(settings):
+            scout.until_states("active", "inactive")
+            time.sleep(SETTLED)
+            check(scout.visual.transitions, ["configure"], "transitions while scans arrive")
+            period[0] = 0.5
+            scout.until_states("inactive", "active")
+            period[0] = 0.05
+            scout.until_states("active", "inactive", 30.0)
+    finally:
+        running.set()
+        thread.join()
+
+
+def value_signal() -> None:
+    """A value of a topic is a measurement in another unit, and the state of a lifecycle node is a component."""
+    settings = STEPS + SIGNALS.replace('"/amcl"', '"/bumper"').replace('component = "c_camera"', 'component = "c_bumper"')
+    scout, level, bumper = Scout(), [30.0], Localization("bumper")
+    scans = scout.equipment.create_publisher(LaserScan, "/scan", qos_profile_sensor_data)
+    scout.equipment.create_timer(0.05, lambda: scans.publish(LaserScan()))
+    light = scout.equipment.create_publisher(Float64, "/light", 10)
+    scout.equipment.create_timer(0.1, lambda: light.publish(Float64(data=level[0])))
+    bumper.trigger_configure()
+    bumper.trigger_activate()
+    with nodes(bumper), scout.managed(settings):
+        scout.until_states("active", "inactive")
+        scout.until("the fast design is used", lambda: scout.equipment.settings == [(1.0, False)])
+        time.sleep(SETTLED)
+        check(scout.equipment.settings, [(1.0, False)], "designs while nothing changes")
+        # The robot drives slowly while the node of the bumper is not active.
+        bumper.trigger_deactivate()
+        scout.until("the slow design is used", lambda: scout.equipment.settings[-1] == (0.25, True))
+        bumper.trigger_activate()
+        scout.until("the fast design is used", lambda: scout.equipment.settings[-1] == (1.0, False))
+        # It becomes dark: inspections need the thermal camera, which switches the lamp off.
+        level[0] = 5.0
+        scout.until("the dark design is used", lambda: arrive(scout) and scout.equipment.lamp[-1:] == [False])
+        check(scout.count("steps_failed"), 0, "failures")
+
+
+def silent_signal() -> None:
+    """A sensor that falls silent counts with its worst value; one that repeats its value does not."""
+    settings = STEPS + SIGNALS.replace('node = "/amcl"', 'node = "/controller"').replace('state = "active"\n', "", 1)
+    scout = Scout()
+    level = [30.0]
+    scans = scout.equipment.create_publisher(LaserScan, "/scan", qos_profile_sensor_data)
+    scout.equipment.create_timer(0.05, lambda: scans.publish(LaserScan()))
+    light = scout.equipment.create_publisher(Float64, "/light", 10)
+    scout.equipment.create_timer(0.1, lambda: level[0] is not None and light.publish(Float64(data=level[0])))
+    with scout.managed(settings):
+        scout.until_states("active", "inactive")
+        time.sleep(SETTLED)
+        silences = lambda: [event for event in scout.events if event["answer"] == "silent" and "function" not in event]
+        check(silences(), [], "reports of silence while the value is repeated")
+        level[0] = None
+        scout.until("silence is reported", lambda: len(silences()) == 1)
+
+
+def simulated_time() -> None:
+    """With `use_sim_time`, a filter waits for simulated seconds: the recovery of a component takes effect when the simulation says so."""
+    scout, now, step = Scout(), [1000.0], [0.01]
+    clock = scout.equipment.create_publisher(Clock, "/clock", qos_profile_sensor_data)
+    stopped = threading.Event()
+
+    def simulate() -> None:
+        while not stopped.wait(0.01):
+            now[0] += step[0]
+            seconds = int(now[0])
+            clock.publish(Clock(clock=Time(sec=seconds, nanosec=int((now[0] - seconds) * 1e9))))
+
+    threading.Thread(target=simulate, daemon=True).start()
+    stamps: list[int] = []
+    scout.equipment.create_subscription(
+        DiagnosticArray,
+        "/diagnostics",
+        lambda array: stamps.extend(
+            array.header.stamp.sec for status in array.status if status.name == "metaplan: manager"
+        ),
+        10,
+    )
+    try:
+        with scout.managed(STEPS, "--ros-args", "-p", "use_sim_time:=true"):
+            scout.until_states("active", "inactive")
+            scout.until("its status has a simulated stamp", lambda: any(999 < stamp < 3000 for stamp in stamps))
+            scout.equipment.lidar(DiagnosticStatus.ERROR, "no scan")
+            scout.until_states("inactive", "active")
+            # The clock stands still: 2 s of `heal_time` and 5 s of `settle` do not pass.
+            step[0] = 0.0
+            scout.equipment.lidar(DiagnosticStatus.OK, "scans")
+            time.sleep(9.0)
+            check(scout.states(), ("inactive", "active"), "states while the clock stands still")
+            # Ten times as fast: both pass within about a second.
+            step[0] = 0.1
+            resumed = time.monotonic()
+            scout.until_states("active", "inactive")
+            elapsed = time.monotonic() - resumed
+            if elapsed > 5.0:
+                raise Failure(f"the recovery took {elapsed:.1f} s at tenfold speed, 7 simulated seconds are expected")
+    finally:
+        stopped.set()
+
+
+def discover() -> None:
+    """The settings that are written name what the robot has, and can be used as they are."""
+    scout = Scout()
+    scans = scout.equipment.create_publisher(LaserScan, "/scan", qos_profile_sensor_data)
+    scout.equipment.create_timer(0.1, lambda: scans.publish(LaserScan()))
+    scout.equipment.create_publisher(Float64, "/light", 10)
+    scout.equipment.create_timer(0.5, lambda: scout.equipment.lidar(DiagnosticStatus.ERROR, "no scan"))
+    with tempfile.TemporaryDirectory() as directory, nodes(scout.amcl, scout.visual, scout.equipment):
+        file = pathlib.Path(directory) / "ros.toml"
+        command = [PROGRAM, "--as", "discover", "--mission", SCOUT, "--seconds", "6", "--output", file]
+        ended = subprocess.run(command, capture_output=True, text=True, timeout=START, check=False)
+        check(ended.returncode, 0, f"the status\n{ended.stderr}")
+        text = file.read_text()
+        for part in (
+            '# name = "lidar: driver"\n# component = "c_lidar"',
+            '# node = "/amcl"\n# state = "active"  # now unconfigured',
+            '# topic = "/scan"',
+            '# topic = "/light"\n# type = "std_msgs/msg/Float64"',
+            "# [functions.f_localize.designs.fd_lidar_localization]",
+            'service = "/lamp", type = "std_srvs/srv/SetBool"',
+        ):
+            check(part in text, True, f"{part} in the settings\n{text}")
+        again = subprocess.run(command, capture_output=True, text=True, timeout=START, check=False)
+        check((again.returncode, "not overwritten" in again.stderr), (2, True), "the existing file is kept")
+        # The rule for the lidar adapts the robot at once.
+        start = text.index("# [[diagnostics]]")
+        rule = "\n".join(line.removeprefix("# ") for line in text[start:].split("\n\n")[0].splitlines())
+        settings = STEPS.replace('[[diagnostics]]\nname = "lidar: *"\ncomponent = "c_lidar"\n', rule + "\n")
+        check("lidar: *" in settings, False, "the rule is replaced")
+    scout = Scout()
+    with scout.managed(settings):
+        scout.until_states("active", "inactive")
+        scout.equipment.lidar(DiagnosticStatus.ERROR, "no scan")
+        scout.until_states("inactive", "active")
+
+
 SCENARIOS = {
     "manager": lambda: manager(0.0),
     "manager_50ms": lambda: manager(0.05),
@@ -211,6 +587,19 @@ SCENARIOS = {
     "parameters": parameters,
     "driver": driver,
     "waiting": waiting,
+    "steps": steps,
+    "rollback": rollback,
+    "refused_parameters": refused_parameters,
+    "refused_service": refused_service,
+    "silent_topic": silent_topic,
+    "changed_by_others": changed_by_others,
+    "restarted": restarted,
+    "commands": commands,
+    "rate_signal": rate_signal,
+    "value_signal": value_signal,
+    "silent_signal": silent_signal,
+    "simulated_time": simulated_time,
+    "discover": discover,
 }
 
 

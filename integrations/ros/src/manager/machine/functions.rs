@@ -43,16 +43,22 @@ pub(super) struct Grant {
 impl Machine {
     /// Requests the mode for a function that is not needed.
     pub(super) fn unground(&mut self, function: &str) {
-        let mode = self.settings.functions.unground(function).to_owned();
+        let Some(mode) = self.settings.functions.unground(function).map(str::to_owned) else { return };
         let requested = self.pending.get(function).map(|change| &change.mode);
         let has = requested.or_else(|| self.modes.get(function));
         // Nothing is requested while the mode of the function is unknown.
         if has.is_some_and(|has| *has != mode) {
-            self.change(Change { function: function.to_owned(), mode, effect: None, attempt: 1 });
+            self.change(function.to_owned(), mode, None);
         }
     }
 
-    pub(super) fn change(&mut self, change: Change) {
+    /// Requests a mode. Steps have waited for their nodes and are undone when they fail, so that they are not repeated at once.
+    pub(super) fn change(&mut self, function: String, mode: String, effect: Option<u64>) {
+        let attempt = if self.settings.functions.has_steps(&function) { MAX_ATTEMPTS } else { 1 };
+        self.send(Change { function, mode, effect, attempt });
+    }
+
+    fn send(&mut self, change: Change) {
         self.pending.insert(change.function.clone(), change.clone());
         self.outputs.push(Output::Change(change));
     }
@@ -77,7 +83,7 @@ impl Machine {
             }
             Outcome::Failed(because) if attempt < MAX_ATTEMPTS => {
                 self.complain(&function, &mode, &because);
-                self.change(Change { attempt: attempt + 1, ..change });
+                self.send(Change { attempt: attempt + 1, ..change });
                 because
             }
             Outcome::Failed(because) => {
@@ -97,14 +103,26 @@ impl Machine {
                 self.failed(&function, effect, Some(self.now + REFUSED_RETRY_DELAY));
                 because
             }
+            Outcome::StepFailed(because) => {
+                self.complain(&function, &mode, &because);
+                self.failed(&function, effect, Some(self.now + REFUSED_RETRY_DELAY));
+                because
+            }
         }
     }
 
     pub(super) fn complain(&mut self, function: &str, mode: &str, because: &str) {
-        let system = self.settings.functions.system(function).to_owned();
-        self.outputs.push(Output::Warn(format!("/{system}/change_mode {mode}: {because}")));
+        if self.settings.functions.has_steps(function) {
+            self.outputs.push(Output::Warn(format!("{function} {mode}: {because}")));
+            self.outputs.push(Output::Event(json!({
+                "answer": "steps_failed", "function": function, "mode": mode, "because": because,
+            })));
+            return;
+        }
+        let service = format!("/{}/change_mode", self.settings.functions.system(function));
+        self.outputs.push(Output::Warn(format!("{service} {mode}: {because}")));
         self.outputs.push(Output::Event(json!({
-            "answer": "call_failed", "service": format!("/{system}/change_mode"), "mode": mode, "because": because,
+            "answer": "call_failed", "service": service, "mode": mode, "because": because,
         })));
     }
 
@@ -158,9 +176,13 @@ impl Machine {
 
     /// Handles a reported mode.
     pub(super) fn mode(&mut self, function: &str, mode: &str) -> String {
-        let because = format!("{function} was seen with the mode {mode}");
+        let because = match mode {
+            "" => format!("{function} was seen in none of its modes"),
+            _ => format!("{function} was seen with the mode {mode}"),
+        };
         if let Some(change) = self.pending.get(function).cloned() {
-            if change.mode == mode && change.attempt >= MAX_ATTEMPTS {
+            let has_steps = self.settings.functions.has_steps(function);
+            if change.mode == mode && change.attempt >= MAX_ATTEMPTS && !has_steps {
                 // The reply was lost, but the mode shows that the call succeeded.
                 return self.changed(change, Outcome::Done);
             }

@@ -22,7 +22,8 @@ pub(in crate::manager) enum Input {
     Cancel(u64, String),
     /// A function has replied to a call, or the call has failed.
     Changed(Change, Outcome),
-    /// The current mode of a function, as its mode manager has answered.
+    /// The current mode of a function, as its mode manager has answered or as its nodes show. Empty if the function is in
+    /// none of its modes.
     Mode(String, String),
     /// The mode that a client has requested from a function's mode manager.
     ModeRequested(String, String),
@@ -40,7 +41,7 @@ pub(in crate::manager) enum Input {
     Tick,
 }
 
-/// A call of `change_mode`.
+/// A call of `change_mode`, or the steps that have the same effect.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::manager) struct Change {
     /// Name of the function.
@@ -62,6 +63,8 @@ pub(in crate::manager) enum Outcome {
     Refused,
     /// There was no valid reply, for this reason.
     Failed(String),
+    /// A step has failed for this reason, and the steps before it are undone.
+    StepFailed(String),
 }
 
 /// Outcome of an action.
@@ -75,7 +78,7 @@ pub(in crate::manager) enum Ended {
 /// Output of the state machine.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::manager) enum Output {
-    /// Call `change_mode`.
+    /// Call `change_mode`, or execute the steps of the mode.
     Change(Change),
     /// Request the mode of a function.
     Look(String),

@@ -295,12 +295,18 @@ impl Machine {
         match effect.command {
             Command::Reconfigure { function, to, .. } => {
                 let mode = self.settings.functions.mode(&function, &to).to_owned();
+                // Steps end by their own timeout; a repeated request must not interrupt them.
+                if self.settings.functions.has_steps(&function)
+                    && self.pending.get(&function).is_some_and(|change| change.effect == Some(effect.number))
+                {
+                    return;
+                }
                 // Another client has already set the mode while this program was not running.
                 if self.deferred.is_some() && self.modes.get(&function) == Some(&mode) {
                     self.acknowledge(effect.number);
                     return;
                 }
-                self.change(Change { function, mode, effect: Some(effect.number), attempt: 1 });
+                self.change(function, mode, Some(effect.number));
             }
             Command::Request { step } => {
                 let call = call(&step);

@@ -18,8 +18,10 @@ impl Machine {
             self.outputs.push(Output::Reply(number, granted));
         }
         for number in std::mem::take(&mut self.end_requests) {
-            let unanswered =
-                self.modes.iter().any(|(function, mode)| self.settings.functions.unground(function) != mode);
+            let is_other = |(function, mode): (&String, &String)| {
+                self.settings.functions.unground(function).is_some_and(|unground| unground != mode)
+            };
+            let unanswered = self.modes.iter().any(is_other);
             self.outputs.push(Output::Reply(number, self.task.is_none() && !unanswered));
         }
     }

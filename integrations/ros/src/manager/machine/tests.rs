@@ -35,7 +35,17 @@ impl Robot {
 
     /// Creates a machine whose functions reply with these modes.
     fn found(journal: Option<&Path>, mode: impl Fn(&str) -> &'static str) -> Self {
-        let (mut control, settings) = control();
+        let (control, settings) = control();
+        Self::with(control, settings, journal, mode)
+    }
+
+    /// Creates a machine whose functions reply with these modes.
+    fn with(
+        mut control: Loop,
+        settings: Settings,
+        journal: Option<&Path>,
+        mode: impl Fn(&str) -> &'static str,
+    ) -> Self {
         let journal =
             journal.map(|path| Journal::open(path, Policy::default(), &mut control).expect("a journal").0);
         let machine = Machine::new(control, journal, settings);
@@ -345,4 +355,65 @@ fn a_restart_repeats_no_fulfilled_request() {
     let text = format!("{report:?}");
     assert!(text.contains("WAIT_GRAPH -> IDLE: every function answers"), "{text}");
     assert!(text.contains("IDLE -> PLAN -> RECONFIGURE: the task search_pipeline is requested"), "{text}");
+}
+
+/// Creates a machine whose spiral has steps for its designs, and none for the time when it is not needed.
+fn with_steps() -> Robot {
+    let mission = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/suave/suave.toml");
+    let (control, _) = control();
+    let mut text = std::fs::read_to_string(mission.with_file_name("ros.toml")).expect("settings");
+    for design in ["fd_spiral_high", "fd_spiral_medium", "fd_spiral_low"] {
+        text += &format!(
+            "\n[functions.{PATH}.designs.{design}]\nsteps = [{{ node = \"/{design}\", state = \"active\" }}]\n"
+        );
+    }
+    let directory = tempfile::tempdir().expect("a directory");
+    let file = directory.path().join("ros.toml");
+    std::fs::write(&file, text).expect("written");
+    let settings = Settings::read(Some(&file), &mission).expect("settings");
+    Robot::with(control, settings, None, |function| if function == PATH { "" } else { "fd_unground" })
+}
+
+#[test]
+fn failed_steps_are_replaced_by_another_design_at_once_and_tried_again_later() {
+    let mut robot = with_steps();
+    let outputs = robot.request("search_pipeline");
+    assert_eq!(changes(&outputs), [(PATH, "fd_spiral_high"), (MOTION, "fd_all_thrusters")]);
+    let is_path = |output: &Output| matches!(output, Output::Change(change) if change.function == PATH);
+    let first = outputs.iter().find(|output| is_path(output)).expect("a change").clone();
+    let next = robot.answer(&first, Outcome::StepFailed("/fd_spiral_high has refused".to_owned()));
+    assert_eq!(changes(&next), [(PATH, "fd_spiral_medium")]);
+    // A node without an answer is not called twice, because the steps have waited for it.
+    let second = next.iter().find(|output| is_path(output)).expect("a change").clone();
+    let next = robot.answer(&second, Outcome::Failed("no answer".to_owned()));
+    assert_eq!(changes(&next), [(PATH, "fd_spiral_low")]);
+    assert!(next.iter().any(|output| matches!(output, Output::Probe(function, _) if function == PATH)));
+    let outputs = robot.handle(Input::Probed(PATH.to_owned(), true));
+    assert_eq!(changes(&outputs), [(PATH, "fd_spiral_medium")]);
+}
+
+#[test]
+fn a_mode_that_is_seen_does_not_end_running_steps() {
+    let mut robot = with_steps();
+    let outputs = robot.request("search_pipeline");
+    assert_eq!(robot.handle(Input::Mode(PATH.to_owned(), "fd_spiral_high".to_owned())), []);
+    assert_eq!(robot.machine.state(), State::Reconfigure);
+    robot.obey(outputs);
+    assert_eq!(robot.machine.state(), State::Execute);
+    // The node fails later.
+    robot.now += Duration::from_secs(3);
+    robot.handle(Input::Tick);
+    let outputs = robot.handle(Input::Mode(PATH.to_owned(), String::new()));
+    assert_eq!(changes(&outputs), [(PATH, "fd_spiral_high")]);
+}
+
+#[test]
+fn a_function_without_steps_for_its_idle_time_keeps_its_design() {
+    let mut robot = with_steps();
+    let outputs = robot.request("search_pipeline");
+    robot.obey(outputs);
+    let outputs = robot.handle(Input::Cancel(8, "search_pipeline".to_owned()));
+    assert_eq!(changes(&outputs), [(MOTION, "fd_unground")]);
+    let outputs = robot.obey(outputs);
+    assert!(outputs.contains(&Output::Reply(8, true)), "{outputs:?}");
 }

@@ -1,0 +1,422 @@
+//! Clients of the nodes, services and topics that procedures use.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::process::Stdio;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use metaplan::message::Message;
+use ros2_client::ParameterValue;
+use smol::Timer;
+
+use crate::interfaces::lifecycle_msgs::msg::State;
+use crate::interfaces::lifecycle_msgs::srv::{ChangeState, ChangeStateRequest, GetState, GetStateRequest};
+use crate::interfaces::rcl_interfaces::msg;
+use crate::interfaces::rcl_interfaces::srv::{
+    GetParameters, GetParametersRequest, SetParametersAtomically, SetParametersAtomicallyRequest,
+};
+use crate::interfaces::std_srvs::srv::{
+    Empty, EmptyRequest, SetBool, SetBoolRequest, Trigger, TriggerRequest,
+};
+use crate::node::{Arrivals, CallError, Caller, Node, PrimaryState, fitting, parameter, raw};
+use crate::procedure::settings::{Condition, Operation, Procedure, ServiceCall};
+
+/// Period of repeated observations of a condition.
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
+
+/// Timeout of a single observation of a node.
+pub(super) const OBSERVATION_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// Reason for the failure of an operation or a condition.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Failure {
+    /// The robot has answered, and the operation has not succeeded.
+    Refused(String),
+    /// The robot has not answered.
+    Silent(String),
+    /// A newer request replaces the procedure.
+    Replaced,
+}
+
+impl Failure {
+    pub(super) fn because(&self) -> &str {
+        match self {
+            Self::Refused(because) | Self::Silent(because) => because,
+            Self::Replaced => "a newer request replaces it",
+        }
+    }
+}
+
+impl From<CallError> for Failure {
+    fn from(error: CallError) -> Self {
+        Self::Silent(error.to_string())
+    }
+}
+
+/// Service clients of a node.
+struct NodeClient {
+    change_state: Caller<ChangeState>,
+    get_state: Caller<GetState>,
+    set_parameters: Caller<SetParametersAtomically>,
+    get_parameters: Caller<GetParameters>,
+}
+
+/// Client of a service.
+enum ServiceClient {
+    Empty(Caller<Empty>),
+    Trigger(Caller<Trigger>),
+    SetBool(Caller<SetBool>),
+}
+
+/// All clients, by the names in the settings.
+pub(super) struct Clients {
+    nodes: BTreeMap<String, NodeClient>,
+    services: BTreeMap<(String, &'static str), ServiceClient>,
+    topics: BTreeMap<String, Arrivals>,
+}
+
+fn kind(call: ServiceCall) -> &'static str {
+    match call {
+        ServiceCall::Empty => "Empty",
+        ServiceCall::Trigger => "Trigger",
+        ServiceCall::SetBool(_) => "SetBool",
+    }
+}
+
+fn remaining(deadline: Instant) -> Duration {
+    deadline.saturating_duration_since(Instant::now())
+}
+
+impl Clients {
+    /// Creates the clients of procedures.
+    ///
+    /// # Errors
+    /// A topic cannot be subscribed to.
+    pub(super) fn new<'p>(
+        node: &Arc<Node>,
+        procedures: impl Iterator<Item = &'p Procedure>,
+    ) -> Result<Self, Message> {
+        let mut clients = Self { nodes: BTreeMap::new(), services: BTreeMap::new(), topics: BTreeMap::new() };
+        for procedure in procedures {
+            for operation in procedure.operations() {
+                match operation {
+                    Operation::State { node: name, .. } | Operation::Parameters { node: name, .. } => {
+                        clients.add_node(node, name);
+                    }
+                    Operation::Service { service, call } => {
+                        let client = || match call {
+                            ServiceCall::Empty => ServiceClient::Empty(node.caller(service)),
+                            ServiceCall::Trigger => ServiceClient::Trigger(node.caller(service)),
+                            ServiceCall::SetBool(_) => ServiceClient::SetBool(node.caller(service)),
+                        };
+                        clients.services.entry((service.clone(), kind(*call))).or_insert_with(client);
+                    }
+                    Operation::Command(_) => {}
+                }
+            }
+            for condition in &procedure.conditions {
+                match condition {
+                    Condition::State { node: name, .. } | Condition::Parameters { node: name, .. } => {
+                        clients.add_node(node, name);
+                    }
+                    Condition::Topic(topic) if !clients.topics.contains_key(topic) => {
+                        clients.topics.insert(topic.clone(), node.arrivals(topic)?);
+                    }
+                    Condition::Topic(_) => {}
+                }
+            }
+        }
+        Ok(clients)
+    }
+
+    fn add_node(&mut self, node: &Arc<Node>, name: &str) {
+        self.nodes.entry(name.to_owned()).or_insert_with(|| NodeClient {
+            change_state: node.caller(&format!("{name}/change_state")),
+            get_state: node.caller(&format!("{name}/get_state")),
+            set_parameters: node.caller(&format!("{name}/set_parameters_atomically")),
+            get_parameters: node.caller(&format!("{name}/get_parameters")),
+        });
+    }
+
+    fn node(&self, name: &str) -> Result<&NodeClient, Failure> {
+        // Clients exist for all nodes of the settings.
+        self.nodes.get(name).ok_or_else(|| Failure::Refused(format!("{name} has no client")))
+    }
+
+    /// Connects to the services of an operation. Returns the missing ones.
+    pub(super) async fn missing(&self, operation: &Operation, within: Duration) -> Vec<String> {
+        let mut missing = Vec::new();
+        let mut note =
+            |result: Result<(), CallError>| missing.extend(result.err().map(|error| error.to_string()));
+        match operation {
+            Operation::State { node, .. } => {
+                let Ok(client) = self.node(node) else { return missing };
+                note(client.change_state.ready(within).await);
+                note(client.get_state.ready(within).await);
+            }
+            Operation::Parameters { node, .. } => {
+                let Ok(client) = self.node(node) else { return missing };
+                note(client.set_parameters.ready(within).await);
+                note(client.get_parameters.ready(within).await);
+            }
+            Operation::Service { service, call } => {
+                match self.services.get(&(service.clone(), kind(*call))) {
+                    Some(ServiceClient::Empty(client)) => note(client.ready(within).await),
+                    Some(ServiceClient::Trigger(client)) => note(client.ready(within).await),
+                    Some(ServiceClient::SetBool(client)) => note(client.ready(within).await),
+                    None => {}
+                }
+            }
+            Operation::Command(_) => {}
+        }
+        missing
+    }
+
+    /// Returns `true` if the services of an operation answer, as far as that can be tested without an effect.
+    pub(super) async fn answers(&self, operation: &Operation) -> bool {
+        if !self.missing(operation, Duration::ZERO).await.is_empty() {
+            return false;
+        }
+        match operation.condition() {
+            Some(condition) => self.holds(&condition).await.is_ok(),
+            None => true,
+        }
+    }
+
+    /// Returns the GUIDs of the servers that tell the state and the parameters of a node.
+    pub(super) fn servers(&self, condition: &Condition) -> BTreeSet<[u8; 16]> {
+        let (Condition::State { node, .. } | Condition::Parameters { node, .. }) = condition else {
+            return BTreeSet::new();
+        };
+        let Ok(client) = self.node(node) else { return BTreeSet::new() };
+        match condition {
+            Condition::State { .. } => client.get_state.servers(),
+            _ => client.get_parameters.servers(),
+        }
+    }
+
+    /// Returns the state of a node.
+    async fn state(&self, node: &str, within: Duration) -> Result<State, Failure> {
+        let answer = self.node(node)?.get_state.call(GetStateRequest::default(), within).await?;
+        Ok(answer.current_state)
+    }
+
+    /// Returns the primary state of a node, once it is in no transition. A finalized node is a failure.
+    async fn primary_state(&self, node: &str, deadline: Instant) -> Result<PrimaryState, Failure> {
+        loop {
+            let state = self.state(node, remaining(deadline)).await?;
+            if let Some(primary) = PrimaryState::of(&state) {
+                return Ok(primary);
+            }
+            if state.id == State::PRIMARY_STATE_FINALIZED {
+                return Err(Failure::Refused(format!("{node} is finalized and has to be started again")));
+            }
+            if remaining(deadline).is_zero() {
+                return Err(Failure::Refused(format!(
+                    "{node} is still {} at the end of the timeout",
+                    state.label
+                )));
+            }
+            Timer::after(POLL_INTERVAL).await;
+        }
+    }
+
+    /// Brings a node to a state. Returns its state before.
+    pub(super) async fn bring(
+        &self,
+        node: &str,
+        target: PrimaryState,
+        deadline: Instant,
+        mut before: impl FnMut(PrimaryState),
+    ) -> Result<(), Failure> {
+        let mut state = self.primary_state(node, deadline).await?;
+        before(state);
+        while let Some(transition) = state.toward(target) {
+            let label = transition.label.clone();
+            let request = ChangeStateRequest { transition };
+            let answer = self.node(node)?.change_state.call(request, remaining(deadline)).await?;
+            let reached = self.primary_state(node, deadline).await?;
+            if !answer.success || reached == state {
+                let text = format!("{node} has refused the transition `{label}` and is {reached}");
+                return Err(Failure::Refused(text));
+            }
+            state = reached;
+        }
+        Ok(())
+    }
+
+    /// Returns the present values of parameters; a parameter that does not exist is not set.
+    pub(super) async fn parameters(
+        &self,
+        node: &str,
+        values: &[(String, ParameterValue)],
+        within: Duration,
+    ) -> Result<Vec<ParameterValue>, Failure> {
+        let names: Vec<String> = values.iter().map(|(name, _)| name.clone()).collect();
+        let answer = self.node(node)?.get_parameters.call(GetParametersRequest { names }, within).await?;
+        let mut present: Vec<ParameterValue> = answer
+            .values
+            .into_iter()
+            .map(|value| parameter(value).unwrap_or(ParameterValue::NotSet))
+            .collect();
+        // Nodes of `rclcpp` answer without values if one of the parameters is not declared.
+        present.resize(values.len(), ParameterValue::NotSet);
+        Ok(present)
+    }
+
+    /// Sets parameters atomically and checks the values afterwards. Returns without a call if the node has the values.
+    pub(super) async fn set(
+        &self,
+        node: &str,
+        values: &[(String, ParameterValue)],
+        deadline: Instant,
+        before: impl FnOnce(Vec<(String, ParameterValue)>),
+    ) -> Result<(), Failure> {
+        let present = self.parameters(node, values, remaining(deadline)).await?;
+        let values_to_set = fitted(values, &present);
+        if values_to_set == present {
+            return Ok(());
+        }
+        before(values.iter().map(|(name, _)| name.clone()).zip(present).collect());
+        let parameters = values
+            .iter()
+            .zip(&values_to_set)
+            .map(|((name, _), value)| msg::Parameter { name: name.clone(), value: raw(value.clone()) })
+            .collect();
+        let request = SetParametersAtomicallyRequest { parameters };
+        let answer = self.node(node)?.set_parameters.call(request, remaining(deadline)).await?;
+        if !answer.result.successful {
+            let reason = answer.result.reason;
+            return Err(Failure::Refused(format!("{node} has refused the parameters: {reason}")));
+        }
+        let present = self.parameters(node, values, remaining(deadline)).await?;
+        let differs = values
+            .iter()
+            .zip(&values_to_set)
+            .zip(&present)
+            .find(|((_, values_to_set), present)| values_to_set != present);
+        match differs {
+            None => Ok(()),
+            Some((((name, _), values_to_set), present)) => Err(Failure::Refused(format!(
+                "{node} has accepted the parameter {name} = {}, and has {}",
+                text(values_to_set),
+                text(present)
+            ))),
+        }
+    }
+
+    /// Calls a service.
+    pub(super) async fn call(
+        &self,
+        service: &str,
+        call: ServiceCall,
+        within: Duration,
+    ) -> Result<(), Failure> {
+        let client = self.services.get(&(service.to_owned(), kind(call)));
+        let (success, message) = match (client, call) {
+            (Some(ServiceClient::Empty(client)), _) => {
+                client.call(EmptyRequest::default(), within).await?;
+                (true, String::new())
+            }
+            (Some(ServiceClient::Trigger(client)), _) => {
+                let answer = client.call(TriggerRequest::default(), within).await?;
+                (answer.success, answer.message)
+            }
+            (Some(ServiceClient::SetBool(client)), ServiceCall::SetBool(data)) => {
+                let answer = client.call(SetBoolRequest { data }, within).await?;
+                (answer.success, answer.message)
+            }
+            _ => (false, "there is no client".to_owned()),
+        };
+        if success { Ok(()) } else { Err(Failure::Refused(format!("{service} has refused: {message}"))) }
+    }
+
+    /// Returns `true` if a node has a state or parameters. The arrival of messages is not tested here.
+    pub(super) async fn holds(&self, condition: &Condition) -> Result<bool, Failure> {
+        match condition {
+            Condition::State { node, state } => {
+                let present = self.state(node, OBSERVATION_TIMEOUT).await?;
+                match PrimaryState::of(&present) {
+                    Some(primary) => Ok(primary == *state),
+                    None if present.id == State::PRIMARY_STATE_FINALIZED => Ok(false),
+                    None => Err(Failure::Silent(format!("{node} is {}", present.label))),
+                }
+            }
+            Condition::Parameters { node, values } => {
+                let present = self.parameters(node, values, OBSERVATION_TIMEOUT).await?;
+                Ok(fitted(values, &present) == present)
+            }
+            Condition::Topic(_) => Ok(true),
+        }
+    }
+
+    /// Waits until a condition holds.
+    pub(super) async fn until(
+        &self,
+        condition: &Condition,
+        since: Instant,
+        deadline: Instant,
+    ) -> Result<(), Failure> {
+        loop {
+            let outcome = match condition {
+                Condition::Topic(topic) => {
+                    Ok(self.topics.get(topic).is_some_and(|arrivals| arrivals.is_after(since)))
+                }
+                other => self.holds(other).await,
+            };
+            match outcome {
+                Ok(true) => return Ok(()),
+                Ok(false) if remaining(deadline).is_zero() => {
+                    return Err(Failure::Refused(format!("not seen afterwards: {condition}")));
+                }
+                Err(failure) if remaining(deadline).is_zero() => return Err(failure),
+                Ok(false) | Err(_) => {
+                    Timer::after(POLL_INTERVAL).await;
+                }
+            }
+        }
+    }
+}
+
+/// Executes a program. Its output goes to standard error, and it is killed at the deadline.
+pub(super) async fn execute(words: &[String], deadline: Instant) -> Result<(), Failure> {
+    let [program, arguments @ ..] = words else { return Ok(()) };
+    let child = smol::process::Command::new(program)
+        .args(arguments)
+        .stdin(Stdio::null())
+        .stdout(Stdio::from(std::io::stderr()))
+        .kill_on_drop(true)
+        .spawn();
+    let mut child =
+        child.map_err(|error| Failure::Refused(format!("`{program}` cannot be started: {error}")))?;
+    let ended = async { Some(child.status().await) };
+    let late = async {
+        Timer::at(deadline).await;
+        None
+    };
+    match smol::future::or(ended, late).await {
+        Some(Ok(status)) if status.success() => Ok(()),
+        Some(Ok(status)) => Err(Failure::Refused(format!("`{}` has ended with {status}", words.join(" ")))),
+        Some(Err(error)) => Err(Failure::Refused(format!("`{program}` cannot be waited for: {error}"))),
+        None => Err(Failure::Silent(format!("`{}` had not ended in time and was killed", words.join(" ")))),
+    }
+}
+
+/// Converts values to the types of the present ones: an integer for a double.
+fn fitted(values: &[(String, ParameterValue)], present: &[ParameterValue]) -> Vec<ParameterValue> {
+    let fit = |((_, value), present): (&(String, ParameterValue), &ParameterValue)| {
+        fitting(present, value.clone()).unwrap_or_else(|_| value.clone())
+    };
+    values.iter().zip(present).map(fit).collect()
+}
+
+fn text(value: &ParameterValue) -> String {
+    match value {
+        ParameterValue::NotSet => "no value".to_owned(),
+        ParameterValue::Boolean(truth) => truth.to_string(),
+        ParameterValue::Integer(number) => number.to_string(),
+        ParameterValue::Double(number) => number.to_string(),
+        ParameterValue::String(text) => format!("{text:?}"),
+        other => format!("{other:?}"),
+    }
+}

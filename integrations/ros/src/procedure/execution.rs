@@ -1,0 +1,394 @@
+//! Execution of procedures: steps in order, verification, and rollback after a failure.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use metaplan::message::Message;
+use serde_json::{Value, json};
+
+use crate::node::{Node, Severity};
+use crate::procedure::clients::{Clients, Failure, OBSERVATION_TIMEOUT, execute};
+use crate::procedure::settings::{Condition, Operation, Procedure};
+
+/// Outcome of a procedure.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Outcome {
+    /// All steps have succeeded and all conditions hold.
+    Done,
+    /// A step has failed or a condition does not hold, although the robot answers. Earlier steps are undone.
+    Failed(String),
+    /// A node does not answer. Earlier steps are undone as far as possible.
+    Silent(String),
+}
+
+/// Design of a function as it is seen on the robot.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Seen {
+    /// The conditions of this mode hold.
+    Mode(String),
+    /// The conditions of no mode hold.
+    Nothing,
+    /// A node does not answer or is in a transition, or several modes cannot be distinguished.
+    Unknown,
+}
+
+/// Receiver of events about steps.
+type Report = dyn Fn(&Value) + Send + Sync;
+
+/// Procedures of one function.
+struct FunctionProcedures {
+    modes: BTreeMap<String, Procedure>,
+    /// Held while a procedure runs, so that procedures of a function never overlap.
+    running: smol::lock::Mutex<()>,
+    /// Mode that was put into effect or seen last.
+    present: Mutex<Option<String>>,
+    /// Modes that could not be put into effect because a node was silent.
+    silent: Mutex<BTreeSet<String>>,
+}
+
+/// Procedures of all functions that have some.
+pub(crate) struct Procedures {
+    node: Arc<Node>,
+    functions: BTreeMap<String, FunctionProcedures>,
+    clients: Clients,
+    report: Box<Report>,
+}
+
+/// Operation that undoes a step.
+#[derive(Debug)]
+enum Undo {
+    Operation(Operation),
+    /// No operation is known that undoes this one.
+    Impossible(String),
+}
+
+impl Procedures {
+    /// Creates the procedures by functions and modes. Events about their steps are passed to `report`.
+    ///
+    /// # Errors
+    /// A topic of a condition cannot be subscribed to.
+    pub(crate) fn new(
+        node: &Arc<Node>,
+        functions: BTreeMap<String, BTreeMap<String, Procedure>>,
+        report: impl Fn(&Value) + Send + Sync + 'static,
+    ) -> Result<Self, Message> {
+        let clients = Clients::new(node, functions.values().flat_map(BTreeMap::values))?;
+        let functions = functions.into_iter().map(|(function, modes)| {
+            let procedures = FunctionProcedures {
+                modes,
+                running: smol::lock::Mutex::new(()),
+                present: Mutex::default(),
+                silent: Mutex::default(),
+            };
+            (function, procedures)
+        });
+        Ok(Self { node: Arc::clone(node), functions: functions.collect(), clients, report: Box::new(report) })
+    }
+
+    /// Returns `true` if a function has procedures.
+    pub(crate) fn contains(&self, function: &str) -> bool {
+        self.functions.contains_key(function)
+    }
+
+    /// Returns `true` if a function has procedures, and none of them sets a state or a parameter.
+    pub(crate) fn is_unobservable(&self, function: &str) -> bool {
+        self.functions.get(function).is_some_and(|procedures| procedures.conditions().next().is_none())
+    }
+
+    /// Returns the nodes whose state or parameters show the mode of a function.
+    pub(crate) fn nodes(&self, function: &str) -> BTreeSet<String> {
+        let conditions = self.functions.get(function).into_iter().flat_map(FunctionProcedures::conditions);
+        let node = |condition| match condition {
+            Condition::State { node, .. } | Condition::Parameters { node, .. } => Some(node),
+            Condition::Topic(_) => None,
+        };
+        conditions.filter_map(node).collect()
+    }
+
+    /// Returns the servers of these nodes. A restarted or lost node changes them.
+    pub(crate) fn servers(&self, function: &str) -> BTreeSet<[u8; 16]> {
+        let conditions = self.functions.get(function).into_iter().flat_map(FunctionProcedures::conditions);
+        conditions.flat_map(|condition| self.clients.servers(&condition)).collect()
+    }
+
+    /// Waits until all services of at least one mode of a function exist. Returns the missing ones of the mode that
+    /// lacks the fewest. Services that are used after a command may be started by it and are not waited for.
+    pub(crate) async fn missing(&self, function: &str, within: Duration) -> Vec<String> {
+        let Some(procedures) = self.functions.get(function) else { return Vec::new() };
+        let of_mode = |procedure: &'_ Procedure| {
+            let operations: Vec<Operation> = procedure
+                .steps
+                .iter()
+                .map(|step| step.operation.clone())
+                .take_while(|operation| !matches!(operation, Operation::Command(_)))
+                .collect();
+            async move {
+                let missing = operations.iter().map(|operation| self.clients.missing(operation, within));
+                futures::future::join_all(missing).await.into_iter().flatten().collect::<Vec<_>>()
+            }
+        };
+        let missing = futures::future::join_all(procedures.modes.values().map(of_mode)).await;
+        missing.into_iter().min_by_key(Vec::len).unwrap_or_default()
+    }
+
+    /// Returns the mode whose conditions hold: of several, the one with the most conditions.
+    pub(crate) async fn observe(&self, function: &str) -> Seen {
+        let Some(procedures) = self.functions.get(function) else { return Seen::Unknown };
+        // The modes in the middle of a procedure mean nothing.
+        let Some(_idle) = procedures.running.try_lock() else { return Seen::Unknown };
+        let present = procedures.present();
+        let is_unobservable = |mode: &String| {
+            procedures.modes.get(mode).is_some_and(|procedure| procedure.lasting().is_empty())
+        };
+        if let Some(mode) = present.clone().filter(is_unobservable) {
+            return Seen::Mode(mode);
+        }
+        let mut matching: Vec<(usize, &String)> = Vec::new();
+        for (mode, procedure) in &procedures.modes {
+            let lasting = procedure.lasting();
+            let results = lasting.iter().map(|condition| self.observed(condition));
+            let results = futures::future::join_all(results).await;
+            if results.contains(&None) {
+                return Seen::Unknown;
+            }
+            if !lasting.is_empty() && results.iter().all(|result| *result == Some(true)) {
+                matching.push((lasting.len(), mode));
+            }
+        }
+        let greatest_count = matching.iter().map(|(count, _)| *count).max().unwrap_or_default();
+        matching.retain(|(count, _)| *count == greatest_count);
+        let observed_mode = match matching.as_slice() {
+            [] if procedures.modes.keys().any(is_unobservable) && present.is_none() => return Seen::Unknown,
+            [] => {
+                procedures.set_present(None);
+                return Seen::Nothing;
+            }
+            [(_, mode)] => (*mode).clone(),
+            several => match present.filter(|present| several.iter().any(|(_, mode)| *mode == present)) {
+                Some(present) => present,
+                None => return Seen::Unknown,
+            },
+        };
+        procedures.set_present(Some(observed_mode.clone()));
+        Seen::Mode(observed_mode)
+    }
+
+    /// Returns whether a condition holds; `None` if its node is silent. A node that does not exist meets no condition.
+    async fn observed(&self, condition: &Condition) -> Option<bool> {
+        if self.clients.servers(condition).is_empty() && !matches!(condition, Condition::Topic(_)) {
+            return Some(false);
+        }
+        self.clients.holds(condition).await.ok()
+    }
+
+    /// Returns `true` if the nodes answer whose silence has ended a procedure.
+    pub(crate) async fn answers(&self, function: &str) -> bool {
+        let Some(procedures) = self.functions.get(function) else { return false };
+        let silent = procedures.silent.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        for mode in &silent {
+            let steps = procedures.modes.get(mode).into_iter().flat_map(|procedure| &procedure.steps);
+            for step in steps.take_while(|step| !matches!(step.operation, Operation::Command(_))) {
+                if !self.clients.answers(&step.operation).await {
+                    return false;
+                }
+            }
+        }
+        procedures.silent.lock().unwrap_or_else(PoisonError::into_inner).clear();
+        true
+    }
+
+    /// Puts a mode of a function into effect. A procedure that still runs for the function is undone first; its caller
+    /// must have set its `is_replaced` before.
+    pub(crate) async fn apply(
+        &self,
+        function: &str,
+        mode: &str,
+        timeout: Duration,
+        is_replaced: &AtomicBool,
+    ) -> Outcome {
+        let Some((procedures, procedure)) =
+            self.functions.get(function).and_then(|own| Some((own, own.modes.get(mode)?)))
+        else {
+            return Outcome::Failed(format!("{function} has no steps for {mode}"));
+        };
+        let _running = procedures.running.lock().await;
+        let run = Run { procedures: self, function, mode, is_replaced };
+        let timeout = procedure.timeout.unwrap_or(timeout);
+        let mut undos = Vec::new();
+        let Err(failure) = run.perform(procedure, Instant::now() + timeout, &mut undos).await else {
+            procedures.set_present(Some(mode.to_owned()));
+            procedures.silent.lock().unwrap_or_else(PoisonError::into_inner).remove(mode);
+            return Outcome::Done;
+        };
+        // A node that was silent must not use up the time of those that answer.
+        let first =
+            if matches!(failure, Failure::Silent(_)) { timeout.min(OBSERVATION_TIMEOUT) } else { timeout };
+        run.roll_back(undos, first, timeout).await;
+        let because = failure.because().to_owned();
+        match failure {
+            Failure::Silent(_) => {
+                procedures.silent.lock().unwrap_or_else(PoisonError::into_inner).insert(mode.to_owned());
+                Outcome::Silent(because)
+            }
+            Failure::Refused(_) | Failure::Replaced => Outcome::Failed(because),
+        }
+    }
+}
+
+impl FunctionProcedures {
+    fn conditions(&self) -> impl Iterator<Item = Condition> {
+        self.modes.values().flat_map(Procedure::lasting)
+    }
+
+    fn present(&self) -> Option<String> {
+        self.present.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    fn set_present(&self, mode: Option<String>) {
+        *self.present.lock().unwrap_or_else(PoisonError::into_inner) = mode;
+    }
+}
+
+/// A running procedure.
+struct Run<'r> {
+    procedures: &'r Procedures,
+    function: &'r str,
+    mode: &'r str,
+    is_replaced: &'r AtomicBool,
+}
+
+impl Run<'_> {
+    /// Executes all steps, and waits for all conditions. Collects the operations that undo the steps.
+    async fn perform(
+        &self,
+        procedure: &Procedure,
+        deadline: Instant,
+        undos: &mut Vec<Undo>,
+    ) -> Result<(), Failure> {
+        let clients = &self.procedures.clients;
+        for step in &procedure.steps {
+            if self.is_replaced.load(Ordering::Relaxed) {
+                return Err(Failure::Replaced);
+            }
+            let outcome = self.step(&step.operation, step.undo.as_ref(), deadline, undos).await;
+            self.report(
+                &step.operation,
+                if outcome.is_ok() { "done" } else { "failed" },
+                outcome.as_ref().err(),
+            );
+            outcome?;
+        }
+        let end = Instant::now();
+        for condition in procedure.lasting().iter().chain(&procedure.conditions) {
+            if self.is_replaced.load(Ordering::Relaxed) {
+                return Err(Failure::Replaced);
+            }
+            clients.until(condition, end, deadline).await?;
+        }
+        Ok(())
+    }
+
+    async fn step(
+        &self,
+        operation: &Operation,
+        undo: Option<&Operation>,
+        deadline: Instant,
+        undos: &mut Vec<Undo>,
+    ) -> Result<(), Failure> {
+        let clients = &self.procedures.clients;
+        let within = deadline.saturating_duration_since(Instant::now());
+        let count = undos.len();
+        let outcome = match operation {
+            Operation::State { node, state } => {
+                let target = *state;
+                // A refused transition may have changed the state, so that its undo is kept.
+                return clients
+                    .bring(node, target, deadline, |before| {
+                        if before != target {
+                            let undo = Operation::State { node: node.clone(), state: before };
+                            undos.push(Undo::Operation(undo));
+                        }
+                    })
+                    .await;
+            }
+            Operation::Parameters { node, values } => {
+                let note = |before: Vec<(String, ros2_client::ParameterValue)>| {
+                    let (set, unset): (Vec<_>, Vec<_>) = before
+                        .into_iter()
+                        .partition(|(_, value)| *value != ros2_client::ParameterValue::NotSet);
+                    let unset = unset.into_iter().map(|(name, _)| {
+                        Undo::Impossible(format!("the parameter {name} of {node} had no value before"))
+                    });
+                    undos.extend(unset);
+                    if !set.is_empty() {
+                        undos
+                            .push(Undo::Operation(Operation::Parameters { node: node.clone(), values: set }));
+                    }
+                };
+                clients.set(node, values, deadline, note).await
+            }
+            Operation::Service { service, call } => {
+                undos.push(undo_of(operation, undo));
+                clients.call(service, *call, within).await
+            }
+            Operation::Command(words) => {
+                undos.push(undo_of(operation, undo));
+                execute(words, deadline).await
+            }
+        };
+        // A refusal has changed nothing, and without an answer the effect is unknown. Only parameters may differ
+        // although they were accepted, and to set their earlier values once more has no effect.
+        if matches!(outcome, Err(Failure::Refused(_))) {
+            let is_kept = |undo: &Undo| matches!(undo, Undo::Operation(Operation::Parameters { .. }));
+            let undone = undos.split_off(count);
+            undos.extend(undone.into_iter().filter(is_kept));
+        }
+        outcome
+    }
+
+    /// Undoes steps in reverse order, with a timeout for the first undo and one for each other. A step that cannot be
+    /// undone does not stop the others.
+    async fn roll_back(&self, undos: Vec<Undo>, first: Duration, other: Duration) {
+        for (index, undo) in undos.into_iter().rev().enumerate() {
+            let deadline = Instant::now() + if index == 0 { first } else { other };
+            match undo {
+                Undo::Impossible(text) => self.warn(&format!("{text}: it is not undone")),
+                Undo::Operation(operation) => {
+                    let outcome = self.step(&operation, None, deadline, &mut Vec::new()).await;
+                    let word = if outcome.is_ok() { "undone" } else { "not_undone" };
+                    self.report(&operation, word, outcome.as_ref().err());
+                    if let Err(failure) = outcome {
+                        self.warn(&format!("{operation} could not be restored: {}", failure.because()));
+                    }
+                }
+            }
+        }
+    }
+
+    fn warn(&self, text: &str) {
+        let text = format!("{} {}: {text}", self.function, self.mode);
+        self.procedures.node.log(Severity::Warn, &text);
+    }
+
+    /// Publishes the result of a step.
+    fn report(&self, operation: &Operation, outcome: &str, failure: Option<&Failure>) {
+        let mut event = json!({
+            "answer": "step", "function": self.function, "mode": self.mode, "step": operation.to_string(),
+            "outcome": outcome,
+        });
+        if let Some(failure) = failure {
+            event["because"] = failure.because().into();
+        }
+        (self.procedures.report)(&event);
+    }
+}
+
+/// Operation that undoes a service call or a command.
+fn undo_of(operation: &Operation, undo: Option<&Operation>) -> Undo {
+    match undo {
+        Some(undo) => Undo::Operation(undo.clone()),
+        None => Undo::Impossible(format!("{operation} has no `undo`")),
+    }
+}

@@ -1,0 +1,237 @@
+//! Observation of signals: each change becomes a status of the loop.
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use metaplan::message::Message;
+use serde_json::Value;
+use smol::{Task, Timer};
+
+use crate::diagnostic_rules::{COMPONENT, MEASUREMENT};
+use crate::interfaces::diagnostic_msgs::msg::{DiagnosticStatus, KeyValue};
+use crate::interfaces::lifecycle_msgs::msg::{State, TransitionEvent};
+use crate::interfaces::lifecycle_msgs::srv::{GetState, GetStateRequest};
+use crate::interfaces::lyrical::lifecycle_msgs::msg as lyrical;
+use crate::interfaces::rcl_interfaces::srv::GetParameters;
+use crate::interfaces::{MessageVisitor, Msg, visit_message};
+use crate::node::{Caller, Clock, Node, PrimaryState, depth, is_lyrical};
+use crate::signals::settings::{Condition, Signal, Source, Target, number};
+
+/// Period of checks whether nodes exist and topics are silent.
+const CHECK_PERIOD: Duration = Duration::from_millis(250);
+
+/// Timeout of the state of a lifecycle node.
+const STATE_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// Receiver of statuses for the loop.
+pub(crate) type Report = Arc<dyn Fn(DiagnosticStatus) + Send + Sync>;
+
+/// Observes signals until the returned tasks are dropped.
+///
+/// # Errors
+/// A topic cannot be subscribed to.
+pub(crate) fn watch(node: &Arc<Node>, signals: &[Signal], report: &Report) -> Result<Vec<Task<()>>, Message> {
+    let mut tasks = Vec::new();
+    for signal in signals {
+        let Signal { source, target, every, .. } = signal;
+        let reporter = Reporter { target: target.clone(), report: Arc::clone(report) };
+        match source {
+            Source::State { node: name, state } => tasks.push(watch_state(node, name, *state, reporter)?),
+            Source::Presence { node: name } => tasks.push(watch_presence(node, name, reporter)),
+            Source::Field { topic, kind, field, period } => {
+                let clock = node.clock();
+                let last = Arc::new(Mutex::new(clock.elapsed()));
+                let (noted, field, every) = (Arc::clone(&last), field.clone(), *every);
+                let of_message = reporter.clone();
+                let mut reported: Option<Duration> = None;
+                let take = move |message: &dyn Fn() -> Value| {
+                    let now = clock.elapsed();
+                    *noted.lock().unwrap_or_else(PoisonError::into_inner) = now;
+                    // Messages between two reports are not even converted.
+                    if reported.is_some_and(|reported| now.saturating_sub(reported) < every) {
+                        return;
+                    }
+                    reported = Some(now);
+                    if let Some(value) = field.find(&message()) {
+                        of_message.value(value);
+                    }
+                };
+                visit_message(kind, Subscribe { node, topic, take: Box::new(take) }).transpose()?;
+                if let (Some(period), Target::Component { .. }) = (period, target) {
+                    tasks.push(watch_silence(node.clock(), last, *period, reporter));
+                }
+            }
+            Source::Rate { topic, period } => tasks.push(watch_rate(node, topic, *period, *every, reporter)?),
+        }
+    }
+    Ok(tasks)
+}
+
+/// Calls a closure periodically until the task is dropped.
+fn repeat(period: Duration, mut work: impl FnMut() + Send + 'static) -> Task<()> {
+    smol::spawn(async move {
+        loop {
+            Timer::after(period).await;
+            work();
+        }
+    })
+}
+
+/// Target of a signal, and the receiver of its reports.
+#[derive(Clone)]
+struct Reporter {
+    target: Target,
+    report: Report,
+}
+
+impl Reporter {
+    /// Reports whether a component works. Attributes have no such report.
+    fn works(&self, works: bool) {
+        if let Target::Component { component, .. } = &self.target {
+            self.send(COMPONENT, component, if works { "TRUE" } else { "FALSE" }.to_owned());
+        }
+    }
+
+    /// Reports a value: that of the attribute, or whether it meets the condition of the component.
+    fn value(&self, value: &Value) {
+        match &self.target {
+            Target::Component { condition, .. } => self.works(condition.holds(value)),
+            Target::Attribute { attribute, scale, offset } => {
+                // A value that is not a number, such as the NaN of an unmeasured field, measures nothing.
+                let Some(number) = number(value) else { return };
+                let converted = number * scale + offset;
+                if converted.is_finite() {
+                    let is_same = (*scale, *offset) == (1.0, 0.0) && value.is_number();
+                    // The digits are copied unchanged, because a conversion would round them.
+                    let text = if is_same { value.to_string() } else { converted.to_string() };
+                    self.send(MEASUREMENT, attribute, text);
+                }
+            }
+        }
+    }
+
+    fn send(&self, message: &str, key: &str, value: String) {
+        (self.report)(DiagnosticStatus {
+            message: message.to_owned(),
+            values: vec![KeyValue { key: key.to_owned(), value }],
+            ..DiagnosticStatus::default()
+        });
+    }
+}
+
+type Take = Box<dyn FnMut(&dyn Fn() -> Value) + Send>;
+
+/// Subscribes to a topic with a type that is known by its name.
+struct Subscribe<'n> {
+    node: &'n Arc<Node>,
+    topic: &'n str,
+    take: Take,
+}
+
+impl MessageVisitor for Subscribe<'_> {
+    type Output = Result<(), Message>;
+
+    fn visit<M: Msg>(self) -> Self::Output {
+        let mut take = self.take;
+        self.node.subscribe_when_published::<M>(self.topic, move |message| {
+            // Serialisation cannot fail: messages consist of texts, numbers and lists.
+            take(&|| serde_json::to_value(&message).unwrap_or_default());
+        })
+    }
+}
+
+/// Reports a component as failed while no message arrives.
+fn watch_silence(
+    clock: Arc<Clock>,
+    last: Arc<Mutex<Duration>>,
+    period: Duration,
+    reporter: Reporter,
+) -> Task<()> {
+    repeat(CHECK_PERIOD.min(period), move || {
+        let last = *last.lock().unwrap_or_else(PoisonError::into_inner);
+        if clock.elapsed().saturating_sub(last) > period {
+            reporter.works(false);
+        }
+    })
+}
+
+/// Reports the messages per second within the last period.
+fn watch_rate(
+    node: &Arc<Node>,
+    topic: &str,
+    period: Duration,
+    every: Duration,
+    reporter: Reporter,
+) -> Result<Task<()>, Message> {
+    let clock = node.clock();
+    let arrivals: Arc<Mutex<VecDeque<Duration>>> = Arc::default();
+    let (noted, of_arrivals) = (Arc::clone(&arrivals), node.clock());
+    node.subscribe_any(topic, move || {
+        noted.lock().unwrap_or_else(PoisonError::into_inner).push_back(of_arrivals.elapsed());
+    })?;
+    let started = clock.elapsed();
+    Ok(repeat(every.max(CHECK_PERIOD.min(period)), move || {
+        let now = clock.elapsed();
+        let mut arrivals = arrivals.lock().unwrap_or_else(PoisonError::into_inner);
+        while arrivals.front().is_some_and(|arrival| now.saturating_sub(*arrival) > period) {
+            arrivals.pop_front();
+        }
+        let count = arrivals.len();
+        drop(arrivals);
+        // Within the first period the rate is not known yet.
+        if now.saturating_sub(started) < period {
+            return;
+        }
+        let rate = count as f64 / period.as_secs_f64();
+        match &reporter.target {
+            Target::Component { condition, .. } if *condition == Condition::default() => {
+                reporter.works(count > 0);
+            }
+            _ => reporter.value(&Value::from((rate * 100.0).round() / 100.0)),
+        }
+    }))
+}
+
+/// Reports a component as working while a node exists. A node exists while its parameter service does.
+fn watch_presence(node: &Arc<Node>, name: &str, reporter: Reporter) -> Task<()> {
+    let service: Caller<GetParameters> = node.caller(&format!("{name}/get_parameters"));
+    repeat(CHECK_PERIOD, move || reporter.works(!service.servers().is_empty()))
+}
+
+/// Reports a component as working while a lifecycle node has a state.
+fn watch_state(
+    node: &Arc<Node>,
+    name: &str,
+    state: PrimaryState,
+    reporter: Reporter,
+) -> Result<Task<()>, Message> {
+    let of_event = reporter.clone();
+    let take = move |goal: &State| {
+        // A node in a transition has neither the former nor the next state.
+        of_event.works(PrimaryState::of(goal) == Some(state));
+    };
+    let topic = format!("{name}/transition_event");
+    if is_lyrical() {
+        node.subscribe::<lyrical::TransitionEvent>(&topic, depth(10), move |event| take(&event.goal_state))?;
+    } else {
+        node.subscribe::<TransitionEvent>(&topic, depth(10), move |event| take(&event.goal_state))?;
+    }
+    let service: Caller<GetState> = node.caller(&format!("{name}/get_state"));
+    let mut last_servers = None;
+    Ok(smol::spawn(async move {
+        loop {
+            let servers = service.servers();
+            if last_servers.as_ref() != Some(&servers) {
+                if servers.is_empty() {
+                    reporter.works(false);
+                    last_servers = Some(servers);
+                } else if let Ok(answer) = service.call(GetStateRequest::default(), STATE_TIMEOUT).await {
+                    reporter.works(PrimaryState::of(&answer.current_state) == Some(state));
+                    last_servers = Some(servers);
+                }
+            }
+            Timer::after(CHECK_PERIOD).await;
+        }
+    }))
+}
