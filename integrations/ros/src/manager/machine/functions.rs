@@ -17,7 +17,7 @@ const INITIAL_PROBE_DELAY: Duration = Duration::from_secs(1);
 /// Maximum delay of a probe.
 const MAX_PROBE_DELAY: Duration = Duration::from_secs(60);
 
-/// Minimum delay until the designs of a function without a reply are retried.
+/// Maximum delay until a function that did not reply to a probe is probed again.
 const SILENT_RETRY_DELAY: Duration = Duration::from_secs(2);
 
 /// Delay until a refused design is retried.
