@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 use serde::Deserialize;
 
 /// Files and folders that are copied from the workspace.
-const COPIED_PATHS: [&str; 16] = [
+const COPIED_PATHS: [&str; 17] = [
     "Cargo.toml",
     "Cargo.lock",
     "README.md",
@@ -29,6 +29,7 @@ const COPIED_PATHS: [&str; 16] = [
     "rules",
     "encodings",
     "crates",
+    "examples",
     "integrations",
     ".ci/features",
     "tests",
