@@ -47,26 +47,40 @@ const MAX_GROUPS: usize = 6;
 const COST_LIMIT: Int = 1 << 39;
 
 /// An exclusive resource: the instances that occupy it.
+#[derive(Clone)]
 struct Resource {
     instances: Vec<u32>,
 }
 
 /// Lower bound on the makespan of every plan, in the task's time unit.
 pub(super) fn makespan_bound(concurrent: &TemporalTask, limits: &Limits) -> Int {
-    let mut groups: BTreeMap<Vec<u32>, Vec<Resource>> = BTreeMap::new();
-    for resource in resources(concurrent) {
+    let mut by_schemas: BTreeMap<Vec<u32>, Vec<Resource>> = BTreeMap::new();
+    let mut by_size: BTreeMap<(Vec<u32>, usize), Vec<Resource>> = BTreeMap::new();
+    // A resource for a single instance bounds no more than the duration of this instance.
+    for resource in resources(concurrent).into_iter().filter(|resource| resource.instances.len() > 1) {
         let schema = |instance: &u32| {
             let start = concurrent.instances[*instance as usize].start;
             concurrent.task.operators[start.index()].schema
         };
-        // Interchangeable objects are resources for the same action schemas.
+        // Interchangeable objects are resources for the same action schemas. Other variables that
+        // these actions change usually have another number of instances.
         let mut schemas: Vec<u32> = resource.instances.iter().map(schema).collect();
         schemas.sort_unstable();
         schemas.dedup();
-        groups.entry(schemas).or_default().push(resource);
+        by_size.entry((schemas.clone(), resource.instances.len())).or_default().push(resource.clone());
+        by_schemas.entry(schemas).or_default().push(resource);
     }
-    let mut groups: Vec<Vec<Resource>> = groups.into_values().collect();
-    groups.sort_by_key(|group| std::cmp::Reverse(group.iter().map(|one| one.instances.len()).sum::<usize>()));
+    let mut groups: Vec<Vec<Resource>> = by_size.into_values().collect();
+    // A group by schemas that is not split by size is the same group.
+    groups.extend(by_schemas.into_values().filter(|group| {
+        let sizes: FxHashSet<usize> = group.iter().map(|resource| resource.instances.len()).collect();
+        sizes.len() > 1
+    }));
+    // Groups with many instances per resource have the highest bounds.
+    groups.sort_by_key(|group| {
+        let instances: usize = group.iter().map(|resource| resource.instances.len()).sum();
+        std::cmp::Reverse(instances.checked_div(group.len()))
+    });
     groups.truncate(MAX_GROUPS);
     if groups.is_empty() {
         return 0;
@@ -210,5 +224,60 @@ fn resource(concurrent: &TemporalTask, variable: VariableId, setters: &[Operator
         if busy.is_empty() {
             return None;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use num_rational::BigRational;
+    use pddl::{Source, read};
+    use task::ground::GroundConfig;
+
+    use super::*;
+    use crate::concurrent::ground_concurrent;
+
+    /// Lower bound on the makespan in thousandths, with a separation of a thousandth.
+    fn bound_of(domain: &str, problem: &str) -> Int {
+        let read = read(&Source::new("domain", domain), &Source::new("problem", problem));
+        let (domain, problem, _) = read.expect("PDDL");
+        let separation = BigRational::new(1.into(), 1000.into());
+        let task = ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation);
+        let concurrent = task.expect("a task");
+        makespan_bound(&concurrent, &Limits::none()) * 1000 / concurrent.task.time_scale
+    }
+
+    /// Each switch changes a variable of its own, which must not count as a resource of the same kind
+    /// as the hand that moves all switches.
+    #[test]
+    fn one_hand_moves_the_switches_one_after_another() {
+        let domain = "(define (domain switches) (:requirements :durative-actions) (:predicates (on ?x) (off ?x) (free))
+          (:durative-action switch :parameters (?x) :duration (= ?duration 2)
+            :condition (and (at start (free)) (at start (off ?x)))
+            :effect (and (at start (not (free))) (at start (not (off ?x))) (at end (on ?x)) (at end (free)))))";
+        let problem = |init: &str| {
+            format!(
+                "(define (problem p) (:domain switches) (:objects a b c d) (:init (free) (off a) (off b) (off c) {init})
+                   (:goal (and (on a) (on b) (on c))))"
+            )
+        };
+        assert_eq!(bound_of(domain, &problem("")), 6_002);
+        // A literal can free the hand during an action, so it is no exclusive resource.
+        assert_eq!(bound_of(domain, &problem("(at 1 (free))")), 0);
+    }
+
+    #[test]
+    fn robots_share_the_work() {
+        let domain = "(define (domain jobs) (:requirements :durative-actions :typing) (:types robot place)
+          (:predicates (at ?r - robot ?p - place) (free ?r - robot) (done ?p - place))
+          (:durative-action drive :parameters (?r - robot ?a ?b - place) :duration (= ?duration 5)
+            :condition (and (at start (at ?r ?a)) (at start (free ?r)))
+            :effect (and (at start (not (at ?r ?a))) (at start (not (free ?r))) (at end (at ?r ?b)) (at end (free ?r))))
+          (:durative-action work :parameters (?r - robot ?p - place) :duration (= ?duration 40)
+            :condition (and (at start (free ?r)) (over all (at ?r ?p)))
+            :effect (and (at start (not (free ?r))) (at end (free ?r)) (at end (done ?p)))))";
+        let problem = "(define (problem p) (:domain jobs) (:objects r s - robot base a b c d - place)
+          (:init (at r base) (free r) (at s base) (free s)) (:goal (and (done a) (done b) (done c) (done d))))";
+        // Two jobs of 45 per robot, and three gaps.
+        assert_eq!(bound_of(domain, problem), 90_003);
     }
 }

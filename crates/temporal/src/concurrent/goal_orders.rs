@@ -12,7 +12,7 @@
 //! each of which was executed happening by happening.
 //!
 //! A short plan is the executable part of the relaxed plan, as in \[4\], repeatedly. If this leads
-//! to a known state, breadth-first search by the size of the relaxed plan continues \[5\].
+//! to a known state, best-first search by the size of the relaxed plan continues \[5\].
 //!
 //! \[1\] R. Graham: Bounds on multiprocessing timing anomalies, SIAM Journal on Applied Mathematics
 //! 17, 1969.
@@ -42,8 +42,11 @@ use crate::concurrent::timed_relaxed_plan::{TimedRelaxation, TimedRelaxedPlan};
 
 /// Upper limit on the number of relaxed plans per goal.
 const MAX_ROUNDS: usize = 60;
-/// Upper limit on the number of states that breadth-first search evaluates per goal.
+/// Upper limit on the number of states that one best-first search evaluates, and on the number of
+/// these searches per goal. Orders that need more are dropped, so that tasks whose goals conflict
+/// leave the time to the other searches.
 const MAX_ESCAPE: usize = 100;
+const MAX_ESCAPES: usize = 3;
 /// Number of orders without any plan after which the search ends.
 const MAX_FAILURES: usize = 12;
 /// Work without a better plan after which the search ends.
@@ -406,6 +409,7 @@ fn achieve(
     pulse: &mut LimitPoll<'_>,
 ) -> Result<Option<TemporalState>, Stopped> {
     let mut visited: FxHashSet<u64> = FxHashSet::default();
+    let mut escapes = 0;
     for _ in 0..MAX_ROUNDS {
         if (goal.is_reached)(&situation) {
             return Ok(Some(situation));
@@ -419,7 +423,9 @@ fn achieve(
         figures.generated = figures.generated.saturating_add(plan.happenings.len() as u64);
         match next {
             Some(next) if !visited.contains(&key(&next)) || (goal.is_reached)(&next) => situation = next,
+            _ if escapes == MAX_ESCAPES => return Ok(None),
             _ => {
+                escapes = escapes.saturating_add(1);
                 links.truncate(before);
                 let size = plan.happenings.len();
                 let found = escape(
