@@ -5,6 +5,7 @@ mod certificate;
 mod concurrent;
 mod concurrent_definition;
 mod concurrent_durations;
+mod concurrent_jobs;
 mod concurrent_language;
 mod concurrent_runs;
 mod concurrent_trajectories;

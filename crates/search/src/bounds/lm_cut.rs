@@ -13,17 +13,29 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
+use task::limits::Limits;
 use task::number::dense;
 use task::task::Task;
 
 use crate::bounds::delete_relaxation::{ALWAYS, DeleteRelaxation, GOAL};
 
+/// Work units after which [`landmark_cut_bound`] keeps the landmarks that it has.
+const MAX_WORK: u64 = 100_000_000;
 /// Work units per visited fact or rule.
 const WORK_PER_VISIT: u64 = 8;
 /// h^max value of an unreachable fact.
 const UNREACHABLE: u64 = u64::MAX;
 /// Number that represents a missing fact.
 const NONE: u32 = u32::MAX;
+
+/// LM-cut value of the initial state, or the part of it that was computed when a limit was reached:
+/// each landmark adds to a lower bound. Returns `None` if an operator costs too much or the goal is
+/// unreachable.
+pub fn landmark_cut_bound(task: &Task, limits: &Limits) -> Option<u64> {
+    let mut cut = LandmarkCut::new(task)?;
+    let stops = |work| work > MAX_WORK || limits.reached();
+    cut.lm_cut_value_until(&task.initial.values, &stops)
+}
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum CutSide {
@@ -95,12 +107,21 @@ impl LandmarkCut {
     /// Returns the LM-cut value of a state, which is a lower bound on its goal distance. Returns `None` if
     /// the goal is unreachable in the delete relaxation, and thus in the task.
     pub(crate) fn lm_cut_value(&mut self, values: &[u32]) -> Option<u64> {
+        self.lm_cut_value_until(values, &|_| false)
+    }
+
+    /// Like [`Self::lm_cut_value`], but ends with the landmarks found so far when `stops` returns
+    /// `true` for the work units done.
+    fn lm_cut_value_until(&mut self, values: &[u32], stops: &dyn Fn(u64) -> bool) -> Option<u64> {
         self.costs.clone_from(&self.relaxed.costs);
         self.reach(values);
         let mut sum = 0;
         while self.values[GOAL as usize] > 0 {
             if self.values[GOAL as usize] == UNREACHABLE {
                 return None;
+            }
+            if stops(self.work()) {
+                break;
             }
             self.mark_goal_zone();
             sum += self.cross(values);

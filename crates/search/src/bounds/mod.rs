@@ -15,7 +15,7 @@ mod lm_cut;
 mod pattern_database;
 mod resources;
 
-pub use lm_cut::LandmarkCut;
+pub use lm_cut::{LandmarkCut, landmark_cut_bound};
 pub use pattern_database::Projection;
 
 use cost_partitioning::CostPartitioning;

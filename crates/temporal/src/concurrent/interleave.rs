@@ -9,6 +9,8 @@ use task::number::{Int, Rational};
 use task::plan::solution::PlannerPart;
 use tracing::info_span;
 
+use crate::concurrent::exclusive_resources::makespan_bound;
+use crate::concurrent::goal_orders::GoalOrders;
 use crate::concurrent::greedy::{Greedy, Mode, Outcome};
 use crate::concurrent::makespan_heuristic::Estimate;
 use crate::concurrent::relaxed_plan_heuristic::RelaxedPlanHeuristic;
@@ -37,12 +39,19 @@ pub(super) fn interleave_searches(
     let estimate = Estimate::new(concurrent);
     let expansion = Expansion::new(concurrent);
     let mut exact = Search::new(concurrent, &expansion, &estimate, bounds);
-    let root = if concurrent.is_bounded { exact.lower() } else { 0 };
+    let mut root = if concurrent.is_bounded { exact.lower() } else { 0 };
     record.begin(Rational::from_integer(root));
     let mut search_end =
         info_span!("search").in_scope(|| exact.run(limits, limits.thresholds().concurrent, record));
     if exact.is_over() || limits.reached() {
         return (claimed(search_end, (concurrent, &exact), root), exact.incumbent);
+    }
+    if concurrent.is_bounded && concurrent.measure.time > 0 {
+        let _span = info_span!("resources").entered();
+        exact.raise_floor(makespan_bound(concurrent, limits));
+        root = root.max(concurrent.measure.total(exact.floor(), 0).unwrap_or(0));
+        record.begin(Rational::from_integer(root));
+        search_end = SearchEnd::Stopped(exact.lower());
     }
     let relaxed = TemporalRelaxation::new(concurrent);
     let begin = |mode| {
@@ -53,12 +62,15 @@ pub(super) fn interleave_searches(
     let differs = concurrent.instances.iter().any(|instance| !instance.compressible);
     let mut greedy = vec![begin(Mode::Overlapping)];
     greedy.extend(differs.then(|| begin(Mode::Sequential)));
+    let (mut share, turn) = (1_usize, limits.thresholds().turn.max(1));
+    let mut orders = GoalOrders::new(concurrent, &expansion, &relaxed, limits);
+    // A first plan comes before the sequential task is ground.
+    improve(&mut orders, &mut exact, turn, limits, record);
     let whole = SequentialTask::new(concurrent, limits);
     let mut seeker = whole.as_ref().map(|task| SequentialPlanner::new(task, limits));
-    let (mut share, turn) = (1_usize, limits.thresholds().turn.max(1));
     for round in 0..rounds {
         let is_over = exact.is_over() || is_best(concurrent, &exact, root);
-        if is_over || limits.reached() || (greedy.is_empty() && exact.is_full(limits)) {
+        if is_over || limits.reached() || (greedy.is_empty() && orders.is_none() && exact.is_full(limits)) {
             break;
         }
         seeker = seeker.filter(|_| exact.incumbent.is_none() || round < WHOLE);
@@ -85,6 +97,7 @@ pub(super) fn interleave_searches(
                 *restarts = restarts.saturating_add(1);
             }
         }
+        improve(&mut orders, &mut exact, turn.saturating_mul(share), limits, record);
         // Plans better than a sequential one have more overlap.
         greedy.retain(|search| search.mode != Mode::Sequential || exact.incumbent.is_none());
         let _span = info_span!("search").entered();
@@ -115,6 +128,31 @@ fn pursue(
         let lower = exact.lower();
         let incumbent = exact.incumbent.iter();
         incumbent.for_each(|sequence| sequence.tell(lower, PlannerPart::Satisficing, record));
+    }
+}
+
+/// Resumes the search over goal orders, from each improved plan to the next. Removes it when it has
+/// ended.
+fn improve(
+    orders: &mut Option<GoalOrders<'_>>,
+    exact: &mut Search<'_>,
+    work: usize,
+    limits: &Limits,
+    record: &mut Record<'_>,
+) {
+    let Some(search) = orders else { return };
+    let _span = info_span!("goal orders").entered();
+    let before = search.figures;
+    let end = search.work().saturating_add(work as u64);
+    while let Some(left) = end.checked_sub(search.work()).filter(|left| *left > 0) {
+        let left = usize::try_from(left).unwrap_or(usize::MAX);
+        let Some(sequence) = search.run(exact.incumbent.as_ref(), limits, left) else { break };
+        sequence.tell(exact.lower(), PlannerPart::Satisficing, record);
+        exact.incumbent = Some(sequence);
+    }
+    search.figures.add_to(before, &mut record.statistics);
+    if search.is_over() {
+        *orders = None;
     }
 }
 

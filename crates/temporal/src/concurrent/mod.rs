@@ -13,8 +13,10 @@ mod conjunctions;
 mod deadline;
 mod duration_fluents;
 mod envelope_facts;
+mod exclusive_resources;
 mod flexible_durations;
 mod footprint;
+mod goal_orders;
 mod greedy;
 mod happening;
 mod interference;
@@ -41,6 +43,7 @@ mod successors;
 mod temporal_relaxation;
 mod temporal_task;
 mod time;
+mod timed_relaxed_plan;
 mod unit;
 
 use std::time::Instant;

@@ -167,7 +167,7 @@ impl<'a> RelaxedPlanHeuristic<'a> {
             self.improve(*add, cost, Some((rule, 1)));
         }
         for (position, by) in &relaxed.raises[rule as usize] {
-            let times = times(self.missing[*position as usize], *by);
+            let times = repetitions(self.missing[*position as usize], *by);
             let cost = sum.saturating_add(weight.saturating_mul(times)).min(MAX_COST);
             let proposition = relaxed.numeric[*position as usize].proposition;
             self.improve(proposition, cost, Some((rule, times)));
@@ -208,7 +208,7 @@ impl<'a> RelaxedPlanHeuristic<'a> {
 }
 
 /// Number of applications that add the missing amount.
-fn times(missing: Option<Int>, by: Option<Int>) -> u32 {
+pub(super) fn repetitions(missing: Option<Int>, by: Option<Int>) -> u32 {
     let (Some(missing), Some(by)) = (missing, by) else { return 1 };
     let times = missing.checked_add(by.saturating_sub(1)).and_then(|sum| sum.checked_div(by));
     times.and_then(|times| u32::try_from(times).ok()).unwrap_or(MAX_REPETITIONS).clamp(1, MAX_REPETITIONS)

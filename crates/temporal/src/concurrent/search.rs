@@ -70,6 +70,8 @@ pub(super) struct Search<'a> {
     /// Lower bound on the metric of plans below nodes that were dropped because their numbers
     /// overflow.
     left_out: Option<Int>,
+    /// Lower bound on the makespan of every plan.
+    floor: Int,
     figures: SearchStatistics,
 }
 
@@ -93,11 +95,30 @@ impl<'a> Search<'a> {
             open: BinaryHeap::new(),
             incumbent: None,
             left_out: None,
+            floor: 0,
             figures: SearchStatistics::default(),
         };
         // Costs and times are not negative, so 0 is a lower bound.
         search.push(&expansion.root(), None, 0);
         search
+    }
+
+    /// Sets a lower bound on the makespan of every plan.
+    pub(super) fn raise_floor(&mut self, makespan: Int) {
+        self.floor = self.floor.max(makespan);
+    }
+
+    /// Lower bound on the makespan of every plan, as far as it was set.
+    pub(super) fn floor(&self) -> Int {
+        self.floor
+    }
+
+    /// Lower bounds on the metric and the makespan of plans below a node, given bounds that do not
+    /// use the lower bound for all plans.
+    fn at_least(&self, (total, makespan): (Int, Int)) -> (Int, Int) {
+        // Costs are not negative.
+        let floor = self.concurrent.measure.total(self.floor, 0).unwrap_or(0);
+        (total.max(floor), makespan.max(self.floor))
     }
 
     /// Searches until the open list is exhausted, `max_nodes` nodes were expanded, or a limit is
@@ -115,7 +136,7 @@ impl<'a> Search<'a> {
         let mut pulse = limits.pulse();
         while let Some(Reverse(priority)) = self.open.pop() {
             let id = priority.4;
-            let value = (priority.0, priority.1);
+            let value = self.at_least((priority.0, priority.1));
             if self.store.is_dominated(id) || !self.is_better(value) {
                 continue;
             }
@@ -143,6 +164,7 @@ impl<'a> Search<'a> {
             expanded += self.expand(id, &situation, value.0);
         }
         self.left_out
+            .map(|lower| self.at_least((lower, 0)).0)
             .filter(|lower| self.may_be_better(*lower))
             .map_or(SearchEnd::Exhausted, SearchEnd::Stopped)
     }
@@ -175,7 +197,8 @@ impl<'a> Search<'a> {
 
     /// Lower bound on the metric of plans not found yet, given the bound `open` of the open nodes.
     fn known(&self, open: Int) -> Int {
-        self.left_out.map_or(open, |left_out| left_out.min(open))
+        let bound = self.left_out.map_or(open, |left_out| left_out.min(open));
+        self.at_least((bound, 0)).0
     }
 
     /// Records that nodes below a node with lower bound `lower` were dropped.
@@ -226,13 +249,13 @@ impl<'a> Search<'a> {
             },
             None => 0,
         };
-        let total =
-            cost.checked_add(costs).and_then(|cost| self.concurrent.measure.total(remaining.makespan, cost));
+        let makespan = remaining.makespan.max(self.floor);
+        let total = cost.checked_add(costs).and_then(|cost| self.concurrent.measure.total(makespan, cost));
         let Some(total) = total.filter(|total| *total < GROWTH_LIMIT) else {
             self.leave_out(lower);
             return;
         };
-        let value = (total, remaining.makespan);
+        let value = (total, makespan);
         if !self.is_better(value) {
             return;
         }
