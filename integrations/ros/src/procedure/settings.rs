@@ -449,7 +449,7 @@ mod tests {
             (r#"[{ service = "/a", type = "std_srvs/srv/SetBool" }]"#, "needs `data`"),
             (r#"[{ service = "/a", type = "std_srvs/srv/Trigger", data = true }]"#, "has `data`"),
             (r#"[{ service = "/a", type = "nav2_msgs/srv/LoadMap" }]"#, "cannot be called"),
-            (r#"[{ command = [] }]"#, "`command` is empty"),
+            (r"[{ command = [] }]", "`command` is empty"),
             (r#"[{ command = ["a"], undo = {} }]"#, "`undo` needs either"),
             (r#"[{ comand = ["a"] }]"#, "unknown field `comand`"),
         ] {
