@@ -146,7 +146,7 @@ impl TryFrom<StepEntry> for Step {
                             .to_owned(),
                     );
                 }
-                match node_target(node, state, parameters)? {
+                match node_target(&node, state, parameters)? {
                     Target::State(node, state) => Operation::State { node, state },
                     Target::Parameters(node, values) => Operation::Parameters { node, values },
                 }
@@ -196,7 +196,7 @@ impl TryFrom<ConditionEntry> for Condition {
     fn try_from(entry: ConditionEntry) -> Result<Self, Self::Error> {
         let ConditionEntry { node, state, parameters, topic } = entry;
         match (node, topic) {
-            (Some(node), None) => Ok(match node_target(node, state, parameters)? {
+            (Some(node), None) => Ok(match node_target(&node, state, parameters)? {
                 Target::State(node, state) => Self::State { node, state },
                 Target::Parameters(node, values) => Self::Parameters { node, values },
             }),
@@ -218,11 +218,11 @@ enum Target {
 }
 
 fn node_target(
-    node: String,
+    node: &str,
     state: Option<PrimaryState>,
     parameters: Option<BTreeMap<String, Value>>,
 ) -> Result<Target, String> {
-    let node = valid_name("node", &node)?;
+    let node = valid_name("node", node)?;
     match (state, parameters) {
         (Some(state), None) => Ok(Target::State(node, state)),
         (None, Some(parameters)) if parameters.is_empty() => {
