@@ -70,9 +70,9 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
         }
     }
     settings.check_steps(&designs, options.allow_commands)?;
-    let attribute = |name: &str| match knowledge.has_attribute(name) {
-        true => Ok(()),
-        false => Err(format!("the knowledge base has no quality attribute `{name}`")),
+    let attribute = |name: &str| {
+        let text = || format!("the knowledge base has no quality attribute `{name}`");
+        knowledge.has_attribute(name).then_some(()).ok_or_else(text)
     };
     settings.check_targets(&components(Some(&knowledge)), attribute)?;
     let configurator = Configurator::new(knowledge, Wishes::default())?;

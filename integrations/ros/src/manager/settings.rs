@@ -308,6 +308,8 @@ impl Functions {
 mod tests {
     use std::path::Path;
 
+    use metaplan::message::Message;
+
     use super::Settings;
 
     #[test]
@@ -351,7 +353,7 @@ mod tests {
         };
         match settings.check_steps(&designs.into(), are_commands_allowed) {
             Ok(()) => String::new(),
-            Err(errors) => errors.iter().map(|error| error.text()).collect(),
+            Err(errors) => errors.iter().map(Message::text).collect(),
         }
     }
 

@@ -146,7 +146,7 @@ impl TryFrom<StepEntry> for Step {
                             .to_owned(),
                     );
                 }
-                match node_target(node, state, parameters)? {
+                match node_target(&node, state, parameters)? {
                     Target::State(node, state) => Operation::State { node, state },
                     Target::Parameters(node, values) => Operation::Parameters { node, values },
                 }
@@ -196,7 +196,7 @@ impl TryFrom<ConditionEntry> for Condition {
     fn try_from(entry: ConditionEntry) -> Result<Self, Self::Error> {
         let ConditionEntry { node, state, parameters, topic } = entry;
         match (node, topic) {
-            (Some(node), None) => Ok(match node_target(node, state, parameters)? {
+            (Some(node), None) => Ok(match node_target(&node, state, parameters)? {
                 Target::State(node, state) => Self::State { node, state },
                 Target::Parameters(node, values) => Self::Parameters { node, values },
             }),
@@ -218,11 +218,11 @@ enum Target {
 }
 
 fn node_target(
-    node: String,
+    node: &str,
     state: Option<PrimaryState>,
     parameters: Option<BTreeMap<String, Value>>,
 ) -> Result<Target, String> {
-    let node = valid_name("node", &node)?;
+    let node = valid_name("node", node)?;
     match (state, parameters) {
         (Some(state), None) => Ok(Target::State(node, state)),
         (None, Some(parameters)) if parameters.is_empty() => {
@@ -449,7 +449,7 @@ mod tests {
             (r#"[{ service = "/a", type = "std_srvs/srv/SetBool" }]"#, "needs `data`"),
             (r#"[{ service = "/a", type = "std_srvs/srv/Trigger", data = true }]"#, "has `data`"),
             (r#"[{ service = "/a", type = "nav2_msgs/srv/LoadMap" }]"#, "cannot be called"),
-            (r#"[{ command = [] }]"#, "`command` is empty"),
+            (r"[{ command = [] }]", "`command` is empty"),
             (r#"[{ command = ["a"], undo = {} }]"#, "`undo` needs either"),
             (r#"[{ comand = ["a"] }]"#, "unknown field `comand`"),
         ] {

@@ -1,5 +1,6 @@
 //! Settings of signals: the tables `[[signals]]` of `ros.toml`.
 
+use std::cmp::Ordering;
 use std::time::Duration;
 
 use metaplan::mapek::{ComponentTimes, FilterSettings, MeasuredSettings, Stale};
@@ -66,7 +67,7 @@ impl Condition {
             bound.is_none_or(|bound| number.is_some_and(|number| is_met(number, bound)))
         };
         let is_equal = self.equals.as_ref().is_none_or(|equal| match (self::number(equal), number) {
-            (Some(equal), Some(number)) => equal == number,
+            (Some(equal), Some(number)) => equal.partial_cmp(&number) == Some(Ordering::Equal),
             _ => equal == value,
         });
         is_equal

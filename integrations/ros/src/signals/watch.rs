@@ -21,6 +21,9 @@ use crate::signals::settings::{Condition, Signal, Source, Target, number};
 /// Period of checks whether nodes exist and topics are silent.
 const CHECK_PERIOD: Duration = Duration::from_millis(250);
 
+/// Time after the start during which a topic without messages does not count as silent.
+const DISCOVERY_TIME: Duration = Duration::from_secs(3);
+
 /// Timeout of the state of a lifecycle node.
 const STATE_TIMEOUT: Duration = Duration::from_secs(2);
 
@@ -171,6 +174,7 @@ fn watch_rate(
         noted.lock().unwrap_or_else(PoisonError::into_inner).push_back(of_arrivals.elapsed());
     })?;
     let started = clock.elapsed();
+    let mut first_arrival = None;
     Ok(repeat(every.max(CHECK_PERIOD.min(period)), move || {
         let now = clock.elapsed();
         let mut arrivals = arrivals.lock().unwrap_or_else(PoisonError::into_inner);
@@ -178,9 +182,14 @@ fn watch_rate(
             arrivals.pop_front();
         }
         let count = arrivals.len();
+        first_arrival = first_arrival.or(arrivals.front().copied());
         drop(arrivals);
-        // Within the first period the rate is not known yet.
-        if now.saturating_sub(started) < period {
+        // The rate is known a period after the first message. A topic without messages may not be discovered yet.
+        let known_from = match first_arrival {
+            Some(first) => first + period,
+            None => started + period.max(DISCOVERY_TIME),
+        };
+        if now < known_from {
             return;
         }
         let rate = count as f64 / period.as_secs_f64();

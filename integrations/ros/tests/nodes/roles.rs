@@ -263,12 +263,12 @@ fn a_reasoner_executes_steps_and_avoids_a_design_that_is_refused() {
     let (_spiral, altitudes) = spiral(domain);
     let directory = tempfile::tempdir().expect("a directory");
     let settings = directory.path().join("ros.toml");
-    let mut text = String::new();
-    for (design, altitude) in [("fd_spiral_high", 3.0), ("fd_spiral_medium", 2.0), ("fd_spiral_low", 1.0)] {
-        text += &format!(
-            "[functions.f_generate_search_path.designs.{design}]\nsteps = [{{ node = \"/spiral\", parameters = {{ altitude = {altitude:?} }} }}]\n"
-        );
-    }
+    let table = |(design, altitude): (&str, f64)| {
+        let step = format!("{{ node = \"/spiral\", parameters = {{ altitude = {altitude:?} }} }}");
+        format!("[functions.f_generate_search_path.designs.{design}]\nsteps = [{step}]\n")
+    };
+    let altitudes_of_designs = [("fd_spiral_high", 3.0), ("fd_spiral_medium", 2.0), ("fd_spiral_low", 1.0)];
+    let text = altitudes_of_designs.map(table).concat();
     std::fs::write(&settings, text).expect("written");
     let node = node(domain, "reasoner", "");
     let options = reasoner::Options {

@@ -363,9 +363,8 @@ fn with_steps() -> Robot {
     let (control, _) = control();
     let mut text = std::fs::read_to_string(mission.with_file_name("ros.toml")).expect("settings");
     for design in ["fd_spiral_high", "fd_spiral_medium", "fd_spiral_low"] {
-        text += &format!(
-            "\n[functions.{PATH}.designs.{design}]\nsteps = [{{ node = \"/{design}\", state = \"active\" }}]\n"
-        );
+        let step = format!("{{ node = \"/{design}\", state = \"active\" }}");
+        text.extend([format!("\n[functions.{PATH}.designs.{design}]\nsteps = [{step}]\n")]);
     }
     let directory = tempfile::tempdir().expect("a directory");
     let file = directory.path().join("ros.toml");
