@@ -9,6 +9,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
+use test_resources::{Resource, missing};
+
 use super::wires::{Wire, routes};
 
 /// The pairs of servers, by the number of the third one.
@@ -21,10 +23,15 @@ fn program() -> String {
     std::env::var("NATS_SERVER").unwrap_or_else(|_| "nats-server".to_owned())
 }
 
-/// Returns `true` if the server program is available.
-pub(super) fn is_there() -> Option<()> {
-    let out = Command::new(program()).arg("--version").stdout(Stdio::null()).status();
-    out.ok().filter(std::process::ExitStatus::success).map(|_| ())
+/// Returns `true` if the server program is available. Otherwise reports that the test lacks it.
+pub(super) fn is_possible() -> bool {
+    let program = program();
+    let status = Command::new(&program).arg("--version").stdout(Stdio::null()).status();
+    let is_possible = status.is_ok_and(|status| status.success());
+    if !is_possible {
+        missing(Resource::Nats, &format!("{program} does not start"));
+    }
+    is_possible
 }
 
 /// The processes of the cluster.
