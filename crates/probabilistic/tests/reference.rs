@@ -12,6 +12,10 @@ use num_rational::BigRational;
 use serde_json::Value;
 use test_resources::{data, python};
 
+/// A temporary file of the authors of the models. The table has values for it, but the test data do not
+/// contain it.
+const TEMPORARY: &str = "prismtmp.prism";
+
 fn json(path: &Path) -> Value {
     serde_json::from_str(&std::fs::read_to_string(path).expect("readable")).expect("JSON")
 }
@@ -191,6 +195,9 @@ fn repository_models_agree_with_storm() {
     let mut checked = 0;
     for case in json(&reference)["repository_files"].as_array().expect("cases") {
         let text = |key: &str| case[key].as_str().expect("text");
+        if text("case") == TEMPORARY {
+            continue;
+        }
         let Some(model) = data(folder.join(text("case"))) else { continue };
         checked += 1;
         for exactness in [Exactness::Auto, Exactness::Never] {
