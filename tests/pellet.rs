@@ -12,13 +12,14 @@
 
 #![allow(clippy::print_stdout)] // Measurements are printed.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
 use std::time::Instant;
 
 use ontology::runtime::{Mode, NewObjective, Runtime};
 use ontology::{ReadOptions, lower, read_files, vocab};
 use rules::{Engine, Literal, Symbols};
+use test_resources::{Resource, data, data_directory, program, python_with};
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 const OURS: &str = env!("CARGO_BIN_EXE_metaplan");
@@ -38,26 +39,23 @@ struct Times {
     processor: f64,
 }
 
-/// Locations of Pellet, of the files of SUAVE, and of the generator of large knowledge bases.
+/// Locations of Pellet, and of the test data with the files of SUAVE and the generator of large knowledge bases.
 struct Peer {
     class_path: String,
     shared: PathBuf,
 }
 
 impl Peer {
-    /// Finds Pellet and the shared files. Prints a message and returns `None` if something is missing.
+    /// Finds Pellet and the test data. Returns `None` if something is missing.
     fn find() -> Option<Self> {
-        let shared = Path::new(ROOT).join("../shared");
-        let python = std::env::var("METAPLAN_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+        data("real/owl")?;
+        program(Resource::Java, &["java"])?;
+        let python = python_with(Resource::Owlready2, "METAPLAN_PYTHON", "owlready2.reasoning")?;
         let script = "import owlready2.reasoning as r; print(r._PELLET_CLASSPATH)";
-        let output = Command::new(python).args(["-c", script]).output().ok()?;
-        let class_path = String::from_utf8(output.stdout).ok()?.trim().to_owned();
-        let java = Command::new("java").arg("-version").output().is_ok_and(|output| output.status.success());
-        if class_path.is_empty() || !java || !shared.is_dir() {
-            println!("skipped: needs owlready2 in METAPLAN_PYTHON, java, and {}", shared.display());
-            return None;
-        }
-        Some(Self { class_path, shared })
+        let output = Command::new(python).args(["-c", script]).output().expect("Python starts");
+        let class_path = String::from_utf8(output.stdout).expect("UTF-8").trim().to_owned();
+        assert!(!class_path.is_empty(), "owlready2 contains no Pellet");
+        Some(Self { class_path, shared: data_directory() })
     }
 
     /// Returns the command line with which owlready2 starts Pellet on an N-Triples document. `class` is the

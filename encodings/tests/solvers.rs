@@ -4,6 +4,7 @@ use std::time::{Duration, Instant};
 
 use metaplan_encodings::sat::{Answer, Backend, BackendError, Lit, Solver};
 use task::limits::Limits;
+use test_resources::{Resource, missing};
 use testing::random::Random;
 
 /// Command lines of SAT solvers that Linux distributions ship.
@@ -17,18 +18,21 @@ const PROGRAMS: [&str; 6] = [
 ];
 
 /// Returns the built-in solvers and those of [`PROGRAMS`] that are installed.
-#[allow(clippy::print_stdout)]
 pub fn backends() -> Vec<Backend> {
     let built_in = Backend::BUILT_IN.iter().map(|name| name.parse().expect("a name"));
     let mut backends: Vec<Backend> = built_in.collect();
+    let mut absent = Vec::new();
     for program in PROGRAMS {
         let mut words = program.split(' ').map(str::to_owned);
         let backend =
             Backend::Program { command: words.next().expect("a command"), arguments: words.collect() };
         match backend.check() {
             Ok(()) => backends.push(backend),
-            Err(error) => println!("skipped: {error}"),
+            Err(error) => absent.push(error.to_string()),
         }
+    }
+    if !absent.is_empty() {
+        missing(Resource::Solvers, &absent.join("; "));
     }
     backends
 }

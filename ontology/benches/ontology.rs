@@ -1,22 +1,21 @@
 //! Benchmarks: from the files of a knowledge base to all conclusions, and updates of one measured value.
 //!
-//! The files are those of SUAVE in `../shared`, or the embedded UUV if they do not exist. Larger knowledge
+//! The files are those of SUAVE in the test data, or the embedded UUV if they do not exist. Larger knowledge
 //! bases are generated in the shape of SUAVE: functions with designs, each with a component and an estimation.
 
 use std::fmt::Write;
 use std::hint::black_box;
-use std::path::{Path, PathBuf};
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use ontology::runtime::{Mode, NewObjective, Runtime};
 use ontology::{Ontology, ReadOptions, kb, lower, read_files, read_text, vocab};
 use rules::{Engine, Literal, Symbols};
-
-const REAL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/real/owl");
+use test_resources::data_directory;
 
 fn suave() -> Ontology {
-    let file = Path::new(REAL).join("suave/suave.owl");
-    let options = ReadOptions { directories: vec![PathBuf::from(REAL)], ..ReadOptions::default() };
+    let real = data_directory().join("real/owl");
+    let file = real.join("suave/suave.owl");
+    let options = ReadOptions { directories: vec![real], ..ReadOptions::default() };
     if file.is_file() {
         read_files(&[file], &options).expect("readable")
     } else {

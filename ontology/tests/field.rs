@@ -1,9 +1,7 @@
 //! Knowledge bases that other reasoners evaluate wrongly, and documents that stop them, with the expected
-//! verdicts. The files are outside of the project; the tests print a message if they do not exist.
+//! verdicts. The files are outside of the project.
 
-#![allow(clippy::print_stdout, clippy::needless_for_each, clippy::case_sensitive_file_extension_comparisons)]
-
-use crate::common;
+#![allow(clippy::needless_for_each, clippy::case_sensitive_file_extension_comparisons)]
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -12,6 +10,7 @@ use cpu_time::ThreadTime;
 
 use ontology::{Equality, ReadOptions, lower_together, ntriples, read_files};
 use rules::{Engine, Fact, Prefixes, Symbols, parse_rules};
+use test_resources::{data, data_directory};
 
 /// Expected result for a file.
 enum Verdict {
@@ -170,7 +169,7 @@ fn local(term: &str) -> &str {
 }
 
 fn check(file: &str, verdict: &Verdict) {
-    let path = Path::new(common::SHARED).join("field/ontology").join(file);
+    let path = data_directory().join("field/ontology").join(file);
     let (start, wall_start) = (ThreadTime::now(), Instant::now());
     let engine = engine(&path);
     match (verdict, engine) {
@@ -206,17 +205,9 @@ fn check(file: &str, verdict: &Verdict) {
     assert!(wall_start.elapsed() < wall_limit, "{file} took {:?}", wall_start.elapsed());
 }
 
-fn is_there() -> bool {
-    let directory = Path::new(common::SHARED).join("field/ontology");
-    if !directory.is_dir() {
-        println!("skipped: {} is not there", directory.display());
-    }
-    directory.is_dir()
-}
-
 #[test]
 fn every_file_has_its_verdict() {
-    if !is_there() {
+    if data("field/ontology").is_none() {
         return;
     }
     for (file, verdict) in FILES.iter().chain(&HOSTILE_FILES) {
@@ -227,7 +218,7 @@ fn every_file_has_its_verdict() {
 #[test]
 #[cfg_attr(debug_assertions, ignore = "takes a minute without optimisation")]
 fn expensive_files_finish_in_time() {
-    if is_there() {
+    if data("field/ontology").is_some() {
         EXPENSIVE_FILES.iter().for_each(|(file, verdict)| check(file, verdict));
     }
 }
@@ -235,10 +226,7 @@ fn expensive_files_finish_in_time() {
 /// Every file of the directory has a verdict.
 #[test]
 fn every_file_is_in_the_table() {
-    if !is_there() {
-        return;
-    }
-    let root = Path::new(common::SHARED).join("field/ontology");
+    let Some(root) = data("field/ontology") else { return };
     for (directory, prefix) in [(root.clone(), ""), (root.join("hostile"), "hostile/")] {
         for entry in std::fs::read_dir(directory).expect("readable").filter_map(Result::ok) {
             let name = format!("{prefix}{}", entry.file_name().to_string_lossy());
@@ -256,13 +244,9 @@ fn every_file_is_in_the_table() {
 /// Real files that were once rejected or misread, with their available imports.
 #[test]
 fn real_files_are_read() {
-    let root = Path::new(common::SHARED).join("real/owl_field");
-    let Ok(entries) = std::fs::read_dir(&root) else {
-        println!("skipped: {} is not there", root.display());
-        return;
-    };
+    let Some(root) = data("real/owl_field") else { return };
     let mut count = 0;
-    for directory in entries.filter_map(Result::ok) {
+    for directory in std::fs::read_dir(root).expect("readable").filter_map(Result::ok) {
         for file in std::fs::read_dir(directory.path()).expect("readable").filter_map(Result::ok) {
             let options = ReadOptions { allow_missing_imports: true, ..ReadOptions::default() };
             let ontology = read_files(&[file.path()], &options);

@@ -1,12 +1,12 @@
 //! Compares the conclusions about recorded knowledge bases with the conclusions of Pellet and of an independent
 //! closure.
 
-#![allow(clippy::print_stdout)] // a skipped test says so
+#![allow(clippy::print_stdout)] // cases that are not compared are listed
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use crate::common::{SHARED, recorded};
+use crate::common::{real_directory, recorded};
 use ontology::{
     ANONYMOUS, Equality, INTERNAL, Ontology, ReadOptions, lower_with, read_files, read_text, vocab,
 };
@@ -96,7 +96,7 @@ fn check_all(directory: &str, compare: impl Fn(&Value) -> Result<(), String>) {
     for case in &cases {
         let name = case["case"].as_str().expect("case");
         if let Some((_, reason)) = SKIPPED.iter().find(|(skipped, _)| *skipped == name) {
-            println!("{name} skipped: {reason}");
+            println!("{name} is not compared: {reason}");
         } else if let Err(difference) = compare(case) {
             failures.push(format!("{name}: {difference}"));
         }
@@ -147,7 +147,7 @@ fn knowledge_base(case: &Value) -> (Ontology, Vec<Triple>) {
 
 /// Reads the files of a case and an additional file.
 fn read_real(case: &Value, additional: Option<&Path>) -> Ontology {
-    let real = Path::new(SHARED).join("real/owl");
+    let real = real_directory();
     let files = case["kb"].as_array().expect("kb").iter().map(|file| real.join(file.as_str().expect("file")));
     let files: Vec<PathBuf> = files.chain(additional.map(Path::to_owned)).collect();
     let options = ReadOptions { directories: vec![real], ..ReadOptions::default() };

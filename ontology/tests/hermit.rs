@@ -21,8 +21,8 @@ use std::process::{Command, Stdio};
 
 use ontology::{EntityKind, INTERNAL, OutputSyntax, ReadOptions, convert_files, lower, ntriples, read_files};
 use rules::{Engine, Fact, Symbols};
+use test_resources::data_directory;
 
-use crate::common;
 use crate::w3c::premises;
 
 /// Maximum number of conclusions from one document that HermiT has to prove.
@@ -113,7 +113,7 @@ fn every_conclusion_is_entailed() {
     let directory = tempfile::tempdir().expect("a folder");
     let mut files = Vec::new();
     for folder in ["owl", "owl_field"] {
-        documents(&Path::new(common::SHARED).join("real").join(folder), &mut files);
+        documents(&data_directory().join("real").join(folder), &mut files);
     }
     files.sort();
     for (name, text) in premises() {

@@ -1,11 +1,8 @@
 //! Lints for models: reported mistakes, and models without mistakes.
 
-#![allow(clippy::print_stdout)] // a skipped test says so
-
-use std::path::PathBuf;
-
 use ontology::{Ontology, ReadOptions, kb, lower, read_files, read_text, tomasys};
 use rules::{Engine, Symbols};
+use test_resources::data;
 
 /// Prefixes for models that import our metamodel.
 const HEAD: &str = "@prefix t: <http://metacontrol.org/tomasys#> .\n\
@@ -122,16 +119,12 @@ fn our_own_models_have_no_mistakes() {
 /// The codes of the warnings for models in use.
 #[test]
 fn models_in_use_have_only_known_warnings() {
-    let real = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/real/owl"));
+    let Some(real) = data("real/owl") else { return };
     for (file, expected) in [
         ("suave/suave.owl", &["O405"][..]),
         ("navigation_planta/navigation.owl", &[]),
         ("mc_mros_reasoner/kb.owl", &[]),
     ] {
-        if !real.join(file).is_file() {
-            println!("skipped: {file} is not there");
-            return;
-        }
         let options = ReadOptions { directories: vec![real.clone()], ..ReadOptions::default() };
         let reported = warnings(&read_files(&[real.join(file)], &options).expect("readable"));
         let codes: Vec<_> = reported.iter().map(|warning| &warning[8..12]).collect();

@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 
 use ontology::{OutputSyntax, ReadOptions, convert_files, lower, read_text};
 use rules::Symbols;
+use test_resources::data;
 
-const REAL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/real/owl");
 const OURS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/kb");
 
 const SYNTAXES: [OutputSyntax; 5] = [
@@ -35,13 +35,14 @@ impl Numbers {
     }
 }
 
-/// Embedded and real knowledge bases in every syntax.
+/// Embedded knowledge bases in every syntax, and real ones if the test data exist.
 fn seeds() -> Vec<Vec<u8>> {
     let ours = ["tomasys.ttl", "ugv.ttl"].map(|file| Path::new(OURS).join(file));
     let real = ["suave/suave.owl", "mros_ontology/mros.owl", "navigation_planta/navigation_with_imports.owl"];
-    let real = real.map(|file| Path::new(REAL).join(file));
-    let files: Vec<PathBuf> = ours.into_iter().chain(real).filter(|file| file.is_file()).collect();
-    let options = ReadOptions { directories: vec![REAL.into()], ..ReadOptions::default() };
+    let directory = data("real/owl");
+    let real = directory.iter().flat_map(|directory| real.map(|file| directory.join(file)));
+    let files: Vec<PathBuf> = ours.into_iter().chain(real).collect();
+    let options = ReadOptions { directories: directory.iter().cloned().collect(), ..ReadOptions::default() };
     let mut seeds: Vec<Vec<u8>> = files.iter().map(|file| std::fs::read(file).expect("readable")).collect();
     for file in &files {
         for syntax in SYNTAXES {

@@ -1,15 +1,14 @@
 //! Every real knowledge base loads, alone and with its imports, with the contents recorded in
 //! `golden/README.md`.
 
-#![allow(clippy::print_stdout)] // a skipped test says so
-
 use std::path::{Path, PathBuf};
 
 use ontology::EntityKind::{AnnotationProperty, Class, DataProperty, ObjectProperty};
 use ontology::{Ontology, ReadOptions, Warning, lower, read_files, read_text};
 use rules::Symbols;
+use test_resources::data;
 
-const REAL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/real/owl");
+use crate::common::real_directory;
 
 /// File, rules, classes, object properties, data properties, annotation properties, individuals (declared in
 /// the file itself), rules including imports.
@@ -53,16 +52,11 @@ const INVENTORY: [Row; 34] = [
 ];
 
 fn real() -> Option<PathBuf> {
-    let directory = PathBuf::from(REAL);
-    if directory.is_dir() {
-        return Some(directory);
-    }
-    println!("skipped: {} is not there", directory.display());
-    None
+    data("real/owl")
 }
 
 fn with_imports(file: &Path) -> Ontology {
-    let options = ReadOptions { directories: vec![PathBuf::from(REAL)], ..ReadOptions::default() };
+    let options = ReadOptions { directories: vec![real_directory()], ..ReadOptions::default() };
     read_files(&[file], &options).unwrap_or_else(|errors| panic!("{}: {errors:?}", file.display()))
 }
 

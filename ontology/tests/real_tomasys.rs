@@ -1,24 +1,18 @@
 //! The typed view and the updates on real knowledge bases; comparison of the embedded metamodel with the real
 //! one.
 
-#![allow(clippy::print_stdout)] // a skipped test says so
-
 use std::collections::BTreeSet;
-use std::path::PathBuf;
 
 use ontology::tomasys::{View, change};
 use ontology::{Axiom, EntityKind, Ontology, ReadOptions, kb, lower, read_files, read_text};
 use rules::{Delta, Engine, Fact, Literal, Symbols};
+use test_resources::data;
 
-const REAL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/real/owl");
+use crate::common::real_directory;
 
 fn read(file: &str) -> Option<Ontology> {
-    let path = PathBuf::from(REAL).join(file);
-    if !path.is_file() {
-        println!("skipped: {} is not there", path.display());
-        return None;
-    }
-    let options = ReadOptions { directories: vec![PathBuf::from(REAL)], ..ReadOptions::default() };
+    let path = data(real_directory().join(file))?;
+    let options = ReadOptions { directories: vec![real_directory()], ..ReadOptions::default() };
     Some(read_files(&[path], &options).expect("readable"))
 }
 

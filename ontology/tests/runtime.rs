@@ -1,17 +1,14 @@
 //! Reports, objectives in error and selection of designs: a small robot in both modes, and the recorded second
 //! cycles of MROS.
 
-#![allow(clippy::print_stdout)] // a skipped test says so
-
 use std::path::PathBuf;
 
-use crate::common::selected;
+use crate::common::{real_directory, selected};
 use ontology::runtime::{Mode, NewObjective, Objective, Rejection, Runtime};
 use ontology::tomasys::change::Status;
 use ontology::{INTERNAL, ReadOptions, kb, lower, read_files, read_text, vocab};
 use rules::{Delta, Engine, Fact, Literal, Symbols};
-
-const SHARED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared");
+use test_resources::data;
 
 /// Two designs of one function. `slow` depends on light and air; `fast` requires a motor.
 const ROBOT: &str = r#"
@@ -288,11 +285,8 @@ fn recorded_second_cycles_of_mros_are_reproduced() {
         ),
         ("suave_28_second_cycle_visibility_back_latched", Some(vocab::tomasys::HAS_VALUE), "IN_ERROR_NFR"),
     ] {
-        let path = PathBuf::from(SHARED).join("golden/kb").join(format!("{case}.json"));
-        let Ok(text) = std::fs::read_to_string(&path) else {
-            println!("skipped: {} is not there", path.display());
-            return;
-        };
+        let Some(path) = data(format!("golden/kb/{case}.json")) else { return };
+        let text = std::fs::read_to_string(path).expect("readable");
         let case: serde_json::Value = serde_json::from_str(&text).expect("JSON");
         let mut runtime = second_cycle(&case);
         assert_eq!(runtime.conclude().expect("applied"), []);
@@ -325,7 +319,7 @@ fn recorded_second_cycles_of_mros_are_reproduced() {
 
 /// Builds a runtime from the knowledge base of a recorded case with its added triples.
 fn second_cycle(case: &serde_json::Value) -> Runtime {
-    let real = PathBuf::from(SHARED).join("real/owl");
+    let real = real_directory();
     let files = case["kb"].as_array().expect("kb").iter();
     let files: Vec<PathBuf> = files.map(|file| real.join(file.as_str().expect("file"))).collect();
     let options = ReadOptions { directories: vec![real], ..ReadOptions::default() };

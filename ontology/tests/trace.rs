@@ -1,11 +1,11 @@
 //! Replays recorded traces of the unmodified MROS reasoner in latch mode, step by step.
 
-#![allow(clippy::print_stdout)] // a skipped test says so
+#![allow(clippy::print_stdout)] // steps that are not compared are listed
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use crate::common::{SHARED, recorded, selected};
+use crate::common::{real_directory, recorded, selected};
 use ontology::runtime::{Mode, NewObjective, Objective, Runtime};
 use ontology::{ReadOptions, lower, read_files, vocab};
 use rules::{Delta, Engine, Fact, Literal, Symbols};
@@ -55,7 +55,7 @@ fn recorded_traces_of_mros_are_reproduced() {
 
 /// Builds a runtime from the knowledge base of a trace.
 fn runtime(trace: &Value) -> Runtime {
-    let real = PathBuf::from(SHARED).join("real/owl");
+    let real = real_directory();
     let folder = |file: &str| match file {
         "tomasys.owl" => "mc_mdl_tomasys",
         "suave.owl" => "suave",

@@ -1,17 +1,15 @@
 //! The test cases of the W3C's OWL working group under the Direct Semantics: consistency, inconsistency and
-//! entailment. The files are outside of the project; the test prints a message if they do not exist.
+//! entailment. The files are outside of the project.
 
 #![allow(clippy::print_stdout, clippy::format_push_string)]
 
-use crate::common;
-
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 
 use ontology::entail::{Answer, annotations, entailments};
 use ontology::{EntityKind, Equality, Iri, Ontology, ReadOptions, lower_with, read_files};
 use oxrdf::{NamedOrBlankNode, Term};
 use rules::{Engine, Symbols};
+use test_resources::data;
 
 const TEST: &str = "http://www.w3.org/2007/OWL/testOntology#";
 
@@ -96,8 +94,8 @@ fn engine(ontology: &Ontology) -> Result<Engine, String> {
 
 /// Returns the premises of all cases, with their identifiers; empty if the suite does not exist.
 pub fn premises() -> Vec<(String, String)> {
-    let path = Path::new(common::SHARED).join("real/owl_w3c/semantics-direct.rdf");
-    let Ok(text) = std::fs::read_to_string(&path) else { return Vec::new() };
+    let Some(path) = data("real/owl_w3c/semantics-direct.rdf") else { return Vec::new() };
+    let text = std::fs::read_to_string(path).expect("readable");
     let suite = Suite::read(&text);
     let cases = suite.0.iter().filter(|(_, properties)| properties.contains_key("identifier"));
     let premises = cases.filter_map(|(case, properties)| {
@@ -142,11 +140,8 @@ fn decide(suite: &Suite, case: &str) -> Result<Vec<(&'static str, bool)>, String
 #[test]
 #[ignore = "takes minutes without optimisation"]
 fn results_agree_with_the_w3c_test_cases() {
-    let path = Path::new(common::SHARED).join("real/owl_w3c/semantics-direct.rdf");
-    let Ok(text) = std::fs::read_to_string(&path) else {
-        println!("skipped: {} is not there", path.display());
-        return;
-    };
+    let Some(path) = data("real/owl_w3c/semantics-direct.rdf") else { return };
+    let text = std::fs::read_to_string(path).expect("readable");
     let suite = Suite::read(&text);
     let mut open: BTreeSet<(&str, &str)> = OPEN.iter().map(|(name, kind, _)| (*name, *kind)).collect();
     let (mut counts, mut wrong) = (BTreeMap::<(bool, &str, bool), usize>::new(), Vec::new());

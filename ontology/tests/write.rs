@@ -1,16 +1,16 @@
 //! Documents in every output syntax have the same consequences as the original when they are read again.
 
-#![allow(clippy::print_stdout)] // a skipped test says so
-
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use ontology::{
     Equality, Ontology, OutputSyntax, ReadOptions, convert_files, lower_with, read_files, read_text, turtle,
 };
 use rules::{Engine, Symbols};
+use test_resources::data;
 
-const REAL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/real/owl");
+use crate::common::real_directory;
+
 const OURS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/kb");
 
 const ALL: [OutputSyntax; 5] = [
@@ -39,7 +39,7 @@ fn rules(ontology: &Ontology) -> BTreeSet<String> {
 /// Writes a file with its imports in each syntax, and reads the result without imports. Compares the rules
 /// and the conclusions with those of the original.
 fn check(file: &Path) {
-    let options = ReadOptions { directories: vec![REAL.into(), OURS.into()], ..ReadOptions::default() };
+    let options = ReadOptions { directories: vec![real_directory(), OURS.into()], ..ReadOptions::default() };
     let original = read_files(&[file], &options).expect("readable");
     let (axioms, rules) = (conclusions(&original), rules(&original));
     for syntax in ALL {
@@ -75,11 +75,7 @@ fn real_knowledge_bases_survive_conversion() {
         "mros_ontology/urjc_pilot.owl",
         "navigation_planta/navigation.owl",
     ] {
-        let file = PathBuf::from(REAL).join(file);
-        if !file.is_file() {
-            println!("skipped: {} is not there", file.display());
-            return;
-        }
+        let Some(file) = data(real_directory().join(file)) else { return };
         check(&file);
     }
 }

@@ -14,7 +14,7 @@
 //! | `rust` | A doctest, see `src/lib.rs`. |
 //! | `text` | None: output of earlier commands, or a drawing. |
 //! | any, after `<!-- file: PATH -->` | The block must be a part of that file, line by line. |
-//! | `console`, `sh`, after `<!-- needs: NAME, … -->` | As above, if each name is a program in the path or an available [`page::Fixture`]. With `METAPLAN_BOOK_REQUIRES=NAME,…`, missing ones are an error. |
+//! | `console`, `sh`, after `<!-- needs: NAME, … -->` | As above, if each name is a program in the path or an available [`page::Fixture`]. Otherwise the page lacks a resource of `crates/test-resources`; with `METAPLAN_REQUIRE` this is an error. |
 //! | `console`, after `<!-- input ends after: SECONDS -->` | As above; the standard input of the last command stays open for this time. |
 //! | any, after `<!-- not run: REASON -->` | None. The reason names the CI stage or the test that runs the block, if any. |
 //!
@@ -34,6 +34,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use libtest_mimic::{Arguments, Failed, Trial};
+use test_resources::{Resource, missing_in};
 
 use common::root;
 use page::{Block, Kind};
@@ -129,10 +130,14 @@ impl Page {
     fn check(&self) -> Result<(), Failed> {
         let mut faults: Vec<String> = Vec::new();
         for block in &self.blocks {
-            let missing: Vec<String> = block.missing().filter(|name| page::is_required(name)).collect();
+            let missing: Vec<String> = block.missing().collect();
             let fault = match &block.kind {
                 Kind::Console | Kind::Script if !missing.is_empty() => {
-                    format!("{} is not there, and METAPLAN_BOOK_REQUIRES has it", missing.join(", "))
+                    // Fails if the resource is required.
+                    for name in &missing {
+                        self.lacks(page::resource(name), name);
+                    }
+                    continue;
                 }
                 Kind::File(file) if !is_part_of(&block.text, file) => format!("this is not a part of {file}"),
                 Kind::Rust if !self.is_doctest() => {
@@ -144,10 +149,19 @@ impl Page {
             faults.push(format!("{}:{}: {fault}", self.path, block.line));
         }
         let blocks: Vec<&Block> = self.blocks.iter().filter(|block| block.is_run()).collect();
-        if !blocks.is_empty() && Session::is_possible() {
-            faults.extend(self.run(&Session::new(), &blocks));
+        if !blocks.is_empty() {
+            if Session::is_possible() {
+                faults.extend(self.run(&Session::new(), &blocks));
+            } else {
+                self.lacks(Resource::Shell, "sh");
+            }
         }
         if faults.is_empty() { Ok(()) } else { Err(Failed::from(faults.join("\n"))) }
+    }
+
+    /// Reports that blocks of this page are not run.
+    fn lacks(&self, resource: Resource, name: &str) {
+        missing_in(&self.path, resource, &format!("blocks that need {name} are not run"));
     }
 
     /// Runs blocks in order in one session. Returns the differences between their output and the page.

@@ -1,10 +1,7 @@
 //! Fenced blocks of a page, with the instructions in the comment before each block.
 
-use std::path::{Path, PathBuf};
-
 use pulldown_cmark::{CodeBlockKind, Event, Options, Parser, Tag, TagEnd};
-
-use crate::common::root;
+use test_resources::{Resource, data_directory, in_path};
 
 /// Kind of a block, which determines how the block is checked.
 #[derive(Debug, PartialEq, Eq)]
@@ -50,7 +47,7 @@ impl Block {
 /// directory.
 pub struct Fixture {
     pub name: &'static str,
-    /// Pairs of the source path below the directory of shared data and the target path in the session's
+    /// Pairs of the source path below the directory of test data and the target path in the session's
     /// directory.
     pub files: [(&'static str, &'static str); 4],
 }
@@ -65,23 +62,20 @@ pub const FIXTURES: [Fixture; 1] = [Fixture {
     ],
 }];
 
-/// Returns the directory of shared data, a sibling of the project's directory.
-pub fn shared() -> PathBuf {
-    root().join("../shared")
-}
-
 fn is_available(name: &str) -> bool {
-    if let Some(fixture) = FIXTURES.iter().find(|fixture| fixture.name == name) {
-        return fixture.files.iter().all(|(source, _)| shared().join(source).exists());
+    match FIXTURES.iter().find(|fixture| fixture.name == name) {
+        Some(fixture) => fixture.files.iter().all(|(source, _)| data_directory().join(source).exists()),
+        None => in_path(&[name]).is_some(),
     }
-    let path = std::env::var_os("PATH").unwrap_or_default();
-    std::env::split_paths(&path).any(|folder| Path::new(&folder).join(name).is_file())
 }
 
-/// Returns `true` if `METAPLAN_BOOK_REQUIRES` lists this program or fixture.
-pub fn is_required(name: &str) -> bool {
-    let required = std::env::var("METAPLAN_BOOK_REQUIRES").unwrap_or_default();
-    required.split(',').any(|required| required.trim() == name)
+/// Returns the resource that contains a program or fixture.
+pub fn resource(name: &str) -> Resource {
+    if FIXTURES.iter().any(|fixture| fixture.name == name) {
+        return Resource::Data;
+    }
+    let resource = if name == "python3" { Some(Resource::Python) } else { Resource::named(name) };
+    resource.unwrap_or_else(|| panic!("`needs: {name}`: no resource of crates/test-resources has this name"))
 }
 
 pub fn blocks(page: &str) -> Vec<Block> {

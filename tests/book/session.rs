@@ -8,9 +8,10 @@ use std::process::{Command, Stdio};
 
 use snapbox::{Assert, IntoData as _};
 use tempfile::TempDir;
+use test_resources::data_directory;
 
 use crate::common::{copy_folder, root, verifier, without_progress};
-use crate::page::{Block, FIXTURES, Kind, shared};
+use crate::page::{Block, FIXTURES, Kind};
 
 /// Character that no program prints. The script prints it before and after each status.
 const SEPARATOR: char = '\u{1e}';
@@ -59,7 +60,7 @@ impl Session {
             .filter(|fixture| blocks.iter().any(|block| block.needs.iter().any(|name| name == fixture.name)))
         {
             for (source, target) in fixture.files {
-                let (source, target) = (shared().join(source), self.place().join(target));
+                let (source, target) = (data_directory().join(source), self.place().join(target));
                 if source.is_dir() {
                     copy_folder(&source, &target);
                 } else {

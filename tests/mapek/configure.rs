@@ -1,8 +1,6 @@
 //! Selection of designs for objectives, compared with recorded choices of MROS, and as part of the
 //! configuration loop ([`Keeper`]).
 
-#![allow(clippy::print_stdout)] // a skipped test says so
-
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
@@ -15,11 +13,10 @@ use ontology::tomasys::change::Status;
 use planner::Limits;
 use rules::{Delta, Fact};
 use serde_json::Value;
-
-const SHARED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared");
+use test_resources::{data, data_directory};
 
 fn real(files: &[&str]) -> Knowledge {
-    let real = PathBuf::from(SHARED).join("real/owl");
+    let real = data_directory().join("real/owl");
     let folder = |file: &str| match file {
         "tomasys.owl" => "mc_mdl_tomasys",
         "suave.owl" => "suave",
@@ -114,10 +111,8 @@ fn served_by_mros(step: &Value) -> BTreeMap<String, String> {
 
 #[test]
 fn choices_equal_those_of_mros_except_for_listed_differences() {
-    let Ok(folder) = std::fs::read_dir(PathBuf::from(SHARED).join("golden/trace")) else {
-        println!("skipped: the recorded runs of MROS are not there");
-        return;
-    };
+    let Some(folder) = data("golden/trace") else { return };
+    let folder = std::fs::read_dir(folder).expect("a folder");
     let mut files: Vec<PathBuf> = folder.map(|entry| entry.expect("an entry").path()).collect();
     files.sort();
     let (mut cycles, mut differences) = (0, BTreeMap::<String, Vec<usize>>::new());

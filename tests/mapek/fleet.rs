@@ -1,7 +1,6 @@
 //! Tests with a hundred robots in one process, each with a loop over SUAVE's own knowledge base.
 #![expect(clippy::print_stdout, reason = "figures are what these tests are for")]
 
-use std::path::Path;
 use std::time::{Duration, Instant};
 
 use metaplan::mapek::{Answer, Loop, Observation};
@@ -15,9 +14,9 @@ const MANIFEST: &str = r#"
 name = "suave_fleet"
 
 [knowledge]
-files = ["SHARED/real/owl/suave/suave.owl"]
+files = ["REAL/suave/suave.owl"]
 rules = ["coadaptation", "visibility.swrl"]
-directories = ["SHARED/real/owl/mros_ontology", "SHARED/real/owl/mc_mdl_tomasys"]
+directories = ["REAL/mros_ontology", "REAL/mc_mdl_tomasys"]
 
 [planning]
 domain = "domain.pddl"
@@ -53,16 +52,12 @@ const PROBLEM: &str = "
 (define (problem fleet) (:domain suave) (:init) (:goal (inspected)) (:metric minimize (total-time)))
 ";
 
-/// Returns a directory with the files of the mission and the manifest `m.toml`. `None` if the shared material
-/// is absent.
+/// Returns a directory with the files of the mission and the manifest `m.toml`. `None` if the real knowledge
+/// bases are absent.
 pub fn files() -> Option<tempfile::TempDir> {
-    let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared");
-    if !shared.is_dir() {
-        println!("skipped: there is no ../shared beside the project");
-        return None;
-    }
+    let real = test_resources::data("real/owl")?;
     let directory = tempfile::tempdir().expect("a directory");
-    let manifest = MANIFEST.replace("SHARED", &shared.display().to_string());
+    let manifest = MANIFEST.replace("REAL", &real.display().to_string());
     let files = [
         ("m.toml", manifest.as_str()),
         ("visibility.swrl", RULES),

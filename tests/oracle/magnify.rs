@@ -1,7 +1,7 @@
 //! Benchmark: slowdown of planning, certifying and verifying if all numbers of a mission are replaced by
 //! decimals of 16 significant digits.
 //!
-//! The missions come from `../shared/tools/gen_ratpa.py` (needs python3). Distances are multiplied by square roots, other numbers by
+//! The missions come from a script in the test data (needs python3). Distances are multiplied by square roots, other numbers by
 //! decimals. Consumption does not grow and the battery holds slightly more, so a solvable mission remains solvable. The replaced
 //! numbers preserve the order of compared values, so the same designs can be used.
 //!
@@ -12,6 +12,8 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+
+use test_resources::{data, python};
 
 /// Number of significant digits of the decimals.
 const DIGITS: usize = 16;
@@ -207,11 +209,7 @@ fn geometric_mean(ratios: &[f64]) -> f64 {
 #[allow(clippy::print_stdout)]
 #[ignore = "plans, certifies and verifies 150 missions: minutes, and only a release build says something"]
 fn decimals_slow_planning_by_a_bounded_factor() {
-    let tool = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/tools/gen_ratpa.py");
-    if !tool.exists() || Command::new("python3").arg("--version").output().is_err() {
-        println!("skipped: needs python3 and {}", tool.display());
-        return;
-    }
+    let (Some(tool), Some(_)) = (data("tools/gen_ratpa.py"), python()) else { return };
     let temporary = tempfile::tempdir().expect("a temporary directory");
     // `ORACLE_SAVE` preserves the missions and certificates.
     let directory = std::env::var_os("ORACLE_SAVE").map_or(temporary.path().to_owned(), PathBuf::from);

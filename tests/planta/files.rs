@@ -22,16 +22,7 @@ pub struct Input {
 
 /// Returns the directory of the real files, if available.
 pub fn real() -> Option<PathBuf> {
-    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/real");
-    if directory.is_dir() {
-        return Some(directory);
-    }
-    // The reason for skipping should be part of the test's own output.
-    #[allow(clippy::print_stderr)]
-    {
-        eprintln!("skipped: there is no ../shared beside the project");
-    }
-    None
+    test_resources::data("real")
 }
 
 /// Runs the program. Returns its exit status, standard output and standard error.

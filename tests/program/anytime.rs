@@ -6,14 +6,14 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use serde_json::{Value, json};
+use test_resources::data;
 
 use crate::common::{copy_folder, edit, metaplan, metaplan_in, root};
-use crate::probabilistic::shared;
 
 /// Copies the mission `ward` into a temporary directory, with its larger problem if `large`. Returns `None`
-/// if the shared data are not available.
+/// if the test data are not available.
 fn ward(large: bool) -> Option<tempfile::TempDir> {
-    let folder = shared("field3/newcomer3/ward")?;
+    let folder = data("field3/newcomer3/ward")?;
     let directory = tempfile::tempdir().expect("a directory");
     copy_folder(&folder, directory.path());
     if large {

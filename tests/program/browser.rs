@@ -1,10 +1,10 @@
 //! Tests of HTML pages in a browser: no console messages, all foldable parts open, no overlapping elements.
-#![expect(clippy::print_stdout, reason = "what is skipped says so")]
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use serde_json::{Value, json};
+use test_resources::{Resource, program};
 
 use crate::common::{metaplan, metaplan_in, root};
 use crate::live::Run;
@@ -20,16 +20,9 @@ const GREENHOUSE: &str = "tests/program/greenhouse/mission.toml";
 /// Script of the page that surrounds the tested pages. It collects the results for the pages in the frames.
 const QUESTIONS: &str = include_str!("browser.js");
 
-/// Returns the path of the browser. Prints the reason for skipping if no browser is installed.
+/// Returns the path of the browser, if one is installed.
 pub fn browser() -> Option<PathBuf> {
-    let path = std::env::var_os("PATH")?;
-    let folders: Vec<PathBuf> = std::env::split_paths(&path).collect();
-    let program = NAMES.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name)));
-    let program = program.into_iter().find(|program| program.is_file());
-    if program.is_none() {
-        println!("skipped: there is no Chromium in PATH (on Debian: apt-get install chromium)");
-    }
-    program
+    program(Resource::Browser, &NAMES)
 }
 
 /// Opens a page in the browser. Returns the console messages and the final document.

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
+use test_resources::data;
+
 use crate::common::{headlines, metaplan, metaplan_in, root};
-use crate::probabilistic::shared;
 
 const MODEL: &str =
     "mdp\nmodule m\n  s:[0..2] init 0;\n  [a] s=0 -> PROBABILITIES;\nendmodule\nlabel \"goal\" = s=1;\n";
@@ -45,7 +46,7 @@ fn invalid_models_and_properties_are_refused_with_their_position() {
 
 #[test]
 fn policies_are_written_and_evaluated() {
-    let Some(folder) = shared("reference/prism_cases") else { return };
+    let Some(folder) = data("reference/prism_cases") else { return };
     let model = folder.join("c12_det_plan_vs_policy.prism");
     let directory = tempfile::tempdir().expect("a directory");
     let policy = directory.path().join("policy.json");

@@ -1,19 +1,14 @@
 //! Tests of `metaplan configure` and `metaplan run --configure` with SUAVE's knowledge base, and of rejected
 //! arguments.
 
-#![allow(clippy::print_stdout)] // A skipped test prints the reason.
+use test_resources::data;
 
 use crate::common::{metaplan, metaplan_in, root};
 
 #[test]
 fn suave_is_configured() {
-    let shared = root().join("../shared/real/owl");
-    let (directory, file) =
-        (shared.display().to_string(), shared.join("suave/suave.owl").display().to_string());
-    if !shared.exists() {
-        println!("skipped: SUAVE's knowledge base is not there");
-        return;
-    }
+    let Some(real) = data("real/owl") else { return };
+    let (directory, file) = (real.display().to_string(), real.join("suave/suave.owl").display().to_string());
     let choose = |options: &[&str]| {
         let arguments =
             [&["configure", &file, "--directory", &directory, "--format", "json"], options].concat();

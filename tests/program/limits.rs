@@ -1,6 +1,5 @@
 //! Tests of limits and signals in early phases, and of certificates: write errors, and statements about the
 //! scope of a certificate.
-#![expect(clippy::print_stdout, reason = "what is skipped says so")]
 
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -48,12 +47,14 @@ fn is_ignored(signal: i32) -> bool {
 #[test]
 fn signals_end_the_program_while_it_reads() {
     use std::os::unix::process::ExitStatusExt as _;
+
+    use test_resources::{Resource, missing};
     for arguments in
         [&["plan", "-", "encodings/ugv/problem.pddl"][..], &["plan", "encodings/ugv/domain.pddl", "-"]]
     {
         for (name, number) in [("-INT", 2), ("-TERM", 15)] {
             if is_ignored(number) {
-                println!("skipped: who runs the tests ignores {name}, and so does all that is started");
+                missing(Resource::Signals, &format!("the signal {name} is ignored"));
                 continue;
             }
             // Standard input stays open, so the program keeps reading.

@@ -3,12 +3,12 @@
 //!
 //! No test uses a real device, because a faulty program could replace it by a file.
 
-#![allow(clippy::print_stdout)] // A skipped test prints the reason.
-
 use std::fs;
 use std::os::unix::fs::{FileTypeExt as _, MetadataExt as _, PermissionsExt as _, symlink};
 use std::path::Path;
 use std::process::{Command, Stdio};
+
+use test_resources::{Resource, missing, program};
 
 use crate::common::{metaplan, root};
 
@@ -107,7 +107,7 @@ fn devices_are_not_replaced() {
     let null = folder.path().join("null");
     let created = Command::new("mknod").arg(&null).args(["c", "1", "3"]).stderr(Stdio::null()).status();
     if !created.is_ok_and(|status| status.success()) || fs::write(&null, "x").is_err() {
-        println!("skipped: devices can be made by root only");
+        missing(Resource::Root, "mknod cannot create a device");
         return;
     }
     run(&["convert", "ontology/kb/ugv.ttl", "--to", "turtle", "-o", &null.display().to_string()]);
@@ -142,7 +142,7 @@ fn files_keep_mode_owner_and_hard_links() {
         let owned = fs::metadata(&file).expect("a file");
         assert_eq!((owned.uid(), owned.gid(), mode(&file)), (12345, 23456, 0o640));
     } else {
-        println!("skipped: only root can give a file to others");
+        missing(Resource::Root, "the owner of a file cannot be changed");
     }
     // If the target of a link does not exist, it is created.
     fs::remove_file(&file).expect("removed");
@@ -200,11 +200,9 @@ fn dash_and_device_files_are_standard_output() {
     let appended =
         format!("echo first > \"$1/file\"; {convert} -o \"$1/stdout\" >> \"$1/file\"; cat \"$1/file\"");
     assert_eq!(shell("sh", &appended, folder.path()), format!("first\n{plain}"));
-    if Command::new("bash").arg("--version").output().is_ok() {
+    if program(Resource::Bash, &["bash"]).is_some() {
         let script = format!("{convert} -o >(cat > \"$1/copy\"); wait $!; cat \"$1/copy\"");
         assert_eq!(shell("bash", &script, folder.path()), plain);
-    } else {
-        println!("skipped: there is no bash");
     }
     // A plan on standard output has the human-readable format, regardless of the name of the output.
     let plan = "metaplan plan missions/ugv.toml";

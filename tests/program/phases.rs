@@ -9,6 +9,7 @@ use std::path::Path;
 use std::process::Command;
 
 use serde_json::Value;
+use test_resources::python;
 
 use crate::common::{program, verify_in};
 use crate::limits::round_trip;
@@ -31,8 +32,8 @@ fn run(directory: &Path, arguments: &[&str]) -> Run {
         o = s.run(sys.argv[1:], stdout=s.PIPE, stderr=s.PIPE)\n\
         u = r.getrusage(r.RUSAGE_CHILDREN)\n\
         print(json.dumps([o.returncode, o.stdout.decode(), o.stderr.decode(), u.ru_utime + u.ru_stime, u.ru_maxrss / 1024]))";
-    let mut python = Command::new("python3");
-    let output = python.args(["-c", script]).arg(program()).args(arguments).current_dir(directory).output();
+    let mut command = Command::new("python3");
+    let output = command.args(["-c", script]).arg(program()).args(arguments).current_dir(directory).output();
     let output = output.expect("python3 runs");
     let answer: Value =
         serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{error}: {output:?}"));
@@ -97,6 +98,9 @@ fn many_facts(count: usize) -> tempfile::TempDir {
 
 #[test]
 fn reading_keeps_the_limit() {
+    if python().is_none() {
+        return;
+    }
     let directory = many_facts(400_000);
     assert_nothing_to_show(&limited(directory.path(), &PLAN, 0.3));
 }
@@ -116,6 +120,9 @@ fn transitive(count: usize) -> tempfile::TempDir {
 
 #[test]
 fn reasoning_keeps_the_limit() {
+    if python().is_none() {
+        return;
+    }
     let directory = transitive(1_500);
     assert_nothing_to_show(&limited(directory.path(), &["reason", "chain.ttl"], 0.5));
 }
@@ -138,12 +145,18 @@ fn quantified(variables: usize, objects: &str) -> tempfile::TempDir {
 
 #[test]
 fn grounding_keeps_the_limit() {
+    if python().is_none() {
+        return;
+    }
     assert_nothing_to_show(&limited(quantified(40, "x y").path(), &PLAN, 0.5));
 }
 
 /// With one object per variable, there is only one combination.
 #[test]
 fn variables_with_one_object_are_cheap() {
+    if python().is_none() {
+        return;
+    }
     let outcome = limited(quantified(1_000, "x").path(), &PLAN, 3.0);
     assert_eq!(outcome.status, 0, "{outcome:#?}");
 }
@@ -163,6 +176,9 @@ fn universal(variables: usize) -> tempfile::TempDir {
 
 #[test]
 fn validating_keeps_the_limit() {
+    if python().is_none() {
+        return;
+    }
     let directory = universal(40);
     let outcome = limited(directory.path(), &PLAN, 0.5);
     assert_nothing_to_show(&outcome);
@@ -190,6 +206,9 @@ fn chain(length: usize) -> tempfile::TempDir {
 
 #[test]
 fn planning_with_a_chain_of_derived_facts_keeps_the_limit() {
+    if python().is_none() {
+        return;
+    }
     limited(chain(700).path(), &PLAN, 1.0);
 }
 
@@ -204,6 +223,9 @@ fn trip(places: u32) -> tempfile::TempDir {
 
 #[test]
 fn searching_and_encoding_keep_the_limit() {
+    if python().is_none() {
+        return;
+    }
     let directory = trip(24);
     let outcome = limited(directory.path(), &PLAN, 1.0);
     // On a busy machine there may be no time for a first plan.
@@ -218,12 +240,18 @@ fn searching_and_encoding_keep_the_limit() {
 
 #[test]
 fn explaining_keeps_the_limit() {
+    if python().is_none() {
+        return;
+    }
     let directory = trip(16);
     limited(directory.path(), &["explain", "mission.toml"], 1.0);
 }
 
 #[test]
 fn certifying_keeps_the_limit() {
+    if python().is_none() {
+        return;
+    }
     let directory = trip(8);
     let outcome = limited(directory.path(), &[&PLAN[..], &["--certificate", "c"]].concat(), 1.0);
     assert!(outcome.stdout.contains("go"), "the plan is shown: {outcome:#?}");
@@ -235,6 +263,9 @@ fn certifying_keeps_the_limit() {
 /// Conditions that grounding cannot simplify need much memory.
 #[test]
 fn grounding_keeps_the_memory_limit() {
+    if python().is_none() {
+        return;
+    }
     let directory = quantified(40, "x y");
     let outcome = run(directory.path(), &[&PLAN[..], &["--memory-limit", "150"]].concat());
     assert!(outcome.memory <= 1.1 * 150.0, "{outcome:#?}");

@@ -2,8 +2,6 @@
 
 #![allow(clippy::print_stdout)]
 
-use std::path::PathBuf;
-
 use metaplan::comparison::{
     Coadaptation, MapOptions, Process, Risk, import_map, program, published, shortest_routes,
 };
@@ -15,17 +13,9 @@ use probabilistic::explore::{Bounds, explore};
 use probabilistic::solve::solve;
 use probabilistic::{Direction, Number, Problem, property};
 use serde_json::{Value, json};
+use test_resources::data;
 
 use crate::common::{metaplan, metaplan_in, root};
-
-/// Returns the path of a shared file; prints a message if the file is not available.
-pub fn shared(path: &str) -> Option<PathBuf> {
-    let path = root().join("../shared").join(path);
-    if !path.exists() {
-        println!("skipped: {} is not there", path.display());
-    }
-    path.exists().then_some(path)
-}
 
 /// Creates the mission of an imported map in a temporary directory.
 pub fn mission(map: &str, options: &MapOptions) -> (tempfile::TempDir, Setup) {
@@ -69,7 +59,7 @@ fn fraction(answer: &Answer) -> String {
 
 #[test]
 fn known_results_on_the_map_of_camara() {
-    let Some(path) = shared("real/map/map-p2cp3.json") else { return };
+    let Some(path) = data("real/map/map-p2cp3.json") else { return };
     let map = std::fs::read_to_string(path).expect("readable");
     // More speeds yield more configurations, but not better results: slower speeds take more time and more
     // energy.
@@ -166,7 +156,7 @@ impl Agreement {
 /// Compares random pairs of places on the map until `count` pairs have a plan. `None` if the map is not
 /// available.
 fn pairs_of_the_map(count: usize) -> Option<Agreement> {
-    let map = std::fs::read_to_string(shared("real/map/map-p2cp3.json")?).expect("readable");
+    let map = std::fs::read_to_string(data("real/map/map-p2cp3.json")?).expect("readable");
     let (_directory, setup) = mission(&map, &MapOptions { dark: dark(), ..places("l1", "l18") });
     let names = coadaptation(&setup).places;
     let mut random = Random(7);
@@ -283,7 +273,7 @@ fn compared(map: &str, options: &MapOptions, extra_arguments: &[&str]) -> Value 
 
 #[test]
 fn plans_that_ignore_losses_have_a_price() {
-    let Some(path) = shared("real/map/map-p2cp3.json") else { return };
+    let Some(path) = data("real/map/map-p2cp3.json") else { return };
     let map = std::fs::read_to_string(path).expect("readable");
     // Start, goal, loss rate, minimum expected time, and expected time of our plan with replanning.
     let cases =

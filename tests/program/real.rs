@@ -3,21 +3,13 @@
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-use crate::common::{metaplan, metaplan_in, root};
+use crate::common::{metaplan, metaplan_in};
 use serde_json::Value;
+use test_resources::{data, data_directory};
 
-/// Returns the directory of the real files, if available.
+/// Returns the directory of the test data, if it contains the real files.
 pub fn shared() -> Option<PathBuf> {
-    let directory = root().join("../shared");
-    if directory.is_dir() {
-        return Some(directory);
-    }
-    // The reason for skipping should be part of the test's own output.
-    #[allow(clippy::print_stderr)]
-    {
-        eprintln!("skipped: there is no ../shared beside the project");
-    }
-    None
+    data("real").map(|_| data_directory())
 }
 
 /// Compares the result of `metaplan reason` with that of the reference reasoner. The input is SUAVE's

@@ -376,7 +376,9 @@ fn diverging_rules_end_every_command() {
             outcome.status,
             &["R301", "doubling.swrl#0 (doubling)", "the last one is", "characters)"],
         );
-        let seconds = processor_time(here, arguments);
-        assert!(seconds < 2.0, "{arguments:?} takes {seconds} s");
+        if test_resources::python().is_some() {
+            let seconds = processor_time(here, arguments);
+            assert!(seconds < 2.0, "{arguments:?} takes {seconds} s");
+        }
     }
 }

@@ -9,8 +9,9 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
+use test_resources::{data, python};
+
 use crate::common::{metaplan_in, processor_time, root};
-use crate::real::shared;
 
 /// Reads a CSV table. Returns its rows as pairs of column name and value.
 fn table(file: &Path) -> Vec<Vec<(String, String)>> {
@@ -24,8 +25,8 @@ fn cell<'a>(row: &'a [(String, String)], column: &str) -> &'a str {
     row.iter().find(|(name, _)| name == column).map_or("", |(_, value)| value)
 }
 
-fn generate(script: &Path, arguments: &[&str]) {
-    let output = Command::new("python3").arg(script).args(arguments).output().expect("python3 runs");
+fn generate(python: &Path, script: &Path, arguments: &[&str]) {
+    let output = Command::new(python).arg(script).args(arguments).output().expect("python3 runs");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
@@ -138,11 +139,15 @@ fn shipped_missions() {
 #[test]
 #[ignore = "takes a minute in a release build, and needs python3"]
 fn generated_missions() {
-    let Some(shared) = shared() else { return };
+    let (Some(costs), Some(script), Some(python)) =
+        (data("reference/optimal_costs.csv"), data("tools/gen_ratpa.py"), python())
+    else {
+        return;
+    };
     let directory = tempfile::tempdir().expect("a directory");
     let out = directory.path().display().to_string();
     let mut rows = Vec::new();
-    for line in table(&shared.join("reference/optimal_costs.csv")) {
+    for line in table(&costs) {
         let name = cell(&line, "name");
         let mut arguments = vec!["--enc", "c,n", "--out", &out, "--name", name];
         for option in ["family", "n", "m", "k", "seed", "goals", "reconf", "metric"] {
@@ -153,7 +158,7 @@ fn generated_missions() {
                     .extend([flag.into_iter().find(|flag| &flag[2..] == option).expect("a flag"), value]);
             }
         }
-        generate(&shared.join("tools/gen_ratpa.py"), &arguments);
+        generate(&python, &script, &arguments);
         for (encoding, column) in [("c", "optimal_cost_c"), ("n", "optimal_cost_bnfo")] {
             rows.push(row(directory.path(), &format!("{name}.{encoding}"), cell(&line, column)));
         }
@@ -164,17 +169,24 @@ fn generated_missions() {
 #[test]
 #[ignore = "takes a minute in a release build, and needs python3"]
 fn missions_with_a_limiting_battery() {
-    let Some(shared) = shared() else { return };
+    let (Some(summary), Some(pairs), Some(script), Some(python)) = (
+        data("reference/p2cp3_summary.json"),
+        data("reference/camara_pairs.csv"),
+        data("tools/gen_camara.py"),
+        python(),
+    ) else {
+        return;
+    };
     let directory = tempfile::tempdir().expect("a directory");
     let out = directory.path().display().to_string();
-    let summary = shared.join("reference/p2cp3_summary.json").display().to_string();
+    let summary = summary.display().to_string();
     let mut rows = Vec::new();
-    for line in table(&shared.join("reference/camara_pairs.csv")) {
+    for line in table(&pairs) {
         let (start, goal, battery, fail) =
             (cell(&line, "start"), cell(&line, "goal"), cell(&line, "battery_mj"), cell(&line, "fail"));
         let mut arguments = vec![summary.as_str(), "--start", start, "--goal", goal, "--battery", battery];
         arguments.extend(["--fail", fail, "--out", &out, "--no-oracle"]);
-        generate(&shared.join("tools/gen_camara.py"), &arguments);
+        generate(&python, &script, &arguments);
         let suffix = if fail.is_empty() { String::new() } else { format!("_no_{}", fail.replace(' ', "_")) };
         let name = format!("camara_{start}_{goal}_b{battery}{suffix}");
         rows.push(row(directory.path(), &name, cell(&line, "optimal_time_ms")));

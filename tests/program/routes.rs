@@ -8,8 +8,9 @@ use probabilistic::explore::{Bounds, explore};
 use probabilistic::solve::solve;
 use probabilistic::{Direction, Number, Problem};
 use serde_json::Value;
+use test_resources::data;
 
-use crate::probabilistic::{coadaptation, dark, mission, places, shared};
+use crate::probabilistic::{coadaptation, dark, mission, places};
 
 /// Maps each place to its neighbours in numeric order, with the lengths of the ways in metres.
 type Graph = BTreeMap<String, Vec<(String, f64)>>;
@@ -127,7 +128,7 @@ fn least_energy(mission: &Coadaptation) -> BTreeMap<usize, f64> {
 /// including dark ones.
 #[test]
 fn joint_optimisation_beats_fixed_shortest_routes() {
-    let Some(path) = shared("real/map/map-p2cp3.json") else { return };
+    let Some(path) = data("real/map/map-p2cp3.json") else { return };
     let map = std::fs::read_to_string(path).expect("readable");
     let (graph, measured_places) = read(&map);
     let (_directory, mission) = mission(&map, &MapOptions { dark: dark(), ..places("l1", "l18") });

@@ -289,13 +289,8 @@ fn greedy_control_observes_requirements() {
 /// A mission from outside the project, if available. The test lists the requirements of the mission's rooms
 /// and corridors by hand.
 #[test]
-#[expect(clippy::print_stdout, reason = "what is skipped says so")]
 fn greedy_control_observes_requirements_in_a_ward() {
-    let ward = root().join("../shared/field3/newcomer3/ward/mission.toml");
-    if !ward.exists() {
-        println!("skipped: {} is not there", ward.display());
-        return;
-    }
+    let Some(ward) = test_resources::data("field3/newcomer3/ward/mission.toml") else { return };
     let directory = tempfile::tempdir().expect("a directory");
     let ward = ward.display().to_string();
     let arguments = [

@@ -23,6 +23,7 @@ use probabilistic::prism::ast::Model;
 use probabilistic::solve::solve;
 use probabilistic::{Direction, Problem, jani, prism, property};
 use serde_json::{Value, json};
+use test_resources::{Resource, python_with};
 
 use random::{Random, questions, random_model};
 
@@ -58,14 +59,7 @@ for line in sys.stdin:
 
 /// Returns Storm's answers to the questions; `None` if Storm is not installed.
 fn storm(questions: &[Value]) -> Option<Vec<Value>> {
-    let python = std::env::var("STORM_PYTHON").unwrap_or_else(|_| "python3".to_owned());
-    let installed = Command::new(&python).args(["-c", "import stormpy"]).output().ok()?.status.success();
-    if !installed {
-        println!(
-            "skipped: no stormpy; python3 -m venv storm && storm/bin/pip install stormpy==2.0.0, STORM_PYTHON=storm/bin/python"
-        );
-        return None;
-    }
+    let python = python_with(Resource::Stormpy, "STORM_PYTHON", "stormpy")?;
     let mut child = Command::new(&python)
         .args(["-c", SCRIPT])
         .stdin(Stdio::piped())

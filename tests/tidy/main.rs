@@ -5,6 +5,7 @@ mod circles;
 mod codes;
 mod facade_layers;
 mod language;
+mod metadata;
 mod packages;
 mod pages;
 
@@ -189,6 +190,18 @@ fn folders_do_not_use_forbidden_names() {
             }
         }
         offenders
+    });
+}
+
+/// Otherwise a test that lacks a resource would count as passed, without a trace.
+#[test]
+fn tests_request_resources_from_their_crate() {
+    check("only crates/test-resources finds test data and reports missing resources", |path, text| {
+        // The texts are split so that this file does not contain them.
+        let texts = [concat!("\"skip", "ped: "), concat!("../", "shared")];
+        let is_own = path.starts_with("crates/test-resources/");
+        let offends = |part: &&&str| !is_own && text.contains(**part);
+        texts.iter().filter(offends).map(|part| format!("{path}: {part}")).collect()
     });
 }
 

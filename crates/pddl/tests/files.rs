@@ -1,18 +1,18 @@
 //! Parses, checks and prints all available real PDDL files, and parses the printed text again.
 //!
-//! The tests are skipped if the files, which are not part of the project, are absent.
-
-#![expect(clippy::print_stdout, reason = "a skipped test says so")]
+//! The files are not part of the project.
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use metaplan_pddl::{
     Diagnostic, Errors, Severity, Source, check_domain, has_errors, parse_domain, parse_problem,
     print_domain, print_problem, read,
 };
+use test_resources::{data, data_directory};
 
-const REAL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/real/pddl");
+/// Directory of the files below the directory of test data.
+const REAL: &str = "real/pddl";
 
 /// Expected diagnostics of domains: `CODE:line`, with a tilde before warnings. All other domains have no
 /// diagnostics.
@@ -115,26 +115,25 @@ fn path_of(short: &str) -> String {
 }
 
 fn source(path: &str) -> Source {
-    let bytes = std::fs::read(Path::new(REAL).join(path)).unwrap_or_else(|error| panic!("{path}: {error}"));
+    let bytes = std::fs::read(data_directory().join(REAL).join(path))
+        .unwrap_or_else(|error| panic!("{path}: {error}"));
     Source::from_bytes(path, &bytes)
 }
 
 /// Returns the paths of all files below `REAL`; empty if the folder is absent.
 fn files() -> BTreeSet<String> {
     let mut paths = BTreeSet::new();
-    let mut folders = vec![PathBuf::from(REAL)];
+    let Some(real) = data(REAL) else { return paths };
+    let mut folders: Vec<PathBuf> = vec![real.clone()];
     while let Some(folder) = folders.pop() {
         let Ok(entries) = std::fs::read_dir(&folder) else { continue };
         for path in entries.filter_map(Result::ok).map(|entry| entry.path()) {
             if path.is_dir() {
                 folders.push(path);
-            } else if let Ok(relative) = path.strip_prefix(REAL) {
+            } else if let Ok(relative) = path.strip_prefix(&real) {
                 paths.insert(relative.to_string_lossy().into_owned());
             }
         }
-    }
-    if paths.is_empty() {
-        println!("skipped: {REAL} is absent");
     }
     paths
 }

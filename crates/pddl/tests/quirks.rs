@@ -2,32 +2,21 @@
 //! names are errors.
 //!
 //! Two domains in the repository contain the quirks. A larger matrix of minimal pairs and the generated
-//! missions come from scripts outside of the project; their tests are skipped without the scripts.
-
-#![expect(clippy::print_stdout, reason = "a skipped test says so")]
+//! missions come from scripts outside of the project.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use metaplan_pddl::validate::{Options, PlanText, validate};
 use metaplan_pddl::{Severity, Source, read, render};
-
-const TOOLS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/tools");
-
-const MATRIX: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/reference/pddl_quirks.md");
+use test_resources::{data, python};
 
 /// Runs one of the scripts outside of the project. Returns `None` if the script or Python is absent.
 fn script(name: &str, arguments: &[&str]) -> Option<()> {
-    let path = Path::new(TOOLS).join(name);
-    let output = path.exists().then(|| Command::new("python3").arg(&path).args(arguments).output());
-    match output {
-        Some(Ok(output)) if output.status.success() => Some(()),
-        Some(Ok(output)) => panic!("{name} {arguments:?}: {}", String::from_utf8_lossy(&output.stderr)),
-        _ => {
-            println!("skipped: {name} or python3 is absent");
-            None
-        }
-    }
+    let (script, python) = (data(Path::new("tools").join(name))?, python()?);
+    let output = Command::new(python).arg(script).args(arguments).output().expect("Python starts");
+    assert!(output.status.success(), "{name} {arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    Some(())
 }
 
 fn folder(name: &str) -> PathBuf {
@@ -119,10 +108,8 @@ fn types_decide_which_objects_fit() {
 /// Checks that `index` has a minimal pair of files for each row of the matrix of quirks. The matrix lists
 /// which other planners accept each quirk.
 fn check_matrix_rows(index: &str) {
-    let Ok(text) = std::fs::read_to_string(MATRIX) else {
-        println!("skipped: {MATRIX} is absent");
-        return;
-    };
+    let Some(path) = data("reference/pddl_quirks.md") else { return };
+    let text = std::fs::read_to_string(path).expect("a file");
     let matrix = text.split("| quirk |").nth(1).expect("a matrix");
     let rows = matrix.lines().filter_map(|line| line.strip_prefix("| ")?.split_once(" | "));
     let quirks: Vec<_> = rows.map(|(quirk, _)| quirk.replace('"', "\\\"")).collect();

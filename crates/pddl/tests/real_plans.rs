@@ -1,27 +1,19 @@
 //! Validates hand-made plans for real files.
 //!
-//! The tests are skipped if the files, which are not part of the project, are absent.
-
-#![expect(clippy::print_stdout, reason = "a skipped test says so")]
-
-use std::path::Path;
+//! The files are not part of the project.
 
 use metaplan_pddl::validate::{Options, PlanText, validate};
 use metaplan_pddl::{Source, read, render};
-
-const REAL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/real/pddl");
+use test_resources::data;
 
 /// Validates a plan and compares the result with `expected`: `time metric`, or the step and the kind of the
 /// violation.
 fn check(domain: &str, problem: &str, plan: &str, concurrent: bool, expected: &str) {
     let source = |path: &str| {
-        let bytes = std::fs::read(Path::new(REAL).join(path)).ok()?;
+        let bytes = std::fs::read(data(format!("real/pddl/{path}"))?).expect("a file");
         Some(Source::from_bytes(path, &bytes))
     };
-    let (Some(domain), Some(problem)) = (source(domain), source(problem)) else {
-        println!("skipped: {REAL} is absent");
-        return;
-    };
+    let (Some(domain), Some(problem)) = (source(domain), source(problem)) else { return };
     let (domain_tree, problem_tree) = match read(&domain, &problem) {
         Ok((domain, problem, _)) => (domain, problem),
         Err(errors) => panic!("{}", render(&errors, &[&domain, &problem], false)),

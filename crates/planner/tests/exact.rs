@@ -1,7 +1,7 @@
 //! Tasks whose numbers have no common integer scale. Random tasks are compared with all sequences of actions,
 //! executed in big rationals; other tasks have known costs. The validator executes every plan.
 
-#![allow(clippy::format_collect, clippy::print_stderr)]
+#![allow(clippy::format_collect)]
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -15,6 +15,7 @@ use num_traits::{One, Signed, Zero};
 use pddl::ast::{Domain, Name, Problem};
 use pddl::validate::{Options, PlanStep, PlanText, validate};
 use pddl::{Source, read};
+use test_resources::data;
 use testing::random::Random;
 
 fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
@@ -477,12 +478,7 @@ fn times_may_be_quotients_of_measured_speeds() {
 /// whole action.
 #[test]
 fn a_task_of_another_generator_has_its_plan() {
-    let directory =
-        concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/field/soundness/random/false-noplan-dur-1065");
-    let file = |name: &str| std::fs::read_to_string(format!("{directory}/{name}"));
-    let (Ok(domain), Ok(problem)) = (file("d.pddl"), file("p.pddl")) else {
-        eprintln!("skipped: {directory} is not there");
-        return;
-    };
-    known("1065", &domain, &problem, Some("0"));
+    let Some(directory) = data("field/soundness/random/false-noplan-dur-1065") else { return };
+    let file = |name: &str| std::fs::read_to_string(directory.join(name)).expect("a file");
+    known("1065", &file("d.pddl"), &file("p.pddl"), Some("0"));
 }

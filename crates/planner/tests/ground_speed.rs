@@ -12,8 +12,7 @@ use std::process::Command;
 
 use metaplan_planner::{GroundConfig, Task, ground};
 use pddl::{Source, read};
-
-const TOOL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/tools/gen_ratpa.py");
+use test_resources::data;
 
 /// Returns the CPU time of this thread in seconds, or `None` if the system does not provide it.
 fn cpu_time() -> Option<f64> {
@@ -172,6 +171,7 @@ print(used.ru_utime + used.ru_stime)";
 #[ignore = "measures beside a peer; in release"]
 fn reading_and_grounding_compared_with_the_translator_of_fast_downward() {
     let Ok(python) = std::env::var("METAPLAN_PEERS") else { panic!("METAPLAN_PEERS names no Python") };
+    let Some(tool) = data("tools/gen_ratpa.py") else { return };
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("speed");
     std::fs::create_dir_all(&folder).expect("a folder");
     let rows = [
@@ -194,7 +194,7 @@ fn reading_and_grounding_compared_with_the_translator_of_fast_downward() {
         let arguments =
             [["--n", &n, "--m", &m], ["--k", &k, "--enc", encoding], ["--name", &name, "--seed", "1"]];
         let made = Command::new("python3")
-            .arg(TOOL)
+            .arg(&tool)
             .args(arguments.as_flattened())
             .arg("--out")
             .arg(&folder)

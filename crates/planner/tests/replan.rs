@@ -15,6 +15,7 @@ use num_rational::BigRational;
 use pddl::ast::{Atom, Domain, Identifier, InitialElement, Name, Problem, Span, Term};
 use pddl::validate::metric_after;
 use pddl::{Source, read};
+use test_resources::{data, python};
 use testing::missions::Mission;
 use testing::random::Random;
 
@@ -388,19 +389,18 @@ fn a_reconfiguration_at_the_last_step_counts() {
     compare(&solution, &live(&mut new(&domain, &problem), &domain, &problem), &String::new);
 }
 
-const TOOL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/tools/gen_ratpa.py");
-
-/// Returns a generated map with a battery.
+/// Returns a generated map with a battery. `None` if the script or Python is missing.
 fn generated(waypoints: usize, designs: usize, functions: usize) -> Option<(Domain, Problem)> {
     let directory = Path::new(env!("CARGO_TARGET_TMPDIR"));
     let arguments = ["--family", "ugv", "--seed", "1", "--metric", "weighted", "--enc", "n", "--name", "map"];
     let sizes = [("--n", waypoints), ("--m", designs), ("--k", functions)];
     let sizes = sizes.into_iter().flat_map(|(name, size)| [name.to_owned(), size.to_string()]);
-    let mut command = Command::new("python3");
-    command.arg(TOOL).args(arguments).args(sizes).arg("--out").arg(directory);
+    let mut command = Command::new(python()?);
+    command.arg(data("tools/gen_ratpa.py")?).args(arguments).args(sizes).arg("--out").arg(directory);
     let read =
         |part: &str| std::fs::read_to_string(directory.join(format!("map.n.{part}.pddl"))).expect("a file");
-    command.output().ok()?.status.success().then(|| parse(&read("domain"), &read("problem")))
+    assert!(command.output().is_ok_and(|output| output.status.success()), "the script makes a map");
+    Some(parse(&read("domain"), &read("problem")))
 }
 
 /// Returns the CPU time of the thread in milliseconds.
@@ -412,13 +412,9 @@ fn used() -> f64 {
 #[test]
 #[ignore = "a measurement, for release builds"]
 fn replanning_time_compared_with_planning_from_scratch() {
-    if !Path::new(TOOL).exists() {
-        println!("skipped: {TOOL} is absent");
-        return;
-    }
     println!("places designs functions   answers   anew ms  live ms  ratio  slowest anew  slowest live");
     for (waypoints, designs, functions) in [(20, 3, 2), (50, 6, 2), (100, 6, 2), (200, 6, 2), (100, 12, 3)] {
-        let (domain, mut problem) = generated(waypoints, designs, functions).expect("a map");
+        let Some((domain, mut problem)) = generated(waypoints, designs, functions) else { return };
         let possible = Changes::of(&problem, "robot_at", "waypoint", "function_design");
         let mut random = Random(7);
         let mut replanner = new(&domain, &problem);

@@ -12,8 +12,7 @@ use std::process::Command;
 use metaplan_planner::{Config, GroundConfig, ground, optimize};
 use pddl::validate::{Options, PlanText, validate};
 use pddl::{Source, read};
-
-const TOOL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/tools/gen_ratpa.py");
+use test_resources::data;
 
 /// Python program that reads a domain, a problem and plans, and prints a verdict for each plan.
 const PEER: &str = "import sys
@@ -58,6 +57,7 @@ fn changed(plan: &[String], objects: &[String], number: usize) -> Vec<String> {
 #[ignore = "needs a peer"]
 fn verdicts_are_those_of_the_unified_planning_framework() {
     let Ok(python) = std::env::var("METAPLAN_PEERS") else { panic!("METAPLAN_PEERS names no Python") };
+    let Some(tool) = data("tools/gen_ratpa.py") else { return };
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("verdicts");
     let (mut valid, mut invalid) = (0, 0);
     for (family, seed, k, encoding) in
@@ -69,7 +69,7 @@ fn verdicts_are_those_of_the_unified_planning_framework() {
         let arguments =
             [["--family", family, "--n", n], ["--m", "3", "--k", &k], ["--seed", &seed, "--enc", encoding]];
         let mut script = Command::new("python3");
-        script.arg(TOOL).args(arguments.as_flattened()).args(["--name", &name, "--out"]).arg(&folder);
+        script.arg(&tool).args(arguments.as_flattened()).args(["--name", &name, "--out"]).arg(&folder);
         assert!(script.output().is_ok_and(|made| made.status.success()), "the script makes {name}");
         let path = |kind: &str| folder.join(format!("{name}.{encoding}.{kind}.pddl"));
         let source = |kind: &str| Source::new(kind, std::fs::read_to_string(path(kind)).expect("a file"));

@@ -1,14 +1,13 @@
 //! Stiff processes, in which the probability of leaving a set of states is tiny. In doubles, these
 //! processes have no inductive certificate, but state elimination has a small relative error.
 
-#![allow(clippy::print_stdout)]
-
 use std::time::{Duration, Instant};
 
 use metaplan_probabilistic::check::{Answer, Exactness, Options, Outcome, Quantity, check};
 use metaplan_probabilistic::{prism, property};
 use num_bigint::BigInt;
 use num_rational::BigRational;
+use test_resources::data;
 
 fn value(model: &str, question: &str, exactness: Exactness) -> Quantity {
     let model = prism::parse(model).unwrap_or_else(|problems| panic!("{problems:?}"));
@@ -118,11 +117,8 @@ fn bounds_of_tiny_values_are_relative() {
 /// Verification Benchmark Set.
 #[test]
 fn wide_bounds_are_improved_only_if_that_is_cheap() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/real/qvbs/mdp/zeroconf/zeroconf.prism");
-    let Ok(model) = std::fs::read_to_string(path) else {
-        println!("skipped: {path} is not there");
-        return;
-    };
+    let Some(path) = data("real/qvbs/mdp/zeroconf/zeroconf.prism") else { return };
+    let model = std::fs::read_to_string(path).expect("a file");
     let open = ["const int N;", "const int K;", "const bool reset;"];
     let set = ["const int N = 1000;", "const int K = 8;", "const bool reset = true;"];
     let model = open.iter().zip(set).fold(model, |model, (open, set)| model.replace(open, set));

@@ -1,9 +1,6 @@
 //! `popf` as called by PlanSys2's plugin, with the plugin's parser applied to the output.
 //!
-//! The files of PlanSys2's tests are read from `../shared`. If they are missing, their cases report
-//! it and end.
-
-#![allow(clippy::print_stderr)] // a skipped test says so
+//! The files of PlanSys2's tests are not part of the project.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -73,12 +70,7 @@ fn files(domain: &str, problem: &str) -> (tempfile::TempDir, [String; 2]) {
 }
 
 fn shared(file: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/real/pddl/plansys2").join(file);
-    let is_there = path.is_file();
-    if !is_there {
-        eprintln!("skipped: {} is not there", path.display());
-    }
-    is_there.then_some(path)
+    test_resources::data(Path::new("real/pddl/plansys2").join(file))
 }
 
 #[test]

@@ -1,23 +1,21 @@
-//! Recorded cases in the directory `shared`, which is outside of the project.
+//! Recorded cases and real knowledge bases, which are not part of the project.
 
-#![allow(clippy::print_stdout)]
-
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use ontology::runtime::Runtime;
 use serde_json::Value;
+use test_resources::{data, data_directory};
 
-pub const SHARED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared");
+/// Returns the directory of the real knowledge bases, which need not exist.
+pub fn real_directory() -> PathBuf {
+    data_directory().join("real/owl")
+}
 
-/// Returns the JSON documents of a directory, ordered by file name. Prints a message if the directory does not
-/// exist.
-#[allow(dead_code)] // not every suite reads recorded cases
+/// Returns the JSON documents of a directory of the test data, ordered by file name. Returns no document if
+/// the directory does not exist.
 pub fn recorded(directory: &str) -> Vec<Value> {
-    let directory = Path::new(SHARED).join(directory);
-    let Ok(entries) = std::fs::read_dir(&directory) else {
-        println!("skipped: {} is not there", directory.display());
-        return Vec::new();
-    };
+    let Some(directory) = data(directory) else { return Vec::new() };
+    let entries = std::fs::read_dir(directory).expect("readable");
     let mut files: Vec<PathBuf> = entries.filter_map(Result::ok).map(|entry| entry.path()).collect();
     files.sort();
     let read = |file: PathBuf| serde_json::from_slice(&std::fs::read(file).expect("readable")).expect("JSON");
@@ -26,7 +24,6 @@ pub fn recorded(directory: &str) -> Vec<Value> {
 
 /// Returns the design that MROS selects for an objective: the design with the greatest utility among those
 /// without a rejection. The first one by IRI wins a tie.
-#[allow(dead_code)] // not every suite selects
 pub fn selected(runtime: &Runtime, objective: &str) -> Option<String> {
     let mut candidates = runtime.candidates(objective, None).expect("known");
     candidates.retain(|candidate| candidate.rejections.is_empty());

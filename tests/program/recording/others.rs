@@ -1,31 +1,18 @@
 //! Exchange of recordings with other implementations: `mcap` and `mcap-ros2-support` for Python, installed by `.ci/mcap-peers`.
-#![expect(clippy::print_stdout, reason = "what is skipped says so")]
 
 use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
 use serde_json::{Value, json};
+use test_resources::{Resource, python_with};
 
 use super::{decisions, input, run};
 use crate::common::root;
 
-/// Returns the Python executable with the packages, if available. Otherwise prints the reason for skipping.
+/// Returns the Python executable with the packages, if available.
 fn python() -> Option<String> {
-    let python = std::env::var("METAPLAN_PYTHON").unwrap_or_else(|_| "python3".to_owned());
-    let output = Command::new(&python).args(["-c", "import mcap.reader, mcap_ros2.decoder"]).output();
-    match output {
-        Ok(output) if output.status.success() => Some(python),
-        Ok(output) => {
-            let text = String::from_utf8_lossy(&output.stderr);
-            println!("skipped: {python}: {}", text.trim().lines().last().unwrap_or_default());
-            None
-        }
-        Err(error) => {
-            println!("skipped: there is no {python}: {error}");
-            None
-        }
-    }
+    python_with(Resource::Mcap, "METAPLAN_PYTHON", "mcap.reader, mcap_ros2.decoder")
 }
 
 /// Runs the peer script and returns its output, one JSON value per line.

@@ -2,8 +2,6 @@
 //! states that uses the definition of such functions. Planner and validator process the compiled task and
 //! must agree with this search.
 
-#![expect(clippy::print_stdout, reason = "a skipped test says so")]
-
 mod generate;
 mod model;
 
@@ -15,6 +13,7 @@ use generate::Generator;
 use model::{Formula, Step, Term};
 use pddl::validate::{Options, PlanText, validate};
 use pddl::{Source, print_domain, print_problem, read};
+use test_resources::data;
 
 /// Returns the compiled domain and problem. Printing and reading them must yield equal trees.
 fn compiled(domain: &str, problem: &str) -> (pddl::ast::Domain, pddl::ast::Problem) {
@@ -96,15 +95,10 @@ fn the_validator_executes_functions_with_objects_as_values() {
 
 #[test]
 fn the_public_file_is_planned() {
-    let directory = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../shared/real/ipc/numeric/up-unified_planning-test-pddl-object_fluents-domain.pddl"
-    );
-    let text = |name: &str| std::fs::read_to_string(format!("{directory}/{name}"));
-    let (Ok(domain), Ok(problem)) = (text("domain.pddl"), text("problem.pddl")) else {
-        println!("skipped: {directory} is not there");
-        return;
-    };
+    let directory = "real/ipc/numeric/up-unified_planning-test-pddl-object_fluents-domain.pddl";
+    let Some(directory) = data(directory) else { return };
+    let text = |name: &str| std::fs::read_to_string(directory.join(name)).expect("a file");
+    let (domain, problem) = (text("domain.pddl"), text("problem.pddl"));
     // No action assigns a place to a package.
     let solved = |problem: &str| solve(&domain, problem).expect("it is ground");
     assert_eq!(solved(&problem).status, Status::Unsolvable);

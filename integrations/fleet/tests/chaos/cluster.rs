@@ -9,6 +9,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
+use test_resources::{Resource, missing};
+
 use super::wires::{Wire, routes};
 
 /// For each server, the other two servers.
@@ -21,10 +23,15 @@ fn program() -> String {
     std::env::var("NATS_SERVER").unwrap_or_else(|_| "nats-server".to_owned())
 }
 
-/// Returns `Some` if the program `nats-server` can be started.
-pub(super) fn is_there() -> Option<()> {
-    let out = Command::new(program()).arg("--version").stdout(Stdio::null()).status();
-    out.ok().filter(std::process::ExitStatus::success).map(|_| ())
+/// Returns `true` if the server program is available. Otherwise reports that the test lacks it.
+pub(super) fn is_possible() -> bool {
+    let program = program();
+    let status = Command::new(&program).arg("--version").stdout(Stdio::null()).status();
+    let is_possible = status.is_ok_and(|status| status.success());
+    if !is_possible {
+        missing(Resource::Nats, &format!("{program} does not start"));
+    }
+    is_possible
 }
 
 /// The processes of the cluster. Clones share the processes.
