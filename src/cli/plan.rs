@@ -267,7 +267,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
             not_minimised.join(" and ")
         );
         let help = "to exclude expensive plans, add an upper bound on the fluent to the goal";
-        output::warnings(common, &[Message::warning("M116", text).with_help(help)]);
+        output::warnings(common, &[Message::warning("M119", text).with_help(help)]);
     }
     finish(&planned, &mission, (arguments, common))?;
     // The plan is shown before the certificate is written, which may take long.

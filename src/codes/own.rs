@@ -63,7 +63,7 @@ pub const CODES: &[[&str; 4]] = &[
         "Omit `--memory-limit` and use the limits of the operating system.",
     ],
     [
-        "M116",
+        "M119",
         "The metric was not minimised.",
         "Actions change a fluent of the metric by amounts that depend on the state. The plan is valid, but plans with lower values may exist.",
         "Add an upper bound on the fluent to the goal, or give each amount an action of its own.",

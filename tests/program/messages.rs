@@ -215,6 +215,6 @@ fn a_metric_that_is_not_minimised_is_named() {
     std::fs::write(directory.path().join("problem.pddl"), problem).expect("written");
     let outcome = metaplan_in(directory.path(), &["plan", "domain.pddl", "problem.pddl"], "");
     assert!(outcome.stdout.contains("cost 5000: a plan, not proved optimal"), "{outcome:#?}");
-    assert!(outcome.stderr.contains("warning[M116]: the metric was not minimised"), "{outcome:#?}");
+    assert!(outcome.stderr.contains("warning[M119]: the metric was not minimised"), "{outcome:#?}");
     assert!(outcome.stderr.contains("total-cost"), "{outcome:#?}");
 }
