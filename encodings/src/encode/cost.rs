@@ -268,8 +268,8 @@ impl Sum<'_, '_> {
         Some(spent)
     }
 
-    /// Adds the amounts of a source to the order encoding: `spent ≥ v ∧ increment ≥ w → spent' ≥ v
-    /// + w`. Sums above the gap are conflicts.
+    /// Adds the amounts of a source to the order encoding: `spent ≥ v` and `increment ≥ w` imply
+    /// `spent' ≥ v + w`. Sums above the gap are conflicts.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "amounts are at most the gap, which is at most GROWTH_LIMIT; steps are in memory"
