@@ -5,10 +5,10 @@ use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 
 use crate::mission::Mission;
-use crate::picture::Sheet;
 use crate::report::timeline_picture;
 use crate::visible::visible;
 use clap::{Args, ValueEnum};
+use picture::Sheet;
 use planner::Solution;
 
 use crate::cli::common::Failure;

@@ -7,13 +7,13 @@ use crate::certificate::{Verification, Verifier};
 use crate::journal::JournalReport;
 use crate::message::Message;
 use crate::mission::Mission;
-use crate::picture::{Checked, Plan, Report};
 use crate::planner::Planner;
 use crate::report::{Cost, Positions, changes, log_picture};
 use crate::setup::Setup;
 use crate::visible::visible;
 use clap::Args;
 use num_rational::BigRational;
+use picture::{Checked, Plan, Report};
 use planner::{Limits, Solution, Status};
 
 use crate::cli::common::{Common, Exit, Failure, Format};

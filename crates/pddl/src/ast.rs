@@ -251,7 +251,7 @@ pub enum ActionBody {
     /// `:action`.
     Instantaneous {
         /// `:precondition` without its preferences, together with the conditions that object fluents in the
-        /// effect impose. An empty conjunction if there are none.
+        /// effect impose. An empty conjunction without constraints.
         precondition: Condition,
         /// `:effect`.
         effect: Effect,

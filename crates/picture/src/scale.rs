@@ -44,7 +44,7 @@ pub(crate) fn round_step(least: f64) -> f64 {
     enough.unwrap_or(10.0) * power
 }
 
-/// Returns the minimum and maximum of the finite numbers, or 0 and 1 if there are none.
+/// Returns the minimum and maximum of the finite numbers, or 0 and 1 without finite numbers.
 pub(crate) fn range(numbers: impl IntoIterator<Item = f64>) -> (f64, f64) {
     let finite = numbers.into_iter().filter(|number| number.is_finite());
     let range = finite.fold(None, |range: Option<(f64, f64)>, number| {

@@ -1,6 +1,8 @@
 //! Certificates of random missions: true claims must be accepted; false claims and changed certificates must
 //! be rejected.
 
+use std::fmt::Write as _;
+
 #[allow(dead_code, reason = "another suite uses the rest")]
 use certificate::{Faithful, check as check_argument, faithful, verification_conditions, witness};
 use metaplan_planner::{Certificate, Config, GroundConfig, Limits, Status, certify, ground, optimize};
@@ -81,7 +83,7 @@ fn expedition(seed: u64) -> (String, String) {
           :effect (and (decrease (stock ?p) 1) (increase (load ?s) 1) (increase (total-cost) 1))))";
     let mut init = "(= (total-cost) 0) (next p0 p1) (next p1 p2)".to_owned();
     for place in 0..3 {
-        init.push_str(&format!(" (= (stock p{place}) {})", random.below(3)));
+        let _ = write!(init, " (= (stock p{place}) {})", random.below(3));
     }
     for sled in 0..2 {
         let (capacity, load) = (1 + random.below(2), random.below(2));

@@ -196,7 +196,7 @@ impl<S: Clone + Eq + Hash, N: Number> Exploration<S, N> {
         Ok(Self { explored, next: 0, next_report: 0 })
     }
 
-    /// Expands states until none is left or the process has at least `transitions` transitions; the
+    /// Expands states until all are expanded or the process has at least `transitions` transitions; the
     /// limit can be exceeded by one batch. Returns `true` if all states are expanded.
     pub fn run<G: Generator<N, State = S>>(
         &mut self,

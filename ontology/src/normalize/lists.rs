@@ -21,7 +21,7 @@ pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) -> Vec<Ann
 }
 
 /// Maximum number of members up to which an axiom about disjoint named classes is expanded to pairs, and one
-/// about different named individuals is left to horned-owl. Larger ones are read by [`groups`].
+/// about different named individuals is read by horned-owl. Larger ones are read by [`groups`].
 const MAX_PAIRED_MEMBERS: usize = 16;
 
 /// Removes and returns axioms about more than [`MAX_PAIRED_MEMBERS`] disjoint named classes or different

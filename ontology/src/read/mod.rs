@@ -46,7 +46,7 @@ use text::{Text, Visited};
 ///
 /// # Errors
 /// Returns all errors of all documents: unreadable files, syntax errors with positions, unresolved imports.
-/// If there are none, returns the first error of the merged documents (O105, O112).
+/// Without them, returns the first error of the merged documents (O105, O112).
 pub fn read_files<P: AsRef<Path>>(files: &[P], options: &ReadOptions) -> Result<Ontology, Errors> {
     let roots = files.iter().map(|file| Pending::File(file.as_ref().to_owned()));
     read(roots.collect(), options)

@@ -9,7 +9,7 @@ use crate::faithful::reader::Reader;
 use pddl::ast::{Atom, Condition, Name, Term, TypedName};
 
 /// A conjunct is skipped if it has more rows (possible facts) than about this factor times the
-/// number of candidates found so far.
+/// number of candidates found up to now.
 const WORTHWHILE: usize = 16;
 
 impl Reader<'_> {

@@ -241,7 +241,7 @@ impl Passage {
     }
 
     /// Returns the effects of an action with this passage (position relative to the events) on the
-    /// atoms of the phases and on the atom `waited`; none if there are no events.
+    /// atoms of the phases and on the atom `waited`; `None` without events.
     pub(super) fn truths(&self, timeline: &Timeline) -> Truths {
         if timeline.is_empty() {
             return Truths::new();

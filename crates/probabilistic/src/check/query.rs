@@ -22,7 +22,7 @@ pub struct Query<'a, N> {
     pub options: &'a Options<'a>,
     /// The indices of the reward structures for which rewards were computed during exploration.
     pub computed_rewards: &'a [usize],
-    /// The same process in doubles, from which an initial policy for exact policy iteration is
+    /// The process in doubles, from which an initial policy for exact policy iteration is
     /// computed.
     pub doubles: Option<Mdp<f64>>,
     /// The remaining work budget of exact arithmetic.

@@ -11,7 +11,7 @@ use crate::solve::Solution;
 /// The range in which values lie.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Span {
-    /// From 0 to 1.
+    /// Value between 0 and 1.
     Probability,
     /// At least 0.
     Positive,

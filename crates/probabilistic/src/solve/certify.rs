@@ -103,7 +103,7 @@ fn steps_after<N: Number>(quotient: &Quotient<N>, row: usize, steps: &[f64]) -> 
 }
 
 /// Returns the greatest expected number of steps from each block (merged end component) until the
-/// component is left, over policies that use only the rows in `near`. Returns `None` if a number is
+/// run leaves the component, over policies that use only the rows in `near`. Returns `None` if a number is
 /// infinite, or if the numbers are not found within the limits.
 fn greatest_steps<N: Number>(quotient: &Quotient<N>, policy: &[u32], near: &[bool]) -> Option<Vec<f64>> {
     let rows = &quotient.rows;

@@ -191,7 +191,7 @@ impl<N: Number> Chain<'_, N> {
         }
     }
 
-    /// Computes the expected cost from each state of the chain until the chain is left. Returns
+    /// Computes the expected cost from each state of the chain until the run leaves the chain. Returns
     /// `None` if a set of states is never left, or if a limit on the work is exceeded.
     pub fn solve(&self, work: &mut Work) -> Option<Solved<N>> {
         let order = components(self.policy.len(), |state| self.targets(state as usize));

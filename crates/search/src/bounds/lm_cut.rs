@@ -110,7 +110,7 @@ impl LandmarkCut {
         self.lm_cut_value_until(values, &|_| false)
     }
 
-    /// Like [`Self::lm_cut_value`], but ends with the landmarks found so far when `stops` returns
+    /// Like [`Self::lm_cut_value`], but ends with the landmarks found until then when `stops` returns
     /// `true` for the work units done.
     fn lm_cut_value_until(&mut self, values: &[u32], stops: &dyn Fn(u64) -> bool) -> Option<u64> {
         self.costs.clone_from(&self.relaxed.costs);

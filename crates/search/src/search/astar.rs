@@ -79,7 +79,7 @@ pub enum OpenListOrder {
 pub(super) enum OutOfMemoryPolicy {
     /// Stop the search.
     None,
-    /// Ignore forecasts; the last forecast was favourable, or there was none.
+    /// Ignore forecasts; the last forecast was favourable, or nothing was forecast.
     Some,
     /// Ignore forecasts; the last forecast was unfavourable.
     Needed,

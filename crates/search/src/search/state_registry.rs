@@ -70,7 +70,7 @@ struct Node {
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum NodeStatus {
     Open,
-    /// Not dominated, and the lazy heuristic has been evaluated.
+    /// Non-dominated, and the lazy heuristic has been evaluated.
     Closer,
     Dominated,
 }

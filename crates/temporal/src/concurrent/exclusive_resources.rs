@@ -108,9 +108,9 @@ fn bound(concurrent: &TemporalTask, task: &mut Task, group: &[Resource], limits:
     for instance in group.iter().flat_map(|resource| &resource.instances) {
         costs[*instance as usize] += concurrent.instances[*instance as usize].duration + separation;
     }
-    let most = costs.iter().copied().max().unwrap_or(0);
+    let max_cost = costs.iter().copied().max().unwrap_or(0);
     let mut shift = 0;
-    while most >> shift >= COST_LIMIT {
+    while max_cost >> shift >= COST_LIMIT {
         shift += 1;
     }
     for (instance, cost) in concurrent.instances.iter().zip(costs) {

@@ -428,7 +428,7 @@ fn achieve(
                 escapes = escapes.saturating_add(1);
                 links.truncate(before);
                 let size = plan.happenings.len();
-                let found = escape(
+                let successor = escape(
                     relaxation,
                     (concurrent, expansion),
                     figures,
@@ -437,7 +437,7 @@ fn achieve(
                     &mut visited,
                     pulse,
                 )?;
-                let Some((next, further)) = found else { return Ok(None) };
+                let Some((next, further)) = successor else { return Ok(None) };
                 links.extend(further);
                 situation = next;
             }
@@ -446,8 +446,8 @@ fn achieve(
     Ok(None)
 }
 
-/// Executes the actions of a relaxed plan that can be executed, in its order. Returns `None` if
-/// there is none.
+/// Executes the actions of a relaxed plan that can be executed, in its order. Returns `None` if no
+/// action can be executed.
 fn execute(
     context: (&TemporalTask, &Expansion<'_>),
     situation: &TemporalState,
@@ -506,7 +506,7 @@ fn escape(
 ) -> Result<Option<(TemporalState, Vec<Link>)>, Stopped> {
     let mut nodes: Vec<(TemporalState, Vec<Link>)> = vec![(situation.clone(), Vec::new())];
     let mut queue = BinaryHeap::from([Reverse((size, 0_i64, 0_u32))]);
-    let mut left = MAX_ESCAPE;
+    let mut budget = MAX_ESCAPE;
     while let Some(Reverse((_, _, node))) = queue.pop() {
         let (from, path) = nodes[node as usize].clone();
         for operator in context.1.starts(&from.state) {
@@ -519,10 +519,10 @@ fn escape(
             if (goal.is_reached)(&next) {
                 return Ok(Some((next, path)));
             }
-            if left == 0 {
+            if budget == 0 {
                 return Ok(None);
             }
-            left = left.saturating_sub(1);
+            budget = budget.saturating_sub(1);
             figures.evaluated = figures.evaluated.saturating_add(1);
             let Some(plan) = relaxation.plan(&next, goal.targets) else { continue };
             if plan.happenings.len() < size {

@@ -144,9 +144,9 @@ fn improve(
     let _span = info_span!("goal orders").entered();
     let before = search.figures;
     let end = search.work().saturating_add(work as u64);
-    while let Some(left) = end.checked_sub(search.work()).filter(|left| *left > 0) {
-        let left = usize::try_from(left).unwrap_or(usize::MAX);
-        let Some(sequence) = search.run(exact.incumbent.as_ref(), limits, left) else { break };
+    while let Some(budget) = end.checked_sub(search.work()).filter(|budget| *budget > 0) {
+        let budget = usize::try_from(budget).unwrap_or(usize::MAX);
+        let Some(sequence) = search.run(exact.incumbent.as_ref(), limits, budget) else { break };
         sequence.tell(exact.lower(), PlannerPart::Satisficing, record);
         exact.incumbent = Some(sequence);
     }

@@ -151,7 +151,7 @@ pub(super) struct SequentialPlanner<'w> {
 }
 
 enum Exact<'w> {
-    /// Not started yet, because computing the heuristics may take longer than finding a plan.
+    /// Absent before the start, because computing the heuristics may take longer than finding a plan.
     Later,
     Begun(Box<InterleavedSearch<'w, Int, Bounds>>),
     Over,
