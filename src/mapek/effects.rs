@@ -182,18 +182,44 @@ mod tests {
         answers.iter().filter_map(Answer::effect).map(|effect| word(&effect.command)).collect()
     }
 
-    #[test]
-    fn designs_are_requested_before_their_action() {
+    fn beliefs() -> Beliefs {
         let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions/ugv.toml");
-        let mut beliefs = Beliefs::new(Setup::read(&manifest).expect("the mission is read").mission);
-        let step = |design: &str| PlannedStep {
+        Beliefs::new(Setup::read(&manifest).expect("the mission is read").mission)
+    }
+
+    fn step(design: &str) -> PlannedStep {
+        PlannedStep {
             action: "move".to_owned(),
             arguments: vec!["wp1".to_owned(), "wp2".to_owned(), design.to_owned()],
             written: 3,
             configuration: vec![("f_localization".to_owned(), design.to_owned())],
             duration: BigRational::default(),
             cost: BigRational::default(),
+        }
+    }
+
+    /// A report of the action implies its reconfiguration, but does not prove that no copy is on its way.
+    #[test]
+    fn a_reconfiguration_supersedes_the_implied_one() {
+        let (mut beliefs, mut answers) = (beliefs(), Vec::new());
+        request(&mut beliefs, step("fd_amcl_kinect"), &mut answers);
+        beliefs.confirm_request(2);
+        request(&mut beliefs, step("fd_amcl_lidar"), &mut answers);
+        let superseded = |beliefs: &Beliefs| {
+            let last =
+                beliefs.outstanding().find(|effect| matches!(effect.command, Command::Reconfigure { .. }));
+            last.map(|effect| effect.supersedes.clone())
         };
+        assert_eq!(superseded(&beliefs), Some(vec![1]));
+        // An acknowledgement proves it.
+        let _ = beliefs.acknowledge(3);
+        request(&mut beliefs, step("fd_amcl_kinect"), &mut answers);
+        assert_eq!(superseded(&beliefs), Some(Vec::new()));
+    }
+
+    #[test]
+    fn designs_are_requested_before_their_action() {
+        let mut beliefs = beliefs();
         let mut answers = Vec::new();
         request(&mut beliefs, step("fd_amcl_kinect"), &mut answers);
         assert_eq!(words(&answers), ["f_localization None fd_amcl_kinect", "move"]);

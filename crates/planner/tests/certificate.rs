@@ -87,9 +87,7 @@ fn expedition(seed: u64) -> (String, String) {
     }
     for sled in 0..2 {
         let (capacity, load) = (1 + random.below(2), random.below(2));
-        init.push_str(&format!(
-            " (at s{sled} p0) (= (capacity s{sled}) {capacity}) (= (load s{sled}) {load})"
-        ));
+        let _ = write!(init, " (at s{sled} p0) (= (capacity s{sled}) {capacity}) (= (load s{sled}) {load})");
     }
     let problem = format!(
         "(define (problem p) (:domain expedition) (:objects s0 s1 - sled p0 p1 p2 - place) (:init {init})
