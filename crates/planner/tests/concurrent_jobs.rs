@@ -1,4 +1,4 @@
-//! Several robots at once: makespans beside longest-job-first and beside brute force, and lower
+//! Several robots at once: makespans compared with longest-job-first and with brute force, and lower
 //! bounds that no plan beats.
 //!
 //! Robots start at a base, drive for 5 to a place and work there for a time of its own. An

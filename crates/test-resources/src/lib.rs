@@ -128,7 +128,7 @@ pub fn data(relative: impl AsRef<Path>) -> Option<PathBuf> {
     None
 }
 
-/// Returns the path of the first of these programs that is in `PATH`, or `None` if there is none of them.
+/// Returns the path of the first of these programs that is in `PATH`, or `None` without any of them.
 ///
 /// # Panics
 /// Panics if the resource is missing and required.

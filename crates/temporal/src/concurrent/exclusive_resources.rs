@@ -16,7 +16,7 @@
 //!
 //! Let `m` resources be given. A plan with makespan `T` contains occupying actions of total duration
 //! at most `T` per resource, and at most `T + s` if each duration is increased by the separation `s`.
-//! So the sum over all actions of the plan, each with its duration plus `s` per resource that it
+//! Therefore the sum over all actions of the plan, each with its duration plus `s` per resource that it
 //! occupies, is at most `m (T + s)`. That sum is a cost of the plan. Every admissible heuristic for
 //! this cost function is a lower bound `W` on it, and `T ≥ W / m - s`. LM-cut \[1\] is used, as it
 //! adds up the landmarks of different goals. It is admissible in the split task because each action
