@@ -59,7 +59,7 @@ impl Ground<'_> {
     }
 }
 
-/// Input of [`write`]: the mission, its task and the solution to certify.
+/// Input of [`write()`]: the mission, its task and the solution to certify.
 #[derive(Debug, Clone, Copy)]
 pub struct Contents<'c> {
     /// The mission.

@@ -3,9 +3,9 @@
 //!
 //! Each instance of a constraint is an automaton. Auxiliary atoms store its state, and additional effects of
 //! the actions update these atoms. A condition on the state *after* an action is regressed to the state
-//! before the action (`regress`) [1], so plans have no additional states. Hard constraints become conditions
+//! before the action (`regress`) \[1\], so plans have no additional states. Hard constraints become conditions
 //! of actions and of the goal. Preferences are evaluated after the plan by hidden actions (`preferences`)
-//! [2]: each preference is satisfied or costs what the metric specifies [3]. If actions may overlap, the
+//! \[2\]: each preference is satisfied or costs what the metric specifies \[3\]. If actions may overlap, the
 //! hidden actions are never executed; their conditions are evaluated in the last state.
 //!
 //! \[1\] L. Bonassi et al.: On planning with qualitative state-trajectory constraints in PDDL3 by compiling
