@@ -101,8 +101,14 @@ def rubbish(rust: Rust, name: str, variant: str | None, types: Any) -> list[str]
     return []
 
 
+# `ros2-pyterfaces` has the definitions of Humble for these types. Jazzy added `variance` to `Range`.
+OUTDATED_IN_PYTERFACES = {"sensor_msgs/msg/Range"}
+
+
 def of_pyterfaces(name: str) -> str | None:
-    """The hash by `ros2-pyterfaces`, if it knows the type."""
+    """The hash by `ros2-pyterfaces`, if it knows the current definition of the type."""
+    if name in OUTDATED_IN_PYTERFACES:
+        return None
     _, kind, short = name.split("/")
     module = all_msgs if kind == "msg" else all_srvs
     schema = getattr(module, short, None)
