@@ -113,7 +113,7 @@ impl<'a> Lowering<'a> {
     }
 
     /// Adds the rule that derives the matches of an aggregate, and returns the condition of the
-    /// aggregate. `outer_conditions` contains the conditions lowered so far.
+    /// aggregate. `outer_conditions` contains the conditions already lowered.
     fn aggregate(
         &mut self,
         position: usize,

@@ -3,7 +3,7 @@
 //!
 //! A depth-first branch-and-bound search finds the binding with the lowest weight of unsatisfied atoms (a
 //! missing fact weighs more than a failed test). Ties are broken by the total gap of failed numeric
-//! comparisons. After a fixed number of nodes, the search ends with the best binding so far.
+//! comparisons. After a fixed number of nodes, the search ends with the best binding found.
 
 use std::fmt;
 

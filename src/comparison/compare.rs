@@ -16,7 +16,7 @@ use crate::comparison::published::{published, shortest_routes};
 use crate::comparison::referee::Referee;
 use crate::comparison::route::best_on_route;
 
-/// Callback that receives the candidates evaluated so far, and the computational costs so far.
+/// Callback that receives the candidates already evaluated, and the computational costs up to now.
 pub type Listener<'a> = dyn FnMut(&[Candidate], &Costs) + 'a;
 
 /// Settings of a comparison.

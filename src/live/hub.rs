@@ -73,7 +73,7 @@ impl Hub {
         (words.into_iter().map(|(_, line)| line).collect(), state.first)
     }
 
-    /// Returns the retained lines from number `from` on, at most [`MAX_BATCH`]. If there are none yet, waits up to
+    /// Returns the retained lines from number `from` on, at most [`MAX_BATCH`]. If no such line is retained, waits up to
     /// `wait`.
     pub(super) fn news(&self, from: u64, wait: Duration) -> News {
         let is_waiting = |state: &mut RetainedLines| !state.ended && from == state.end();

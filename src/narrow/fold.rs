@@ -2,7 +2,7 @@
 //! facts.
 //!
 //! The clauses of settled predicates, which no action can change (`settle`), have no negated atoms.
-//! So their extension is the least fixpoint over the stated facts, the same set in every state. It
+//! Their extension is therefore the least fixpoint over the stated facts, the same set in every state. It
 //! is computed by naive evaluation; each clause matches its most restrictive atoms first.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};

@@ -15,7 +15,7 @@ const MAX_CASES: usize = 64;
 impl Prover {
     /// Assumes that an individual is in a class: adds the facts to copies of the engine. Returns one engine
     /// for each case, because a disjunction gives several cases. `next` is the number of the last fresh name.
-    /// What rules cannot express of the class is not assumed, so that a proof remains sound.
+    /// Parts of the class that rules cannot express are not assumed, so that a proof remains sound.
     pub(super) fn assume(
         engine: &Engine,
         class: &ClassExpression,
