@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use metaplan::message::Message;
 use serde_json::Value;
@@ -21,7 +21,7 @@ use crate::signals::settings::{Condition, Signal, Source, Target, number};
 /// Period of checks whether nodes exist and topics are silent.
 const CHECK_PERIOD: Duration = Duration::from_millis(250);
 
-/// Time after the start during which a topic without messages does not count as silent.
+/// Time after the start during which nodes and topics that were never seen do not count as missing: DDS may not have discovered them yet.
 const DISCOVERY_TIME: Duration = Duration::from_secs(3);
 
 /// Timeout of the state of a lifecycle node.
@@ -44,13 +44,14 @@ pub(crate) fn watch(node: &Arc<Node>, signals: &[Signal], report: &Report) -> Re
             Source::Presence { node: name } => tasks.push(watch_presence(node, name, reporter)),
             Source::Field { topic, kind, field, period } => {
                 let clock = node.clock();
-                let last = Arc::new(Mutex::new(clock.elapsed()));
+                let started = clock.elapsed();
+                let last = Arc::new(Mutex::new(None));
                 let (noted, field, every) = (Arc::clone(&last), field.clone(), *every);
                 let of_message = reporter.clone();
                 let mut reported: Option<Duration> = None;
                 let take = move |message: &dyn Fn() -> Value| {
                     let now = clock.elapsed();
-                    *noted.lock().unwrap_or_else(PoisonError::into_inner) = now;
+                    *noted.lock().unwrap_or_else(PoisonError::into_inner) = Some(now);
                     // Messages between two reports are not even converted.
                     if reported.is_some_and(|reported| now.saturating_sub(reported) < every) {
                         return;
@@ -62,7 +63,8 @@ pub(crate) fn watch(node: &Arc<Node>, signals: &[Signal], report: &Report) -> Re
                 };
                 visit_message(kind, Subscribe { node, topic, take: Box::new(take) }).transpose()?;
                 if let (Some(period), Target::Component { .. }) = (period, target) {
-                    tasks.push(watch_silence(node.clock(), last, *period, reporter));
+                    let last_message = move || *last.lock().unwrap_or_else(PoisonError::into_inner);
+                    tasks.push(watch_silence(node.clock(), started, last_message, *period, reporter));
                 }
             }
             Source::Rate { topic, period } => tasks.push(watch_rate(node, topic, *period, *every, reporter)?),
@@ -147,13 +149,17 @@ impl MessageVisitor for Subscribe<'_> {
 /// Reports a component as failed while no message arrives.
 fn watch_silence(
     clock: Arc<Clock>,
-    last: Arc<Mutex<Duration>>,
+    started: Duration,
+    last_message: impl Fn() -> Option<Duration> + Send + 'static,
     period: Duration,
     reporter: Reporter,
 ) -> Task<()> {
     repeat(CHECK_PERIOD.min(period), move || {
-        let last = *last.lock().unwrap_or_else(PoisonError::into_inner);
-        if clock.elapsed().saturating_sub(last) > period {
+        let silent_from = match last_message() {
+            Some(last) => last + period,
+            None => started + period.max(DISCOVERY_TIME),
+        };
+        if clock.elapsed() > silent_from {
             reporter.works(false);
         }
     })
@@ -205,7 +211,15 @@ fn watch_rate(
 /// Reports a component as working while a node exists. A node exists while its parameter service does.
 fn watch_presence(node: &Arc<Node>, name: &str, reporter: Reporter) -> Task<()> {
     let service: Caller<GetParameters> = node.caller(&format!("{name}/get_parameters"));
-    repeat(CHECK_PERIOD, move || reporter.works(!service.servers().is_empty()))
+    let started = Instant::now();
+    let mut was_seen = false;
+    repeat(CHECK_PERIOD, move || {
+        let exists = !service.servers().is_empty();
+        was_seen |= exists;
+        if was_seen || started.elapsed() > DISCOVERY_TIME {
+            reporter.works(exists);
+        }
+    })
 }
 
 /// Reports a component as working while a lifecycle node has a state.
@@ -227,14 +241,17 @@ fn watch_state(
         node.subscribe::<TransitionEvent>(&topic, depth(10), move |event| take(&event.goal_state))?;
     }
     let service: Caller<GetState> = node.caller(&format!("{name}/get_state"));
+    let started = Instant::now();
     let mut last_servers = None;
     Ok(smol::spawn(async move {
         loop {
             let servers = service.servers();
             if last_servers.as_ref() != Some(&servers) {
                 if servers.is_empty() {
-                    reporter.works(false);
-                    last_servers = Some(servers);
+                    if last_servers.is_some() || started.elapsed() > DISCOVERY_TIME {
+                        reporter.works(false);
+                        last_servers = Some(servers);
+                    }
                 } else if let Ok(answer) = service.call(GetStateRequest::default(), STATE_TIMEOUT).await {
                     reporter.works(PrimaryState::of(&answer.current_state) == Some(state));
                     last_servers = Some(servers);
