@@ -33,6 +33,9 @@ use crate::procedure::{self, Procedures, Seen};
 /// Timeout of a function's reply with its mode.
 const MODE_TIMEOUT: Duration = Duration::from_secs(2);
 
+/// Time after which an observation that has shown no mode is repeated.
+const OBSERVATION_DELAY: Duration = Duration::from_millis(500);
+
 /// Number of mode requests to a new server, one per period: the first ones may be lost before it
 /// has discovered this node.
 const MAX_MODE_REQUESTS: u32 = 3;
@@ -175,7 +178,7 @@ impl Robot {
                     Means::Steps => match self.procedures.observe(&name).await {
                         Seen::Mode(mode) => Ok(mode),
                         Seen::Nothing => Ok(String::new()),
-                        Seen::Unknown => Err(format!("the nodes of {name} do not show which design it has")),
+                        Seen::Unsettled | Seen::Ambiguous => Err(format!("the nodes of {name} do not show which design it has")),
                     },
                 };
                 (name, answer)
@@ -297,10 +300,14 @@ impl Robot {
             Means::Steps => {
                 let procedures = Arc::clone(&self.procedures);
                 smol::spawn(async move {
-                    let mode = match procedures.observe(&name).await {
-                        Seen::Mode(mode) => mode,
-                        Seen::Nothing => String::new(),
-                        Seen::Unknown => return,
+                    // No event announces that a silent node answers again or that a transition has ended unnoticed.
+                    let mode = loop {
+                        match procedures.observe(&name).await {
+                            Seen::Mode(mode) => break mode,
+                            Seen::Nothing => break String::new(),
+                            Seen::Unsettled => Timer::after(OBSERVATION_DELAY).await,
+                            Seen::Ambiguous => return,
+                        };
                     };
                     let _ = inputs.send(Input::Mode(name, mode));
                 })

@@ -30,8 +30,10 @@ pub(crate) enum Seen {
     Mode(String),
     /// The conditions of no mode hold.
     Nothing,
-    /// A node does not answer or is in a transition, or several modes cannot be distinguished.
-    Unknown,
+    /// A node does not answer or is in a transition, or steps are being executed. A later observation may show the mode.
+    Unsettled,
+    /// The nodes answer, but their conditions do not distinguish the modes.
+    Ambiguous,
 }
 
 /// Receiver of events about steps.
@@ -135,9 +137,9 @@ impl Procedures {
 
     /// Returns the mode whose conditions hold: of several, the one with the most conditions.
     pub(crate) async fn observe(&self, function: &str) -> Seen {
-        let Some(procedures) = self.functions.get(function) else { return Seen::Unknown };
+        let Some(procedures) = self.functions.get(function) else { return Seen::Ambiguous };
         // The modes in the middle of a procedure mean nothing.
-        let Some(_idle) = procedures.running.try_lock() else { return Seen::Unknown };
+        let Some(_idle) = procedures.running.try_lock() else { return Seen::Unsettled };
         let present = procedures.present();
         let is_unobservable = |mode: &String| {
             procedures.modes.get(mode).is_some_and(|procedure| procedure.lasting().is_empty())
@@ -151,7 +153,7 @@ impl Procedures {
             let results = lasting.iter().map(|condition| self.observed(condition));
             let results = futures::future::join_all(results).await;
             if results.contains(&None) {
-                return Seen::Unknown;
+                return Seen::Unsettled;
             }
             if !lasting.is_empty() && results.iter().all(|result| *result == Some(true)) {
                 matching.push((lasting.len(), mode));
@@ -160,7 +162,7 @@ impl Procedures {
         let greatest_count = matching.iter().map(|(count, _)| *count).max().unwrap_or_default();
         matching.retain(|(count, _)| *count == greatest_count);
         let observed_mode = match matching.as_slice() {
-            [] if procedures.modes.keys().any(is_unobservable) && present.is_none() => return Seen::Unknown,
+            [] if procedures.modes.keys().any(is_unobservable) && present.is_none() => return Seen::Ambiguous,
             [] => {
                 procedures.set_present(None);
                 return Seen::Nothing;
@@ -168,7 +170,7 @@ impl Procedures {
             [(_, mode)] => (*mode).clone(),
             several => match present.filter(|present| several.iter().any(|(_, mode)| *mode == present)) {
                 Some(present) => present,
-                None => return Seen::Unknown,
+                None => return Seen::Ambiguous,
             },
         };
         procedures.set_present(Some(observed_mode.clone()));

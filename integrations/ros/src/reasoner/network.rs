@@ -176,7 +176,7 @@ impl Network {
                     return match procedures.observe(&function).await {
                         Seen::Mode(mode) => Some((function, mode)),
                         Seen::Nothing => Some((function, String::new())),
-                        Seen::Unknown => None,
+                        Seen::Unsettled | Seen::Ambiguous => None,
                     };
                 }
                 let answer = caller.call(GetModeRequest::default(), MODE_TIMEOUT).await.ok()?;

@@ -228,8 +228,8 @@ class Scout:
         until = time.monotonic() + within
         while not is_so():
             if time.monotonic() > until:
-                steps = [event for event in self.events if event["answer"] in ("step", "steps_failed", "reconfigure")]
-                raise Failure(f"{what}: not within {within} s; {self.states()}; {steps[-8:]}")
+                events = "\n".join(json.dumps(event)[:300] for event in self.events[-40:])
+                raise Failure(f"{what}: not within {within} s; {self.states()}; last events:\n{events}")
             time.sleep(0.02)
 
     def states(self) -> tuple[str, str]:
@@ -239,6 +239,12 @@ class Scout:
     def until_states(self, amcl: str, visual: str, within: float = 20.0) -> None:
         """Waits for the states of both ways to localize."""
         self.until(f"amcl is {amcl}, visual localization is {visual}", lambda: self.states() == (amcl, visual), within)
+
+    def until_moving(self) -> None:
+        """Waits until the robot localizes with the lidar and the manager knows that its steps have succeeded."""
+        self.until_states("active", "inactive")
+        states = lambda: [event["state"] for event in self.events if event["answer"] == "state"]
+        self.until("the action is executed", lambda: states()[-1:] == ["EXECUTE"])
 
     def count(self, answer: str) -> int:
         """Number of events of a kind."""
@@ -259,7 +265,7 @@ def steps() -> None:
     """Lifecycle transitions and parameters put designs into effect, once for each cause."""
     scout = Scout()
     with scout.managed():
-        scout.until_states("active", "inactive")
+        scout.until_moving()
         scout.until("the speed is set", lambda: scout.equipment.get_parameter("max_speed").value == 1.0)
         check(scout.equipment.settings, [(1.0, False)], "parameters, both at once")
         time.sleep(SETTLED)
@@ -288,7 +294,7 @@ def rollback() -> None:
     scout = Scout()
     scout.visual.can_activate = False
     with scout.managed():
-        scout.until_states("active", "inactive")
+        scout.until_moving()
         scout.equipment.lidar(DiagnosticStatus.ERROR, "no scan")
         scout.until("the failure is reported", lambda: scout.count("steps_failed") == 1)
         scout.until_states("active", "inactive")
@@ -328,7 +334,7 @@ def silent_topic() -> None:
     scout = Scout()
     scout.visual.is_mute = True
     with scout.managed(settings):
-        scout.until_states("active", "inactive")
+        scout.until_moving()
         scout.equipment.lidar(DiagnosticStatus.ERROR, "no scan")
         scout.until("visual localization is tried", lambda: scout.visual.state == "active")
         scout.until("the failure is reported", lambda: scout.count("steps_failed") == 1)
@@ -337,7 +343,7 @@ def silent_topic() -> None:
         check(failed, ["not seen afterwards: a message on /visual_localization/pose"], "reasons of failures")
     scout = Scout()
     with scout.managed(settings):
-        scout.until_states("active", "inactive")
+        scout.until_moving()
         scout.equipment.lidar(DiagnosticStatus.ERROR, "no scan")
         scout.until_states("inactive", "active")
         time.sleep(SETTLED)
@@ -450,9 +456,11 @@ def rate_signal() -> None:
             scout.until_states("inactive", "active")
             period[0] = 0.05
             scout.until_states("active", "inactive", 30.0)
+            # Publishers end with the node, so that the thread has to end first.
+            running.set()
+            thread.join()
     finally:
         running.set()
-        thread.join()
 
 
 def value_signal() -> None:
@@ -523,7 +531,7 @@ def simulated_time() -> None:
     )
     try:
         with scout.managed(STEPS, "--ros-args", "-p", "use_sim_time:=true"):
-            scout.until_states("active", "inactive")
+            scout.until_moving()
             scout.until("its status has a simulated stamp", lambda: any(999 < stamp < 3000 for stamp in stamps))
             scout.equipment.lidar(DiagnosticStatus.ERROR, "no scan")
             scout.until_states("inactive", "active")
@@ -574,7 +582,7 @@ def discover() -> None:
         check("lidar: *" in settings, False, "the rule is replaced")
     scout = Scout()
     with scout.managed(settings):
-        scout.until_states("active", "inactive")
+        scout.until_moving()
         scout.equipment.lidar(DiagnosticStatus.ERROR, "no scan")
         scout.until_states("inactive", "active")
 
