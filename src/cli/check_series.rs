@@ -3,7 +3,7 @@
 use crate::message::Message;
 use num_bigint::BigInt;
 use num_rational::BigRational;
-use num_traits::{One, Signed};
+use num_traits::Signed;
 use probabilistic::Error;
 use probabilistic::check::{Answer, Outcome, Report};
 use probabilistic::number::parse_decimal;
@@ -84,23 +84,11 @@ fn values(name: &str, text: &str) -> Result<Vec<String>, String> {
     let mut values = Vec::new();
     let mut value = first;
     while value <= last {
-        values.push(decimal(&value));
+        // All values of a series have finite decimal expansions.
+        values.extend(pddl::to_decimal(&value));
         value += &step;
     }
     Ok(values)
-}
-
-/// Formats a number that has a finite decimal expansion. All values of a series are such numbers.
-fn decimal(value: &BigRational) -> String {
-    let (mut scaled, mut places) = (value.clone(), 0_usize);
-    while !scaled.denom().is_one() {
-        scaled *= BigInt::from(10);
-        places += 1;
-    }
-    let digits = format!("{:0>width$}", scaled.numer().abs().to_string(), width = places + 1);
-    let (whole, fraction) = digits.split_at(digits.len() - places);
-    let sign = if value.is_negative() { "-" } else { "" };
-    if fraction.is_empty() { format!("{sign}{whole}") } else { format!("{sign}{whole}.{fraction}") }
 }
 
 /// Formats the result of a property for a table cell.

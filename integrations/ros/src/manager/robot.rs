@@ -178,7 +178,9 @@ impl Robot {
                     Means::Steps => match self.procedures.observe(&name).await {
                         Seen::Mode(mode) => Ok(mode),
                         Seen::Nothing => Ok(String::new()),
-                        Seen::Unsettled | Seen::Ambiguous => Err(format!("the nodes of {name} do not show which design it has")),
+                        Seen::Unsettled | Seen::Ambiguous => {
+                            Err(format!("the nodes of {name} do not show which design it has"))
+                        }
                     },
                 };
                 (name, answer)

@@ -162,7 +162,9 @@ impl Procedures {
         let greatest_count = matching.iter().map(|(count, _)| *count).max().unwrap_or_default();
         matching.retain(|(count, _)| *count == greatest_count);
         let observed_mode = match matching.as_slice() {
-            [] if procedures.modes.keys().any(is_unobservable) && present.is_none() => return Seen::Ambiguous,
+            [] if procedures.modes.keys().any(is_unobservable) && present.is_none() => {
+                return Seen::Ambiguous;
+            }
             [] => {
                 procedures.set_present(None);
                 return Seen::Nothing;

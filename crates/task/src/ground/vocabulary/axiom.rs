@@ -1,6 +1,6 @@
 //! Ground rules of derived atoms.
 
-use petgraph::algo::tarjan_scc;
+use petgraph::algo::kosaraju_scc;
 use petgraph::graph::DiGraph;
 use rustc_hash::FxHashMap;
 
@@ -29,12 +29,12 @@ pub fn components(axioms: &[GroundAxiom]) -> Vec<Vec<AtomId>> {
             }
         }
     }
-    // Tarjan's algorithm yields the components in reverse topological order, i.e. components without
-    // successors first.
+    // Components without successors come first. Petgraph's version of Tarjan's algorithm is recursive and
+    // would overflow the stack on long chains of axioms.
     let sorted = |component: Vec<_>| {
         let mut atoms: Vec<AtomId> = component.into_iter().map(|node| graph[node]).collect();
         atoms.sort_unstable();
         atoms
     };
-    tarjan_scc(&graph).into_iter().map(sorted).collect()
+    kosaraju_scc(&graph).into_iter().map(sorted).collect()
 }
