@@ -154,7 +154,6 @@ impl Engine {
         Ok(maintenance.finish())
     }
 
-    /// Plans the joins again if the number of facts has grown by more than the factor [`REPLAN_FACTOR`].
     fn replan(&mut self) -> Result<(), Error> {
         if self.store.len() <= REPLAN_FACTOR * self.network.planned_for.max(REPLAN_FROM) {
             return Ok(());
@@ -188,7 +187,6 @@ impl Engine {
     }
 }
 
-/// Returns an error if a fact has too many arguments, or a symbol that is not interned.
 pub(crate) fn check_fact(fact: &Fact, symbols: &Symbols) -> Result<(), Error> {
     // An index holds the set of its columns as the bits of a `u32`.
     if fact.arguments.len() > 32 {

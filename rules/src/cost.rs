@@ -9,7 +9,7 @@ use rustc_hash::FxHashSet;
 
 use crate::store::{Relation, RelationId, Row, Store, state};
 
-/// Number of sampled rows per relation.
+/// Approximate number of rows that are sampled per relation (up to twice as many).
 const SAMPLE: usize = 1024;
 /// Assumed number of rows of an empty relation, and minimum of the assumed number for a relation that rules
 /// have yet to fill.
@@ -37,7 +37,6 @@ impl Costs {
         Self { relations: sizes.collect() }
     }
 
-    /// Returns the expected number of rows of a relation.
     pub fn rows(&self, relation: RelationId) -> f64 {
         self.relations[relation.0 as usize].0
     }

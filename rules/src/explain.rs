@@ -162,7 +162,6 @@ impl Engine {
     }
 }
 
-/// Breadth-first traversal of recorded derivations, from a fact to its supports.
 struct Search<'a> {
     engine: &'a Engine,
     positions: FxHashMap<(RelationId, Row), usize>,

@@ -40,12 +40,18 @@ pub(crate) struct Seed {
 /// Initial matches of a plan.
 #[derive(Clone, Debug)]
 pub(crate) enum Start {
-    /// One empty match.
     Nothing,
     /// Changed rows of a relation: a range of [`Round::rows`].
-    Rows { relation: RelationId, from: u32, to: u32 },
+    Rows {
+        relation: RelationId,
+        from: u32,
+        to: u32,
+    },
     /// Partial matches deferred by an earlier run; `step` is the next step of the plan.
-    Matches { step: u32, bindings: Vec<Symbol> },
+    Matches {
+        step: u32,
+        bindings: Vec<Symbol>,
+    },
 }
 
 /// Number of partial matches that one step may produce from a block before the rest of the block is
@@ -82,7 +88,6 @@ pub(crate) struct Round<'a> {
     pub deferred: RefCell<Vec<Seed>>,
 }
 
-/// Index into [`Round::blocks`].
 type BlockId = u32;
 
 mod program {
@@ -171,7 +176,6 @@ pub(crate) fn run(round: &Round, seeds: &[Seed]) -> Vec<Matches> {
     heads.into_iter().map(matches).collect()
 }
 
-/// A round together with the seeds of one run.
 struct Seeded<'r, 'a> {
     round: &'r Round<'a>,
     seeds: &'r [Seed],
@@ -198,7 +202,6 @@ impl Evaluate for Seeded<'_, '_> {
 }
 
 impl Round<'_> {
-    /// Removes a block from the round, and returns its partial matches.
     fn take(&self, block: BlockId) -> Vec<Symbol> {
         std::mem::take(&mut self.blocks.borrow_mut()[block as usize])
     }
@@ -220,12 +223,10 @@ impl Round<'_> {
         Some((step, blocks.len() as BlockId - 1))
     }
 
-    /// Returns the number of variables per match of a plan.
     fn width(&self, plan: &Plan) -> usize {
         self.widths[plan.rule as usize]
     }
 
-    /// Returns the initial matches of a seed as a block.
     fn seed(&self, seed: &Seed) -> Vec<Symbol> {
         let plan = &self.plans[seed.plan as usize];
         let empty = vec![Symbol(0); self.width(plan)];
@@ -445,7 +446,6 @@ struct Group<'a> {
     key: &'a [Source],
 }
 
-/// Parameters of a join step.
 struct Lookup<'a> {
     relation: &'a Relation,
     skip: u8,
@@ -491,7 +491,6 @@ fn literals<'s>(symbols: &'s Symbols, sources: &[Source], bound: &[Symbol]) -> O
     sources.iter().map(|&source| symbols.as_literal(resolve(source, bound))).collect()
 }
 
-/// Keeps the matches that pass a test, in place.
 fn retain(mut block: Vec<Symbol>, width: usize, test: impl Fn(&[Symbol]) -> bool) -> Vec<Symbol> {
     let mut end = 0;
     for start in (0..block.len()).step_by(width) {

@@ -61,7 +61,6 @@ impl fmt::Debug for Interrupt {
     }
 }
 
-/// Reason for which an update stopped.
 #[derive(Clone, Copy, Debug)]
 enum Stop {
     Exhausted,
@@ -133,7 +132,6 @@ impl Budget {
         self.stopped.get().is_none()
     }
 
-    /// Records the first reason to stop.
     fn stop(&self, stop: Stop, rule: u32) {
         if self.stopped.get().is_none() {
             self.stopped.set(Some((stop, rule)));
@@ -154,7 +152,6 @@ impl Budget {
     }
 }
 
-/// Returns the text of a value for error messages. A long value is cut, and its length is appended.
 fn abbreviated(value: &Literal) -> Box<str> {
     let text = value.lexical();
     let length = text.chars().count();

@@ -26,7 +26,6 @@ use crate::symbol::{Symbol, Symbols};
 /// partial matches.
 const CHUNK: usize = 2048;
 
-/// Rows, each with its relation.
 type Rows = Vec<(RelationId, Row)>;
 
 /// A change of the stated facts that has been applied to the store, with the affected rows.
@@ -39,7 +38,6 @@ pub(crate) struct Stated {
 }
 
 impl Stated {
-    /// Returns the inverse change.
     pub fn undo(self) -> Delta {
         Delta { insert: self.effective.delete, delete: self.effective.insert }
     }
@@ -82,7 +80,6 @@ pub(crate) fn state_change(engine: &mut Engine, delta: Delta) -> Stated {
     stated
 }
 
-/// An incremental update of the derived facts, in progress.
 pub(crate) struct Maintenance<'a> {
     engine: &'a mut Engine,
     network: Arc<Network>,
@@ -311,7 +308,6 @@ impl<'a> Maintenance<'a> {
         Ok(())
     }
 
-    /// Makes derived rows visible to the rules.
     fn promote(&mut self, rows: &Rows) {
         for &(relation, row) in rows {
             self.engine.store.get_mut(relation).clear(row, state::PENDING);

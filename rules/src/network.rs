@@ -88,12 +88,10 @@ pub(crate) fn compile(
     Ok(network)
 }
 
-/// Result of a change of rules.
 pub(crate) struct Revision {
     pub network: Network,
     /// Numbers of the removed compiled rules; the numbers are not reused before the next revision.
     pub removed: FxHashSet<u32>,
-    /// Numbers of new compiled rules.
     pub added: FxHashSet<u32>,
 }
 
@@ -173,7 +171,6 @@ fn content(rule: &Rule) -> (&[Atom], &[Atom], Option<&RuleIdentity>) {
     (&rule.head, &rule.body, rule.head.is_empty().then_some(&rule.identity))
 }
 
-/// Returns an error if a rule contains a symbol that is not interned.
 fn unknown_symbols(rule: &Rule, symbols: &Symbols) -> Option<Error> {
     let atoms = || rule.head.iter().chain(&rule.body).flat_map(|atom| atom.parts().iter().chain([atom]));
     let predicates = atoms().filter_map(|atom| match atom {

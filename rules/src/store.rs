@@ -17,13 +17,10 @@ use crate::symbol::Symbol;
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]
 pub(crate) struct RelationId(pub u32);
 
-/// Number of a row in a relation.
 pub(crate) type Row = u32;
 
-/// End of a linked list of rows.
 const NO_ROW: Row = Row::MAX;
 
-/// State bits of a row.
 pub(crate) mod state {
     /// The row is unused.
     pub const FREE: u8 = 1;
@@ -48,7 +45,6 @@ pub(crate) struct Record {
 }
 
 impl Record {
-    /// No recorded derivation.
     pub const NONE: Self = Self { rule: u32::MAX, slot: 0 };
 }
 
@@ -122,7 +118,6 @@ impl Store {
     }
 }
 
-/// Facts of one predicate and arity.
 #[derive(Clone, Debug)]
 pub(crate) struct Relation {
     /// Predicate of the facts; `None` for the matches of a constraint or an aggregate.
@@ -185,7 +180,6 @@ impl Relation {
         self.rows.len()
     }
 
-    /// Returns the number of arguments per fact.
     pub fn arity(&self) -> usize {
         self.arity
     }
@@ -336,7 +330,6 @@ impl Relation {
         Rows { links: &index.next, next }
     }
 
-    /// Returns all rows in use.
     pub fn scan(&self) -> impl Iterator<Item = Row> + '_ {
         (0..self.bound()).filter(|&row| self.state(row) & state::FREE == 0)
     }
@@ -362,7 +355,6 @@ impl Iterator for Rows<'_> {
 }
 
 impl Index {
-    /// Returns `true` if rows with this record are in the index.
     fn has(&self, record: Record) -> bool {
         self.excluded_rule.is_none_or(|rule| rule != record.rule)
     }

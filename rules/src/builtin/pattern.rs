@@ -151,7 +151,6 @@ fn translate(pattern: &str) -> Result<String, String> {
     Ok(translated)
 }
 
-/// Translates a replacement text of `XPath` to the syntax of the `regex` crate; `None` if it is invalid.
 fn expand(replacement: &str) -> Option<String> {
     let mut expanded = String::new();
     let mut characters = replacement.chars();

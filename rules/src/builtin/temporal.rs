@@ -8,7 +8,6 @@ use num_traits::{ToPrimitive, Zero};
 use super::signature::BuiltIn;
 use crate::literal::{Decimal, Duration, Literal, Moment, MomentKind, XSD};
 
-/// Returns the value of a temporal function; `None` for other functions and unsuitable arguments.
 pub(super) fn compute(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Literal> {
     use BuiltIn as B;
     match built_in {
@@ -58,8 +57,8 @@ fn construct(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Literal> {
     (!literal.is_ill_typed()).then_some(literal)
 }
 
-/// Returns the common sign of all parts of a duration, and removes it from their texts. `None` if the signs
-/// differ.
+/// Returns the common sign of all parts of a duration (zero has either sign), and removes it from their
+/// texts. `None` if the signs differ or a part is not a number.
 fn common_sign(arguments: &[&Literal], texts: &mut [String]) -> Option<&'static str> {
     let zero = BigRational::zero();
     let numbers = arguments.iter().map(|argument| argument.as_rational()).collect::<Option<Vec<_>>>()?;
@@ -120,7 +119,7 @@ fn scaled(built_in: BuiltIn, duration: &Duration, factor: &BigRational) -> Optio
 }
 
 /// Returns a moment plus or minus a duration; `None` if the built-in is for another kind of moment or
-/// duration.
+/// duration, or if the result is out of range.
 fn shifted(built_in: BuiltIn, moment: &Moment, duration: &Duration) -> Option<Literal> {
     use BuiltIn as B;
     let (kind, months, forward) = match built_in {

@@ -2,7 +2,6 @@
 
 use super::temporal::{split_zone, zone_text};
 
-/// Decodes pairs of hexadecimal digits. Returns `None` for invalid text.
 pub(super) fn parse_hexadecimal(text: &str) -> Option<Box<[u8]>> {
     let digit = |byte: u8| char::from(byte).to_digit(16);
     let pairs = text.as_bytes().chunks(2);
@@ -93,7 +92,6 @@ pub(super) fn recurring(text: &str, local: &str) -> Option<(Box<str>, &'static s
     valid.then(|| (format!("{body}{zone}").into(), local))
 }
 
-/// Returns the IRI of a datatype of recurring dates, given by its local name.
 pub(super) fn recurring_datatype(local: &str) -> &'static str {
     match local {
         "gYear" => "http://www.w3.org/2001/XMLSchema#gYear",

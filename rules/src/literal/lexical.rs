@@ -38,9 +38,7 @@ impl Literal {
 
 /// Result of parsing a lexical form.
 pub(super) enum Parsed {
-    /// A valid form.
     Value(Literal),
-    /// A form that is invalid for its datatype.
     IllTyped,
     /// The datatype is unsupported.
     Unknown,

@@ -10,7 +10,6 @@ const XML_LITERAL: &str = "http://www.w3.org/1999/02/22-rdf-syntax-ns#XMLLiteral
 /// Knowledge about the value of a literal.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
-    /// The value is known.
     Known,
     /// A rational number that is not a decimal.
     Rational,
@@ -18,7 +17,6 @@ enum Kind {
     Xml,
     /// A fresh value: it differs from other fresh values, and nothing else is known. See [`Literal::fresh`].
     Fresh,
-    /// The datatype is unsupported.
     Unknown,
 }
 
@@ -97,7 +95,6 @@ impl Literal {
 /// Datatype of the values of [`Literal::fresh`].
 const FRESH: &str = "urn:metaplan:fresh";
 
-/// Returns `true` for a supported datatype.
 fn is_known(iri: &str) -> bool {
     match (iri.strip_prefix(XSD), iri.strip_prefix(RDF)) {
         (Some(local), _) => !matches!(parse_xsd("", local), Parsed::Unknown),

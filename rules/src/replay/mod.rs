@@ -37,9 +37,7 @@ use names::Names;
 
 pub use fault::Fault;
 
-/// Relation of equal names.
 const SAME_AS: &str = "http://www.w3.org/2002/07/owl#sameAs";
-/// Relation of different individuals.
 const DIFFERENT_FROM: &str = "http://www.w3.org/2002/07/owl#differentFrom";
 
 /// Statistics of a successful [`replay`].
@@ -225,8 +223,8 @@ impl Replayer<'_> {
         }
     }
 
-    /// Checks that all stated facts and all conclusions of rules are present. Returns the number of rule
-    /// matches.
+    /// Checks that all stated facts and all conclusions of rules are present, and that no integrity
+    /// constraint is violated. Returns the number of rule matches.
     fn closed(&mut self, stated: &[Fact]) -> Result<usize, Fault> {
         if let Some(fact) =
             stated.iter().find(|fact| !self.matcher.facts.contains(&self.matcher.names.normal(fact)))

@@ -1,6 +1,5 @@
 //! Lexer: splits rule text into tokens with positions.
 
-/// A token of rule text.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(super) enum Token {
     /// `@prefix`, or `prefix` before a name.
@@ -43,7 +42,6 @@ pub(super) struct Spanned {
     pub column: u32,
 }
 
-/// A lexical error with its position.
 #[derive(Debug)]
 pub(super) struct Fault {
     pub message: String,

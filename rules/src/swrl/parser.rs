@@ -157,14 +157,12 @@ impl Parser<'_> {
         token
     }
 
-    /// Consumes a token if it is the next one. Returns `true` on success.
     fn accept(&mut self, token: &Token) -> bool {
         let is_match = self.peek() == token;
         self.cursor += usize::from(is_match);
         is_match
     }
 
-    /// Returns line and column of the next token.
     fn position(&self) -> (u32, u32) {
         let spanned = &self.tokens[self.cursor.min(self.tokens.len() - 1)];
         (spanned.line, spanned.column)
@@ -447,7 +445,6 @@ impl Parser<'_> {
     }
 }
 
-/// Returns the text of a token for error messages.
 fn describe(token: &Token) -> String {
     match token {
         Token::Prefix => "`@prefix`".into(),

@@ -13,10 +13,8 @@ const EVAL: &str = "http://swrl.stanford.edu/ontologies/built-ins/3.4/swrlm.owl#
 const SQRT: &str = "http://swrl.stanford.edu/ontologies/built-ins/3.4/swrlm.owl#sqrt";
 const LOG: &str = "http://swrl.stanford.edu/ontologies/built-ins/3.4/swrlm.owl#log";
 
-/// A function of one number, with its IRI.
 struct Unary(&'static str, fn(f64) -> f64);
 
-/// The function `eval`.
 struct Eval;
 
 pub(super) const ALL: [&dyn Definition; 3] = [&Unary(SQRT, f64::sqrt), &Unary(LOG, f64::ln), &Eval];

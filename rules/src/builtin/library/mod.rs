@@ -19,7 +19,6 @@ use super::signature::BuiltIn;
 /// Common IRI prefix of the libraries of `SWRLTab`, before the version.
 const LIBRARY_ROOT: &str = "http://swrl.stanford.edu/ontologies/built-ins/";
 
-/// All built-ins of both libraries.
 static ALL: LazyLock<Vec<&'static dyn Definition>> =
     LazyLock::new(|| math::ALL.iter().copied().chain(temporal::all()).collect());
 
@@ -30,7 +29,6 @@ pub(super) fn find(iri: &str) -> Option<BuiltIn> {
     definition.map(|definition| BuiltIn::custom(*definition))
 }
 
-/// Returns the IRIs of all built-ins in the library of an IRI, in any version.
 pub(super) fn names_in_library(iri: &str) -> Vec<&'static str> {
     let library = |iri| name(iri).and_then(|name| name.split_once('#')).map(|(library, _)| library);
     let iris = ALL.iter().map(|definition| definition.iri());
