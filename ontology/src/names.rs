@@ -9,7 +9,6 @@ use crate::owl::{Iri, Literal};
 /// Prefix of the text of a blank node. No IRI has this prefix.
 const BLANK: &str = "_:";
 
-/// Interned IRIs and blank nodes.
 #[derive(Debug, Default)]
 pub(crate) struct Names {
     texts: Vec<Iri>,
@@ -56,7 +55,6 @@ impl Names {
         self.number(&format!("{BLANK}{name}"))
     }
 
-    /// Returns the number of an IRI, if the IRI is interned.
     pub(crate) fn find(&self, name: &str) -> Option<u32> {
         self.numbers.get(name).copied()
     }
@@ -66,7 +64,6 @@ impl Names {
         &self.texts[number as usize]
     }
 
-    /// Returns `true` if the number belongs to a blank node.
     pub(crate) fn is_blank(&self, number: u32) -> bool {
         self.text(number).starts_with(BLANK)
     }
@@ -112,7 +109,6 @@ impl Names {
         }
     }
 
-    /// Converts a triple of numbers to a triple of text.
     pub(crate) fn triple(&self, compact: Compact) -> Triple {
         let named = |number| NamedNode::new_unchecked(&**self.text(number));
         let node = |number| match self.text(number).strip_prefix(BLANK) {

@@ -107,6 +107,7 @@ impl Prover {
     }
 
     /// Proves that an individual is in a class. Returns the explanation, or `None` if the proof fails.
+    /// Contradictory assumptions prove everything.
     pub(super) fn is_in(
         engine: &Engine,
         class: &ClassExpression,
@@ -213,7 +214,6 @@ pub(super) fn refuted(cases: &[Engine]) -> Option<String> {
     Some(format!("the opposite is impossible: {}\n", reasons?.join("; and ")))
 }
 
-/// Returns the facts that the names denote pairwise different individuals.
 pub(super) fn pairwise_different(engine: &mut Engine, names: &[Iri]) -> Vec<Fact> {
     let symbols = engine.symbols_mut();
     let different = symbols.name(owl::DIFFERENT_FROM);

@@ -148,12 +148,10 @@ impl Prover {
     }
 }
 
-/// Returns `true` for an anonymous individual without an assigned value.
 fn is_open(assignment: &Assignment, name: &Iri) -> bool {
     name.starts_with(ANONYMOUS) && !assignment.contains_key(name)
 }
 
-/// Returns the individuals of an assertion.
 fn names(axiom: &Axiom) -> Vec<Iri> {
     match axiom {
         Axiom::ClassAssertion(_, individual) | Axiom::DataPropertyAssertion(_, individual, _) => {

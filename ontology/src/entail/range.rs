@@ -32,7 +32,7 @@ impl Prover {
     }
 }
 
-/// Returns `true` if the intersection of the datatypes is contained in the range.
+/// Returns `true` if the intersection of the datatypes is certainly contained in the range.
 fn contains(datatypes: &[&str], range: &DataRange) -> bool {
     match range {
         DataRange::Datatype(iri) => is_subsumed(datatypes, iri),

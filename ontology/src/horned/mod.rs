@@ -348,8 +348,6 @@ impl Builder {
         }
     }
 
-    /// Converts a component to an axiom. Returns `None` for components that are not axioms (ontology
-    /// header, annotation axiom).
     fn axiom(&mut self, component: &Component<RcStr>) -> Option<Axiom> {
         use Characteristic as C;
         let characteristic =

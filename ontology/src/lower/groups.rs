@@ -20,7 +20,6 @@ pub(crate) fn relation(context: &mut Context, axiom: &str) -> Symbol {
     context.name(&format!("{INTERNAL}member:{hash:016x}"))
 }
 
-/// Returns the symbol of the number of the member at `index`.
 pub(crate) fn number(context: &mut Context, index: usize) -> Symbol {
     context.symbols.literal(rules::Literal::integer(index as i64))
 }

@@ -26,7 +26,6 @@ pub(crate) struct Inclusions {
 }
 
 impl Inclusions {
-    /// Computes the inclusions between the restrictions of an ontology.
     pub(crate) fn new(ontology: &Ontology) -> Self {
         let mut uses = Uses::default();
         uses.collect(ontology);
@@ -97,7 +96,6 @@ struct Uses {
     positions: HashMap<ClassExpression, usize>,
     /// Restrictions that occur in several axioms or rules.
     shared: HashSet<ClassExpression>,
-    /// Position of the current axiom or rule.
     position: usize,
 }
 
@@ -275,8 +273,8 @@ impl InclusionGraph {
         }
     }
 
-    /// Returns the conditions that include a restriction. Restrictions nested in it are compared up to
-    /// `depth` levels.
+    /// Returns the conditions that include a restriction. Nested restrictions are compared up to `depth`
+    /// levels.
     fn including(
         &self,
         restriction: &ClassExpression,
@@ -339,7 +337,6 @@ impl InclusionGraph {
     }
 }
 
-/// Returns property and filler of a restriction.
 fn parts(restriction: &ClassExpression) -> Option<(&Property, &ClassExpression)> {
     match restriction {
         ClassExpression::SomeValuesFrom(property, filler)
@@ -355,7 +352,6 @@ fn inverse(property: &Property) -> Property {
     }
 }
 
-/// Returns the properties that are reachable from `from` in a graph, including `from` itself.
 fn reachable(from: &Property, edges: &HashMap<Property, Vec<Property>>) -> BTreeSet<Property> {
     let mut visited = BTreeSet::from([from.clone()]);
     let mut open = vec![from];

@@ -15,7 +15,6 @@ use crate::vocab::{is_reserved, owl, rdf, rdfs};
 #[derive(Clone, Copy, Default)]
 #[allow(clippy::struct_excessive_bools)] // independent observations
 struct NameUse {
-    /// The name belongs to a reserved vocabulary.
     reserved: bool,
     /// The name is a blank node, or may be part of an axiom, a list, a rule or a header.
     special: bool,
@@ -27,7 +26,6 @@ struct NameUse {
     annotation: bool,
 }
 
-/// Uses of all names in the documents, indexed by the number of the name.
 pub(super) struct Usage {
     uses: Vec<NameUse>,
     kind: Option<u32>,

@@ -88,7 +88,6 @@ pub(crate) fn declare_known(graph: &mut Graph, known: &[(EntityKind, Iri)], name
     }
 }
 
-/// Declarations and uses of properties.
 struct Kinds<'a> {
     declared: &'a Declared,
     uses: BTreeMap<String, Use>,
@@ -238,7 +237,6 @@ fn named(node: &NamedOrBlankNode) -> Option<&str> {
     }
 }
 
-/// Returns `true` if a restriction is about data values.
 fn restricts_data(graph: &Graph, restriction: &NamedOrBlankNode, declared: &Declared) -> bool {
     graph.of(restriction).any(|(_, triple)| match triple.predicate.as_str() {
         owl::ON_DATA_RANGE => true,
@@ -255,7 +253,6 @@ fn restricts_data(graph: &Graph, restriction: &NamedOrBlankNode, declared: &Decl
     })
 }
 
-/// Records the undeclared classes that a triple uses.
 fn record_classes(triple: &Triple, declared: &Declared, classes: &mut BTreeSet<String>) {
     let mut record = |iri: Option<&str>| {
         if let Some(iri) = iri.filter(|iri| !is_reserved(iri))
@@ -282,7 +279,6 @@ fn record_classes(triple: &Triple, declared: &Declared, classes: &mut BTreeSet<S
     }
 }
 
-/// Records the use of an undeclared property in a triple.
 fn record_property(graph: &Graph, triple: &Triple, declared: &Declared, uses: &mut BTreeMap<String, Use>) {
     let mut record = |iri: &str, change: &dyn Fn(&mut Use)| {
         if !is_reserved(iri)

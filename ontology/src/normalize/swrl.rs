@@ -21,7 +21,6 @@ pub(crate) struct Origin {
     pub ontology: Iri,
     /// Index of the rule in its document, from 0. Unreadable rules are counted, too.
     pub position: u32,
-    /// The rule's IRI, if it has one.
     pub iri: Option<Iri>,
 }
 
@@ -84,7 +83,6 @@ struct RdfAtom {
     list: Option<Vec<Term>>,
 }
 
-/// State of the rewriting of all rules.
 struct Pass {
     /// Declared variables, under their original names.
     variables: HashSet<Term>,
@@ -321,7 +319,6 @@ impl RdfAtom {
         Self { class, arguments, list: None }
     }
 
-    /// Returns an atom that always holds.
     fn truth() -> Self {
         let term = || Term::from(NamedNode::new_unchecked(TRUE));
         Self::new(swrl::SAME_INDIVIDUAL_ATOM, vec![(swrl::ARGUMENT1, term()), (swrl::ARGUMENT2, term())])

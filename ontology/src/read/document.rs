@@ -144,7 +144,6 @@ pub(crate) fn ontology_iri(head: &[u8]) -> Option<String> {
     }
 }
 
-/// Returns the text between the first `start` and the next `end`.
 fn between(text: &[u8], start: &str, end: char) -> Option<String> {
     let text = String::from_utf8_lossy(text);
     let tail = &text[text.find(start)? + start.len()..];

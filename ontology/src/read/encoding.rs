@@ -26,7 +26,6 @@ pub(super) fn decoded(bytes: &[u8]) -> Result<Cow<'_, [u8]>, String> {
     Ok(Cow::Owned(as_utf8(text)))
 }
 
-/// Returns the encoding label of an XML declaration, if there is one.
 fn declared(text: &[u8]) -> Option<&[u8]> {
     let label = label(text)?;
     Some(&text[label])

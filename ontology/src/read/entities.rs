@@ -12,10 +12,8 @@ const EXTRA_BYTES: usize = 1 << 20;
 /// Limit on the nesting of entities.
 const MAX_ENTITY_DEPTH: usize = 16;
 
-/// Entities that XML predefines.
 const PREDEFINED: [&[u8]; 5] = [b"lt", b"gt", b"amp", b"quot", b"apos"];
 
-/// An entity that cannot be expanded.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct EntityError {
     /// Byte offset in the document.
@@ -81,8 +79,9 @@ pub(super) fn expanded(text: &[u8]) -> Result<Flattened<'_>, EntityError> {
     Ok(Flattened { text: flat.into(), offsets })
 }
 
-/// Parses the entity reference (`&name;`) at the start of a text. Returns the name of the entity and the
-/// length of the reference; `None` if the text starts with no reference.
+/// Parses the entity reference (`&name;`) at the start of a text, without a check of the first character.
+/// Returns the name of the entity and the length of the reference. `None` if no name with a semicolon follows
+/// the first character.
 fn reference(text: &[u8]) -> Option<(&[u8], usize)> {
     // Names of entities are short; a longer text is not a reference.
     let end = text.iter().take(256).position(|&byte| byte == b';')?;
@@ -130,7 +129,6 @@ impl<'a> Expansion<'a> {
         Ok(())
     }
 
-    /// Expands the references in the value of an entity.
     fn resolved(&mut self, value: &'a [u8], depth: usize) -> Result<Vec<u8>, String> {
         let (mut resolved, mut cursor) = (Vec::new(), 0);
         // Quotation marks are escaped in a value without markup, because the reference may be in an attribute.

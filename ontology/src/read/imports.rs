@@ -41,7 +41,6 @@ const HEAD_BYTES: usize = 1 << 16;
 
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Resolution {
-    /// A document that has already been read.
     Loaded,
     File(PathBuf),
     /// An embedded document: its name for messages, and its text.
@@ -61,7 +60,6 @@ struct OntologyFile {
 }
 
 impl Resolver {
-    /// Creates a resolver and reads the catalogs of `options`.
     pub(crate) fn new(options: &ReadOptions) -> Result<Self, Errors> {
         let (mut catalogs, mut errors) = (Vec::new(), Vec::new());
         for file in &options.catalogs {
@@ -210,7 +208,6 @@ fn candidates(directory: &Path, depth: usize) -> Vec<OntologyFile> {
     files
 }
 
-/// Returns the ontology IRI that the start of a file declares, if there is one.
 fn declared_iri(path: &Path) -> Option<String> {
     use std::io::Read;
     if !path.is_file() {

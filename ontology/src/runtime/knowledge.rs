@@ -197,7 +197,6 @@ impl Runtime {
         Facts::stated(&self.engine, self.mode == Mode::Latch)
     }
 
-    /// Returns all facts that hold.
     pub(super) fn all_facts(&self) -> Facts<'_> {
         Facts::new(&self.engine)
     }

@@ -12,7 +12,6 @@ use crate::vocab::local_name;
 #[derive(Clone, Copy)]
 pub(crate) struct Facts<'a> {
     engine: &'a Engine,
-    /// Whether only asserted facts count.
     only_stated: bool,
 }
 
@@ -48,12 +47,10 @@ impl<'a> Facts<'a> {
         symbols
     }
 
-    /// Returns the members of a class.
     pub(crate) fn members(self, class: Term) -> Vec<Symbol> {
         self.column(class, &[None], 0)
     }
 
-    /// Returns the values of a property of `subject`.
     pub(crate) fn objects(self, subject: Symbol, property: Term) -> Vec<Symbol> {
         self.column(property, &[Some(subject), None], 1)
     }
@@ -85,7 +82,6 @@ impl<'a> Facts<'a> {
         }
     }
 
-    /// Returns the lexical forms of the values of a property, sorted.
     pub(crate) fn texts(self, subject: Symbol, property: Term) -> Vec<String> {
         let mut texts: Vec<_> = self.literals(subject, property).into_iter().map(Literal::lexical).collect();
         texts.sort();

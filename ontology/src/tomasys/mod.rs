@@ -307,7 +307,6 @@ impl<'a> View<'a> {
         sorted(self.related(iri, term, true).into_iter().filter_map(|symbol| self.individual(symbol)))
     }
 
-    /// Returns the literal values of a property of a subject, sorted by text.
     fn literals(&self, iri: &str, term: Term) -> Vec<&'a Literal> {
         let symbols = self.engine.symbols();
         let values = self.related(iri, term, false).into_iter();
