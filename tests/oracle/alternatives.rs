@@ -115,7 +115,6 @@ impl Task {
         (domain + ")", problem)
     }
 
-    /// Returns the numbers of the actions that are not idle; see the head of the file.
     fn active(&self) -> BTreeSet<usize> {
         // All reachable states, by exhaustive search.
         let (mut states, mut open) = (BTreeSet::from([self.initial]), vec![self.initial]);

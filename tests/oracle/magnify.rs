@@ -15,9 +15,7 @@ use std::process::Command;
 
 use test_resources::{data, python};
 
-/// Number of significant digits of the decimals.
 const DIGITS: usize = 16;
-/// Number of generated missions.
 const MISSIONS: usize = 50;
 /// Variants: name, whether the factors in the domain (weights of the metric) are replaced as well, and the maximum
 /// slowdown (geometric mean).
@@ -121,7 +119,6 @@ fn run(arguments: &[&str], once: bool) -> Run {
     Run { status: status.parse().expect("a status"), time: time.parse().expect("a time") }
 }
 
-/// Returns the arguments of the planning command for a mission.
 fn plan_arguments(directory: &Path, name: &str) -> [String; 6] {
     let file = |part: &str| directory.join(format!("{name}.{part}.pddl")).display().to_string();
     let [plan, quiet, limit, seconds] = ["plan", "--quiet", "--time-limit", "60"].map(str::to_owned);

@@ -29,7 +29,6 @@ struct Builder<'r> {
     open: usize,
 }
 
-/// Returns a random arithmetic task.
 pub fn arithmetic(rng: &mut Rng) -> Task {
     let mut builder = Builder::new(rng);
     builder.values();

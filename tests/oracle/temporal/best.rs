@@ -90,7 +90,6 @@ fn scheduled(search: &Search<'_>, edges: &[usize]) -> Schedule {
     plan
 }
 
-/// Converts a schedule to steps with names of actions and objects.
 pub fn written(world: &World, steps: &[(usize, Q, Q)]) -> Vec<Step> {
     let step = |(instance, start, duration): &(usize, Q, Q)| {
         let (action, objects) = &world.instances[*instance];

@@ -160,7 +160,6 @@ impl World {
         Ok(results)
     }
 
-    /// Returns the value of an expression in a state.
     pub fn value(&self, expression: &Expression, state: &State, bound: &[usize]) -> Result<Q, Obstacle> {
         let pair = |left: &Expression, right: &Expression| {
             Ok((self.value(left, state, bound)?, self.value(right, state, bound)?))

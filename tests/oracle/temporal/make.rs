@@ -41,7 +41,6 @@ pub(super) fn constant(value: Q) -> Expression {
     Expression::Number(value)
 }
 
-/// Returns the empty conjunction.
 pub(super) fn always_true() -> Condition {
     Condition::All(Vec::new())
 }
@@ -109,7 +108,6 @@ impl Maker {
         choices[self.random.usize(..choices.len())].clone()
     }
 
-    /// Declares objects, predicates and functions.
     fn declare(&mut self, designs: bool) {
         for kind in 0..self.task.types {
             let count = 1 + self.random.usize(..2);

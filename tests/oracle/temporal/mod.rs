@@ -67,7 +67,6 @@ pub fn concurrent_unit(seed: u64) -> Q {
     units[(seed % 5) as usize]
 }
 
-/// Returns `true` if larger values are better.
 pub fn maximizes(task: &Task) -> bool {
     matches!(task.measure, Measure::Metric { maximize: true, .. })
 }

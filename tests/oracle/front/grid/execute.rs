@@ -117,7 +117,6 @@ impl Task {
         conditions.all(|(_, condition)| condition.holds(state))
     }
 
-    /// Returns the value of a plan; `None` if the plan is invalid.
     fn value(&self, plan: &[Step]) -> Option<i64> {
         let mut times: Vec<i64> =
             plan.iter().flat_map(|(start, _, duration)| [*start, start + duration]).collect();

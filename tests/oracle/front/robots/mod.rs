@@ -28,7 +28,6 @@ const FULL: i64 = 12;
 const CHARGING: i64 = 5;
 const PLACES: usize = 4;
 
-/// Syntactic form of a mission.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Form {
     /// Designs are parameters of actions.
@@ -58,7 +57,6 @@ struct Design {
     energy: i64,
     safety: Option<i64>,
     change: i64,
-    /// Component that the design requires, if any.
     component: Option<usize>,
     /// Minimum visibility with which the design can be used, if any.
     visibility: Option<i64>,
@@ -83,7 +81,6 @@ pub struct Robot {
     knowledge: Knowledge,
 }
 
-/// Initial situation of a mission.
 #[derive(Debug)]
 struct Situation {
     /// For each connected pair of places: `true` for a narrow way, and the length.
@@ -228,7 +225,6 @@ impl Robot {
         combinations
     }
 
-    /// Returns the minimum cost of a plan. `None` if there is no plan.
     fn best(&self, situation: &Situation) -> Option<i64> {
         /// State of the search: place, battery, and current design of each function.
         type Node = (usize, i64, Vec<Option<usize>>);
