@@ -13,7 +13,6 @@ pub(crate) struct Graph {
     fresh: usize,
 }
 
-/// Items of a complete `rdf:List`, and the triples of its nodes.
 #[derive(Debug)]
 pub(crate) struct List {
     pub items: Vec<Term>,
@@ -94,7 +93,6 @@ impl Graph {
         typed.map(|(index, triple)| (index, triple.subject.clone())).collect()
     }
 
-    /// Returns the list that starts at `head`. The error describes a malformed or cyclic list.
     pub(crate) fn list(&self, head: &Term) -> Result<List, String> {
         let mut list = List { items: Vec::new(), spine: Vec::new() };
         let (mut node, mut visited) = (head.clone(), HashSet::default());
@@ -136,7 +134,6 @@ impl Graph {
         BlankNode::new_unchecked(format!("n{}", self.fresh))
     }
 
-    /// Returns for each blank node the number of triples with this node as object.
     pub(crate) fn references(&self) -> HashMap<BlankNode, usize> {
         let mut counts = HashMap::default();
         for (_, triple) in self.iter() {

@@ -15,7 +15,6 @@ pub(crate) struct Names {
     numbers: FxHashMap<Iri, u32>,
 }
 
-/// A triple whose names are numbers.
 #[derive(Debug)]
 pub(crate) struct Compact {
     pub subject: u32,
@@ -25,20 +24,17 @@ pub(crate) struct Compact {
 
 #[derive(Debug)]
 pub(crate) enum Object {
-    /// An IRI or a blank node.
     Node(u32),
     Literal(Box<Literal>),
 }
 
 // Numbers of names are indices in `texts`.
 impl Names {
-    /// Interns an IRI and returns its shared text.
     pub(crate) fn iri(&mut self, name: &str) -> Iri {
         let number = self.number(name);
         self.text(number).clone()
     }
 
-    /// Interns an IRI and returns its number.
     pub(crate) fn number(&mut self, name: &str) -> u32 {
         if let Some(number) = self.numbers.get(name) {
             return *number;
@@ -50,7 +46,6 @@ impl Names {
         number
     }
 
-    /// Interns a blank node and returns its number.
     pub(crate) fn blank(&mut self, name: &str) -> u32 {
         self.number(&format!("{BLANK}{name}"))
     }

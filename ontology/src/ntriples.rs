@@ -63,7 +63,6 @@ impl<'a> Terms<'a> {
         }
     }
 
-    /// Returns the number of a term that is not a literal.
     fn node(&mut self, symbol: Symbol) -> Option<u32> {
         self.symbols.value(symbol).as_name()?;
         self.term(symbol)

@@ -77,7 +77,6 @@ impl Engine {
         Ok(engine)
     }
 
-    /// Adds stated facts to an engine without facts, and derives all facts that follow.
     fn build(&mut self, facts: Vec<Fact>) -> Result<(), Errors> {
         let mut evaluated = Arc::clone(&self.program);
         if self.equality.is_some() {

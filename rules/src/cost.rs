@@ -15,7 +15,6 @@ const SAMPLE: usize = 1024;
 /// have yet to fill.
 const UNKNOWN_ROWS: usize = 64;
 
-/// Known or assumed number of rows of each relation, and estimated number of distinct values of each column.
 pub(crate) struct Costs {
     relations: Vec<(f64, Vec<f64>)>,
 }

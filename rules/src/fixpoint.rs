@@ -27,10 +27,8 @@ use crate::source::Source;
 use crate::store::{Relation, RelationId, Row, Store, state};
 use crate::symbol::{Symbol, Symbols};
 
-/// Index into the plans of a round.
 pub(crate) type PlanId = u32;
 
-/// A plan to evaluate, with its initial matches.
 #[derive(Clone, Debug)]
 pub(crate) struct Seed {
     pub plan: PlanId,
@@ -70,7 +68,6 @@ pub(crate) struct Matches {
     pub bindings: Vec<Symbol>,
 }
 
-/// Inputs of a round, and the blocks in progress.
 pub(crate) struct Round<'a> {
     pub store: &'a Store,
     pub plans: &'a [Plan],
@@ -470,7 +467,6 @@ fn extend_match(block: &mut Vec<Symbol>, bound: &[Symbol], row: &[Symbol], patte
     }
 }
 
-/// Returns the value of an operand; `bound` contains the values of the variables.
 pub(crate) fn resolve(source: Source, bound: &[Symbol]) -> Symbol {
     match source {
         Source::Variable(number) => bound[usize::from(number)],
@@ -486,7 +482,6 @@ fn find(relation: &Relation, key: &[Source], bound: &[Symbol]) -> Option<Row> {
     relation.find(&arguments[..key.len()])
 }
 
-/// Returns the literals that the operands denote, or `None` if an operand is the name of an individual.
 fn literals<'s>(symbols: &'s Symbols, sources: &[Source], bound: &[Symbol]) -> Option<Vec<&'s Literal>> {
     sources.iter().map(|&source| symbols.as_literal(resolve(source, bound))).collect()
 }

@@ -19,7 +19,6 @@ const STEPS_PER_NEW_VALUE: u64 = 25_000;
 /// that doubles a number creates longer and longer values.
 const BYTES_PER_CHARGE: u64 = 8;
 
-/// Maximum length of a value in an error message, in characters.
 const MAX_SHOWN_CHARACTERS: usize = 40;
 
 /// Number of visited rows and charged steps between two calls of the interrupt function.
@@ -67,7 +66,6 @@ enum Stop {
     Interrupted,
 }
 
-/// Remaining budget of an update, and the compiled rule at which it stopped.
 #[derive(Debug)]
 pub(crate) struct Budget {
     limits: Limits,

@@ -294,7 +294,6 @@ impl<'a> Maintenance<'a> {
         self.saturate(stratum)
     }
 
-    /// Runs semi-naive rounds until no new row is derived.
     fn saturate(&mut self, stratum: &Stratum) -> Result<(), Error> {
         self.budget.recursive.set(true);
         while !self.pending.is_empty() {
@@ -468,7 +467,6 @@ impl<'a> Maintenance<'a> {
     }
 }
 
-/// Marks the strata whose rules read or derive a relation.
 fn touch(touched: &mut [bool], network: &Network, relation: RelationId) {
     for &stratum in network.readers.get(relation.0 as usize).into_iter().flatten() {
         touched[stratum as usize] = true;

@@ -16,7 +16,6 @@ use crate::strata::components;
 use crate::symbol::Symbols;
 use crate::vocabulary::SAME_AS;
 
-/// A compiled program. Its parts refer to each other, and to the relations of the store, by number.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Network {
     pub rules: Vec<Lowered>,

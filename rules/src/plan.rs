@@ -16,7 +16,6 @@ use crate::symbol::Symbol;
 /// State bits of the rows that are invisible to plans that derive facts.
 pub(crate) const HIDDEN: u8 = state::FREE | state::PENDING | state::DOOMED;
 
-/// Conditions on a row, and the variables that the row binds.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Pattern {
     /// Columns that bind a variable, each with the number of the variable.
@@ -78,7 +77,6 @@ pub(crate) enum Step {
         arguments: Vec<Source>,
         known: Vec<bool>,
     },
-    /// Binds a variable to the value of an operand.
     Equate {
         variable: u16,
         source: Source,
@@ -119,7 +117,6 @@ pub(crate) struct Template {
     pub arguments: Vec<Source>,
 }
 
-/// A compiled rule, with relations in place of predicates.
 #[derive(Clone, Debug)]
 pub(crate) struct Lowered {
     /// Position of the rule in the program.
@@ -153,7 +150,6 @@ impl Lowered {
     }
 }
 
-/// A body atom, with a relation in place of its predicate.
 #[derive(Clone, Debug)]
 pub(crate) enum Condition {
     Relation(RelationId, Vec<Source>),
@@ -366,8 +362,6 @@ impl Planner<'_> {
     }
 }
 
-/// Chooses the step of a built-in: a test, a function of the other arguments, or the enumeration of
-/// solutions.
 fn built_in_step(built_in: BuiltIn, sources: &[Source], bound: &mut Bound) -> Step {
     let known = bound.bound_flags(sources);
     for source in sources {

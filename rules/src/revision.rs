@@ -209,7 +209,6 @@ impl Engine {
     }
 }
 
-/// Composes consecutive changes into one net change, sorted.
 fn net(changes: impl IntoIterator<Item = Delta>) -> Delta {
     let mut signs: BTreeMap<Fact, i8> = BTreeMap::new();
     for Delta { insert, delete } in changes {

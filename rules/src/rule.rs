@@ -185,7 +185,6 @@ pub struct Program {
 }
 
 impl Program {
-    /// Returns the relations in rule heads, with their numbers of arguments.
     pub(crate) fn concluded(&self, symbols: &Symbols) -> BTreeSet<(String, usize)> {
         relations(self.rules.iter().flat_map(|rule| &rule.head), symbols)
     }

@@ -12,7 +12,6 @@ use crate::plan::Bound;
 use crate::rule::{Atom, Rule, Term};
 use crate::source::Source;
 
-/// Variables and atoms that an aggregate shares with its rule.
 #[derive(Clone, Debug)]
 pub(crate) struct Scope {
     pub position: usize,
@@ -76,7 +75,6 @@ fn close(atoms: &[Atom], bound: &mut Bound, optimistic: bool) {
     }
 }
 
-/// Analyses which variables the body of a rule binds, and in which order its aggregates are evaluated.
 pub(crate) fn binding(rule: &Rule) -> Binding {
     let initial = Bound(vec![false; rule.variable_count()]);
     let mut bound = initial.clone();

@@ -13,7 +13,6 @@ use std::sync::Arc;
 use crate::fact::{Arguments, Fact};
 use crate::symbol::Symbol;
 
-/// Index into [`Store::relations`].
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]
 pub(crate) struct RelationId(pub u32);
 
@@ -131,7 +130,6 @@ pub(crate) struct Relation {
     free: Vec<Row>,
 }
 
-/// Hash index, which maps the values of some columns to the rows with these values.
 #[derive(Clone, Debug)]
 struct Index {
     columns: u32,
@@ -142,7 +140,6 @@ struct Index {
     previous: Vec<Row>,
 }
 
-/// Returns the columns of a bit mask, in ascending order.
 pub(crate) fn columns(mask: u32) -> impl Iterator<Item = usize> {
     let mut remaining = mask;
     std::iter::from_fn(move || {
@@ -335,7 +332,6 @@ impl Relation {
     }
 }
 
-/// Iterator over the rows with equal key columns in an index.
 pub(crate) struct Rows<'a> {
     links: &'a [Row],
     next: Row,

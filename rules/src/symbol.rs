@@ -47,7 +47,6 @@ impl Value {
     }
 }
 
-/// Formats a value in N-Triples form: `<name>` or the literal's canonical form.
 impl fmt::Display for Value {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -187,7 +187,6 @@ impl Prover {
     }
 }
 
-/// Returns the names of the individuals that are values of a property for an individual.
 pub(super) fn values(engine: &mut Engine, property: &ObjectPropertyExpression, individual: &Iri) -> Vec<Iri> {
     let subject = engine.symbols_mut().name(individual);
     let (ObjectPropertyExpression::Property(iri) | ObjectPropertyExpression::Inverse(iri)) = property;
@@ -198,7 +197,6 @@ pub(super) fn values(engine: &mut Engine, property: &ObjectPropertyExpression, i
     engine.matching(predicate, &pattern).filter_map(|row| name(row[usize::from(forward)])).collect()
 }
 
-/// Returns the proof of the first attempt that succeeds; `None` if all attempts fail.
 pub(super) fn first_proof<T>(attempts: &[T], mut prove: impl FnMut(&T) -> ProofResult) -> ProofResult {
     for attempt in attempts {
         if let Some(reason) = prove(attempt)? {

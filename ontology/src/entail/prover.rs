@@ -34,7 +34,6 @@ pub(super) struct Prover {
     pub(super) base: Engine,
 }
 
-/// Explanation of a proved goal; `None` if the goal is not proved.
 pub(super) type ProofResult = Result<Option<String>, Error>;
 
 impl Prover {
@@ -83,7 +82,6 @@ pub(super) fn literal(literal: &crate::owl::Literal) -> Literal {
     Literal::parse(&literal.lexical, literal.datatype.as_deref(), literal.language.as_deref())
 }
 
-/// Returns a copy of an engine with additional facts and their consequences.
 pub(super) fn with_facts(engine: &Engine, facts: impl IntoIterator<Item = Fact>) -> Result<Engine, Error> {
     let mut copy = engine.clone();
     let insert = facts.into_iter().collect();
@@ -91,7 +89,6 @@ pub(super) fn with_facts(engine: &Engine, facts: impl IntoIterator<Item = Fact>)
     Ok(copy)
 }
 
-/// Returns the derivation of a fact as text; `None` if the fact does not hold.
 pub(super) fn explain(engine: &Engine, fact: &Fact) -> Option<String> {
     // The engine does not store that an individual is the same as itself.
     if fact.arguments.len() == 2

@@ -29,7 +29,6 @@ fn message(error: &HornedError) -> String {
     }
 }
 
-/// Converts an OWL/XML or functional-style document to N-Triples.
 pub(crate) fn transcribe(text: &[u8], syntax: Syntax) -> Result<Vec<u8>, Fault> {
     let fault = |error: HornedError| {
         let offset = match &error {

@@ -35,7 +35,6 @@ pub(crate) fn cross(left: &[Conjunction], right: &[Conjunction]) -> Vec<Conjunct
     left.iter().flat_map(|l| right.iter().map(move |r| l.iter().chain(r).cloned().collect())).collect()
 }
 
-/// State of the lowering: the results, and the axiom or rule that is being lowered.
 pub(crate) struct Context<'a> {
     pub symbols: &'a mut Symbols,
     pub rules: Vec<Rule>,
@@ -69,7 +68,6 @@ impl Variables {
         Term::Variable(Variable((self.keys.len() - 1) as u16))
     }
 
-    /// Returns the variable with this IRI, which is added if it is new.
     pub(crate) fn of_iri(&mut self, iri: &Iri) -> Term {
         match self.keys.iter().position(|key| key == iri) {
             Some(index) => Term::Variable(Variable(index as u16)),

@@ -21,7 +21,6 @@ pub(crate) struct Inclusions {
     /// Maps each restriction that an axiom concludes to the restrictions that include it and are
     /// conditions of axioms or rules.
     concluded: BTreeMap<ClassExpression, BTreeSet<ClassExpression>>,
-    /// All conditions in the values of `concluded`.
     conditions: HashSet<ClassExpression>,
 }
 
@@ -86,15 +85,12 @@ fn restriction(class: &ClassExpression, is_concluded: bool) -> Option<ClassExpre
     }
 }
 
-/// Restrictions that axioms and rules conclude, and restrictions that are conditions of axioms and
-/// rules.
 #[derive(Default)]
 struct Uses {
     concluded: BTreeSet<ClassExpression>,
     conditions: HashSet<ClassExpression>,
     /// Maps each restriction to the position of the first axiom or rule that contains it.
     positions: HashMap<ClassExpression, usize>,
-    /// Restrictions that occur in several axioms or rules.
     shared: HashSet<ClassExpression>,
     position: usize,
 }
@@ -195,7 +191,6 @@ struct Memo {
     including: HashMap<(ClassExpression, usize), BTreeSet<ClassExpression>>,
 }
 
-/// The inclusions that axioms state, as graphs, and the conditions to compare.
 struct InclusionGraph {
     classes: HashMap<ClassExpression, Vec<ClassExpression>>,
     properties: HashMap<Property, Vec<Property>>,

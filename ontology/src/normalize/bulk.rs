@@ -11,7 +11,6 @@ use crate::names::{Compact, Names, Object};
 use crate::triples::Document;
 use crate::vocab::{is_reserved, owl, rdf, rdfs};
 
-/// Occurrences of a name in the documents that matter for this pass.
 #[derive(Clone, Copy, Default)]
 #[allow(clippy::struct_excessive_bools)] // independent observations
 struct NameUse {
@@ -102,7 +101,6 @@ impl Usage {
         }
     }
 
-    /// Returns the classes of `bulk` statements that have no declaration.
     pub(super) fn undeclared(&self, bulk: &[Compact], names: &Names) -> BTreeSet<String> {
         let typed = bulk.iter().filter(|triple| Some(triple.predicate) == self.kind);
         let classes: FxHashSet<u32> = typed

@@ -18,7 +18,6 @@ use crate::graph::{Graph, is_type, subject_of};
 use crate::owl::INVERSE;
 use crate::vocab::{owl, rdf, rdfs, xsd};
 
-/// Properties that define a boolean class expression or an enumeration.
 const CONNECTIVES: [&str; 5] =
     [owl::INTERSECTION_OF, owl::UNION_OF, owl::COMPLEMENT_OF, owl::ONE_OF, owl::DATATYPE_COMPLEMENT_OF];
 

@@ -17,10 +17,8 @@ use crate::names::Names;
 use crate::owl::{ANONYMOUS, EntityKind, Iri};
 use crate::vocab::{is_reserved, owl, rdf, rdfs, swrl, swrla, xsd};
 
-/// Limit on the rounds in which kinds propagate between undeclared properties.
 const MAX_PROPAGATION_ROUNDS: usize = 16;
 
-/// Observed uses of an undeclared property.
 #[derive(Clone, Copy, Debug, Default)]
 #[allow(clippy::struct_excessive_bools)] // independent observations
 struct Use {
@@ -175,7 +173,6 @@ fn state(graph: &mut Graph, iri: &str, class: &str) {
     graph.state(&subject, rdf::TYPE, NamedNode::new_unchecked(class));
 }
 
-/// The declarations of the imports closure.
 struct Declared {
     classes: HashSet<String>,
     datatypes: HashSet<String>,

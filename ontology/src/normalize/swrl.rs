@@ -219,7 +219,6 @@ impl Pass {
         Ok(RdfAtom::new(class, arguments))
     }
 
-    /// Converts an argument that has to be an individual or an individual variable.
     fn individual(&mut self, term: &Term) -> Result<Term, String> {
         if self.variables.contains(term) {
             return Ok(self.variable(term));
@@ -239,7 +238,6 @@ impl Pass {
         }
     }
 
-    /// Converts an argument that has to be a literal or a data variable.
     fn data(&mut self, term: &Term) -> Result<Term, String> {
         if self.variables.contains(term) {
             return Ok(self.variable(term));

@@ -23,7 +23,6 @@ use crate::vocab::{owl, rdf};
 /// error.
 const MAX_SYNTAX_ERRORS: usize = 10;
 
-/// Decodes a document to UTF-8 without a byte order mark.
 pub(crate) fn decoded<'a>(bytes: &'a [u8], name: &str) -> Result<Cow<'a, [u8]>, Errors> {
     encoding::decoded(bytes).map_err(|message| {
         let position = Position::of_offset(name, bytes, 0);

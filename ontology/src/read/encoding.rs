@@ -31,7 +31,6 @@ fn declared(text: &[u8]) -> Option<&[u8]> {
     Some(&text[label])
 }
 
-/// Returns the byte range of the encoding label in an XML declaration.
 fn label(text: &[u8]) -> Option<std::ops::Range<usize>> {
     if !text.starts_with(b"<?xml") {
         return None;

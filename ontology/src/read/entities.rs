@@ -9,7 +9,6 @@ use super::syntax::Flattened;
 const MAX_GROWTH_FACTOR: usize = 16;
 /// Constant term of the limit on the expanded size, in bytes.
 const EXTRA_BYTES: usize = 1 << 20;
-/// Limit on the nesting of entities.
 const MAX_ENTITY_DEPTH: usize = 16;
 
 const PREDEFINED: [&[u8]; 5] = [b"lt", b"gt", b"amp", b"quot", b"apos"];
@@ -21,7 +20,6 @@ pub(super) struct EntityError {
     pub message: String,
 }
 
-/// The internal subset of a document type declaration.
 struct Declarations<'a> {
     entities: HashMap<&'a [u8], &'a [u8]>,
     /// Byte offset of `<!DOCTYPE`.
@@ -92,7 +90,6 @@ fn reference(text: &[u8]) -> Option<(&[u8], usize)> {
 
 struct Expansion<'a> {
     entities: &'a HashMap<&'a [u8], &'a [u8]>,
-    /// Expansions of entities, so that each one is computed once.
     cache: HashMap<&'a [u8], Vec<u8>>,
     /// Number of bytes that the expansions may still add to the document.
     budget: usize,
@@ -209,8 +206,6 @@ fn declaration_length(text: &[u8]) -> Option<usize> {
     None
 }
 
-/// Parses an entity declaration `<!ENTITY name "value">`, with quotes of either kind. Returns name and
-/// value.
 fn entity(declaration: &[u8]) -> Option<(&[u8], &[u8])> {
     let tail = declaration.strip_prefix(b"<!ENTITY")?.trim_ascii_start();
     let end = tail.iter().position(u8::is_ascii_whitespace)?;

@@ -26,7 +26,6 @@ use crate::error::{Error, Errors};
 use crate::kb;
 use crate::triples::Document;
 
-/// Name of the catalog that Protégé writes.
 const CATALOG: &str = "catalog-v001.xml";
 
 /// Maximum depth of the subdirectories of the given directories that are searched for imports.
@@ -49,7 +48,6 @@ pub(crate) enum Resolution {
 
 pub(crate) struct Resolver {
     catalogs: Vec<horned_catalog::Catalog>,
-    /// Ontology files under the given directories; collected on first use.
     files: OnceCell<Vec<OntologyFile>>,
     directories: Vec<PathBuf>,
 }
@@ -159,7 +157,6 @@ fn checked_out(import: &str, importer: &Path) -> Option<PathBuf> {
     None
 }
 
-/// Returns `true` if two ontology IRIs are equal, apart from a final `#` or `/`.
 fn same_iri(left: &str, right: &str) -> bool {
     left.trim_end_matches(['#', '/']) == right.trim_end_matches(['#', '/'])
 }

@@ -34,7 +34,6 @@ pub(super) struct Visited {
     /// Canonical paths of the files.
     pub paths: HashSet<PathBuf>,
     hash: RandomState,
-    /// Texts by hash, to compare only texts with equal hashes.
     texts: HashMap<u64, Vec<Text>>,
 }
 

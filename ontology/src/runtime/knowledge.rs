@@ -205,7 +205,6 @@ impl Runtime {
         Individual::new(self.facts().name(symbol).unwrap_or_default())
     }
 
-    /// Returns the asserted facts with values of a property of `subject`.
     pub(super) fn statements(&self, subject: Symbol, property: Term) -> Vec<Fact> {
         let mut facts = Vec::new();
         for predicate in property.iter().filter_map(|name| self.engine.symbols().find_name(name)) {
@@ -214,7 +213,6 @@ impl Runtime {
         facts
     }
 
-    /// Returns all assertions that mention an individual.
     pub(super) fn mentions(&self, individual: Symbol) -> Vec<Fact> {
         let mut mentions = Vec::new();
         for &(predicate, arity) in &self.relations {

@@ -32,7 +32,6 @@ fn iri(facts: Facts, symbol: Symbol) -> String {
     facts.name(symbol).unwrap_or_default().to_owned()
 }
 
-/// Reports designs without a function and functions without a design.
 fn functions(facts: Facts) -> Vec<Warning> {
     let mut warnings = Vec::new();
     for design in facts.members(terms::FUNCTION_DESIGN) {
@@ -141,7 +140,6 @@ fn edge(annotated: &AnnotatedAxiom) -> Option<(&Iri, &Iri)> {
     }
 }
 
-/// Returns the value of a property assertion in N-Triples syntax; `None` for other axioms.
 fn object(annotated: &AnnotatedAxiom) -> Option<String> {
     match &annotated.axiom {
         Axiom::ObjectPropertyAssertion(_, _, to) => Some(format!("<{to}>")),

@@ -16,7 +16,6 @@ pub(crate) struct Facts<'a> {
 }
 
 impl<'a> Facts<'a> {
-    /// Creates a view that answers queries from all facts that hold, stated or derived.
     pub(crate) fn new(engine: &'a Engine) -> Self {
         Self { engine, only_stated: false }
     }
@@ -55,7 +54,6 @@ impl<'a> Facts<'a> {
         self.column(property, &[Some(subject), None], 1)
     }
 
-    /// Returns the subjects for which `object` is a value of the property.
     pub(crate) fn subjects(self, object: Symbol, property: Term) -> Vec<Symbol> {
         self.column(property, &[None, Some(object)], 0)
     }

@@ -121,7 +121,6 @@ type Edges = Rc<HashMap<Symbol, Vec<Symbol>>>;
 #[derive(Debug)]
 pub struct View<'a> {
     engine: &'a Engine,
-    /// Names that replace the local names of individuals.
     called: Option<&'a CalledNames>,
     /// Cache of property values, by the IRI of the property and the direction (`true` from values to
     /// subjects).

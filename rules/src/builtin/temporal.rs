@@ -24,7 +24,6 @@ pub(super) fn compute(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Liter
     }
 }
 
-/// Composes a duration, date or time from its parts: builds the lexical form and parses it.
 fn construct(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Literal> {
     let mut texts: Vec<String> = arguments.iter().map(|argument| argument.lexical()).collect();
     let is_duration = matches!(built_in, BuiltIn::YearMonthDuration | BuiltIn::DayTimeDuration);
@@ -79,7 +78,6 @@ fn is_seconds(duration: &Duration) -> bool {
     duration.months() == 0
 }
 
-/// Returns the sum or difference of two durations, both in months or both in seconds.
 fn durations(built_in: BuiltIn, left: &Duration, right: &Duration) -> Option<Literal> {
     use BuiltIn as B;
     let months = is_months(left) && is_months(right);

@@ -76,7 +76,6 @@ impl Program {
     }
 }
 
-/// Equality classes of names, and the stated facts about the names.
 #[derive(Clone, Debug)]
 pub(crate) struct Equality {
     same_as: Symbol,

@@ -187,7 +187,6 @@ impl<'a> Builder<'a> {
         Self { engine, equality, positions: FxHashMap::default(), queue: Vec::new() }
     }
 
-    /// Returns the index of a fact among the steps. Queues the fact on its first occurrence.
     fn position(&mut self, fact: &Fact) -> usize {
         let queue = &mut self.queue;
         *self.positions.entry(fact.clone()).or_insert_with(|| {
@@ -232,7 +231,6 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Explains an `owl:sameAs` pair by a path of edges between its names.
     fn pair(&mut self, pair: &Fact) -> Reason {
         let (classes, same_as) = (&self.equality.classes, self.equality.same_as);
         let (from, mut to) = (pair.arguments[0], pair.arguments[1]);

@@ -275,7 +275,6 @@ impl<'e> Update<'e> {
         }
     }
 
-    /// Returns the facts that a row represented before this update.
     fn facts_before(&self, row: &Fact) -> Vec<Fact> {
         let names = |symbol| match self.old_classes.get(&symbol) {
             Some(class) if class.len() > 1 => Some(&**class),
@@ -333,7 +332,6 @@ impl<'e> Update<'e> {
         }
     }
 
-    /// Marks the `owl:sameAs` pair of a name with itself as changed.
     fn touch_reflexive(&mut self, name: Symbol) {
         let row = Fact::new(self.equality.same_as, [name, name]);
         self.originals(&row);

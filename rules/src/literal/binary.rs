@@ -12,7 +12,6 @@ pub(super) fn parse_hexadecimal(text: &str) -> Option<Box<[u8]>> {
     pairs.map(byte).collect()
 }
 
-/// Encodes bytes in the canonical form: upper case.
 pub(super) fn hexadecimal(bytes: &[u8]) -> String {
     let digit = |half: u8| char::from(b"0123456789ABCDEF"[usize::from(half)]);
     bytes.iter().flat_map(|byte| [digit(byte >> 4), digit(byte & 15)]).collect()
@@ -41,7 +40,6 @@ pub(super) fn parse_base64(text: &str) -> Option<Box<[u8]>> {
     unused.iter().all(|byte| *byte == 0).then(|| bytes.into())
 }
 
-/// Encodes bytes in the canonical form: no white space.
 pub(super) fn base64(bytes: &[u8]) -> String {
     let mut text = String::new();
     for three in bytes.chunks(3) {

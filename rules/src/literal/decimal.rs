@@ -199,7 +199,6 @@ impl PartialOrd for Decimal {
     }
 }
 
-/// Formats the shortest form, for example `-0.5` or `12`.
 impl fmt::Display for Decimal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (unscaled, scale) = self.parts();

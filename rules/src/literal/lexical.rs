@@ -36,7 +36,6 @@ impl Literal {
     }
 }
 
-/// Result of parsing a lexical form.
 pub(super) enum Parsed {
     Value(Literal),
     IllTyped,
@@ -53,7 +52,6 @@ fn parse_plain_literal(lexical: &str) -> Literal {
     }
 }
 
-/// Parses a lexical form of an XSD datatype, given by its local name.
 pub(super) fn parse_xsd(lexical: &str, local: &str) -> Parsed {
     let collapsed = lexical.trim_matches([' ', '\t', '\n', '\r']);
     let value = match local {

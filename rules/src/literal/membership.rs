@@ -7,11 +7,9 @@ use super::value::Literal;
 
 const XML_LITERAL: &str = "http://www.w3.org/1999/02/22-rdf-syntax-ns#XMLLiteral";
 
-/// Knowledge about the value of a literal.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Known,
-    /// A rational number that is not a decimal.
     Rational,
     /// XML content. Two different spellings can denote the same value.
     Xml,
@@ -92,7 +90,6 @@ impl Literal {
     }
 }
 
-/// Datatype of the values of [`Literal::fresh`].
 const FRESH: &str = "urn:metaplan:fresh";
 
 fn is_known(iri: &str) -> bool {

@@ -14,7 +14,6 @@ use super::decimal::{Decimal, ten_to};
 use num_bigint::BigInt;
 use num_traits::Zero;
 
-/// Seconds per day.
 const DAY: i64 = 86_400;
 /// Largest offset of a time zone from UTC, in seconds.
 const ZONE_LIMIT: i64 = 14 * 3600;

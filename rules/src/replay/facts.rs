@@ -5,7 +5,6 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use crate::fact::Fact;
 use crate::symbol::Symbol;
 
-/// A predicate with its number of arguments.
 type Relation = (Symbol, usize);
 
 pub(super) struct Facts {

@@ -127,7 +127,6 @@ impl Replayer<'_> {
         self.program.equality && fact.predicate == self.same_as && fact.arguments.len() == 2
     }
 
-    /// Checks that each step is stated, or follows from earlier steps.
     fn founded(&mut self, stated: &[Fact], derivation: &Derivation) -> Result<(), Fault> {
         let stated: FxHashSet<&Fact> = stated.iter().collect();
         let mut rules: FxHashMap<&RuleIdentity, Vec<&Rule>> = FxHashMap::default();

@@ -10,11 +10,9 @@ pub(super) enum Token {
     Name(Option<String>, String),
     /// A variable `?name`, without the question mark.
     Variable(String),
-    /// A quoted string, unescaped.
     Text(String),
     /// A language tag `@en`, without the at-sign.
     Language(String),
-    /// A number as written.
     Number(String),
     /// A rule label `[label]`, without the brackets.
     Label(String),

@@ -12,7 +12,6 @@ use crate::literal::{Literal, XSD, is_datatype};
 use crate::rule::{Aggregate, Atom, Program, Rule, RuleIdentity, Term, Variable};
 use crate::symbol::{Symbol, Symbols};
 
-/// Namespaces of the built-ins of `SWRLTab` and SQWRL.
 const LIBRARIES: [&str; 2] =
     ["http://swrl.stanford.edu/ontologies/built-ins/", "http://sqwrl.stanford.edu/ontologies/built-ins/"];
 
@@ -362,7 +361,6 @@ impl Parser<'_> {
         }
     }
 
-    /// Parses a name or an IRI, and returns the full IRI.
     fn name(&mut self) -> Parsed<String> {
         let (line, column) = self.position();
         let name = match self.peek().clone() {

@@ -19,7 +19,6 @@ struct Eval;
 
 pub(super) const ALL: [&dyn Definition; 3] = [&Unary(SQRT, f64::sqrt), &Unary(LOG, f64::ln), &Eval];
 
-/// Returns the result as a double; `None` if it is infinite or NaN.
 fn number(value: f64) -> Option<Literal> {
     value.is_finite().then(|| Literal::double(value))
 }

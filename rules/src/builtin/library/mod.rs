@@ -16,13 +16,11 @@ use std::sync::LazyLock;
 use super::custom::Definition;
 use super::signature::BuiltIn;
 
-/// Common IRI prefix of the libraries of `SWRLTab`, before the version.
 const LIBRARY_ROOT: &str = "http://swrl.stanford.edu/ontologies/built-ins/";
 
 static ALL: LazyLock<Vec<&'static dyn Definition>> =
     LazyLock::new(|| math::ALL.iter().copied().chain(temporal::all()).collect());
 
-/// Returns the built-in with this IRI, in any version of its library.
 pub(super) fn find(iri: &str) -> Option<BuiltIn> {
     let target = name(iri)?;
     let definition = ALL.iter().find(|definition| name(definition.iri()) == Some(target));
