@@ -35,7 +35,6 @@ pub(crate) struct Seed {
     pub start: Start,
 }
 
-/// Initial matches of a plan.
 #[derive(Clone, Debug)]
 pub(crate) enum Start {
     Nothing,

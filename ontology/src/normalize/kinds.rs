@@ -24,9 +24,7 @@ const MAX_PROPAGATION_ROUNDS: usize = 16;
 struct Use {
     literal: bool,
     individual: bool,
-    /// Used as a data property in an axiom or rule.
     data: bool,
-    /// Used as an object property in an axiom or rule.
     object: bool,
     /// Used in a restriction of unknown kind.
     restricted: bool,

@@ -79,12 +79,10 @@ pub(crate) fn rewrite(graph: &mut Graph, parts: &[(usize, Iri)], warnings: &mut 
 struct RdfAtom {
     class: &'static str,
     arguments: Vec<(&'static str, Term)>,
-    /// Arguments of a built-in.
     list: Option<Vec<Term>>,
 }
 
 struct Pass {
-    /// Declared variables, under their original names.
     variables: HashSet<Term>,
     /// Terms that occur outside of rules.
     described: HashSet<Term>,

@@ -199,8 +199,8 @@ impl Runtime {
         copy.error_status(&name)
     }
 
-    /// Ends a cycle of the adaptation loop (see [`Runtime::conclude`]) and returns the first status of an
-    /// objective, or `None` if the objective is not in error.
+    /// Ends a cycle of the adaptation loop (see [`Runtime::conclude`]). Returns the first of the objective's
+    /// statuses if the objective is in error, and otherwise `None`.
     fn error_status(&mut self, objective: &str) -> Result<Option<String>, Error> {
         self.conclude()?;
         let objective_state = self.objectives().into_iter().find(|state| state.individual.iri == objective);

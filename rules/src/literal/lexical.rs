@@ -39,7 +39,6 @@ impl Literal {
 pub(super) enum Parsed {
     Value(Literal),
     IllTyped,
-    /// The datatype is unsupported.
     Unknown,
 }
 

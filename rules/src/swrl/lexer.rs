@@ -8,13 +8,10 @@ pub(super) enum Token {
     Iri(String),
     /// `prefix:local`, `:local` or `local`. The prefix is `None` without a colon.
     Name(Option<String>, String),
-    /// A variable `?name`, without the question mark.
     Variable(String),
     Text(String),
-    /// A language tag `@en`, without the at-sign.
     Language(String),
     Number(String),
-    /// A rule label `[label]`, without the brackets.
     Label(String),
     Carets,
     Open,
