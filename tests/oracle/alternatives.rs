@@ -13,7 +13,6 @@ use planner::{Config, Engine, Limits, Status, Thresholds};
 use crate::judge::{read, setting};
 
 const FACTS: usize = 5;
-/// Maximum number of steps of an enumerated plan.
 const LENGTH: usize = 5;
 
 /// State as the bit set of the facts that hold.

@@ -59,7 +59,6 @@ fn magnified(function: &str, arguments: &[&str], value: f64) -> String {
     })
 }
 
-/// Replaces the initial values in the text of a problem.
 fn problem(text: &str) -> String {
     let mut parts = text.split("(= (");
     let mut magnified_text = parts.next().unwrap_or_default().to_owned();
@@ -125,7 +124,6 @@ fn plan_arguments(directory: &Path, name: &str) -> [String; 6] {
     [plan, quiet, limit, seconds, file("domain"), file("problem")]
 }
 
-/// Runs and measures planning, certifying and verifying, in this order.
 fn all_runs(directory: &Path, name: &str) -> [Run; 3] {
     let certificate = directory.join(format!("{name}.certificate")).display().to_string();
     let _ = std::fs::remove_dir_all(&certificate);

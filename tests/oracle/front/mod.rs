@@ -253,7 +253,6 @@ fn check(sample: &Sample, about: &str, seed: u64, tally: &mut Tally) {
     }
 }
 
-/// Returns the generator of robots' missions, with [`SITUATIONS`] situations per robot.
 fn robots(form: impl Fn(u64) -> Form + 'static) -> Samples {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let mut current: Option<(u64, Robot)> = None;

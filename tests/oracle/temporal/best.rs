@@ -65,7 +65,6 @@ pub fn judged(
     }
 }
 
-/// Returns exact start times for the actions of a path.
 fn scheduled(search: &Search<'_>, edges: &[usize]) -> Schedule {
     let edges: Vec<&Edge> = edges.iter().map(|edge| &search.edges[*edge]).collect();
     let steps = edges.iter().filter(|edge| edge.step.is_some()).count() as i64;

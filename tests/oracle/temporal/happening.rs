@@ -53,7 +53,6 @@ pub struct World {
     pub(super) atoms: Vec<usize>,
     /// Number of the first instance of each function.
     pub(super) values: Vec<usize>,
-    /// Atoms and numbers on which each derived predicate depends.
     pub(super) depends: HashMap<usize, (Atoms, u64)>,
     /// Ground actions: number of the action schema, and arguments.
     pub instances: Vec<(usize, Vec<usize>)>,

@@ -169,7 +169,6 @@ impl Maker {
         self.task.axioms.iter().any(|axiom| axiom.predicate == predicate)
     }
 
-    /// Returns `true` if effects and events must not change a predicate.
     pub(super) fn is_fixed(&self, predicate: usize) -> bool {
         self.is_derived(predicate) || self.designs.is_some_and(|(solves, _)| solves == predicate)
     }
@@ -390,7 +389,6 @@ impl Maker {
         Action { name: format!("a{number}"), parameters, body }
     }
 
-    /// Adds effects whose operands depend on the duration of the action.
     fn durations_in_effects(&mut self) {
         for at in 0..self.task.actions.len() {
             let mut action = self.task.actions[at].clone();

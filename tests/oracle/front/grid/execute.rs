@@ -175,7 +175,6 @@ impl Task {
         Some(value)
     }
 
-    /// Returns the minimum value among the enumerated plans.
     pub(super) fn best(&self, rng: &mut Rng) -> Option<i64> {
         let mut steps: Vec<Step> = Vec::new();
         for (number, action) in self.actions.iter().enumerate() {

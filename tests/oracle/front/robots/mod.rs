@@ -22,7 +22,6 @@ use rules::Limits as StepLimits;
 use super::{Reference, Sample, whole};
 use crate::judge::Mode;
 
-/// Charge of a full battery.
 const FULL: i64 = 12;
 /// Price of charging, or its duration in timed missions.
 const CHARGING: i64 = 5;
