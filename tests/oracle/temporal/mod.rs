@@ -24,7 +24,9 @@ use happening::{Obstacle, World};
 use make::Maker;
 use model::{Measure, Q, Task, big};
 
+/// Maximum number of nodes of the oracle for sequential plans.
 const CAP: usize = 400;
+/// Maximum number of nodes of the oracle for concurrent plans.
 const OVERLAP_CAP: usize = 300;
 
 fn schedule_of(world: &World, steps: &[Step]) -> Result<Vec<(usize, Q, Q)>, String> {
