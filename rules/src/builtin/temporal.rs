@@ -117,7 +117,7 @@ fn scaled(built_in: BuiltIn, duration: &Duration, factor: &BigRational) -> Optio
 }
 
 /// Returns a moment plus or minus a duration; `None` if the built-in is for another kind of moment or
-/// duration, or if the result is out of range.
+/// duration, or if [`Moment::later`] has no result.
 fn shifted(built_in: BuiltIn, moment: &Moment, duration: &Duration) -> Option<Literal> {
     use BuiltIn as B;
     let (kind, months, forward) = match built_in {

@@ -78,10 +78,10 @@ impl Moment {
         &self.seconds
     }
 
-    /// Returns the moment plus a duration, with the same time zone; the calculation is in local time.
-    /// Months are added first; a day that does not exist in the new month becomes its last day. Then
-    /// seconds are added. A time of day wraps around at midnight. A date is rounded down to whole days.
-    /// Returns `None` if months are added to a time, or if the result is out of range.
+    /// Returns the moment plus a duration, with the same time zone; the calculation is in local time. Months
+    /// are added first; a day that does not exist in the new month becomes its last day. Then seconds are
+    /// added. A time of day wraps around at midnight. A date is rounded down to whole days. Returns `None` if
+    /// months are added to a time, or if the year is out of range after the months are added.
     pub(crate) fn later(&self, duration: &Duration) -> Option<Self> {
         let local = self.local();
         let (day, _) = split_day(&local);
