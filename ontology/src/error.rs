@@ -403,12 +403,10 @@ pub enum Warning {
     },
 }
 
-/// Formats a position as a prefix of a message; empty without a position.
 fn before(position: Option<&Position>) -> String {
     position.map_or_else(String::new, |position| format!("{position}: "))
 }
 
-/// Returns the position as text, or the file if the position is unknown.
 fn place(file: &str, position: Option<&Position>) -> String {
     position.map_or_else(|| file.to_owned(), ToString::to_string)
 }
@@ -456,5 +454,4 @@ fn abbreviated(values: &[String]) -> String {
     }
 }
 
-/// Maximum number of values listed in a message.
 const MAX_LISTED_VALUES: usize = 10;

@@ -35,7 +35,6 @@ impl Display for Angle<'_> {
     }
 }
 
-/// Formats arguments separated by spaces.
 struct Joined<'a, T>(&'a [T]);
 
 impl<T: Display> Display for Joined<'_, T> {

@@ -13,7 +13,6 @@ pub(crate) struct Graph {
     fresh: usize,
 }
 
-/// Items of a complete `rdf:List`, and the triples of its nodes.
 #[derive(Debug)]
 pub(crate) struct List {
     pub items: Vec<Term>,
@@ -22,7 +21,6 @@ pub(crate) struct List {
 }
 
 impl Graph {
-    /// Adds a triple and returns its index.
     pub(crate) fn add(&mut self, triple: Triple) -> usize {
         let index = self.triples.len();
         match self.by_subject.get_mut(&triple.subject) {
@@ -35,7 +33,6 @@ impl Graph {
         index
     }
 
-    /// Adds the triple with this subject, predicate and object.
     pub(crate) fn state(&mut self, subject: &NamedOrBlankNode, predicate: &str, object: impl Into<Term>) {
         self.add(Triple::new(subject.clone(), NamedNode::new_unchecked(predicate), object));
     }
@@ -53,12 +50,10 @@ impl Graph {
         self.triples.get_mut(index).and_then(Option::as_mut)
     }
 
-    /// Returns all triples with their indices, in order.
     pub(crate) fn iter(&self) -> impl Iterator<Item = (usize, &Triple)> {
         self.triples.iter().enumerate().filter_map(|(index, triple)| Some((index, triple.as_ref()?)))
     }
 
-    /// Returns the triples of a subject with their indices, in order.
     pub(crate) fn of<'a>(
         &'a self,
         subject: &NamedOrBlankNode,
@@ -67,7 +62,6 @@ impl Graph {
         indices.iter().filter_map(|&index| Some((index, self.triples[index].as_ref()?)))
     }
 
-    /// Returns the objects of all triples with this subject and predicate, in order.
     pub(crate) fn objects<'a>(
         &'a self,
         subject: &NamedOrBlankNode,
@@ -99,7 +93,6 @@ impl Graph {
         typed.map(|(index, triple)| (index, triple.subject.clone())).collect()
     }
 
-    /// Returns the list that starts at `head`. The error describes a malformed or cyclic list.
     pub(crate) fn list(&self, head: &Term) -> Result<List, String> {
         let mut list = List { items: Vec::new(), spine: Vec::new() };
         let (mut node, mut visited) = (head.clone(), HashSet::default());
@@ -141,7 +134,6 @@ impl Graph {
         BlankNode::new_unchecked(format!("n{}", self.fresh))
     }
 
-    /// Returns for each blank node the number of triples with this node as object.
     pub(crate) fn references(&self) -> HashMap<BlankNode, usize> {
         let mut counts = HashMap::default();
         for (_, triple) in self.iter() {
@@ -152,12 +144,10 @@ impl Graph {
         counts
     }
 
-    /// Returns the triples that were not removed, in order.
     pub(crate) fn into_triples(self) -> Vec<Triple> {
         self.triples.into_iter().flatten().collect()
     }
 
-    /// Returns the triples that were not removed as an N-Triples document.
     pub(crate) fn to_ntriples(&self) -> Vec<u8> {
         use std::io::Write;
         let mut text = Vec::with_capacity(self.triples.len() * 128);
@@ -169,13 +159,11 @@ impl Graph {
     }
 }
 
-/// Returns `true` if the triple states that its subject has type `class`.
 pub(crate) fn is_type(triple: &Triple, class: &str) -> bool {
     triple.predicate.as_str() == rdf::TYPE
         && matches!(&triple.object, Term::NamedNode(object) if object.as_str() == class)
 }
 
-/// Converts a term to a subject; `None` for a literal.
 pub(crate) fn subject_of(term: &Term) -> Option<NamedOrBlankNode> {
     match term {
         Term::NamedNode(node) => Some(node.clone().into()),
@@ -184,7 +172,6 @@ pub(crate) fn subject_of(term: &Term) -> Option<NamedOrBlankNode> {
     }
 }
 
-/// Returns the IRI of a named node; `None` for other terms.
 pub(crate) fn iri_of(term: &Term) -> Option<&str> {
     match term {
         Term::NamedNode(node) => Some(node.as_str()),

@@ -9,7 +9,6 @@ pub const UGV: &str = include_str!("../kb/ugv.ttl");
 /// An unmanned underwater vehicle that inspects a pipeline, `<http://metacontrol.org/metaplan/uuv>`.
 pub const UUV: &str = include_str!("../kb/uuv.ttl");
 
-/// Ontology IRI and text of each embedded knowledge base.
 pub(crate) const EMBEDDED: [(&str, &str); 3] = [
     ("http://metacontrol.org/tomasys", TOMASYS),
     ("http://metacontrol.org/metaplan/ugv", UGV),

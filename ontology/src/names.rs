@@ -9,14 +9,12 @@ use crate::owl::{Iri, Literal};
 /// Prefix of the text of a blank node. No IRI has this prefix.
 const BLANK: &str = "_:";
 
-/// Interned IRIs and blank nodes.
 #[derive(Debug, Default)]
 pub(crate) struct Names {
     texts: Vec<Iri>,
     numbers: FxHashMap<Iri, u32>,
 }
 
-/// A triple whose names are numbers.
 #[derive(Debug)]
 pub(crate) struct Compact {
     pub subject: u32,
@@ -26,20 +24,17 @@ pub(crate) struct Compact {
 
 #[derive(Debug)]
 pub(crate) enum Object {
-    /// An IRI or a blank node.
     Node(u32),
     Literal(Box<Literal>),
 }
 
 // Numbers of names are indices in `texts`.
 impl Names {
-    /// Interns an IRI and returns its shared text.
     pub(crate) fn iri(&mut self, name: &str) -> Iri {
         let number = self.number(name);
         self.text(number).clone()
     }
 
-    /// Interns an IRI and returns its number.
     pub(crate) fn number(&mut self, name: &str) -> u32 {
         if let Some(number) = self.numbers.get(name) {
             return *number;
@@ -51,12 +46,10 @@ impl Names {
         number
     }
 
-    /// Interns a blank node and returns its number.
     pub(crate) fn blank(&mut self, name: &str) -> u32 {
         self.number(&format!("{BLANK}{name}"))
     }
 
-    /// Returns the number of an IRI, if the IRI is interned.
     pub(crate) fn find(&self, name: &str) -> Option<u32> {
         self.numbers.get(name).copied()
     }
@@ -66,7 +59,6 @@ impl Names {
         &self.texts[number as usize]
     }
 
-    /// Returns `true` if the number belongs to a blank node.
     pub(crate) fn is_blank(&self, number: u32) -> bool {
         self.text(number).starts_with(BLANK)
     }
@@ -112,7 +104,6 @@ impl Names {
         }
     }
 
-    /// Converts a triple of numbers to a triple of text.
     pub(crate) fn triple(&self, compact: Compact) -> Triple {
         let named = |number| NamedNode::new_unchecked(&**self.text(number));
         let node = |number| match self.text(number).strip_prefix(BLANK) {

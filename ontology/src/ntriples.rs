@@ -31,7 +31,6 @@ pub fn ntriples<'a>(symbols: &Symbols, facts: impl IntoIterator<Item = &'a Fact>
     text
 }
 
-/// The distinct terms of the triples.
 struct Terms<'a> {
     symbols: &'a Symbols,
     /// Text of each term with a trailing space, so that the order of the terms is the order of the
@@ -64,7 +63,6 @@ impl<'a> Terms<'a> {
         }
     }
 
-    /// Returns the number of a term that is not a literal.
     fn node(&mut self, symbol: Symbol) -> Option<u32> {
         self.symbols.value(symbol).as_name()?;
         self.term(symbol)

@@ -313,7 +313,6 @@ fn mentions_any(axiom: &Axiom, individuals: &HashSet<&Iri>) -> bool {
     individuals_of(axiom).into_iter().any(|individual| individuals.contains(individual))
 }
 
-/// Returns `true` if two assertions share an individual, so that they may state the same fact.
 fn resembles(first: &Axiom, second: &Axiom) -> bool {
     individuals_of(second).into_iter().any(|individual| individuals_of(first).contains(&individual))
 }

@@ -6,7 +6,6 @@ use crate::error::Position;
 use crate::names::Compact;
 use crate::read::syntax::Syntax;
 
-/// The triples of a document, and its header.
 #[derive(Debug)]
 pub(crate) struct Document {
     /// Path of the document, or the name given for a text.

@@ -196,7 +196,6 @@ fn documents_are_read_in_any_encoding_and_spelling() {
     }
 }
 
-/// The message contains a position and the cause.
 #[test]
 fn rejections_name_position_and_cause() {
     let deep =

@@ -115,7 +115,6 @@ fn entailed_statements_are_proved_and_others_are_not() {
     assert!(follows(":A owl:disjointWith :B . :i a :A , :B .", ":x :p :y ."), "anything follows");
 }
 
-/// A conclusion need not repeat the declarations of the knowledge base.
 #[test]
 fn conclusions_use_the_declarations_of_the_knowledge_base() {
     let asks = |text: &str, known: &Ontology| {

@@ -12,13 +12,10 @@ use ontology::{Equality, ReadOptions, lower_together, ntriples, read_files};
 use rules::{Engine, Fact, Prefixes, Symbols, parse_rules};
 use test_resources::{data, data_directory};
 
-/// Expected result for a file.
 enum Verdict {
     /// Consistent; the conclusions include these ones (in short form).
     Follows(&'static [&'static str]),
-    /// Consistent; there are no conclusions.
     Nothing,
-    /// Inconsistent.
     Inconsistent,
     /// Rejected with a message that contains all of these texts.
     Refused(&'static [&'static str]),
@@ -118,7 +115,6 @@ const HOSTILE_FILES: [(&str, Verdict); 16] = [
     ("hostile/47-regex.ttl", Nothing),
 ];
 
-/// Files that require much work from every reasoner.
 const EXPENSIVE_FILES: [(&str, Verdict); 3] = [
     ("hostile/40-trans.ttl", Follows(&["i0 p i1500", "i1 p i3"])),
     ("hostile/41-maxcard.ttl", Follows(&["i0 sameAs i1", "i7 sameAs i1000"])),
@@ -152,7 +148,6 @@ fn engine(path: &Path) -> Result<Engine, String> {
         .map_err(|errors| join(&errors.iter().map(ToString::to_string).collect::<Vec<_>>()))
 }
 
-/// Replaces IRIs by local names.
 fn short(text: &str) -> Vec<String> {
     let term = |term: &str| match term.split_once("^^") {
         Some((value, datatype)) => format!("{value}^^{}", local(datatype)),
@@ -223,7 +218,6 @@ fn expensive_files_finish_in_time() {
     }
 }
 
-/// Every file of the directory has a verdict.
 #[test]
 fn every_file_is_in_the_table() {
     let Some(root) = data("field/ontology") else { return };

@@ -13,7 +13,6 @@ use ontology::{
 use rules::{Delta, Engine, Fact, Literal, Symbols};
 use serde_json::Value;
 
-/// Cases that are not compared, with the reason.
 const SKIPPED: [(&str, &str); 5] = [
     ("suave_26_second_cycle_latched", LATCHED),
     ("suave_27_second_cycle_status_removed_latched", LATCHED),
@@ -145,7 +144,6 @@ fn knowledge_base(case: &Value) -> (Ontology, Vec<Triple>) {
     (read_real(case, added_file), triples(&case["removed"]))
 }
 
-/// Reads the files of a case and an additional file.
 fn read_real(case: &Value, additional: Option<&Path>) -> Ontology {
     let real = real_directory();
     let files = case["kb"].as_array().expect("kb").iter().map(|file| real.join(file.as_str().expect("file")));
@@ -189,7 +187,6 @@ fn ntriple([subject, predicate, object]: &Triple) -> String {
     format!("<{subject}> <{predicate}> {object} .\n")
 }
 
-/// Converts a triple of a case to a fact.
 fn fact([subject, predicate, object]: &Triple, symbols: &mut Symbols) -> Fact {
     let subject = symbols.name(subject);
     if predicate == vocab::rdf::TYPE {

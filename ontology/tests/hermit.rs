@@ -50,7 +50,6 @@ fn class_path() -> String {
     class_path
 }
 
-/// Collects the documents in a folder and its subfolders.
 fn documents(folder: &Path, paths: &mut Vec<PathBuf>) {
     let Ok(entries) = std::fs::read_dir(folder) else { return };
     for path in entries.filter_map(Result::ok).map(|entry| entry.path()) {
@@ -63,7 +62,6 @@ fn documents(folder: &Path, paths: &mut Vec<PathBuf>) {
     }
 }
 
-/// Conclusions from a document.
 struct Conclusions {
     is_consistent: bool,
     /// A Turtle document of conclusions with declarations.

@@ -139,7 +139,6 @@ fn unknown_names_are_reported_with_those_that_exist() {
     );
 }
 
-/// The rule texts that are evaluated together with a knowledge base are consistent with its own rules.
 #[test]
 fn rule_texts_can_be_added() {
     for (text, name, unavailable) in [(kb::UGV, "ugv.ttl", 2), (kb::UUV, "uuv.ttl", 3)] {

@@ -248,7 +248,6 @@ fn axioms_without_a_rule_form_are_reported_once() {
     }
 }
 
-/// If only a part of an axiom has a rule form, this part is used.
 #[test]
 fn axioms_are_used_in_part() {
     let some = "[ a owl:Restriction ; owl:onProperty :p ; owl:someValuesFrom :C ]";
@@ -351,7 +350,6 @@ fn chains_of_restrictions_are_lowered() {
     assert_eq!(derived(&engine), BTreeSet::from(["i a A", "i a C", "i a N0"].map(str::to_owned)));
 }
 
-/// The lowering of a definition by a restriction needs no auxiliary relation.
 #[test]
 fn definitions_by_restrictions_have_no_auxiliary_relation() {
     let definition =

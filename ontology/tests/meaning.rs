@@ -20,7 +20,6 @@ fn engine(document: &str, rules: &str) -> Engine {
     Engine::new(symbols, lowered.program, lowered.facts).expect("safe")
 }
 
-/// The derived facts in short form.
 fn inferred(engine: &Engine) -> Vec<String> {
     let facts: Vec<Fact> = engine.facts().filter(|fact| !engine.is_asserted(fact)).collect();
     let text = ntriples(engine.symbols(), &facts);

@@ -4,7 +4,6 @@ use ontology::{Ontology, ReadOptions, kb, lower, read_files, read_text, tomasys}
 use rules::{Engine, Symbols};
 use test_resources::data;
 
-/// Prefixes for models that import our metamodel.
 const HEAD: &str = "@prefix t: <http://metacontrol.org/tomasys#> .\n\
     @prefix owl: <http://www.w3.org/2002/07/owl#> .\n@prefix : <http://x#> .\n\
     @prefix rdf: <http://www.w3.org/1999/02/22-rdf-syntax-ns#> .\n\
@@ -116,7 +115,6 @@ fn our_own_models_have_no_mistakes() {
     }
 }
 
-/// The codes of the warnings for models in use.
 #[test]
 fn models_in_use_have_only_known_warnings() {
     let Some(real) = data("real/owl") else { return };

@@ -277,7 +277,6 @@ fn a_missing_file_is_an_error() {
     assert!(matches!(&errors[..], [Error::Unreadable { .. }]), "{errors:?}");
 }
 
-/// Creates a new directory with files.
 fn directory(files: &[(&str, &str)]) -> tempfile::TempDir {
     let directory = tempfile::tempdir().expect("temporary directory");
     for (name, text) in files {

@@ -49,7 +49,6 @@ fn from_scratch(text: &str) -> (Ontology, Engine) {
     (ontology, engine)
 }
 
-/// A knowledge base that documents change.
 struct Revised {
     stated: Stated,
     engine: Engine,
@@ -76,7 +75,6 @@ impl Revised {
     }
 }
 
-/// Pseudorandom numbers: Marsaglia's xorshift.
 struct Random(u64);
 
 impl Random {
@@ -404,7 +402,6 @@ fn values_are_retracted_by_value() {
     assert!(answers(&revised.engine).0.is_empty());
 }
 
-/// Anonymous individuals of two documents are different.
 #[test]
 fn anonymous_individuals_of_two_documents_are_different() {
     let text = document(&["ClassAssertion(:A _:one)".into()], true);

@@ -3,7 +3,6 @@
 use ontology::{ReadOptions, kb, lower, read_text};
 use rules::Symbols;
 
-/// A pseudorandom number generator (xorshift) with the same numbers on every machine.
 struct Numbers(u64);
 
 impl Numbers {
@@ -15,7 +14,6 @@ impl Numbers {
     }
 }
 
-/// Reads and lowers a text. Returns `true` if it is accepted.
 fn survives(text: &str) -> bool {
     let Ok(ontology) = read_text(text, "damaged", &ReadOptions::default()) else { return false };
     lower(&ontology, &mut Symbols::new());
@@ -120,7 +118,6 @@ fn malformed_documents_are_rejected_with_their_place() {
     }
 }
 
-/// Undeclared entities get their kinds from their use, each with a warning.
 #[test]
 fn an_undeclared_vocabulary_is_read_with_warnings() {
     let text = "@prefix : <http://x#> .\n:a a :Robot ; :carries :b ; :mass 2.5 .\n:b a :Load .\n";

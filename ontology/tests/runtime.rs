@@ -44,7 +44,6 @@ t:qa_comparison_operator a owl:DatatypeProperty .
 :e_fast a t:QAvalue ; t:isQAtype :performance ; t:hasValue 0.0 .
 "#;
 
-/// The rules of MROS in text form.
 const RULES: &str = r#"
 PREFIX t: <http://metacontrol.org/tomasys#>
 PREFIX m: <http://ros/mros#>
@@ -317,7 +316,6 @@ fn recorded_second_cycles_of_mros_are_reproduced() {
     }
 }
 
-/// Builds a runtime from the knowledge base of a recorded case with its added triples.
 fn second_cycle(case: &serde_json::Value) -> Runtime {
     let real = real_directory();
     let files = case["kb"].as_array().expect("kb").iter();

@@ -53,7 +53,6 @@ fn recorded_traces_of_mros_are_reproduced() {
     assert!(failures.is_empty(), "{} of {} differ:\n{}", failures.len(), traces.len(), failures.join("\n"));
 }
 
-/// Builds a runtime from the knowledge base of a trace.
 fn runtime(trace: &Value) -> Runtime {
     let real = real_directory();
     let folder = |file: &str| match file {

@@ -93,7 +93,6 @@ fn ntriples_are_converted_to_turtle() {
     assert!(turtle("no triple").is_err());
 }
 
-/// Annotations of an annotation, such as its source, are written together with it.
 #[test]
 fn annotations_of_annotations_are_kept() {
     let directory = tempfile::tempdir().expect("a folder");

@@ -12,7 +12,6 @@ use crate::rule::Aggregate;
 use crate::source::Source;
 use crate::symbol::{Symbol, Symbols};
 
-/// Aggregate function (count, sum, minimum or maximum) over the rows of a relation.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Function {
     pub aggregate: Aggregate,

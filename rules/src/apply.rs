@@ -77,7 +77,6 @@ impl Engine {
         Ok(engine)
     }
 
-    /// Adds stated facts to an engine without facts, and derives all facts that follow.
     fn build(&mut self, facts: Vec<Fact>) -> Result<(), Errors> {
         let mut evaluated = Arc::clone(&self.program);
         if self.equality.is_some() {
@@ -154,7 +153,6 @@ impl Engine {
         Ok(maintenance.finish())
     }
 
-    /// Plans the joins again if the number of facts has grown by more than the factor [`REPLAN_FACTOR`].
     fn replan(&mut self) -> Result<(), Error> {
         if self.store.len() <= REPLAN_FACTOR * self.network.planned_for.max(REPLAN_FROM) {
             return Ok(());
@@ -188,7 +186,6 @@ impl Engine {
     }
 }
 
-/// Returns an error if a fact has too many arguments, or a symbol that is not interned.
 pub(crate) fn check_fact(fact: &Fact, symbols: &Symbols) -> Result<(), Error> {
     // An index holds the set of its columns as the bits of a `u32`.
     if fact.arguments.len() > 32 {

@@ -9,13 +9,12 @@ use rustc_hash::FxHashSet;
 
 use crate::store::{Relation, RelationId, Row, Store, state};
 
-/// Number of sampled rows per relation.
+/// Approximate number of rows that are sampled per relation (up to twice as many).
 const SAMPLE: usize = 1024;
 /// Assumed number of rows of an empty relation, and minimum of the assumed number for a relation that rules
 /// have yet to fill.
 const UNKNOWN_ROWS: usize = 64;
 
-/// Known or assumed number of rows of each relation, and estimated number of distinct values of each column.
 pub(crate) struct Costs {
     relations: Vec<(f64, Vec<f64>)>,
 }
@@ -37,7 +36,6 @@ impl Costs {
         Self { relations: sizes.collect() }
     }
 
-    /// Returns the expected number of rows of a relation.
     pub fn rows(&self, relation: RelationId) -> f64 {
         self.relations[relation.0 as usize].0
     }

@@ -51,7 +51,6 @@ impl Engine {
         self.limits = limits;
     }
 
-    /// Returns all stated facts.
     pub(crate) fn stated(&self) -> Vec<Fact> {
         match &self.equality {
             Some(equality) => equality.stated(self),

@@ -254,12 +254,10 @@ impl Error {
     }
 }
 
-/// Suggests a built-in with a similar name.
 fn did_you_mean(iri: &str) -> String {
     BuiltIn::similar(iri).map_or_else(String::new, |name| format!("; did you mean `{name}`?"))
 }
 
-/// Notes in the message that a rule computes new values from its own conclusions.
 fn value_note(value: Option<&str>) -> String {
     value.map_or_else(String::new, |value| {
         format!(", which makes new values of its own conclusions; the last one is {value}")

@@ -162,7 +162,6 @@ impl Engine {
     }
 }
 
-/// Breadth-first traversal of recorded derivations, from a fact to its supports.
 struct Search<'a> {
     engine: &'a Engine,
     positions: FxHashMap<(RelationId, Row), usize>,
@@ -193,7 +192,6 @@ impl Search<'_> {
         Reason::Rule { identity: rule.identity.clone(), bindings, supports, absent, aggregates }
     }
 
-    /// Returns the step positions of the facts that the relation atoms of a recorded derivation matched.
     fn supports(&mut self, record: Record) -> Vec<usize> {
         let engine = self.engine;
         let bound = engine.records.get(record);

@@ -27,25 +27,28 @@ use crate::source::Source;
 use crate::store::{Relation, RelationId, Row, Store, state};
 use crate::symbol::{Symbol, Symbols};
 
-/// Index into the plans of a round.
 pub(crate) type PlanId = u32;
 
-/// A plan to evaluate, with its initial matches.
 #[derive(Clone, Debug)]
 pub(crate) struct Seed {
     pub plan: PlanId,
     pub start: Start,
 }
 
-/// Initial matches of a plan.
 #[derive(Clone, Debug)]
 pub(crate) enum Start {
-    /// One empty match.
     Nothing,
     /// Changed rows of a relation: a range of [`Round::rows`].
-    Rows { relation: RelationId, from: u32, to: u32 },
+    Rows {
+        relation: RelationId,
+        from: u32,
+        to: u32,
+    },
     /// Partial matches deferred by an earlier run; `step` is the next step of the plan.
-    Matches { step: u32, bindings: Vec<Symbol> },
+    Matches {
+        step: u32,
+        bindings: Vec<Symbol>,
+    },
 }
 
 /// Number of partial matches that one step may produce from a block before the rest of the block is
@@ -64,7 +67,6 @@ pub(crate) struct Matches {
     pub bindings: Vec<Symbol>,
 }
 
-/// Inputs of a round, and the blocks in progress.
 pub(crate) struct Round<'a> {
     pub store: &'a Store,
     pub plans: &'a [Plan],
@@ -82,7 +84,6 @@ pub(crate) struct Round<'a> {
     pub deferred: RefCell<Vec<Seed>>,
 }
 
-/// Index into [`Round::blocks`].
 type BlockId = u32;
 
 mod program {
@@ -171,7 +172,6 @@ pub(crate) fn run(round: &Round, seeds: &[Seed]) -> Vec<Matches> {
     heads.into_iter().map(matches).collect()
 }
 
-/// A round together with the seeds of one run.
 struct Seeded<'r, 'a> {
     round: &'r Round<'a>,
     seeds: &'r [Seed],
@@ -198,7 +198,6 @@ impl Evaluate for Seeded<'_, '_> {
 }
 
 impl Round<'_> {
-    /// Removes a block from the round, and returns its partial matches.
     fn take(&self, block: BlockId) -> Vec<Symbol> {
         std::mem::take(&mut self.blocks.borrow_mut()[block as usize])
     }
@@ -220,12 +219,10 @@ impl Round<'_> {
         Some((step, blocks.len() as BlockId - 1))
     }
 
-    /// Returns the number of variables per match of a plan.
     fn width(&self, plan: &Plan) -> usize {
         self.widths[plan.rule as usize]
     }
 
-    /// Returns the initial matches of a seed as a block.
     fn seed(&self, seed: &Seed) -> Vec<Symbol> {
         let plan = &self.plans[seed.plan as usize];
         let empty = vec![Symbol(0); self.width(plan)];
@@ -445,7 +442,6 @@ struct Group<'a> {
     key: &'a [Source],
 }
 
-/// Parameters of a join step.
 struct Lookup<'a> {
     relation: &'a Relation,
     skip: u8,
@@ -470,7 +466,6 @@ fn extend_match(block: &mut Vec<Symbol>, bound: &[Symbol], row: &[Symbol], patte
     }
 }
 
-/// Returns the value of an operand; `bound` contains the values of the variables.
 pub(crate) fn resolve(source: Source, bound: &[Symbol]) -> Symbol {
     match source {
         Source::Variable(number) => bound[usize::from(number)],
@@ -486,12 +481,10 @@ fn find(relation: &Relation, key: &[Source], bound: &[Symbol]) -> Option<Row> {
     relation.find(&arguments[..key.len()])
 }
 
-/// Returns the literals that the operands denote, or `None` if an operand is the name of an individual.
 fn literals<'s>(symbols: &'s Symbols, sources: &[Source], bound: &[Symbol]) -> Option<Vec<&'s Literal>> {
     sources.iter().map(|&source| symbols.as_literal(resolve(source, bound))).collect()
 }
 
-/// Keeps the matches that pass a test, in place.
 fn retain(mut block: Vec<Symbol>, width: usize, test: impl Fn(&[Symbol]) -> bool) -> Vec<Symbol> {
     let mut end = 0;
     for start in (0..block.len()).step_by(width) {

@@ -19,7 +19,6 @@ const STEPS_PER_NEW_VALUE: u64 = 25_000;
 /// that doubles a number creates longer and longer values.
 const BYTES_PER_CHARGE: u64 = 8;
 
-/// Maximum length of a value in an error message, in characters.
 const MAX_SHOWN_CHARACTERS: usize = 40;
 
 /// Number of visited rows and charged steps between two calls of the interrupt function.
@@ -61,14 +60,12 @@ impl fmt::Debug for Interrupt {
     }
 }
 
-/// Reason for which an update stopped.
 #[derive(Clone, Copy, Debug)]
 enum Stop {
     Exhausted,
     Interrupted,
 }
 
-/// Remaining budget of an update, and the compiled rule at which it stopped.
 #[derive(Debug)]
 pub(crate) struct Budget {
     limits: Limits,
@@ -133,7 +130,6 @@ impl Budget {
         self.stopped.get().is_none()
     }
 
-    /// Records the first reason to stop.
     fn stop(&self, stop: Stop, rule: u32) {
         if self.stopped.get().is_none() {
             self.stopped.set(Some((stop, rule)));
@@ -154,7 +150,6 @@ impl Budget {
     }
 }
 
-/// Returns the text of a value for error messages. A long value is cut, and its length is appended.
 fn abbreviated(value: &Literal) -> Box<str> {
     let text = value.lexical();
     let length = text.chars().count();

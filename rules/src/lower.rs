@@ -85,7 +85,6 @@ impl<'a> Lowering<'a> {
         self.store.relation(predicate, terms.len())
     }
 
-    /// Lowers a body atom. Returns `None` for aggregates.
     fn condition(&mut self, atom: &Atom) -> Option<Condition> {
         Some(match atom {
             Atom::Relation { predicate, arguments } => {
@@ -101,7 +100,6 @@ impl<'a> Lowering<'a> {
         })
     }
 
-    /// Lowers a head atom. Returns `None` for atoms that no rule can derive.
     fn template(&mut self, atom: &Atom) -> Option<Template> {
         let (predicate, terms) = match atom {
             Atom::Relation { predicate, arguments } => (*predicate, arguments.clone()),

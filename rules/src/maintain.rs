@@ -26,7 +26,6 @@ use crate::symbol::{Symbol, Symbols};
 /// partial matches.
 const CHUNK: usize = 2048;
 
-/// Rows, each with its relation.
 type Rows = Vec<(RelationId, Row)>;
 
 /// A change of the stated facts that has been applied to the store, with the affected rows.
@@ -39,7 +38,6 @@ pub(crate) struct Stated {
 }
 
 impl Stated {
-    /// Returns the inverse change.
     pub fn undo(self) -> Delta {
         Delta { insert: self.effective.delete, delete: self.effective.insert }
     }
@@ -82,7 +80,6 @@ pub(crate) fn state_change(engine: &mut Engine, delta: Delta) -> Stated {
     stated
 }
 
-/// An incremental update of the derived facts, in progress.
 pub(crate) struct Maintenance<'a> {
     engine: &'a mut Engine,
     network: Arc<Network>,
@@ -297,7 +294,6 @@ impl<'a> Maintenance<'a> {
         self.saturate(stratum)
     }
 
-    /// Runs semi-naive rounds until no new row is derived.
     fn saturate(&mut self, stratum: &Stratum) -> Result<(), Error> {
         self.budget.recursive.set(true);
         while !self.pending.is_empty() {
@@ -311,7 +307,6 @@ impl<'a> Maintenance<'a> {
         Ok(())
     }
 
-    /// Makes derived rows visible to the rules.
     fn promote(&mut self, rows: &Rows) {
         for &(relation, row) in rows {
             self.engine.store.get_mut(relation).clear(row, state::PENDING);
@@ -472,7 +467,6 @@ impl<'a> Maintenance<'a> {
     }
 }
 
-/// Marks the strata whose rules read or derive a relation.
 fn touch(touched: &mut [bool], network: &Network, relation: RelationId) {
     for &stratum in network.readers.get(relation.0 as usize).into_iter().flatten() {
         touched[stratum as usize] = true;

@@ -16,7 +16,6 @@ use crate::strata::components;
 use crate::symbol::Symbols;
 use crate::vocabulary::SAME_AS;
 
-/// A compiled program. Its parts refer to each other, and to the relations of the store, by number.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Network {
     pub rules: Vec<Lowered>,
@@ -88,12 +87,10 @@ pub(crate) fn compile(
     Ok(network)
 }
 
-/// Result of a change of rules.
 pub(crate) struct Revision {
     pub network: Network,
     /// Numbers of the removed compiled rules; the numbers are not reused before the next revision.
     pub removed: FxHashSet<u32>,
-    /// Numbers of new compiled rules.
     pub added: FxHashSet<u32>,
 }
 
@@ -173,7 +170,6 @@ fn content(rule: &Rule) -> (&[Atom], &[Atom], Option<&RuleIdentity>) {
     (&rule.head, &rule.body, rule.head.is_empty().then_some(&rule.identity))
 }
 
-/// Returns an error if a rule contains a symbol that is not interned.
 fn unknown_symbols(rule: &Rule, symbols: &Symbols) -> Option<Error> {
     let atoms = || rule.head.iter().chain(&rule.body).flat_map(|atom| atom.parts().iter().chain([atom]));
     let predicates = atoms().filter_map(|atom| match atom {

@@ -16,7 +16,6 @@ use crate::symbol::Symbol;
 /// State bits of the rows that are invisible to plans that derive facts.
 pub(crate) const HIDDEN: u8 = state::FREE | state::PENDING | state::DOOMED;
 
-/// Conditions on a row, and the variables that the row binds.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Pattern {
     /// Columns that bind a variable, each with the number of the variable.
@@ -36,7 +35,6 @@ impl Pattern {
     }
 }
 
-/// One step of a plan, which extends or tests a partial match.
 #[derive(Clone, Debug)]
 pub(crate) enum Step {
     /// Extends a match by the rows of a relation that fit `pattern`. `index` is the index on the columns of
@@ -52,17 +50,37 @@ pub(crate) enum Step {
     },
     /// Tests that a relation contains a row; all columns are bound. `skip` and `is_link` exclude rows as for
     /// [`Step::Join`].
-    Contains { relation: RelationId, skip: u8, key: Vec<Source>, is_link: bool },
+    Contains {
+        relation: RelationId,
+        skip: u8,
+        key: Vec<Source>,
+        is_link: bool,
+    },
     /// Tests that a relation does not contain a row; all columns are bound.
-    Absent { relation: RelationId, key: Vec<Source> },
-    /// Tests a built-in; all arguments are bound.
-    Test { built_in: BuiltIn, arguments: Vec<Source> },
+    Absent {
+        relation: RelationId,
+        key: Vec<Source>,
+    },
+    Test {
+        built_in: BuiltIn,
+        arguments: Vec<Source>,
+    },
     /// Computes the first argument of a built-in from the others.
-    Compute { built_in: BuiltIn, result: u16, arguments: Vec<Source> },
+    Compute {
+        built_in: BuiltIn,
+        result: u16,
+        arguments: Vec<Source>,
+    },
     /// Enumerates the values of the unbound arguments of a built-in.
-    Solve { built_in: BuiltIn, arguments: Vec<Source>, known: Vec<bool> },
-    /// Binds a variable to the value of an operand.
-    Equate { variable: u16, source: Source },
+    Solve {
+        built_in: BuiltIn,
+        arguments: Vec<Source>,
+        known: Vec<bool>,
+    },
+    Equate {
+        variable: u16,
+        source: Source,
+    },
     /// Computes an aggregate over the rows of `matches` whose first columns equal `group`. The result
     /// binds a variable (`binds`) or is compared with an operand.
     Aggregate {
@@ -73,8 +91,11 @@ pub(crate) enum Step {
         result: Source,
         binds: bool,
     },
-    /// Compares two bound operands.
-    Compare { left: Source, right: Source, equal: bool },
+    Compare {
+        left: Source,
+        right: Source,
+        equal: bool,
+    },
 }
 
 /// A join plan: the pattern of the start row (seed), and the steps to a complete match of the rule's
@@ -90,14 +111,12 @@ pub(crate) struct Plan {
     pub steps: Vec<Step>,
 }
 
-/// A head atom, to be instantiated by a match.
 #[derive(Clone, Debug)]
 pub(crate) struct Template {
     pub relation: RelationId,
     pub arguments: Vec<Source>,
 }
 
-/// A compiled rule, with relations in place of predicates.
 #[derive(Clone, Debug)]
 pub(crate) struct Lowered {
     /// Position of the rule in the program.
@@ -114,7 +133,6 @@ pub(crate) struct Lowered {
 }
 
 impl Lowered {
-    /// Returns `true` if heads and body state transitivity: `p(x, y), p(y, z) -> p(x, z)`.
     pub fn is_transitivity(heads: &[Template], body: &[Condition]) -> bool {
         let ([head], [Condition::Relation(first, left), Condition::Relation(second, right)]) = (heads, body)
         else {
@@ -132,7 +150,6 @@ impl Lowered {
     }
 }
 
-/// A body atom, with a relation in place of its predicate.
 #[derive(Clone, Debug)]
 pub(crate) enum Condition {
     Relation(RelationId, Vec<Source>),
@@ -173,7 +190,6 @@ impl Bound {
         }
     }
 
-    /// Returns a flag for each operand: `true` if it is bound.
     pub fn bound_flags(&self, sources: &[Source]) -> Vec<bool> {
         sources.iter().map(|&source| self.is_bound(source)).collect()
     }
@@ -207,12 +223,10 @@ impl Bound {
     }
 }
 
-/// Creates the plans of one compiled rule.
 pub(crate) struct Planner<'a> {
     /// The planner adds the indexes that the plans need.
     pub store: &'a mut Store,
     pub lowered: &'a Lowered,
-    /// Number of the compiled rule.
     pub number: u32,
     pub costs: &'a Costs,
     pub budget: &'a Budget,
@@ -234,12 +248,10 @@ impl Planner<'_> {
         }
     }
 
-    /// Creates a plan that starts from a row of a head atom and searches for a derivation of the row.
     pub fn start_at_head(&mut self, head: usize) -> Option<Plan> {
         self.plan(self.lowered.heads[head].arguments.clone(), None, 0)
     }
 
-    /// Creates a plan that starts from the empty match.
     pub fn start_at_nothing(&mut self) -> Option<Plan> {
         self.plan(Vec::new(), None, 0)
     }
@@ -350,8 +362,6 @@ impl Planner<'_> {
     }
 }
 
-/// Chooses the step of a built-in: a test, a function of the other arguments, or the enumeration of
-/// solutions.
 fn built_in_step(built_in: BuiltIn, sources: &[Source], bound: &mut Bound) -> Step {
     let known = bound.bound_flags(sources);
     for source in sources {

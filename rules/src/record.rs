@@ -7,7 +7,6 @@ use crate::network::Network;
 use crate::store::Record;
 use crate::symbol::Symbol;
 
-/// Recorded bindings of all derived rows.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Records {
     rules: Vec<Arc<Slots>>,

@@ -197,7 +197,6 @@ impl Engine {
         Ok(change)
     }
 
-    /// Replaces the program and derives all facts again. Returns the change of the facts.
     fn rebuild(&mut self, program: Program) -> Result<Delta, Errors> {
         // Sorted, so that the order does not depend on the history.
         let mut stated = self.stated();
@@ -210,7 +209,6 @@ impl Engine {
     }
 }
 
-/// Composes consecutive changes into one net change, sorted.
 fn net(changes: impl IntoIterator<Item = Delta>) -> Delta {
     let mut signs: BTreeMap<Fact, i8> = BTreeMap::new();
     for Delta { insert, delete } in changes {
@@ -231,8 +229,8 @@ fn net(changes: impl IntoIterator<Item = Delta>) -> Delta {
     net
 }
 
-/// Returns the first of several errors. Rules that were compiled before can fail only because they have
-/// no common stratification.
+/// Returns the first of several errors. Rules that were compiled before can fail only because they have no
+/// common stratification, or by an interrupt.
 fn first(errors: Errors) -> Error {
     errors.into_iter().next().unwrap_or(Error::UnknownSymbol { index: 0 })
 }

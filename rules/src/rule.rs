@@ -90,7 +90,6 @@ impl Aggregate {
         }
     }
 
-    /// Returns the aggregate with `term` applied to the aggregated term.
     pub(crate) fn map(self, term: &impl Fn(Term) -> Term) -> Self {
         match self {
             Self::Count => Self::Count,
@@ -186,7 +185,6 @@ pub struct Program {
 }
 
 impl Program {
-    /// Returns the relations in rule heads, with their numbers of arguments.
     pub(crate) fn concluded(&self, symbols: &Symbols) -> BTreeSet<(String, usize)> {
         relations(self.rules.iter().flat_map(|rule| &rule.head), symbols)
     }
@@ -198,7 +196,6 @@ impl Program {
     }
 }
 
-/// Returns the names and arities of the relations in atoms.
 fn relations<'a>(atoms: impl Iterator<Item = &'a Atom>, symbols: &Symbols) -> BTreeSet<(String, usize)> {
     let relation = |atom: &Atom| match atom {
         Atom::Relation { predicate, arguments } | Atom::Not { predicate, arguments } => {

@@ -12,10 +12,8 @@ use crate::plan::Bound;
 use crate::rule::{Atom, Rule, Term};
 use crate::source::Source;
 
-/// Variables and atoms that an aggregate shares with its rule.
 #[derive(Clone, Debug)]
 pub(crate) struct Scope {
-    /// Position of the aggregate in the body.
     pub position: usize,
     /// Variables of the aggregate that atoms outside the aggregate bind, in ascending order.
     pub group: Vec<u16>,
@@ -26,7 +24,6 @@ pub(crate) struct Scope {
     pub context: Vec<usize>,
 }
 
-/// Variables bound by a body, and the evaluation order of its aggregates.
 pub(crate) struct Binding {
     bound: Bound,
     /// Aggregates in an order in which each comes after the aggregates whose results it needs.
@@ -37,7 +34,6 @@ fn sources(terms: &[Term]) -> Vec<Source> {
     terms.iter().copied().map(Source::from).collect()
 }
 
-/// Returns the variables among terms, in ascending order.
 fn variables(terms: &[Term]) -> Vec<u16> {
     let mut numbers: Vec<u16> = terms.iter().filter_map(|term| Some(term.as_variable()?.0)).collect();
     numbers.sort_unstable();
@@ -79,7 +75,6 @@ fn close(atoms: &[Atom], bound: &mut Bound, optimistic: bool) {
     }
 }
 
-/// Analyses which variables the body of a rule binds, and in which order its aggregates are evaluated.
 pub(crate) fn binding(rule: &Rule) -> Binding {
     let initial = Bound(vec![false; rule.variable_count()]);
     let mut bound = initial.clone();

@@ -3,7 +3,6 @@
 use crate::rule::{Term, Variable};
 use crate::symbol::Symbol;
 
-/// Operand of a step: a variable of the current match or a constant.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Source {
     Variable(u16),

@@ -13,17 +13,13 @@ use std::sync::Arc;
 use crate::fact::{Arguments, Fact};
 use crate::symbol::Symbol;
 
-/// Index into [`Store::relations`].
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]
 pub(crate) struct RelationId(pub u32);
 
-/// Number of a row in a relation.
 pub(crate) type Row = u32;
 
-/// End of a linked list of rows.
 const NO_ROW: Row = Row::MAX;
 
-/// State bits of a row.
 pub(crate) mod state {
     /// The row is unused.
     pub const FREE: u8 = 1;
@@ -48,7 +44,6 @@ pub(crate) struct Record {
 }
 
 impl Record {
-    /// No recorded derivation.
     pub const NONE: Self = Self { rule: u32::MAX, slot: 0 };
 }
 
@@ -122,7 +117,6 @@ impl Store {
     }
 }
 
-/// Facts of one predicate and arity.
 #[derive(Clone, Debug)]
 pub(crate) struct Relation {
     /// Predicate of the facts; `None` for the matches of a constraint or an aggregate.
@@ -136,7 +130,6 @@ pub(crate) struct Relation {
     free: Vec<Row>,
 }
 
-/// Hash index, which maps the values of some columns to the rows with these values.
 #[derive(Clone, Debug)]
 struct Index {
     columns: u32,
@@ -147,7 +140,6 @@ struct Index {
     previous: Vec<Row>,
 }
 
-/// Returns the columns of a bit mask, in ascending order.
 pub(crate) fn columns(mask: u32) -> impl Iterator<Item = usize> {
     let mut remaining = mask;
     std::iter::from_fn(move || {
@@ -185,7 +177,6 @@ impl Relation {
         self.rows.len()
     }
 
-    /// Returns the number of arguments per fact.
     pub fn arity(&self) -> usize {
         self.arity
     }
@@ -336,13 +327,11 @@ impl Relation {
         Rows { links: &index.next, next }
     }
 
-    /// Returns all rows in use.
     pub fn scan(&self) -> impl Iterator<Item = Row> + '_ {
         (0..self.bound()).filter(|&row| self.state(row) & state::FREE == 0)
     }
 }
 
-/// Iterator over the rows with equal key columns in an index.
 pub(crate) struct Rows<'a> {
     links: &'a [Row],
     next: Row,
@@ -362,7 +351,6 @@ impl Iterator for Rows<'_> {
 }
 
 impl Index {
-    /// Returns `true` if rows with this record are in the index.
     fn has(&self, record: Record) -> bool {
         self.excluded_rule.is_none_or(|rule| rule != record.rule)
     }

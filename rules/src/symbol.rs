@@ -47,7 +47,6 @@ impl Value {
     }
 }
 
-/// Formats a value in N-Triples form: `<name>` or the literal's canonical form.
 impl fmt::Display for Value {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -147,13 +146,10 @@ impl Symbols {
             }
     }
 
-    /// Returns `true` if an ill-typed literal is interned, i.e. a literal with a lexical form invalid
-    /// for its datatype.
     pub(crate) fn any_ill_typed(&self) -> bool {
         self.ill_typed > 0
     }
 
-    /// Returns the literal of a symbol, or `None` for a name.
     pub(crate) fn as_literal(&self, symbol: Symbol) -> Option<&Literal> {
         self.values.get(symbol.index()).and_then(Value::as_literal)
     }

@@ -1,6 +1,4 @@
 //! IRIs of OWL with a fixed meaning for the engine.
 
-/// Relation of equal individuals.
 pub(crate) const SAME_AS: &str = "http://www.w3.org/2002/07/owl#sameAs";
-/// Relation of different individuals.
 pub(crate) const DIFFERENT_FROM: &str = "http://www.w3.org/2002/07/owl#differentFrom";

@@ -174,7 +174,6 @@ impl Engine {
     }
 }
 
-/// Search node: a partial binding with its satisfied and unsatisfied atoms.
 #[derive(Clone, Default)]
 struct State {
     bound: Vec<Option<Symbol>>,

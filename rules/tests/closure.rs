@@ -10,7 +10,6 @@ const NODES: usize = 7;
 
 type Pairs = BTreeSet<(usize, usize)>;
 
-/// A pseudorandom number generator (xorshift).
 struct Random(u64);
 
 impl Random {

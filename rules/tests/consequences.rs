@@ -105,7 +105,7 @@ fn a_violated_requirement_makes_designs_unavailable() {
     check(COADAPTATION_RULES, stated, &script);
 }
 
-/// As in MROS, a design is excluded if a measurement is on the wrong side of the design's estimation,
+/// A design is excluded, as in MROS, if a measurement is on the wrong side of the design's estimation,
 /// according to the operator of the attribute. Other estimations and requirements of objectives are no
 /// measurements.
 #[test]

@@ -13,7 +13,6 @@ const RULES: &str = "
 const STATED: &str =
     "design(a), design(b), needs(a, 0.5), needs(b, 2), measured(m, 0.75), measured(n, 1.5), twin(a, a)";
 
-/// Compares the obstacles of each rule that could derive a fact.
 fn check(text: &str, expected: &[&[&str]]) {
     let mut engine = engine(RULES, STATED).expect("rules");
     let fact = fact(&mut engine, text);

@@ -35,7 +35,6 @@ fn check(change: impl Fn(&mut Derivation, &Engine), expected: Result<usize, &str
     }
 }
 
-/// Returns the position of the step for a fact, given as displayed.
 fn position(derivation: &Derivation, engine: &Engine, fact: &str) -> usize {
     let display = |step: &metaplan_rules::DerivationStep| step.fact.display(engine.symbols()).to_string();
     derivation.steps.iter().position(|step| display(step) == fact).expect("a step")

@@ -13,7 +13,6 @@ use planner::{Config, Engine, Limits, Status, Thresholds};
 use crate::judge::{read, setting};
 
 const FACTS: usize = 5;
-/// Maximum number of steps of an enumerated plan.
 const LENGTH: usize = 5;
 
 /// State as the bit set of the facts that hold.
@@ -115,7 +114,6 @@ impl Task {
         (domain + ")", problem)
     }
 
-    /// Returns the numbers of the actions that are not idle; see the head of the file.
     fn active(&self) -> BTreeSet<usize> {
         // All reachable states, by exhaustive search.
         let (mut states, mut open) = (BTreeSet::from([self.initial]), vec![self.initial]);

@@ -7,7 +7,6 @@ use planner::{ExactTask, Limits, Solution, Status, Task};
 
 use crate::judge::{Case, Tally, Truth, compare, plan_lines, rational, steps_of};
 
-/// The ground task of a solution, with integers or with exact rational numbers.
 #[derive(Debug)]
 pub enum Planned {
     Integers(Box<Task>),

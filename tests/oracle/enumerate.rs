@@ -24,7 +24,6 @@ use crate::temporal::happening::{Obstacle, World};
 use crate::temporal::model::{Body, Q, big, q};
 use crate::temporal::{concurrent_unit, execute, maximizes, overlap, sequential_task};
 
-/// Result of an execution.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Outcome {
     Valid(Option<BigRational>),
@@ -42,13 +41,11 @@ struct Enumeration<'e> {
     random: fastrand::Rng,
     times: Vec<Q>,
     remaining_plans: usize,
-    /// Descriptions of plans on which validator and executor disagree.
     disagreements: Vec<String>,
     best: Option<(BigRational, Schedule)>,
     valid: usize,
 }
 
-/// Returns the relevant start times of sequential plans; see the head of the file.
 fn times(world: &World, durations: &[Q]) -> Vec<Q> {
     let mut borders = vec![q(0)];
     let mut sums = vec![q(0)];
@@ -128,7 +125,8 @@ impl Enumeration<'_> {
         Some(executed)
     }
 
-    /// Executes all extensions of a plan by up to `steps` further actions, in random order.
+    /// Executes the extensions of a plan by up to `steps` further actions, in random order. Ends when the
+    /// limit on the number of plans is reached or a disagreement was found.
     fn extend(&mut self, plan: &Schedule, steps: usize) {
         let clock = plan.last().map_or(q(0), |(_, start, length)| start + length);
         let mut candidates: Vec<(usize, Q, Q)> = Vec::new();

@@ -12,7 +12,6 @@ use planner::{Config, Limits, Status};
 
 use crate::judge::{Case, Mode, Step, Tally, Truth, judge, read};
 
-/// Parses a decimal exactly.
 fn exact(text: &str) -> BigRational {
     let (whole, fraction) = text.split_once('.').unwrap_or((text, ""));
     let digits: BigInt = format!("{whole}{fraction}").parse().expect("a number");
@@ -35,7 +34,6 @@ fn steps(text: &str) -> Vec<Step> {
     text.split(", ").filter(|text| !text.is_empty()).map(step).collect()
 }
 
-/// Returns the truth with the best value and a plan that attains it.
 fn best(value: &str, plan: &str) -> Truth {
     Truth::Best(exact(value), steps(plan))
 }
@@ -83,7 +81,6 @@ fn conflict(costly_action: &str) -> String {
     )
 }
 
-/// Effects at the start conflict only under a condition.
 #[test]
 fn b1_conditional_start_conflict() {
     let problem = "(define (problem p) (:domain d) (:init (= (f) 2)) (:goal (q)))";
@@ -296,7 +293,6 @@ fn n1_cheap_and_dear() {
     }
 }
 
-/// One action costs 2^128, another one costs 1.
 #[test]
 fn n1_large_cost() {
     let domain =
@@ -354,7 +350,6 @@ fn two_exactly_between_events() {
     check("two-too-late", (domain, &problem("19.999")), vec![(sequential(), Truth::NoPlan)]);
 }
 
-/// One action changes a number that another action reads.
 #[test]
 fn a_number_is_read_after_it_has_changed() {
     let domain = "(define (domain d) (:requirements :fluents :durative-actions) (:predicates (g)) (:functions (x))
@@ -407,7 +402,6 @@ fn n2_coefficients() {
     check("n2", (domain, problem), cases);
 }
 
-/// A number grows to 2^70 by doubling.
 #[test]
 fn n3_doublings() {
     let predicates: String = (0..71).map(|at| format!(" (c{at})")).collect();
@@ -453,7 +447,6 @@ fn n3_more_doublings() {
     check("n3-more", (&domain, problem), vec![(sequential(), best("140", &plan.join(", ")))]);
 }
 
-/// The metric value exceeds 64 bits.
 #[test]
 fn n5_large_measure() {
     let domain = "(define (domain d) (:requirements :durative-actions :fluents) (:predicates (done)) (:functions (cost))

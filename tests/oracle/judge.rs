@@ -20,7 +20,6 @@ use planner::{Config, Exact, Limits, MetricUnbounded, Plan, Solution, Status, Th
 
 use crate::certify::{self, Planned};
 
-/// One action of a plan, with its exact times.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Step {
     pub action: String,
@@ -30,12 +29,10 @@ pub struct Step {
     pub duration: BigRational,
 }
 
-/// The correct answer for a task.
 #[derive(Debug, Clone)]
 pub enum Truth {
     /// The metric has a best value. The fields are this value and a plan that attains it.
     Best(BigRational, Vec<Step>),
-    /// There is no plan.
     NoPlan,
     /// The task is solvable, but has no best value. The fields are the value of some plan and this plan.
     NoBest(BigRational, Vec<Step>),
@@ -43,10 +40,8 @@ pub enum Truth {
     Open(Option<(BigRational, Vec<Step>)>),
 }
 
-/// Plan semantics.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Mode {
-    /// One action after another.
     Sequential,
     /// Actions can overlap. The field is the separation: the minimum distance of interfering happenings.
     Concurrent(BigRational),
@@ -56,7 +51,6 @@ pub enum Mode {
 /// invalid.
 pub type Executor = Box<dyn Fn(&[Step]) -> Result<BigRational, String>>;
 
-/// A task with its correct answer, ready for comparison with the planner.
 pub struct Case {
     /// Name of the generator and seed. Also the name of the directory in which a failure is saved.
     pub name: String,
@@ -69,11 +63,9 @@ pub struct Case {
     pub execute: Executor,
     /// Whether a certificate is written and verified, in sequential mode only.
     pub certify: bool,
-    /// Time limit of the planner.
     pub limit: Duration,
 }
 
-/// A contradiction between the planner, the certificate, the validator and the oracle.
 #[derive(Debug)]
 pub struct Failure {
     /// Short description of the kind of contradiction, by which failures are counted.
@@ -81,7 +73,6 @@ pub struct Failure {
     pub text: String,
 }
 
-/// Counts and failures of a run over many tasks.
 #[derive(Debug, Default)]
 pub struct Tally {
     pub tasks: usize,
@@ -93,7 +84,6 @@ pub struct Tally {
     pub certificates: Duration,
 }
 
-/// The planner's answer.
 #[derive(Debug)]
 enum Answer {
     Refused(String),
@@ -109,7 +99,6 @@ struct Solved {
     task: Option<Planned>,
 }
 
-/// Converts an exact number of the planner to a rational number.
 pub fn rational(exact: &Exact) -> BigRational {
     exact.to_rational()
 }
@@ -140,7 +129,6 @@ pub fn plan_lines(steps: &[Step]) -> String {
     })
 }
 
-/// Converts the planner's plan to the oracle's steps.
 pub fn steps_of(plan: &Plan) -> Vec<Step> {
     plan.steps
         .iter()
@@ -153,7 +141,6 @@ pub fn steps_of(plan: &Plan) -> Vec<Step> {
         .collect()
 }
 
-/// Converts the oracle's steps to the validator's input.
 pub fn plan_text(steps: &[Step]) -> PlanText {
     let step = |step: &Step| PlanStep {
         action: Name::new(&step.action),
@@ -177,12 +164,10 @@ pub fn options(mode: &Mode) -> Options {
     }
 }
 
-/// Returns the verdict of the project's validator on a plan.
 pub fn project_verdict(mission: &Mission, problem: &Problem, steps: &[Step], mode: &Mode) -> Verdict {
     validate(mission.domain(), problem, &plan_text(steps), &options(mode))
 }
 
-/// Parses and joins a domain and a problem as the program does.
 pub fn read(domain: &str, problem: &str) -> Result<(Mission, Problem), Errors> {
     let source = |name: &str, text: &str| Ok(Source::new(name, text.to_owned()));
     let (domain, problem) = (source("domain.pddl", domain), source("problem.pddl", problem));
@@ -251,7 +236,6 @@ fn plan(
 }
 
 impl Tally {
-    /// Increments the counter `key`.
     pub fn count(&mut self, key: impl Into<String>) {
         *self.counts.entry(key.into()).or_default() += 1;
     }
@@ -286,7 +270,6 @@ impl Tally {
         self.failures.push(Failure { kind, text });
     }
 
-    /// Formats the counts, one per line, and the mean times per task.
     pub fn summary(&self) -> String {
         let mut text = format!("{} tasks\n", self.tasks);
         for (key, count) in &self.counts {
@@ -359,7 +342,6 @@ fn judge_caught(case: &Case, tally: &mut Tally) {
     }
 }
 
-/// Compares an answer of the planner with the correct answer.
 fn judge_answer(
     case: &Case,
     (mission, problem): (&Mission, &Problem),
@@ -490,7 +472,7 @@ fn check_plan(
     }
 }
 
-/// Returns an integer from an environment variable, or `default` if it is not set.
+/// Returns an integer from an environment variable; `default` if the variable is not set or is no integer.
 pub fn setting(name: &str, default: u64) -> u64 {
     std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
 }
@@ -500,7 +482,8 @@ pub fn is_over(tally: &Tally) -> bool {
     !tally.failures.is_empty() && std::env::var_os("ORACLE_STOP").is_some()
 }
 
-/// Runs [`judge`] on the cases of `ORACLE_TASKS` seeds (default: `default`), starting at `ORACLE_FROM`.
+/// Runs [`judge`] on the cases of `ORACLE_TASKS` seeds (default: `default`), starting at `ORACLE_FROM`. Stops
+/// at the first failure if `ORACLE_STOP` is set.
 pub fn run(default: u64, cases: impl Fn(u64) -> Vec<Case>) -> Tally {
     let (from, tasks) = (setting("ORACLE_FROM", 0), setting("ORACLE_TASKS", default));
     let mut tally = Tally::default();

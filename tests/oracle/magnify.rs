@@ -15,9 +15,7 @@ use std::process::Command;
 
 use test_resources::{data, python};
 
-/// Number of significant digits of the decimals.
 const DIGITS: usize = 16;
-/// Number of generated missions.
 const MISSIONS: usize = 50;
 /// Variants: name, whether the factors in the domain (weights of the metric) are replaced as well, and the maximum
 /// slowdown (geometric mean).
@@ -61,7 +59,6 @@ fn magnified(function: &str, arguments: &[&str], value: f64) -> String {
     })
 }
 
-/// Replaces the initial values in the text of a problem.
 fn problem(text: &str) -> String {
     let mut parts = text.split("(= (");
     let mut magnified_text = parts.next().unwrap_or_default().to_owned();
@@ -121,14 +118,12 @@ fn run(arguments: &[&str], once: bool) -> Run {
     Run { status: status.parse().expect("a status"), time: time.parse().expect("a time") }
 }
 
-/// Returns the arguments of the planning command for a mission.
 fn plan_arguments(directory: &Path, name: &str) -> [String; 6] {
     let file = |part: &str| directory.join(format!("{name}.{part}.pddl")).display().to_string();
     let [plan, quiet, limit, seconds] = ["plan", "--quiet", "--time-limit", "60"].map(str::to_owned);
     [plan, quiet, limit, seconds, file("domain"), file("problem")]
 }
 
-/// Runs and measures planning, certifying and verifying, in this order.
 fn all_runs(directory: &Path, name: &str) -> [Run; 3] {
     let certificate = directory.join(format!("{name}.certificate")).display().to_string();
     let _ = std::fs::remove_dir_all(&certificate);

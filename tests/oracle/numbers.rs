@@ -32,10 +32,8 @@ use ground::Ground;
 use model::{Expr, Number, Task};
 use truth::{Explored, Outcome};
 
-/// Work limits of the oracle for one task.
 const BUDGET: Budget = Budget { states: 300, attempts: 25_000 };
 
-/// A generated task with the oracle's result.
 struct Puzzle {
     name: String,
     task: Task,
@@ -132,7 +130,6 @@ fn executor(ground: Rc<Ground>) -> Executor {
     })
 }
 
-/// Returns the task of a seed.
 fn task(seed: u64) -> Task {
     let mut rng = Rng::with_seed(seed);
     // The first numbers of neighbouring seeds are correlated, so they are discarded.

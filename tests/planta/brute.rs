@@ -11,7 +11,6 @@ pub type Text = String;
 type Words = Vec<String>;
 type Facts = BTreeMap<String, BTreeSet<Words>>;
 
-/// The reachable part of the state space.
 #[derive(Debug, Default)]
 pub struct StateSpace {
     /// All atoms that hold in some reachable state, including derived atoms.
@@ -63,7 +62,6 @@ struct Schema {
 }
 
 pub struct Task {
-    /// All types of each object.
     objects: BTreeMap<String, BTreeSet<String>>,
     rules: Vec<Rule>,
     schemas: Vec<Schema>,
@@ -308,7 +306,6 @@ impl Task {
         }
     }
 
-    /// Returns the names of the predicates that actions change.
     fn changed_predicates(&self) -> BTreeSet<String> {
         let changed_atoms = self.schemas.iter().flat_map(|schema| schema.adds.iter().chain(&schema.deletes));
         changed_atoms.map(|(name, _)| name.clone()).collect()

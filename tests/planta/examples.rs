@@ -12,7 +12,6 @@ use serde_json::Value;
 use crate::brute::{StateSpace, Task};
 use crate::files::{Input, metaplan, parsed, real, text_of};
 
-/// An example, with the domain and problem that the converter writes for it.
 struct Example {
     name: &'static str,
     input: Input,
@@ -102,7 +101,6 @@ fn atoms(space: &StateSpace, is_kept: &dyn Fn(&str) -> bool) -> BTreeSet<String>
     space.atoms.iter().filter(predicate).cloned().collect()
 }
 
-/// Exports a domain and a problem for other planners, and parses the exported text.
 fn written(domain: &Domain, problem: &Problem) -> (Domain, Problem) {
     let (domain, problem) = portable(domain, problem);
     let text = |name: &str, text: String| pddl::Source::new(name, text);

@@ -10,7 +10,6 @@ use metaplan::mission::{Bindings, Mission};
 use ontology::ReadOptions;
 use pddl::ast::{Domain, Problem};
 
-/// Input files of PLANTA's converter.
 #[derive(Debug, Clone)]
 pub struct Input {
     pub domain: PathBuf,
@@ -20,12 +19,10 @@ pub struct Input {
     pub directory: PathBuf,
 }
 
-/// Returns the directory of the real files, if available.
 pub fn real() -> Option<PathBuf> {
     test_resources::data("real")
 }
 
-/// Runs the program. Returns its exit status, standard output and standard error.
 pub fn metaplan(arguments: &[&str]) -> (i32, String, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_metaplan")).args(arguments).output().expect("it runs");
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
@@ -33,7 +30,6 @@ pub fn metaplan(arguments: &[&str]) -> (i32, String, String) {
 }
 
 impl Input {
-    /// Returns input files in `directory`, with the directory of PLANTA's imports.
     pub fn new(directory: &Path, domain: &str, problem: &str, knowledge: &str) -> Self {
         Self {
             domain: directory.join(domain),
@@ -43,7 +39,6 @@ impl Input {
         }
     }
 
-    /// Returns the command line of a command on these files, with further options.
     pub fn arguments<'a>(&'a self, command: &'a str, options: &[&'a str]) -> Vec<&'a str> {
         let path = |path: &'a Path| path.to_str().expect("UTF-8");
         let mut command_line = vec![command, path(&self.domain), path(&self.problem), "--quiet"];
@@ -52,7 +47,6 @@ impl Input {
         command_line
     }
 
-    /// Reads the files as a mission.
     pub fn mission(&self) -> Mission {
         let (domain, problem) = (source(&self.domain), source(&self.problem));
         let options = ReadOptions { directories: vec![self.directory.clone()], ..ReadOptions::default() };
@@ -65,7 +59,6 @@ impl Input {
     }
 }
 
-/// Concatenates the texts of messages.
 pub fn text_of(messages: &[Message]) -> String {
     messages.iter().map(Message::text).collect()
 }

@@ -20,7 +20,6 @@ const INDIVIDUALS: [&str; 2] = ["i1", "i2"];
 /// Maximum number of states of a task. Larger tasks are skipped.
 const MAX_STATES: usize = 300;
 
-/// Input texts of a task: knowledge base, domain and problem.
 struct Texts {
     knowledge: String,
     domain: String,
@@ -59,7 +58,6 @@ fn pick<'n>(random: &mut Rng, names: &[&'n str]) -> &'n str {
     names[random.usize(..names.len())]
 }
 
-/// Returns random axioms about classes and properties, and random assertions.
 fn axioms(random: &mut Rng) -> String {
     let mut text = String::new();
     // An individual without an assertion would not become an object.
@@ -95,12 +93,10 @@ fn axioms(random: &mut Rng) -> String {
     text
 }
 
-/// Returns the name of the predicate for inferred members of a class or property.
 fn inferred(name: &str) -> String {
     format!("inferred-{}{}", name[..1].to_uppercase(), &name[1..])
 }
 
-/// Returns a random condition on one or two variables.
 fn condition(random: &mut Rng, has_axiom: bool) -> String {
     let variable = pick(random, &["?x", "?x", "?y"]);
     match random.u8(..if has_axiom { 8 } else { 7 }) {
@@ -162,9 +158,7 @@ fn texts(seed: u64) -> Texts {
     Texts { knowledge, domain, problem }
 }
 
-/// Result for a task that was small enough for the comparison.
 struct Comparison {
-    /// Length of a shortest plan; `None` if there is no plan.
     least_steps: Option<usize>,
 }
 
@@ -243,7 +237,6 @@ fn classes_required_by_one_action_do_not_guard_facts_of_others() {
     assert_eq!(comparison.least_steps, Some(2));
 }
 
-/// No individual belongs to `owl:Nothing`, so a rule that requires one concludes nothing.
 #[test]
 fn rules_that_require_an_individual_of_nothing_conclude_nothing() {
     let knowledge = knowledge(

@@ -42,7 +42,6 @@ fn plan(input: &Input, options: &[&str]) -> Value {
     answer
 }
 
-/// Returns the arguments of all steps of a plan.
 fn arguments_of_steps(answer: &Value) -> BTreeSet<String> {
     let steps = answer["steps"].as_array().expect("steps").iter();
     let arguments = steps.flat_map(|step| step["arguments"].as_array().expect("arguments"));
@@ -149,7 +148,6 @@ fn manifests_support_scenarios_explanations_and_the_loop() {
     assert!(after.contains("fd_recover_thrusters") && !after.contains("fd_all_thrusters"), "{after:?}");
 }
 
-/// Runs the loop with a manifest and returns its answers to one input line.
 fn run_with(manifest: &str, line: &str) -> Vec<Value> {
     run(&["run", manifest, "--quiet"], line)
 }
@@ -244,7 +242,6 @@ fn least_with_designs(problem: &Problem) -> usize {
     panic!("the goal is not reached")
 }
 
-/// Returns the minimum number of moves, by breadth-first search.
 fn least_moves(problem: &Problem) -> usize {
     let corridors = facts(problem, "corridor");
     let goal = format!("{:?}", problem.goal);

@@ -32,7 +32,6 @@ const CRATES: [&str; 15] = [
 /// Path of a module below the crate root, without `crate`.
 pub type Module = Vec<String>;
 
-/// Returns the module that a file defines.
 fn module(path: &str, folder: &str) -> Module {
     let inner = path.strip_prefix(folder).expect("below the folder").trim_start_matches('/');
     let mut parts: Module = inner.trim_end_matches(".rs").split('/').map(str::to_owned).collect();
@@ -42,11 +41,8 @@ fn module(path: &str, folder: &str) -> Module {
     parts
 }
 
-/// Collects the modules to which the paths of a file refer.
 struct Paths<'m> {
-    /// Module of the file.
     module: &'m Module,
-    /// All modules of the crate.
     modules: &'m BTreeSet<Module>,
     /// Names that the crate root re-exports from other crates.
     foreign: &'m BTreeSet<String>,
@@ -156,7 +152,6 @@ impl<'a> Visit<'a> for Paths<'_> {
     }
 }
 
-/// Returns for each module of a crate the modules that it imports from.
 pub fn imports(files: &[(String, String)], folder: &str) -> BTreeMap<Module, BTreeSet<Module>> {
     let crate_files: Vec<_> = files.iter().filter(|(path, _)| Path::new(path).starts_with(folder)).collect();
     let modules: BTreeSet<Module> = crate_files.iter().map(|(path, _)| module(path, folder)).collect();

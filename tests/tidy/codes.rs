@@ -4,10 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use metaplan::codes::{self, Code};
 
-/// Crates with a table of codes.
 const TABLES: [&str; 10] =
     ["rules", "ontology", "pddl", "task", "probabilistic", "mission", "verify", "src", "ros", "fleet"];
-/// First letters of message codes.
 const LETTERS: &str = "EMNOPQR";
 
 /// Returns the codes in a text, except for those in comments and tests.

@@ -6,11 +6,9 @@ use std::path::Path;
 
 use super::circles::imports;
 
-/// Layers and imports of the modules of `src` according to ARCHITECTURE.md.
 struct Documented {
     /// Line of each module in the picture, counted from the top.
     lines: BTreeMap<String, usize>,
-    /// Imports of each module according to the table.
     imports: BTreeMap<String, BTreeSet<String>>,
 }
 
@@ -20,7 +18,6 @@ fn names(cell: &str) -> Vec<String> {
     quoted.map(|name| name.trim_end_matches('/').trim_end_matches(".rs").to_owned()).collect()
 }
 
-/// Parses the picture and the table in ARCHITECTURE.md's section on `src`.
 fn documented(document: &str) -> Documented {
     let section = document.split("\n### src").nth(1).expect("a section on `src`");
     let picture = section.split("```text\n").nth(1).and_then(|block| block.split("```").next());
@@ -38,7 +35,6 @@ fn documented(document: &str) -> Documented {
     Documented { lines: lines.collect(), imports: imports.collect() }
 }
 
-/// Returns the imports of each module according to the source files.
 fn actual_imports(files: &[(String, String)]) -> BTreeMap<String, BTreeSet<String>> {
     let mut modules: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     for (file, from) in imports(files, "src") {
@@ -92,7 +88,6 @@ fn facade_imports_match_the_architecture() {
     assert!(differences.is_empty(), "ARCHITECTURE.md and `src` differ:\n{}", differences.join("\n"));
 }
 
-/// A file in a folder does not import from the module file of that folder.
 #[test]
 fn facade_files_do_not_import_from_their_parent_module() {
     let upwards = |(file, from): (Vec<String>, BTreeSet<Vec<String>>)| {

@@ -6,7 +6,6 @@ use std::path::Path;
 
 use regex::Regex;
 
-/// Discouraged phrases in prose.
 const PHRASES: [&str; 10] = [
     r"\bso (many|much|long|often|far|few)\b",
     r"\bst(and|ands|ood|anding) (in|for|at|behind|alone|beside|there|below|between|under|before|by|on|where|as|apart|together)\b",
@@ -20,14 +19,11 @@ const PHRASES: [&str; 10] = [
     r"\bdear(er|est)?\b",
 ];
 
-/// Discouraged first words of doc comments.
 const FIRST_WORDS: &str =
     r"^(What|Who|Whose|How|Where|Which|When|Why|That|Those|So|As|Of|From|The same|None|Not)\b";
 
-/// Pronouns and participles as variable names.
 const VARIABLES: &str = r"\blet (?:mut )?(?:own|found|all|known|rest|left|others?|most|asked|told|said|seen|gone|made|given|taken|wanted|needed|such|those|these|both|many|few|same|more|less|ones?|none|that|this|what|which|who|lacks|meant|held|kept|put|shown|heard)\b";
 
-/// Upper limits for one folder.
 struct Ceiling {
     folder: &'static str,
     /// Discouraged phrases per 10,000 words of comments.
@@ -65,7 +61,6 @@ const CEILINGS: [Ceiling; 17] = [
 /// Upper limit on discouraged phrases per 10,000 words in Markdown files.
 const MARKDOWN_CEILING: u64 = 6;
 
-/// Counts of words, doc comments, variables and discouraged occurrences in one folder.
 #[derive(Debug, Default)]
 struct Counts {
     words: u64,

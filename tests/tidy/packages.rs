@@ -37,7 +37,6 @@ pub fn linked(package: &str) -> BTreeSet<String> {
     lines.lines().filter_map(|line| line.split_whitespace().next()).map(str::to_owned).collect()
 }
 
-/// Returns the candidates that are in the dependency tree of `package`.
 fn linked_of(package: &str, candidates: &[&'static str]) -> Vec<&'static str> {
     let linked = linked(package);
     candidates.iter().copied().filter(|name| linked.contains(*name)).collect()

@@ -8,7 +8,6 @@ use pulldown_cmark::{Event, Options, Parser, Tag, TagEnd};
 /// Maximum number of lines of README. Details belong to the book.
 const README_LINES: usize = 200;
 
-/// Folders that contain no pages of the project.
 const NO_PAGES: [&str; 3] = ["target", ".git", "node_modules"];
 
 /// Returns the paths of all Markdown files, relative to the root.
@@ -32,7 +31,6 @@ pub fn pages(root: &Path) -> Vec<PathBuf> {
     paths
 }
 
-/// Returns the text of a page with its includes expanded.
 fn read(root: &Path, page: &Path) -> String {
     let text = std::fs::read_to_string(root.join(page)).expect("a page");
     let mut expanded = String::new();

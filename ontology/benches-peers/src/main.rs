@@ -20,7 +20,6 @@ use ontology::{ReadOptions, lower, ntriples, read_files};
 pub struct Random(pub u64);
 
 impl Random {
-    /// Returns a number below `bound`.
     pub fn below(&mut self, bound: u32) -> u32 {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
@@ -147,7 +146,6 @@ fn main() {
     }
 }
 
-/// Writes the ontologies to compare. Returns their names and files.
 fn write_all(directory: &Path) -> Vec<(String, PathBuf)> {
     let (one, five) = (university::universities(1), university::universities(5));
     let mut cases = vec![

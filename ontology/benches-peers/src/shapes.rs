@@ -21,7 +21,6 @@ macro_rules! line {
     };
 }
 
-/// Names and texts of the ontologies.
 pub fn all() -> Vec<(&'static str, String)> {
     vec![
         ("a deep hierarchy", text(deep)),

@@ -88,7 +88,6 @@ const SUB_PROPERTIES: [(&str, &str); 5] = [
     ("worksFor", "memberOf"),
 ];
 
-/// An object of a triple.
 #[derive(Clone)]
 pub enum Object {
     Iri(String),
@@ -103,7 +102,6 @@ fn iri(name: &str) -> String {
     format!("{NS}{name}")
 }
 
-/// Returns the triples of the schema.
 pub fn schema() -> Vec<Triple> {
     let mut triples = Vec::new();
     let mut add = |subject: &str, predicate: &str, object: Object| {
@@ -153,7 +151,6 @@ pub fn schema() -> Vec<Triple> {
     triples
 }
 
-/// Generates the triples of a department.
 struct Department<'r> {
     place: String,
     random: &'r mut Random,
@@ -281,7 +278,6 @@ impl Department<'_> {
     }
 }
 
-/// Generates a department of a university.
 pub fn department(university: u32, number: u32, random: &mut Random) -> Vec<Triple> {
     let whole = format!("http://www.University{university}.example.org");
     let place = format!("http://www.Department{number}.University{university}.example.org");
@@ -313,7 +309,6 @@ pub fn universities(count: u32) -> Vec<Vec<Triple>> {
     documents
 }
 
-/// Formats triples as N-Triples.
 pub fn ntriples(triples: &[Triple]) -> String {
     let mut text = String::new();
     for (subject, predicate, object) in triples {
@@ -330,7 +325,6 @@ pub fn ntriples(triples: &[Triple]) -> String {
     text
 }
 
-/// Formats triples as RDF/XML.
 pub fn rdf_xml(triples: &[Triple]) -> String {
     let mut text = format!(
         "<?xml version=\"1.0\"?>\n<rdf:RDF xmlns:rdf=\"{RDF}\" xmlns:rdfs=\"{RDFS}\" xmlns:owl=\"{OWL}\" xmlns:u=\"{NS}\">\n"

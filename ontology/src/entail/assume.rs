@@ -107,6 +107,7 @@ impl Prover {
     }
 
     /// Proves that an individual is in a class. Returns the explanation, or `None` if the proof fails.
+    /// Contradictory assumptions prove everything.
     pub(super) fn is_in(
         engine: &Engine,
         class: &ClassExpression,
@@ -186,7 +187,6 @@ impl Prover {
     }
 }
 
-/// Returns the names of the individuals that are values of a property for an individual.
 pub(super) fn values(engine: &mut Engine, property: &ObjectPropertyExpression, individual: &Iri) -> Vec<Iri> {
     let subject = engine.symbols_mut().name(individual);
     let (ObjectPropertyExpression::Property(iri) | ObjectPropertyExpression::Inverse(iri)) = property;
@@ -197,7 +197,6 @@ pub(super) fn values(engine: &mut Engine, property: &ObjectPropertyExpression, i
     engine.matching(predicate, &pattern).filter_map(|row| name(row[usize::from(forward)])).collect()
 }
 
-/// Returns the proof of the first attempt that succeeds; `None` if all attempts fail.
 pub(super) fn first_proof<T>(attempts: &[T], mut prove: impl FnMut(&T) -> ProofResult) -> ProofResult {
     for attempt in attempts {
         if let Some(reason) = prove(attempt)? {
@@ -213,7 +212,6 @@ pub(super) fn refuted(cases: &[Engine]) -> Option<String> {
     Some(format!("the opposite is impossible: {}\n", reasons?.join("; and ")))
 }
 
-/// Returns the facts that the names denote pairwise different individuals.
 pub(super) fn pairwise_different(engine: &mut Engine, names: &[Iri]) -> Vec<Fact> {
     let symbols = engine.symbols_mut();
     let different = symbols.name(owl::DIFFERENT_FROM);

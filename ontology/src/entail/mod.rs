@@ -118,7 +118,6 @@ fn unread(warning: &Warning) -> Option<Entailment> {
     Some(Entailment { statement, answer: Answer::Open("it could not be read") })
 }
 
-/// Returns `true` if an assertion has an anonymous individual.
 fn has_anonymous(axiom: &Axiom) -> bool {
     let is_anonymous = |iri: &Iri| iri.starts_with(ANONYMOUS);
     match axiom {

@@ -29,13 +29,11 @@ pub(super) fn contradiction(engine: &Engine) -> Option<String> {
     Some(format!("{violated} is violated by {}", facts.join(", ")))
 }
 
-/// Proves statements from the knowledge of an engine.
 pub(super) struct Prover {
     /// Engine with the facts and rules of the knowledge base, in which `owl:sameAs` is equality.
     pub(super) base: Engine,
 }
 
-/// Explanation of a proved goal; `None` if the goal is not proved.
 pub(super) type ProofResult = Result<Option<String>, Error>;
 
 impl Prover {
@@ -55,7 +53,6 @@ impl Prover {
     }
 }
 
-/// Returns the fact that an individual is in a named class.
 pub(super) fn member(engine: &mut Engine, class: &str, individual: &str) -> Fact {
     let symbols = engine.symbols_mut();
     Fact::new(symbols.name(class), [symbols.name(individual)])
@@ -71,24 +68,20 @@ pub(super) fn edge(engine: &mut Engine, property: &ObjectPropertyExpression, fro
     }
 }
 
-/// Returns the fact that a data property of an individual has a value.
 pub(super) fn value(engine: &mut Engine, property: &str, from: &str, value: Literal) -> Fact {
     let symbols = engine.symbols_mut();
     Fact::new(symbols.name(property), [symbols.name(from), symbols.literal(value)])
 }
 
-/// Returns the fact that two names denote the same individual.
 pub(super) fn same(engine: &mut Engine, left: &str, right: &str) -> Fact {
     let symbols = engine.symbols_mut();
     Fact::new(symbols.name(owl::SAME_AS), [symbols.name(left), symbols.name(right)])
 }
 
-/// Converts a literal of an ontology to the value that the rule engine uses.
 pub(super) fn literal(literal: &crate::owl::Literal) -> Literal {
     Literal::parse(&literal.lexical, literal.datatype.as_deref(), literal.language.as_deref())
 }
 
-/// Returns a copy of an engine with additional facts and their consequences.
 pub(super) fn with_facts(engine: &Engine, facts: impl IntoIterator<Item = Fact>) -> Result<Engine, Error> {
     let mut copy = engine.clone();
     let insert = facts.into_iter().collect();
@@ -96,7 +89,6 @@ pub(super) fn with_facts(engine: &Engine, facts: impl IntoIterator<Item = Fact>)
     Ok(copy)
 }
 
-/// Returns the derivation of a fact as text; `None` if the fact does not hold.
 pub(super) fn explain(engine: &Engine, fact: &Fact) -> Option<String> {
     // The engine does not store that an individual is the same as itself.
     if fact.arguments.len() == 2

@@ -7,7 +7,6 @@ use rules::{Error, Symbol};
 use super::prover::{Answer, Prover, edge, explain, literal, same, value};
 use crate::owl::{ANONYMOUS, Axiom, ClassExpression, Iri, ObjectPropertyExpression as Property};
 
-/// Maximum number of partial answers that the search visits.
 const MAX_PARTIAL_ANSWERS: usize = 100_000;
 
 /// Partial answer of a query: maps anonymous individuals to named individuals.
@@ -110,8 +109,6 @@ impl Prover {
         }
     }
 
-    /// Explains a statement without unassigned individuals. Returns `None` if the statement is not
-    /// proved.
     fn holds(&self, assignment: &Assignment, axiom: &Axiom) -> Result<Option<String>, Error> {
         let mut copy = self.base.clone();
         let name = |iri: &Iri| assignment.get(iri).cloned().unwrap_or_else(|| iri.clone());
@@ -148,12 +145,10 @@ impl Prover {
     }
 }
 
-/// Returns `true` for an anonymous individual without an assigned value.
 fn is_open(assignment: &Assignment, name: &Iri) -> bool {
     name.starts_with(ANONYMOUS) && !assignment.contains_key(name)
 }
 
-/// Returns the individuals of an assertion.
 fn names(axiom: &Axiom) -> Vec<Iri> {
     match axiom {
         Axiom::ClassAssertion(_, individual) | Axiom::DataPropertyAssertion(_, individual, _) => {

@@ -8,7 +8,6 @@ use super::prover::{ProofResult, Prover, value, with_facts};
 use crate::owl::{DataRange, Iri};
 
 impl Prover {
-    /// Proves that all values of a property are in a data range.
     pub(super) fn range(&self, property: &Iri, range: &DataRange) -> ProofResult {
         let mut copy = self.base.clone();
         let assumed = value(&mut copy, property, &Self::fresh(0), Literal::fresh(1));
@@ -32,7 +31,7 @@ impl Prover {
     }
 }
 
-/// Returns `true` if the intersection of the datatypes is contained in the range.
+/// Returns `true` if the intersection of the datatypes is certainly contained in the range.
 fn contains(datatypes: &[&str], range: &DataRange) -> bool {
     match range {
         DataRange::Datatype(iri) => is_subsumed(datatypes, iri),

@@ -91,7 +91,6 @@ fn located(rule: Rule, origin: &Origin) -> Rule {
     Rule { ontology: origin.ontology.clone(), position: origin.position, iri: origin.iri.clone(), ..rule }
 }
 
-/// Converts horned-owl components to the structures of this crate. Equal IRIs share one string.
 struct Builder {
     /// IRI of the first document; empty if it declares none.
     ontology: Iri,
@@ -348,8 +347,6 @@ impl Builder {
         }
     }
 
-    /// Converts a component to an axiom. Returns `None` for components that are not axioms (ontology
-    /// header, annotation axiom).
     fn axiom(&mut self, component: &Component<RcStr>) -> Option<Axiom> {
         use Characteristic as C;
         let characteristic =

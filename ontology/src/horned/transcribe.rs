@@ -10,7 +10,6 @@ use horned_owl::ontology::set::SetOntology;
 use super::stack::with_stack;
 use crate::read::syntax::Syntax;
 
-/// The reason why a document cannot be transcribed.
 #[derive(Debug)]
 pub(crate) struct Fault {
     /// Byte offset in the document; 0 if unknown.
@@ -18,7 +17,6 @@ pub(crate) struct Fault {
     pub message: String,
 }
 
-/// Describes an error without its location.
 fn message(error: &HornedError) -> String {
     match error {
         // The reader reports a missing child element as an unexpected end of the file.
@@ -31,7 +29,6 @@ fn message(error: &HornedError) -> String {
     }
 }
 
-/// Converts an OWL/XML or functional-style document to N-Triples.
 pub(crate) fn transcribe(text: &[u8], syntax: Syntax) -> Result<Vec<u8>, Fault> {
     let fault = |error: HornedError| {
         let offset = match &error {
@@ -59,7 +56,6 @@ pub(crate) fn transcribe(text: &[u8], syntax: Syntax) -> Result<Vec<u8>, Fault> 
     with_stack(|| transcription().map_err(fault)).map_err(panicked)?
 }
 
-/// Converts a functional-style document to OWL/XML.
 pub(crate) fn owl_xml(text: &[u8]) -> Result<String, String> {
     let transcription = || -> Result<Vec<u8>, HornedError> {
         let (mut text, build) = (text, ho::Build::new_rc());

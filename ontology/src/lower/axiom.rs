@@ -41,8 +41,6 @@ pub(crate) fn lower_rules(axioms: &[AnnotatedAxiom], context: &mut Context) {
     }
 }
 
-/// Adds the facts of the assertions about named classes and properties, `sameAs` and `differentFrom` to
-/// `context`.
 pub(crate) fn lower_assertions(axioms: &[AnnotatedAxiom], context: &mut Context) {
     for annotated in axioms {
         assertion(context, &annotated.axiom);

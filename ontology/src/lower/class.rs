@@ -296,7 +296,6 @@ pub(crate) fn lower_inclusions(context: &mut Context, position: usize) {
     }
 }
 
-/// Returns the name of a restriction's auxiliary relation.
 fn relation_of(restriction: &ClassExpression) -> String {
     format!("{INTERNAL}restriction:{restriction}")
 }

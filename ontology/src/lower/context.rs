@@ -27,7 +27,6 @@ pub enum Equality {
     UniqueNames,
 }
 
-/// Conjunction of atoms.
 pub(crate) type Conjunction = Vec<Atom>;
 
 /// Returns the Cartesian product of two lists: each conjunction of the first list joined with each
@@ -36,7 +35,6 @@ pub(crate) fn cross(left: &[Conjunction], right: &[Conjunction]) -> Vec<Conjunct
     left.iter().flat_map(|l| right.iter().map(move |r| l.iter().chain(r).cloned().collect())).collect()
 }
 
-/// State of the lowering: the results, and the axiom or rule that is being lowered.
 pub(crate) struct Context<'a> {
     pub symbols: &'a mut Symbols,
     pub rules: Vec<Rule>,
@@ -45,13 +43,11 @@ pub(crate) struct Context<'a> {
     pub equality: Equality,
     /// Maps each datatype with a definition to its data range.
     pub definitions: HashMap<Iri, DataRange>,
-    /// All entities of the ontology, with their kinds.
     entities: HashSet<(EntityKind, Iri)>,
     /// Identity of the axiom or rule that is being lowered.
     pub identity: RuleIdentity,
     /// Reasons why parts of the current axiom or rule have no rule form.
     gaps: Vec<&'static str>,
-    /// Inclusions (`⊑`) between existential or universal restrictions.
     pub inclusions: Inclusions,
     /// Names of the auxiliary relations whose rules have already been added.
     pub abbreviated: HashSet<String>,
@@ -72,7 +68,6 @@ impl Variables {
         Term::Variable(Variable((self.keys.len() - 1) as u16))
     }
 
-    /// Returns the variable with this IRI, which is added if it is new.
     pub(crate) fn of_iri(&mut self, iri: &Iri) -> Term {
         match self.keys.iter().position(|key| key == iri) {
             Some(index) => Term::Variable(Variable(index as u16)),
@@ -80,7 +75,6 @@ impl Variables {
         }
     }
 
-    /// Returns the local names of the variables for output, indexed by variable number.
     fn names(&self) -> Vec<Box<str>> {
         self.keys.iter().map(|key| local_name(key).into()).collect()
     }
@@ -89,7 +83,6 @@ impl Variables {
 /// Limit on the length of a rule's label, in characters: an axiom can have thousands of members.
 const MAX_LABEL_CHARS: usize = 2_000;
 
-/// Returns the identity of the rules that are lowered from the axiom at `position`.
 pub(crate) fn identity(axiom: &Axiom, position: usize) -> RuleIdentity {
     let mut label = axiom.to_string();
     if let Some((end, _)) = label.char_indices().nth(MAX_LABEL_CHARS) {
@@ -121,12 +114,10 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// Returns `true` if an IRI names an entity of this kind.
     pub(crate) fn is(&self, kind: EntityKind, iri: &Iri) -> bool {
         self.entities.contains(&(kind, iri.clone()))
     }
 
-    /// Returns the entities of a kind, sorted.
     pub(crate) fn entities_of_kind(&self, kind: EntityKind) -> Vec<Iri> {
         let mut iris: Vec<Iri> =
             self.entities.iter().filter(|(other, _)| *other == kind).map(|(_, iri)| iri.clone()).collect();
@@ -134,7 +125,6 @@ impl<'a> Context<'a> {
         iris
     }
 
-    /// Builds the atom `owl:Thing(term)`.
     pub(crate) fn thing(&mut self, term: Term) -> Atom {
         self.relation(owl::THING, [term])
     }
@@ -175,7 +165,6 @@ impl<'a> Context<'a> {
         self.symbols.literal(value)
     }
 
-    /// Builds the atom `name(arguments)`.
     pub(crate) fn relation<const N: usize>(&mut self, name: &str, arguments: [Term; N]) -> Atom {
         Atom::relation(self.symbols.name(name), arguments)
     }

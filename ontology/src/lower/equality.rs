@@ -85,7 +85,6 @@ fn identity(label: &str, position: usize) -> RuleIdentity {
     RuleIdentity { source: AXIOM_SOURCE.into(), label: Some(label.into()), position: position as u32 }
 }
 
-/// Adds the rules that derive `differentFrom`.
 fn difference(axioms: &[AnnotatedAxiom], context: &mut Context) {
     let mut variables = Variables::default();
     let (x, y, p, q) =

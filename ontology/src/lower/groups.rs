@@ -20,12 +20,10 @@ pub(crate) fn relation(context: &mut Context, axiom: &str) -> Symbol {
     context.name(&format!("{INTERNAL}member:{hash:016x}"))
 }
 
-/// Returns the symbol of the number of the member at `index`.
 pub(crate) fn number(context: &mut Context, index: usize) -> Symbol {
     context.symbols.literal(rules::Literal::integer(index as i64))
 }
 
-/// Builds the body atoms that match two members with different numbers.
 fn differently_numbered(member: Symbol, [x, y]: [Term; 2], [i, j]: [Term; 2]) -> Vec<Atom> {
     vec![Atom::relation(member, [x, i]), Atom::relation(member, [y, j]), Atom::Different(i, j)]
 }

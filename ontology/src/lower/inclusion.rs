@@ -21,12 +21,10 @@ pub(crate) struct Inclusions {
     /// Maps each restriction that an axiom concludes to the restrictions that include it and are
     /// conditions of axioms or rules.
     concluded: BTreeMap<ClassExpression, BTreeSet<ClassExpression>>,
-    /// All conditions in the values of `concluded`.
     conditions: HashSet<ClassExpression>,
 }
 
 impl Inclusions {
-    /// Computes the inclusions between the restrictions of an ontology.
     pub(crate) fn new(ontology: &Ontology) -> Self {
         let mut uses = Uses::default();
         uses.collect(ontology);
@@ -87,17 +85,13 @@ fn restriction(class: &ClassExpression, is_concluded: bool) -> Option<ClassExpre
     }
 }
 
-/// Restrictions that axioms and rules conclude, and restrictions that are conditions of axioms and
-/// rules.
 #[derive(Default)]
 struct Uses {
     concluded: BTreeSet<ClassExpression>,
     conditions: HashSet<ClassExpression>,
     /// Maps each restriction to the position of the first axiom or rule that contains it.
     positions: HashMap<ClassExpression, usize>,
-    /// Restrictions that occur in several axioms or rules.
     shared: HashSet<ClassExpression>,
-    /// Position of the current axiom or rule.
     position: usize,
 }
 
@@ -197,7 +191,6 @@ struct Memo {
     including: HashMap<(ClassExpression, usize), BTreeSet<ClassExpression>>,
 }
 
-/// The inclusions that axioms state, as graphs, and the conditions to compare.
 struct InclusionGraph {
     classes: HashMap<ClassExpression, Vec<ClassExpression>>,
     properties: HashMap<Property, Vec<Property>>,
@@ -275,8 +268,8 @@ impl InclusionGraph {
         }
     }
 
-    /// Returns the conditions that include a restriction. Restrictions nested in it are compared up to
-    /// `depth` levels.
+    /// Returns the conditions that include a restriction. Nested restrictions are compared up to `depth`
+    /// levels.
     fn including(
         &self,
         restriction: &ClassExpression,
@@ -339,7 +332,6 @@ impl InclusionGraph {
     }
 }
 
-/// Returns property and filler of a restriction.
 fn parts(restriction: &ClassExpression) -> Option<(&Property, &ClassExpression)> {
     match restriction {
         ClassExpression::SomeValuesFrom(property, filler)
@@ -355,7 +347,6 @@ fn inverse(property: &Property) -> Property {
     }
 }
 
-/// Returns the properties that are reachable from `from` in a graph, including `from` itself.
 fn reachable(from: &Property, edges: &HashMap<Property, Vec<Property>>) -> BTreeSet<Property> {
     let mut visited = BTreeSet::from([from.clone()]);
     let mut open = vec![from];

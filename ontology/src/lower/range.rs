@@ -14,7 +14,6 @@ use crate::vocab::{owl, rdf, rdfs, xsd};
 /// rejected.
 const MAX_DEFINITION_DEPTH: usize = 16;
 
-/// Limit on the number of alternatives to which an intersection of unions is expanded.
 const MAX_RANGE_ALTERNATIVES: usize = 1_024;
 
 /// Local names of the XML Schema datatypes whose value spaces the engine implements, each between spaces.

@@ -227,7 +227,6 @@ fn with_names(built_in: BuiltIn, mut arguments: Vec<Argument>) -> Vec<Argument> 
     arguments
 }
 
-/// Lowers an atom of a head to its conclusions: additional conditions and head atoms.
 fn conclusions(
     context: &mut Context,
     atom: &Atom,

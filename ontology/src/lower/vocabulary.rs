@@ -60,7 +60,6 @@ fn mentioned_symbol(context: &Context, name: &str) -> Option<Symbol> {
     (in_rules || in_facts()).then_some(symbol)
 }
 
-/// Adds the facts and rules that make `owl:Thing` contain all individuals.
 fn things(ontology: &Ontology, thing: Symbol, context: &mut Context) {
     let mut variables = Variables::default();
     let (x, y) = (variables.fresh("x"), variables.fresh("y"));

@@ -48,7 +48,6 @@ fn name(node: &BlankNode) -> NamedNode {
     NamedNode::new_unchecked(format!("{ANONYMOUS}{}", node.as_str()))
 }
 
-/// Returns the blank nodes that are part of an axiom, a class expression, a rule or a list.
 fn structural(graph: &Graph) -> HashSet<BlankNode> {
     let mut nodes = HashSet::default();
     for (_, triple) in graph.iter() {

@@ -11,11 +11,9 @@ use crate::names::{Compact, Names, Object};
 use crate::triples::Document;
 use crate::vocab::{is_reserved, owl, rdf, rdfs};
 
-/// Occurrences of a name in the documents that matter for this pass.
 #[derive(Clone, Copy, Default)]
 #[allow(clippy::struct_excessive_bools)] // independent observations
 struct NameUse {
-    /// The name belongs to a reserved vocabulary.
     reserved: bool,
     /// The name is a blank node, or may be part of an axiom, a list, a rule or a header.
     special: bool,
@@ -27,7 +25,6 @@ struct NameUse {
     annotation: bool,
 }
 
-/// Uses of all names in the documents, indexed by the number of the name.
 pub(super) struct Usage {
     uses: Vec<NameUse>,
     kind: Option<u32>,
@@ -104,7 +101,6 @@ impl Usage {
         }
     }
 
-    /// Returns the classes of `bulk` statements that have no declaration.
     pub(super) fn undeclared(&self, bulk: &[Compact], names: &Names) -> BTreeSet<String> {
         let typed = bulk.iter().filter(|triple| Some(triple.predicate) == self.kind);
         let classes: FxHashSet<u32> = typed

@@ -41,7 +41,6 @@ pub(crate) fn too_deep(graph: &Graph) -> Option<(usize, Option<String>)> {
     None
 }
 
-/// Returns the first IRI that an expression nested too deeply describes.
 fn described_iri(graph: &Graph, depths: &mut FxHashMap<NamedOrBlankNode, usize>) -> Option<String> {
     graph.iter().find_map(|(_, triple)| match (&triple.subject, nested(&triple.object)) {
         (NamedOrBlankNode::NamedNode(iri), Some(root)) if depth(graph, &root, depths) >= MAX_NESTING => {

@@ -18,11 +18,9 @@ use crate::graph::{Graph, is_type, subject_of};
 use crate::owl::INVERSE;
 use crate::vocab::{owl, rdf, rdfs, xsd};
 
-/// Properties that define a boolean class expression or an enumeration.
 const CONNECTIVES: [&str; 5] =
     [owl::INTERSECTION_OF, owl::UNION_OF, owl::COMPLEMENT_OF, owl::ONE_OF, owl::DATATYPE_COMPLEMENT_OF];
 
-/// Properties that define a restriction.
 const RESTRICTION_PROPERTIES: [&str; 14] = [
     owl::ON_PROPERTY,
     owl::ON_PROPERTIES,
@@ -56,7 +54,6 @@ fn remove_anonymous_headers(graph: &mut Graph) {
     }
 }
 
-/// Removes all triples of a subject.
 fn take_all(graph: &mut Graph, node: &NamedOrBlankNode) {
     let indices: Vec<usize> = graph.of(node).map(|(index, _)| index).collect();
     for index in indices {
@@ -128,7 +125,8 @@ fn state(graph: &mut Graph, subject: &NamedOrBlankNode, predicate: &str, object:
     graph.state(subject, predicate, NamedNode::new_unchecked(object));
 }
 
-/// Gives each anonymous expression the type that its properties require, and removes other types.
+/// Gives each anonymous expression the type that its properties require, and removes other types of
+/// expressions.
 fn correct_types(graph: &mut Graph) {
     let datatypes: FxHashSet<Term> =
         graph.instances(rdfs::DATATYPE).into_iter().map(|(_, node)| Term::from(node)).collect();

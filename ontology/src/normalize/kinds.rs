@@ -17,18 +17,14 @@ use crate::names::Names;
 use crate::owl::{ANONYMOUS, EntityKind, Iri};
 use crate::vocab::{is_reserved, owl, rdf, rdfs, swrl, swrla, xsd};
 
-/// Limit on the rounds in which kinds propagate between undeclared properties.
 const MAX_PROPAGATION_ROUNDS: usize = 16;
 
-/// Observed uses of an undeclared property.
 #[derive(Clone, Copy, Debug, Default)]
 #[allow(clippy::struct_excessive_bools)] // independent observations
 struct Use {
     literal: bool,
     individual: bool,
-    /// Used as a data property in an axiom or rule.
     data: bool,
-    /// Used as an object property in an axiom or rule.
     object: bool,
     /// Used in a restriction of unknown kind.
     restricted: bool,
@@ -88,7 +84,6 @@ pub(crate) fn declare_known(graph: &mut Graph, known: &[(EntityKind, Iri)], name
     }
 }
 
-/// Declarations and uses of properties.
 struct Kinds<'a> {
     declared: &'a Declared,
     uses: BTreeMap<String, Use>,
@@ -176,7 +171,6 @@ fn state(graph: &mut Graph, iri: &str, class: &str) {
     graph.state(&subject, rdf::TYPE, NamedNode::new_unchecked(class));
 }
 
-/// The declarations of the imports closure.
 struct Declared {
     classes: HashSet<String>,
     datatypes: HashSet<String>,
@@ -238,7 +232,6 @@ fn named(node: &NamedOrBlankNode) -> Option<&str> {
     }
 }
 
-/// Returns `true` if a restriction is about data values.
 fn restricts_data(graph: &Graph, restriction: &NamedOrBlankNode, declared: &Declared) -> bool {
     graph.of(restriction).any(|(_, triple)| match triple.predicate.as_str() {
         owl::ON_DATA_RANGE => true,
@@ -255,7 +248,6 @@ fn restricts_data(graph: &Graph, restriction: &NamedOrBlankNode, declared: &Decl
     })
 }
 
-/// Records the undeclared classes that a triple uses.
 fn record_classes(triple: &Triple, declared: &Declared, classes: &mut BTreeSet<String>) {
     let mut record = |iri: Option<&str>| {
         if let Some(iri) = iri.filter(|iri| !is_reserved(iri))
@@ -282,7 +274,6 @@ fn record_classes(triple: &Triple, declared: &Declared, classes: &mut BTreeSet<S
     }
 }
 
-/// Records the use of an undeclared property in a triple.
 fn record_property(graph: &Graph, triple: &Triple, declared: &Declared, uses: &mut BTreeMap<String, Use>) {
     let mut record = |iri: &str, change: &dyn Fn(&mut Use)| {
         if !is_reserved(iri)

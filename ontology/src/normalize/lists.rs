@@ -20,8 +20,9 @@ pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) -> Vec<Ann
     groups
 }
 
-/// Maximum number of members up to which an axiom about disjoint named classes is expanded to pairs, and one
-/// about different named individuals is read by horned-owl. Larger ones are read by [`groups`].
+/// Maximum number of members of the axioms that [`groups`] does not read. Axioms about disjoint named classes
+/// with at most this number of members are expanded to pairs, and axioms about different named individuals
+/// are read by horned-owl.
 const MAX_PAIRED_MEMBERS: usize = 16;
 
 /// Removes and returns axioms about more than [`MAX_PAIRED_MEMBERS`] disjoint named classes or different

@@ -28,7 +28,6 @@ enum Statement {
     Annotation,
 }
 
-/// Declared kinds of an IRI.
 #[derive(Clone, Copy, Default)]
 struct DeclaredKinds {
     class: bool,
@@ -59,7 +58,6 @@ pub(crate) fn take(graph: &mut Graph, bulk: Vec<Compact>, names: &mut Names) -> 
     parts
 }
 
-/// Returns the plain statements of the graph with the indices of their triples, in order.
 fn statements(graph: &Graph) -> Vec<(usize, Statement)> {
     let (kinds, patterns, headers) = (kinds(graph), patterns(graph), headers(graph));
     let classify = |triple: &Triple| {
@@ -92,7 +90,6 @@ fn statements(graph: &Graph) -> Vec<(usize, Statement)> {
     graph.iter().filter_map(|(index, triple)| Some((index, classify(triple)?))).collect()
 }
 
-/// Declared kinds of IRIs, by the number of the name.
 struct KindsByNumber {
     kinds: FxHashMap<u32, DeclaredKinds>,
     rdf_type: Option<u32>,
@@ -118,7 +115,6 @@ impl KindsByNumber {
     }
 }
 
-/// Converts a triple of numbered names to an axiom.
 fn axiom(triple: Compact, names: &Names) -> AnnotatedAxiom {
     let text = |number| names.text(number).clone();
     let (subject, predicate) = (text(triple.subject), text(triple.predicate));

@@ -21,7 +21,6 @@ pub(crate) struct Origin {
     pub ontology: Iri,
     /// Index of the rule in its document, from 0. Unreadable rules are counted, too.
     pub position: u32,
-    /// The rule's IRI, if it has one.
     pub iri: Option<Iri>,
 }
 
@@ -80,13 +79,10 @@ pub(crate) fn rewrite(graph: &mut Graph, parts: &[(usize, Iri)], warnings: &mut 
 struct RdfAtom {
     class: &'static str,
     arguments: Vec<(&'static str, Term)>,
-    /// Arguments of a built-in.
     list: Option<Vec<Term>>,
 }
 
-/// State of the rewriting of all rules.
 struct Pass {
-    /// Declared variables, under their original names.
     variables: HashSet<Term>,
     /// Terms that occur outside of rules.
     described: HashSet<Term>,
@@ -221,7 +217,6 @@ impl Pass {
         Ok(RdfAtom::new(class, arguments))
     }
 
-    /// Converts an argument that has to be an individual or an individual variable.
     fn individual(&mut self, term: &Term) -> Result<Term, String> {
         if self.variables.contains(term) {
             return Ok(self.variable(term));
@@ -241,7 +236,6 @@ impl Pass {
         }
     }
 
-    /// Converts an argument that has to be a literal or a data variable.
     fn data(&mut self, term: &Term) -> Result<Term, String> {
         if self.variables.contains(term) {
             return Ok(self.variable(term));
@@ -321,7 +315,6 @@ impl RdfAtom {
         Self { class, arguments, list: None }
     }
 
-    /// Returns an atom that always holds.
     fn truth() -> Self {
         let term = || Term::from(NamedNode::new_unchecked(TRUE));
         Self::new(swrl::SAME_INDIVIDUAL_ATOM, vec![(swrl::ARGUMENT1, term()), (swrl::ARGUMENT2, term())])

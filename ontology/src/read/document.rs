@@ -23,7 +23,6 @@ use crate::vocab::{owl, rdf};
 /// error.
 const MAX_SYNTAX_ERRORS: usize = 10;
 
-/// Decodes a document to UTF-8 without a byte order mark.
 pub(crate) fn decoded<'a>(bytes: &'a [u8], name: &str) -> Result<Cow<'a, [u8]>, Errors> {
     encoding::decoded(bytes).map_err(|message| {
         let position = Position::of_offset(name, bytes, 0);
@@ -144,7 +143,6 @@ pub(crate) fn ontology_iri(head: &[u8]) -> Option<String> {
     }
 }
 
-/// Returns the text between the first `start` and the next `end`.
 fn between(text: &[u8], start: &str, end: char) -> Option<String> {
     let text = String::from_utf8_lossy(text);
     let tail = &text[text.find(start)? + start.len()..];

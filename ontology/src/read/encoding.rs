@@ -26,13 +26,11 @@ pub(super) fn decoded(bytes: &[u8]) -> Result<Cow<'_, [u8]>, String> {
     Ok(Cow::Owned(as_utf8(text)))
 }
 
-/// Returns the encoding label of an XML declaration, if there is one.
 fn declared(text: &[u8]) -> Option<&[u8]> {
     let label = label(text)?;
     Some(&text[label])
 }
 
-/// Returns the byte range of the encoding label in an XML declaration.
 fn label(text: &[u8]) -> Option<std::ops::Range<usize>> {
     if !text.starts_with(b"<?xml") {
         return None;

@@ -9,13 +9,10 @@ use super::syntax::Flattened;
 const MAX_GROWTH_FACTOR: usize = 16;
 /// Constant term of the limit on the expanded size, in bytes.
 const EXTRA_BYTES: usize = 1 << 20;
-/// Limit on the nesting of entities.
 const MAX_ENTITY_DEPTH: usize = 16;
 
-/// Entities that XML predefines.
 const PREDEFINED: [&[u8]; 5] = [b"lt", b"gt", b"amp", b"quot", b"apos"];
 
-/// An entity that cannot be expanded.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct EntityError {
     /// Byte offset in the document.
@@ -23,7 +20,6 @@ pub(super) struct EntityError {
     pub message: String,
 }
 
-/// The internal subset of a document type declaration.
 struct Declarations<'a> {
     entities: HashMap<&'a [u8], &'a [u8]>,
     /// Byte offset of `<!DOCTYPE`.
@@ -81,8 +77,9 @@ pub(super) fn expanded(text: &[u8]) -> Result<Flattened<'_>, EntityError> {
     Ok(Flattened { text: flat.into(), offsets })
 }
 
-/// Parses the entity reference (`&name;`) at the start of a text. Returns the name of the entity and the
-/// length of the reference; `None` if the text starts with no reference.
+/// Parses the entity reference (`&name;`) at the start of a text, without a check of the first character.
+/// Returns the name of the entity and the length of the reference. `None` if no name with a semicolon follows
+/// the first character.
 fn reference(text: &[u8]) -> Option<(&[u8], usize)> {
     // Names of entities are short; a longer text is not a reference.
     let end = text.iter().take(256).position(|&byte| byte == b';')?;
@@ -93,7 +90,6 @@ fn reference(text: &[u8]) -> Option<(&[u8], usize)> {
 
 struct Expansion<'a> {
     entities: &'a HashMap<&'a [u8], &'a [u8]>,
-    /// Expansions of entities, so that each one is computed once.
     cache: HashMap<&'a [u8], Vec<u8>>,
     /// Number of bytes that the expansions may still add to the document.
     budget: usize,
@@ -130,7 +126,6 @@ impl<'a> Expansion<'a> {
         Ok(())
     }
 
-    /// Expands the references in the value of an entity.
     fn resolved(&mut self, value: &'a [u8], depth: usize) -> Result<Vec<u8>, String> {
         let (mut resolved, mut cursor) = (Vec::new(), 0);
         // Quotation marks are escaped in a value without markup, because the reference may be in an attribute.
@@ -211,8 +206,6 @@ fn declaration_length(text: &[u8]) -> Option<usize> {
     None
 }
 
-/// Parses an entity declaration `<!ENTITY name "value">`, with quotes of either kind. Returns name and
-/// value.
 fn entity(declaration: &[u8]) -> Option<(&[u8], &[u8])> {
     let tail = declaration.strip_prefix(b"<!ENTITY")?.trim_ascii_start();
     let end = tail.iter().position(u8::is_ascii_whitespace)?;

@@ -1,6 +1,5 @@
 //! Recognises documents in unsupported syntaxes, for the error message.
 
-/// Returns a description of the detected format with a suggestion; `None` if the format is unknown.
 pub(super) fn recognized(text: &[u8]) -> Option<&'static str> {
     let head = text.trim_ascii_start();
     if head.is_empty() {

@@ -26,7 +26,6 @@ use crate::error::{Error, Errors};
 use crate::kb;
 use crate::triples::Document;
 
-/// Name of the catalog that Protégé writes.
 const CATALOG: &str = "catalog-v001.xml";
 
 /// Maximum depth of the subdirectories of the given directories that are searched for imports.
@@ -41,7 +40,6 @@ const HEAD_BYTES: usize = 1 << 16;
 
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Resolution {
-    /// A document that has already been read.
     Loaded,
     File(PathBuf),
     /// An embedded document: its name for messages, and its text.
@@ -50,7 +48,6 @@ pub(crate) enum Resolution {
 
 pub(crate) struct Resolver {
     catalogs: Vec<horned_catalog::Catalog>,
-    /// Ontology files under the given directories; collected on first use.
     files: OnceCell<Vec<OntologyFile>>,
     directories: Vec<PathBuf>,
 }
@@ -61,7 +58,6 @@ struct OntologyFile {
 }
 
 impl Resolver {
-    /// Creates a resolver and reads the catalogs of `options`.
     pub(crate) fn new(options: &ReadOptions) -> Result<Self, Errors> {
         let (mut catalogs, mut errors) = (Vec::new(), Vec::new());
         for file in &options.catalogs {
@@ -161,7 +157,6 @@ fn checked_out(import: &str, importer: &Path) -> Option<PathBuf> {
     None
 }
 
-/// Returns `true` if two ontology IRIs are equal, apart from a final `#` or `/`.
 fn same_iri(left: &str, right: &str) -> bool {
     left.trim_end_matches(['#', '/']) == right.trim_end_matches(['#', '/'])
 }
@@ -210,7 +205,6 @@ fn candidates(directory: &Path, depth: usize) -> Vec<OntologyFile> {
     files
 }
 
-/// Returns the ontology IRI that the start of a file declares, if there is one.
 fn declared_iri(path: &Path) -> Option<String> {
     use std::io::Read;
     if !path.is_file() {

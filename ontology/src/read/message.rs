@@ -1,6 +1,5 @@
 //! Messages of parsers.
 
-/// Maximum length of a parser's message, in characters.
 const MAX_MESSAGE_CHARS: usize = 300;
 
 /// Truncates a message: parsers quote the unreadable text, which may be the whole document.

@@ -132,7 +132,6 @@ fn source(document: &Document) -> Source {
     }
 }
 
-/// Reads the roots and their imports, in breadth-first order.
 fn closure(
     mut pending: VecDeque<Pending>,
     options: &ReadOptions,
@@ -235,7 +234,6 @@ fn load(
     Ok(visited.text(text, path.as_deref()).map(|text| (document, path, text)))
 }
 
-/// Returns a warning if another document declares the same ontology and version.
 fn duplicate_ontology(document: &Document, documents: &[Document]) -> Option<Warning> {
     let iri: &Iri = document.iri.as_ref()?;
     let first = documents

@@ -8,7 +8,6 @@ use crate::error::{Error, Errors, Position};
 use crate::horned;
 use crate::normalize::depth::MAX_NESTING;
 
-/// A document in OWL/XML or functional-style syntax.
 pub(super) struct Structural<'a> {
     pub name: &'a str,
     pub text: &'a [u8],

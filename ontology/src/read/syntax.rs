@@ -45,7 +45,6 @@ impl Syntax {
     }
 }
 
-/// Skips white space and `#` comments at the start of a text.
 fn skip_comments(mut text: &[u8]) -> &[u8] {
     loop {
         text = text.trim_ascii_start();
@@ -141,7 +140,6 @@ pub(super) fn mismatched_tag(text: &[u8], max_depth: usize) -> Result<Option<usi
     Ok((!open.is_empty()).then_some(text.len()))
 }
 
-/// A rewritten document, with a map from its offsets to offsets in the original text.
 #[derive(Debug)]
 pub(super) struct Flattened<'a> {
     pub text: Cow<'a, [u8]>,
@@ -155,7 +153,6 @@ impl<'a> Flattened<'a> {
         Self { text: Cow::Borrowed(text), offsets: Vec::new() }
     }
 
-    /// Converts an offset in the rewritten text to the offset in the original text.
     pub(super) fn origin(&self, offset: usize) -> usize {
         let after = self.offsets.partition_point(|&(rewritten, _)| rewritten <= offset);
         let (rewritten, original) = after.checked_sub(1).map_or((0, 0), |last| self.offsets[last]);
@@ -209,7 +206,6 @@ fn next_markup(text: &[u8], from: usize) -> Option<(usize, Option<usize>)> {
     Some((start, length.map(|length| start + skip + length + end.len())))
 }
 
-/// Returns the offset of a tag's `>` outside of quotes.
 fn end_of_tag(tag: &[u8]) -> Option<usize> {
     let mut quote = None;
     tag.iter().position(|&byte| {

@@ -12,9 +12,7 @@ use super::file::regular_file;
 
 #[derive(Clone, Debug)]
 pub(super) enum Text {
-    /// The text is in a file.
     File(PathBuf),
-    /// The text is only in memory.
     Memory(Arc<Vec<u8>>),
 }
 
@@ -31,13 +29,11 @@ impl Text {
     }
 }
 
-/// Files and texts that have been read.
 #[derive(Default)]
 pub(super) struct Visited {
     /// Canonical paths of the files.
     pub paths: HashSet<PathBuf>,
     hash: RandomState,
-    /// Texts by hash, to compare only texts with equal hashes.
     texts: HashMap<u64, Vec<Text>>,
 }
 

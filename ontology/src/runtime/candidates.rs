@@ -119,7 +119,6 @@ impl Runtime {
         Ok(designs.into_iter().map(|design| self.individual(design)).collect())
     }
 
-    /// Returns the designs that solve any of the functions, sorted by IRI.
     fn designs_of(&self, facts: Facts, functions: &[Symbol]) -> Vec<Symbol> {
         let mut designs: Vec<Symbol> =
             functions.iter().flat_map(|&function| facts.subjects(function, terms::SOLVES_F)).collect();
@@ -128,7 +127,6 @@ impl Runtime {
         designs
     }
 
-    /// Returns a design's estimation of the attribute type with this local name, if there is one.
     fn estimation(&self, design: Symbol, attribute: &str) -> Option<BigRational> {
         let facts = self.facts();
         let is_of = |value: &Symbol| {
@@ -201,8 +199,8 @@ impl Runtime {
         copy.error_status(&name)
     }
 
-    /// Ends a cycle of the adaptation loop (see [`Runtime::conclude`]) and returns the first status of an
-    /// objective, or `None` if the objective is not in error.
+    /// Ends a cycle of the adaptation loop (see [`Runtime::conclude`]). Returns the first of the objective's
+    /// statuses if the objective is in error, and otherwise `None`.
     fn error_status(&mut self, objective: &str) -> Result<Option<String>, Error> {
         self.conclude()?;
         let objective_state = self.objectives().into_iter().find(|state| state.individual.iri == objective);
@@ -227,7 +225,6 @@ fn rejections(facts: Facts, design: Symbol, objective: Symbol) -> Vec<Rejection>
     rejections
 }
 
-/// Returns the reason why an estimation excludes its design; `None` if it does not.
 fn violation(facts: Facts, estimation: Symbol) -> Option<Rejection> {
     let &kind = facts.objects(estimation, terms::IS_TYPE).first()?;
     let operator = facts.texts(kind, terms::OPERATOR).pop()?;

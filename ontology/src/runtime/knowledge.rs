@@ -197,7 +197,6 @@ impl Runtime {
         Facts::stated(&self.engine, self.mode == Mode::Latch)
     }
 
-    /// Returns all facts that hold.
     pub(super) fn all_facts(&self) -> Facts<'_> {
         Facts::new(&self.engine)
     }
@@ -206,7 +205,6 @@ impl Runtime {
         Individual::new(self.facts().name(symbol).unwrap_or_default())
     }
 
-    /// Returns the asserted facts with values of a property of `subject`.
     pub(super) fn statements(&self, subject: Symbol, property: Term) -> Vec<Fact> {
         let mut facts = Vec::new();
         for predicate in property.iter().filter_map(|name| self.engine.symbols().find_name(name)) {
@@ -215,7 +213,6 @@ impl Runtime {
         facts
     }
 
-    /// Returns all assertions that mention an individual.
     pub(super) fn mentions(&self, individual: Symbol) -> Vec<Fact> {
         let mut mentions = Vec::new();
         for &(predicate, arity) in &self.relations {

@@ -9,7 +9,6 @@ use crate::tomasys::change::{self, is_recovered};
 use crate::tomasys::terms::{self, term_for};
 use crate::vocab::{local_name, tomasys};
 
-/// Status of an objective without a selected design.
 const UNGROUNDED: &str = "UNGROUNDED";
 
 /// An objective to add.
@@ -103,7 +102,6 @@ impl Runtime {
         self.ground_and_withdraw(objective, design, Vec::new()).map(|(_, delta)| delta)
     }
 
-    /// Grounds an objective and deletes the facts `withdrawn` in the same update.
     fn ground_and_withdraw(
         &mut self,
         objective: &str,
@@ -191,7 +189,6 @@ impl Runtime {
         self.apply(Delta { insert, delete: Vec::new() })
     }
 
-    /// Returns the stated status facts of the components that have recovered.
     fn recoveries(&self) -> Vec<Fact> {
         let facts = self.facts();
         let recovered =

@@ -172,7 +172,6 @@ pub(crate) fn holders(facts: Facts, kind: Symbol) -> Vec<Symbol> {
     holders
 }
 
-/// Returns the groundings whose design has an estimation of an attribute type.
 fn groundings(facts: Facts, kind: Symbol) -> Vec<Symbol> {
     let values = facts.subjects(kind, terms::IS_TYPE).into_iter();
     let designs = values.flat_map(|value| facts.subjects(value, terms::HAS_ESTIMATION));

@@ -32,7 +32,6 @@ fn iri(facts: Facts, symbol: Symbol) -> String {
     facts.name(symbol).unwrap_or_default().to_owned()
 }
 
-/// Reports designs without a function and functions without a design.
 fn functions(facts: Facts) -> Vec<Warning> {
     let mut warnings = Vec::new();
     for design in facts.members(terms::FUNCTION_DESIGN) {
@@ -123,7 +122,6 @@ fn any_differ(axioms: &[AnnotatedAxiom]) -> bool {
         .any(|(index, first)| values[index + 1..].iter().any(|second| first.differs(second)))
 }
 
-/// Returns the property of a functionality axiom; `None` for other axioms.
 fn functional(annotated: &AnnotatedAxiom) -> Option<&Iri> {
     match &annotated.axiom {
         Axiom::FunctionalDataProperty(property)
@@ -134,7 +132,6 @@ fn functional(annotated: &AnnotatedAxiom) -> Option<&Iri> {
     }
 }
 
-/// Returns property and subject of a property assertion; `None` for other axioms.
 fn edge(annotated: &AnnotatedAxiom) -> Option<(&Iri, &Iri)> {
     match &annotated.axiom {
         Axiom::ObjectPropertyAssertion(Property::Property(property), subject, _)
@@ -143,7 +140,6 @@ fn edge(annotated: &AnnotatedAxiom) -> Option<(&Iri, &Iri)> {
     }
 }
 
-/// Returns the value of a property assertion in N-Triples syntax; `None` for other axioms.
 fn object(annotated: &AnnotatedAxiom) -> Option<String> {
     match &annotated.axiom {
         Axiom::ObjectPropertyAssertion(_, _, to) => Some(format!("<{to}>")),
@@ -156,7 +152,6 @@ fn value(literal: &Literal) -> Value {
     Value::parse(&literal.lexical, literal.datatype.as_deref(), literal.language.as_deref())
 }
 
-/// Returns the kind of a status value, for messages.
 fn kind(value: &Value) -> &'static str {
     match value {
         Value::Boolean(_) => "a boolean",
@@ -165,9 +160,9 @@ fn kind(value: &Value) -> &'static str {
     }
 }
 
-/// Reports asserted status values of an unexpected kind (boolean, number or string). The expected kind
-/// is given by the ranges of the property or, without a range, by the literals in the atoms of the property
-/// in rule bodies.
+/// Reports asserted status values of an unexpected kind (boolean, number or string). The expected kind is
+/// given by the ranges of the property or, without a range, by the literals in the atoms of the property in
+/// rule bodies. A property for which these give no kind or several kinds is not checked.
 fn statuses(ontology: &Ontology) -> Vec<Warning> {
     let properties =
         [terms::STATUS, terms::OBJECTIVE_STATUS, terms::GROUNDING_STATUS, terms::REALISABILITY].concat();
@@ -196,7 +191,6 @@ fn statuses(ontology: &Ontology) -> Vec<Warning> {
     warnings
 }
 
-/// Returns the kinds of values (boolean, string or number) that the ranges of a property allow.
 fn kinds_of_ranges(ontology: &Ontology, property: &str) -> BTreeSet<&'static str> {
     let mut kinds = BTreeSet::new();
     for annotated in &ontology.axioms {

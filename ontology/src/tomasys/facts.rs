@@ -12,12 +12,10 @@ use crate::vocab::local_name;
 #[derive(Clone, Copy)]
 pub(crate) struct Facts<'a> {
     engine: &'a Engine,
-    /// Whether only asserted facts count.
     only_stated: bool,
 }
 
 impl<'a> Facts<'a> {
-    /// Creates a view that answers queries from all facts that hold, stated or derived.
     pub(crate) fn new(engine: &'a Engine) -> Self {
         Self { engine, only_stated: false }
     }
@@ -48,17 +46,14 @@ impl<'a> Facts<'a> {
         symbols
     }
 
-    /// Returns the members of a class.
     pub(crate) fn members(self, class: Term) -> Vec<Symbol> {
         self.column(class, &[None], 0)
     }
 
-    /// Returns the values of a property of `subject`.
     pub(crate) fn objects(self, subject: Symbol, property: Term) -> Vec<Symbol> {
         self.column(property, &[Some(subject), None], 1)
     }
 
-    /// Returns the subjects for which `object` is a value of the property.
     pub(crate) fn subjects(self, object: Symbol, property: Term) -> Vec<Symbol> {
         self.column(property, &[None, Some(object)], 0)
     }
@@ -85,7 +80,6 @@ impl<'a> Facts<'a> {
         }
     }
 
-    /// Returns the lexical forms of the values of a property, sorted.
     pub(crate) fn texts(self, subject: Symbol, property: Term) -> Vec<String> {
         let mut texts: Vec<_> = self.literals(subject, property).into_iter().map(Literal::lexical).collect();
         texts.sort();

@@ -121,7 +121,6 @@ type Edges = Rc<HashMap<Symbol, Vec<Symbol>>>;
 #[derive(Debug)]
 pub struct View<'a> {
     engine: &'a Engine,
-    /// Names that replace the local names of individuals.
     called: Option<&'a CalledNames>,
     /// Cache of property values, by the IRI of the property and the direction (`true` from values to
     /// subjects).
@@ -307,7 +306,6 @@ impl<'a> View<'a> {
         sorted(self.related(iri, term, true).into_iter().filter_map(|symbol| self.individual(symbol)))
     }
 
-    /// Returns the literal values of a property of a subject, sorted by text.
     fn literals(&self, iri: &str, term: Term) -> Vec<&'a Literal> {
         let symbols = self.engine.symbols();
         let values = self.related(iri, term, false).into_iter();

@@ -59,7 +59,6 @@ fn has_form(axiom: &Axiom) -> bool {
     member_count > 1
 }
 
-/// Returns the annotations of an annotation as text, each with a trailing space.
 fn annotations_of(ontology: &Ontology, subject: &Iri, entry: &Annotation) -> String {
     let sorted = &ontology.annotation_annotations;
     let start = sorted

@@ -6,7 +6,6 @@ use ontology::runtime::Runtime;
 use serde_json::Value;
 use test_resources::{data, data_directory};
 
-/// Returns the directory of the real knowledge bases, which need not exist.
 pub fn real_directory() -> PathBuf {
     data_directory().join("real/owl")
 }

@@ -31,7 +31,6 @@ fn processor_time() -> Duration {
     Duration::from_nanos(nanoseconds.expect("nanoseconds on the processor"))
 }
 
-/// Resident memory of the process and its peak, as reported by the kernel.
 fn resident() -> String {
     let status = std::fs::read_to_string("/proc/self/status").expect("Linux");
     status

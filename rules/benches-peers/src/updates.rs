@@ -15,7 +15,6 @@ const RULES: &str = r#"
     solvesO(?fg, ?o) ^ fg_status(?fg, "IN_ERROR_COMPONENT") -> o_status(?o, "IN_ERROR_COMPONENT") .
 "#;
 
-/// Builds an engine with the given number of designs and three facts per design.
 pub fn build(designs: u32) -> Engine {
     let mut symbols = Symbols::new();
     let program = parse_rules(RULES, "status", &mut symbols, &Prefixes::new()).expect("rules");
@@ -32,7 +31,6 @@ pub fn build(designs: u32) -> Engine {
     Engine::new(symbols, program, facts).expect("safe rules")
 }
 
-/// Returns the median wall-clock time of one update of the engine.
 pub fn engine(designs: u32) -> Duration {
     let mut engine = build(designs);
     let symbols = engine.symbols_mut();

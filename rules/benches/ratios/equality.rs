@@ -80,14 +80,12 @@ fn measure(names: usize, representatives: bool) -> ([f64; 3], usize) {
     ([median(builds), median(deletes), median(inserts)], count)
 }
 
-/// Wall-clock time of a function in seconds, and its result.
 fn clocked<T>(run: impl FnOnce() -> T) -> (f64, T) {
     let start = Instant::now();
     let result = run();
     (start.elapsed().as_secs_f64(), result)
 }
 
-/// Prints the times with representatives and with rules, for classes of several sizes.
 pub(crate) fn compare() {
     println!("2,000 names in classes: representatives beside rules");
     for names in [2, 10, 100] {

@@ -18,24 +18,20 @@ use metaplan_rules::{Engine, Fact, Prefixes, Program, Symbols, parse_rules};
 pub(crate) struct Random(u64);
 
 impl Random {
-    /// A number below the bound.
     pub(crate) fn below(&mut self, bound: u64) -> u64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 33) % bound
     }
 }
 
-/// Input of an engine: symbols, rules and stated facts.
 pub(crate) type Task = (Symbols, Program, Vec<Fact>);
 
-/// Processor time of this thread.
 pub(crate) fn processor_time() -> Duration {
     let statistics = std::fs::read_to_string("/proc/thread-self/schedstat").expect("Linux");
     let nanoseconds = statistics.split(' ').next().and_then(|field| field.parse().ok());
     Duration::from_nanos(nanoseconds.expect("nanoseconds on the processor"))
 }
 
-/// Median of several times, in seconds.
 pub(crate) fn median(mut times: Vec<f64>) -> f64 {
     times.sort_by(f64::total_cmp);
     times[times.len() / 2]

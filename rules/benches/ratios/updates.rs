@@ -27,7 +27,6 @@ fn update(designs: u64) -> (f64, usize, usize) {
     (median(times), changed, stated)
 }
 
-/// Prints the time of an update in a small and in a large knowledge base, and the ratio of the two times.
 pub(crate) fn compare() {
     let ((small, changed, small_size), (large, large_changed, large_size)) = (update(70), update(72_000));
     assert_eq!(changed, large_changed);

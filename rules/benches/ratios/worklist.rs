@@ -84,7 +84,6 @@ impl Index {
     }
 }
 
-/// A binary relation, with indexes on the columns that rules look up.
 #[derive(Default)]
 struct Pairs {
     members: FxHashSet<(Symbol, Symbol)>,

@@ -37,7 +37,8 @@ impl BuiltIn {
         }
     }
 
-    /// Returns `true` if a test holds. For a function, returns `true` if the first argument is its result.
+    /// Returns `true` if a test holds. For a function, returns `true` if the first argument is its result;
+    /// for `tokenize`, if the first argument is one of its results.
     pub fn holds(self, arguments: &[&Literal]) -> bool {
         match (self, arguments) {
             (Self::Tokenize, [token, rest @ ..]) => pattern::tokens(rest).iter().any(|other| other == *token),

@@ -13,7 +13,6 @@ use crate::literal::{Decimal, Literal, ten_to};
 /// rounding decimals (larger numbers count as this one).
 const MAX_EXPONENT: u32 = 1000;
 
-/// Numbers that are promoted to a common type.
 enum Numbers {
     Exact(Vec<BigRational>),
     Float(Vec<f64>),

@@ -12,7 +12,6 @@ use regex::{Regex, RegexBuilder};
 use super::text::as_text;
 use crate::literal::Literal;
 
-/// Maximum compiled size of a pattern, in bytes.
 const SIZE_LIMIT: usize = 1 << 20;
 
 /// Returns `true` if the first argument contains a match of the second, a regular expression. The third
@@ -151,7 +150,6 @@ fn translate(pattern: &str) -> Result<String, String> {
     Ok(translated)
 }
 
-/// Translates a replacement text of `XPath` to the syntax of the `regex` crate; `None` if it is invalid.
 fn expand(replacement: &str) -> Option<String> {
     let mut expanded = String::new();
     let mut characters = replacement.chars();

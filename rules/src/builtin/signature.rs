@@ -219,7 +219,6 @@ built_ins! {
     SubtractDateTimesYieldingDayTimeDuration "subtractDateTimesYieldingDayTimeDuration" 3..=3 Function,
 }
 
-/// Local names of the built-ins of `swrlb` on lists, which the engine rejects.
 const LIST_BUILT_INS: [&str; 9] = [
     "empty",
     "first",

@@ -22,7 +22,6 @@ impl BuiltIn {
     }
 }
 
-/// Returns the part of an IRI after `#`, or the whole name if it has no `#`.
 fn local(iri: &str) -> &str {
     iri.rsplit_once('#').map_or(iri, |(_, local)| local)
 }

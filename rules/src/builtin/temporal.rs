@@ -8,7 +8,6 @@ use num_traits::{ToPrimitive, Zero};
 use super::signature::BuiltIn;
 use crate::literal::{Decimal, Duration, Literal, Moment, MomentKind, XSD};
 
-/// Returns the value of a temporal function; `None` for other functions and unsuitable arguments.
 pub(super) fn compute(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Literal> {
     use BuiltIn as B;
     match built_in {
@@ -25,7 +24,6 @@ pub(super) fn compute(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Liter
     }
 }
 
-/// Composes a duration, date or time from its parts: builds the lexical form and parses it.
 fn construct(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Literal> {
     let mut texts: Vec<String> = arguments.iter().map(|argument| argument.lexical()).collect();
     let is_duration = matches!(built_in, BuiltIn::YearMonthDuration | BuiltIn::DayTimeDuration);
@@ -58,8 +56,8 @@ fn construct(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Literal> {
     (!literal.is_ill_typed()).then_some(literal)
 }
 
-/// Returns the common sign of all parts of a duration, and removes it from their texts. `None` if the signs
-/// differ.
+/// Returns the common sign of all parts of a duration (zero has either sign), and removes it from their
+/// texts. `None` if the signs differ or a part is not a number.
 fn common_sign(arguments: &[&Literal], texts: &mut [String]) -> Option<&'static str> {
     let zero = BigRational::zero();
     let numbers = arguments.iter().map(|argument| argument.as_rational()).collect::<Option<Vec<_>>>()?;
@@ -80,7 +78,6 @@ fn is_seconds(duration: &Duration) -> bool {
     duration.months() == 0
 }
 
-/// Returns the sum or difference of two durations, both in months or both in seconds.
 fn durations(built_in: BuiltIn, left: &Duration, right: &Duration) -> Option<Literal> {
     use BuiltIn as B;
     let months = is_months(left) && is_months(right);
@@ -120,7 +117,7 @@ fn scaled(built_in: BuiltIn, duration: &Duration, factor: &BigRational) -> Optio
 }
 
 /// Returns a moment plus or minus a duration; `None` if the built-in is for another kind of moment or
-/// duration.
+/// duration, or if [`Moment::later`] has no result.
 fn shifted(built_in: BuiltIn, moment: &Moment, duration: &Duration) -> Option<Literal> {
     use BuiltIn as B;
     let (kind, months, forward) = match built_in {

@@ -3,7 +3,6 @@
 use super::signature::BuiltIn;
 use crate::literal::Literal;
 
-/// Returns `true` if a string test holds.
 pub(super) fn test(built_in: BuiltIn, left: &Literal, right: &Literal) -> bool {
     let (Some(left), Some(right)) = (as_text(left), as_text(right)) else { return false };
     match built_in {
@@ -16,7 +15,6 @@ pub(super) fn test(built_in: BuiltIn, left: &Literal, right: &Literal) -> bool {
     }
 }
 
-/// Returns the value of a string function; `None` for other functions and unsuitable arguments.
 pub(super) fn compute(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Literal> {
     if built_in == BuiltIn::StringConcat {
         return Some(Literal::String(arguments.iter().map(|a| a.lexical()).collect::<String>().into()));

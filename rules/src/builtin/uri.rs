@@ -8,7 +8,6 @@ use super::signature::BuiltIn;
 use super::text::as_text;
 use crate::literal::Literal;
 
-/// Returns the value of a URI function; `None` for other functions and invalid URIs.
 pub(super) fn compute(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Literal> {
     let text = match (built_in, arguments) {
         (BuiltIn::ResolveUri, [reference, base]) => {

@@ -22,7 +22,6 @@ pub(super) type Step = DerivationStep;
 /// Number of an edge (recorded equality of two names), in the order of creation.
 pub(super) type EdgeId = u32;
 
-/// A stated or derived equality of two names, with its premises.
 #[derive(Clone, Debug)]
 pub(super) struct Edge {
     pub left: Symbol,
@@ -43,7 +42,6 @@ pub(super) struct Classes {
     members: FxHashMap<Symbol, Arc<[Symbol]>>,
     pub edges: FxHashMap<EdgeId, Edge>,
     next: EdgeId,
-    /// Maps each name to its edges.
     edges_at: FxHashMap<Symbol, Vec<EdgeId>>,
     by_fact: FxHashMap<Fact, Vec<EdgeId>>,
     by_edge: FxHashMap<EdgeId, Vec<EdgeId>>,
@@ -65,7 +63,6 @@ impl Classes {
         Fact::new(fact.predicate, fact.arguments.iter().map(|&name| self.find(name)))
     }
 
-    /// Returns the names in the class of a name, in ascending order.
     pub fn class(&self, name: Symbol) -> Arc<[Symbol]> {
         self.members(self.find(name)).map_or_else(|| Arc::from([name]), Arc::clone)
     }
@@ -193,7 +190,6 @@ impl Classes {
         path
     }
 
-    /// Returns the number of the next edge.
     pub fn next_edge_id(&self) -> EdgeId {
         self.next
     }

@@ -76,10 +76,8 @@ impl Program {
     }
 }
 
-/// Equality classes of names, and the stated facts about the names.
 #[derive(Clone, Debug)]
 pub(crate) struct Equality {
-    /// Symbol of `owl:sameAs`, the relation of stated and derived equalities.
     same_as: Symbol,
     classes: Classes,
     /// Maps each row to the stated facts that it represents, unless these are just the row itself.
@@ -88,7 +86,6 @@ pub(crate) struct Equality {
     pairs: FxHashMap<Symbol, BTreeSet<Fact>>,
     /// Rules with representatives as constants, in the order of the engine's rules.
     pub program: Arc<Program>,
-    /// Names and literals that the rules mention.
     constants: FxHashSet<Symbol>,
 }
 
@@ -122,12 +119,10 @@ impl Equality {
         row.predicate == self.same_as && row.arguments.len() == 2 && row.arguments[0] == row.arguments[1]
     }
 
-    /// Returns the fact with all names replaced by their representatives.
     pub fn normal(&self, fact: &Fact) -> Fact {
         self.classes.normal(fact)
     }
 
-    /// Returns the names in a representative's class; `None` for a class of one name.
     fn names(&self, representative: Symbol) -> Option<&[Symbol]> {
         self.classes.members(representative).map(|members| &**members)
     }
@@ -147,7 +142,6 @@ impl Equality {
     }
 }
 
-/// Returns the names and literals that the rules mention.
 fn constants(program: &Program) -> impl Iterator<Item = Symbol> {
     let atoms = program.rules.iter().flat_map(|rule| rule.head.iter().chain(&rule.body));
     atoms.flat_map(Atom::terms).filter_map(|term| match term {
@@ -157,7 +151,6 @@ fn constants(program: &Program) -> impl Iterator<Item = Symbol> {
 }
 
 impl Atom {
-    /// Returns the atom with a function applied to all terms.
     fn map(&self, term: &impl Fn(Term) -> Term) -> Self {
         let map_terms = |terms: &[Term]| terms.iter().copied().map(term).collect();
         match self {

@@ -35,7 +35,7 @@ pub(super) fn edge_of(engine: &Engine, equality: &Equality, pair: &Fact) -> Edge
     Edge { left: pair.arguments[0], right: pair.arguments[1], facts, edges: edges.collect(), proof }
 }
 
-/// Reason of a fact whose supports are indices into `steps`.
+/// A reason of a fact; the supports in the reason are indices into `steps`.
 #[derive(Clone)]
 struct Ground<'a> {
     reason: &'a Reason,
@@ -146,7 +146,6 @@ impl Equality {
             }
             facts.push(fact);
         }
-        // Keeps the first occurrence of each fact.
         let mut unique = rustc_hash::FxHashSet::default();
         facts.retain(|fact| unique.insert(fact.clone()));
         facts
@@ -176,7 +175,6 @@ fn rebased(ground: &Ground, mut position: impl FnMut(&Fact) -> usize) -> Reason 
     }
 }
 
-/// Builds a derivation from the derivations that the engine has recorded.
 struct Builder<'a> {
     engine: &'a Engine,
     equality: &'a Equality,
@@ -189,7 +187,6 @@ impl<'a> Builder<'a> {
         Self { engine, equality, positions: FxHashMap::default(), queue: Vec::new() }
     }
 
-    /// Returns the index of a fact among the steps. Queues the fact on its first occurrence.
     fn position(&mut self, fact: &Fact) -> usize {
         let queue = &mut self.queue;
         *self.positions.entry(fact.clone()).or_insert_with(|| {
@@ -234,7 +231,6 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Explains an `owl:sameAs` pair by a path of edges between its names.
     fn pair(&mut self, pair: &Fact) -> Reason {
         let (classes, same_as) = (&self.equality.classes, self.equality.same_as);
         let (from, mut to) = (pair.arguments[0], pair.arguments[1]);

@@ -18,7 +18,6 @@ use crate::rule::{Program, Rule};
 use crate::store::{Record, state};
 use crate::symbol::Symbol;
 
-/// An update of an engine with equality, in progress.
 struct Update<'e> {
     engine: &'e mut Engine,
     equality: Equality,
@@ -132,8 +131,6 @@ impl<'e> Update<'e> {
         }
     }
 
-    /// Applies a change of the stated facts and returns the net change of the facts that hold. An error
-    /// comes with the delta that restores the stated facts.
     fn apply(&mut self, delta: &Delta) -> Result<Delta, (Error, Delta)> {
         // A fact in both lists remains stated.
         let inserted: FxHashSet<&Fact> = delta.insert.iter().collect();
@@ -228,7 +225,8 @@ impl<'e> Update<'e> {
         }
     }
 
-    /// Returns the rows of the store with the argument `name`, which is the representative of a class.
+    /// Returns the rows of the store with the argument `name`, the representative of a class, except rows of
+    /// constraints and aggregates. Creates the indexes that the look-up needs.
     fn mentions(&mut self, name: Symbol) -> Vec<Fact> {
         let mut rows = Vec::new();
         for relation in &mut self.engine.store.relations {
@@ -251,8 +249,9 @@ impl<'e> Update<'e> {
         rows
     }
 
-    /// Saves the class of `representative`, and the facts about its names, before the class changes.
-    /// Does nothing more if this update has saved the class already.
+    /// Saves the class of `representative` before the class changes and, unless the update is silent, the
+    /// facts about its names. Each class is saved only once per update. In any case, records whether a rule
+    /// mentions a name of the class.
     fn record_class(&mut self, representative: Symbol) {
         let class = self.equality.classes.class(representative);
         self.rules_changed |= class.iter().any(|name| self.equality.constants.contains(name));
@@ -276,7 +275,6 @@ impl<'e> Update<'e> {
         }
     }
 
-    /// Returns the facts that a row represented before this update.
     fn facts_before(&self, row: &Fact) -> Vec<Fact> {
         let names = |symbol| match self.old_classes.get(&symbol) {
             Some(class) if class.len() > 1 => Some(&**class),
@@ -334,7 +332,6 @@ impl<'e> Update<'e> {
         }
     }
 
-    /// Marks the `owl:sameAs` pair of a name with itself as changed.
     fn touch_reflexive(&mut self, name: Symbol) {
         let row = Fact::new(self.equality.same_as, [name, name]);
         self.originals(&row);

@@ -34,7 +34,6 @@ impl Equality {
         }
     }
 
-    /// Returns all stated facts.
     pub fn stated(&self, engine: &Engine) -> Vec<Fact> {
         // A stated `owl:sameAs` pair is stored under both of its names; the filter selects it once.
         let pairs = self

@@ -2,7 +2,6 @@
 
 use super::temporal::{split_zone, zone_text};
 
-/// Decodes pairs of hexadecimal digits. Returns `None` for invalid text.
 pub(super) fn parse_hexadecimal(text: &str) -> Option<Box<[u8]>> {
     let digit = |byte: u8| char::from(byte).to_digit(16);
     let pairs = text.as_bytes().chunks(2);
@@ -13,7 +12,6 @@ pub(super) fn parse_hexadecimal(text: &str) -> Option<Box<[u8]>> {
     pairs.map(byte).collect()
 }
 
-/// Encodes bytes in the canonical form: upper case.
 pub(super) fn hexadecimal(bytes: &[u8]) -> String {
     let digit = |half: u8| char::from(b"0123456789ABCDEF"[usize::from(half)]);
     bytes.iter().flat_map(|byte| [digit(byte >> 4), digit(byte & 15)]).collect()
@@ -42,7 +40,6 @@ pub(super) fn parse_base64(text: &str) -> Option<Box<[u8]>> {
     unused.iter().all(|byte| *byte == 0).then(|| bytes.into())
 }
 
-/// Encodes bytes in the canonical form: no white space.
 pub(super) fn base64(bytes: &[u8]) -> String {
     let mut text = String::new();
     for three in bytes.chunks(3) {
@@ -93,7 +90,6 @@ pub(super) fn recurring(text: &str, local: &str) -> Option<(Box<str>, &'static s
     valid.then(|| (format!("{body}{zone}").into(), local))
 }
 
-/// Returns the IRI of a datatype of recurring dates, given by its local name.
 pub(super) fn recurring_datatype(local: &str) -> &'static str {
     match local {
         "gYear" => "http://www.w3.org/2001/XMLSchema#gYear",

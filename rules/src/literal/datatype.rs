@@ -1,6 +1,5 @@
 //! IRIs of the datatypes of XSD, RDF, RDFS and OWL, and the bounds of the integer types.
 
-/// Namespace of the XML Schema datatypes.
 pub(crate) const XSD: &str = "http://www.w3.org/2001/XMLSchema#";
 pub(super) const RDFS_LITERAL: &str = "http://www.w3.org/2000/01/rdf-schema#Literal";
 pub(super) const OWL_REAL: &str = "http://www.w3.org/2002/07/owl#real";
@@ -16,8 +15,8 @@ pub(crate) fn is_datatype(iri: &str) -> bool {
     iri.starts_with(XSD) || [RDFS_LITERAL, OWL_REAL, OWL_RATIONAL].contains(&iri) || rdf(iri)
 }
 
-/// Returns the inclusive bounds of an integer type of XSD, given by its local name; `None` for other
-/// types.
+/// Returns the inclusive bounds of an integer type of XSD, given by its local name; a bound of `None` is no
+/// limit. Returns `None` for other types.
 pub(super) fn integer_range(local: &str) -> Option<(Option<i128>, Option<i128>)> {
     Some(match local {
         "integer" => (None, None),

@@ -141,7 +141,6 @@ impl Decimal {
     }
 }
 
-/// Computes the exact sum.
 impl<'a> std::iter::Sum<&'a Decimal> for Decimal {
     fn sum<I: Iterator<Item = &'a Self>>(values: I) -> Self {
         let (mut sum, mut scale) = (BigInt::zero(), 0);
@@ -200,7 +199,6 @@ impl PartialOrd for Decimal {
     }
 }
 
-/// Formats the shortest form, for example `-0.5` or `12`.
 impl fmt::Display for Decimal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (unscaled, scale) = self.parts();
@@ -220,7 +218,6 @@ pub(super) fn in_range(value: &Decimal, minimum: Option<i128>, maximum: Option<i
     minimum.is_none_or(|m| unscaled >= BigInt::from(m)) && maximum.is_none_or(|m| unscaled <= BigInt::from(m))
 }
 
-/// Returns `10^exponent`.
 pub(crate) fn ten_to(exponent: u32) -> BigInt {
     if exponent == 0 { BigInt::one() } else { power_of_ten(exponent) }
 }
@@ -229,7 +226,6 @@ pub(crate) fn ten_to(exponent: u32) -> BigInt {
 mod tests {
     use super::{BigInt, BigRational, DIVISION_DIGITS, Decimal, power_of_ten};
 
-    /// The fast conversion from rational numbers gives the same representation as the general conversion.
     #[test]
     fn short_conversion_equals_general_conversion() {
         let mut values = vec![(i64::MAX, 1), (i64::MIN, 1), (i64::MAX, 10), (1, i64::MAX), (0, 7), (100, 1)];

@@ -36,13 +36,9 @@ impl Literal {
     }
 }
 
-/// Result of parsing a lexical form.
 pub(super) enum Parsed {
-    /// A valid form.
     Value(Literal),
-    /// A form that is invalid for its datatype.
     IllTyped,
-    /// The datatype is unsupported.
     Unknown,
 }
 
@@ -55,7 +51,6 @@ fn parse_plain_literal(lexical: &str) -> Literal {
     }
 }
 
-/// Parses a lexical form of an XSD datatype, given by its local name.
 pub(super) fn parse_xsd(lexical: &str, local: &str) -> Parsed {
     let collapsed = lexical.trim_matches([' ', '\t', '\n', '\r']);
     let value = match local {

@@ -7,18 +7,14 @@ use super::value::Literal;
 
 const XML_LITERAL: &str = "http://www.w3.org/1999/02/22-rdf-syntax-ns#XMLLiteral";
 
-/// Knowledge about the value of a literal.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
-    /// The value is known.
     Known,
-    /// A rational number that is not a decimal.
     Rational,
     /// XML content. Two different spellings can denote the same value.
     Xml,
     /// A fresh value: it differs from other fresh values, and nothing else is known. See [`Literal::fresh`].
     Fresh,
-    /// The datatype is unsupported.
     Unknown,
 }
 
@@ -94,10 +90,8 @@ impl Literal {
     }
 }
 
-/// Datatype of the values of [`Literal::fresh`].
 const FRESH: &str = "urn:metaplan:fresh";
 
-/// Returns `true` for a supported datatype.
 fn is_known(iri: &str) -> bool {
     match (iri.strip_prefix(XSD), iri.strip_prefix(RDF)) {
         (Some(local), _) => !matches!(parse_xsd("", local), Parsed::Unknown),

@@ -49,7 +49,6 @@ fn local(iri: &str) -> Option<&str> {
     }
 }
 
-/// Returns a datatype and its ancestors in the type hierarchy, all by local name.
 fn upwards(local: &str) -> Vec<&str> {
     let mut ancestors = vec![local];
     while let Some((_, parent)) =

@@ -14,7 +14,6 @@ use super::decimal::{Decimal, ten_to};
 use num_bigint::BigInt;
 use num_traits::Zero;
 
-/// Seconds per day.
 const DAY: i64 = 86_400;
 /// Largest offset of a time zone from UTC, in seconds.
 const ZONE_LIMIT: i64 = 14 * 3600;
@@ -79,10 +78,10 @@ impl Moment {
         &self.seconds
     }
 
-    /// Returns the moment plus a duration, with the same time zone; the calculation is in local time.
-    /// Months are added first; a day that does not exist in the new month becomes its last day. Then
-    /// seconds are added. A time of day wraps around at midnight. A date is rounded down to whole days.
-    /// Returns `None` if months are added to a time, or if the result is out of range.
+    /// Returns the moment plus a duration, with the same time zone; the calculation is in local time. Months
+    /// are added first; a day that does not exist in the new month becomes its last day. Then seconds are
+    /// added. A time of day wraps around at midnight. A date is rounded down to whole days. Returns `None` if
+    /// months are added to a time, or if the year is out of range after the months are added.
     pub(crate) fn later(&self, duration: &Duration) -> Option<Self> {
         let local = self.local();
         let (day, _) = split_day(&local);
@@ -110,7 +109,6 @@ impl Moment {
         Some(Self { kind: self.kind, seconds, zone: self.zone })
     }
 
-    /// Seconds since 1970-01-01T00:00:00 in local time.
     fn local(&self) -> Decimal {
         add_seconds(&self.seconds, self.zone.unwrap_or(0))
     }
@@ -155,7 +153,6 @@ impl Moment {
         Self { zone: self.zone.map(|_| 0), ..self.clone() }
     }
 
-    /// Converts a date to the `dateTime` of its first instant.
     pub(crate) fn as_date_time(&self) -> Self {
         Self { kind: MomentKind::DateTime, ..self.clone() }
     }
@@ -194,7 +191,6 @@ impl PartialOrd for Moment {
     }
 }
 
-/// Formats the canonical lexical form.
 impl fmt::Display for Moment {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (day, clock) = split_day(&self.local());
@@ -253,7 +249,6 @@ impl Duration {
         })
     }
 
-    /// Creates a duration from months and seconds.
     pub(crate) fn new(months: i64, seconds: Decimal) -> Self {
         Self { months, seconds }
     }
@@ -268,8 +263,8 @@ impl Duration {
         &self.seconds
     }
 
-    /// Splits the seconds into days, hours, minutes and seconds, all of one sign. `None` if the days exceed
-    /// the range of `i64`.
+    /// Splits the seconds into days, hours, minutes and seconds, all of one sign. `None` if the whole seconds
+    /// exceed the range of `i64`.
     pub(crate) fn clock(&self) -> Option<(i64, i64, i64, Decimal)> {
         let (unscaled, scale) = self.seconds.parts();
         let unit = ten_to(scale);
@@ -278,7 +273,6 @@ impl Duration {
         Some((whole / DAY, whole % DAY / 3600, whole % 3600 / 60, add_seconds(&fraction, whole % 60)))
     }
 
-    /// Returns the duration with the opposite sign. `None` on overflow.
     pub(crate) fn negated(&self) -> Option<Self> {
         Some(Self { months: self.months.checked_neg()?, seconds: negate(&self.seconds) })
     }
@@ -332,7 +326,7 @@ impl fmt::Display for Duration {
 }
 
 /// Parses a field such as `12H` for the unit `H`. Returns its number and the remaining text, or 0 and the
-/// whole text without such a field.
+/// whole text if there is no field at the start. `None` if the number is missing or too large.
 fn take_field(text: &str, unit: char) -> Option<(i64, &str)> {
     let digits = text.bytes().take_while(u8::is_ascii_digit).count();
     match text[digits..].strip_prefix(unit) {
@@ -384,7 +378,6 @@ pub(super) fn split_zone(lexical: &str) -> Option<(&str, Option<i64>)> {
     (seconds <= ZONE_LIMIT).then_some((body, Some(sign * seconds)))
 }
 
-/// Parses a number of exactly `width` digits.
 fn number(text: &str, width: usize) -> Option<i64> {
     (text.len() == width && text.bytes().all(|b| b.is_ascii_digit())).then(|| text.parse().ok())?
 }

@@ -1,7 +1,6 @@
 //! Datatypes derived from `xsd:string`: treatment of white space, and valid forms (XML Schema Part 2,
 //! section 3.4).
 
-/// Parses a lexical form of the derived datatype with the local name `local`; `None` if it is invalid.
 pub(super) fn parse(lexical: &str, local: &str) -> Option<String> {
     if local == "normalizedString" {
         return Some(lexical.replace(['\t', '\n', '\r'], " "));

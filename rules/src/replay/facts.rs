@@ -5,10 +5,8 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use crate::fact::Fact;
 use crate::symbol::Symbol;
 
-/// A predicate with its number of arguments.
 type Relation = (Symbol, usize);
 
-/// An immutable, indexed set of facts.
 pub(super) struct Facts {
     members: FxHashSet<Fact>,
     by_relation: FxHashMap<Relation, Vec<Fact>>,
@@ -55,7 +53,6 @@ impl Facts {
         }
     }
 
-    /// Returns the number of facts that [`Facts::rows`] returns.
     pub fn count(&self, relation: Relation, place: Option<(usize, Symbol)>) -> usize {
         match place {
             None => self.by_relation.get(&relation).map_or(0, Vec::len),

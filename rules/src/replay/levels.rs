@@ -17,7 +17,6 @@ struct Uses {
     body: Vec<(Relation, usize)>,
 }
 
-/// Checks that a program is stratified.
 pub(super) fn check(program: &Program, same_as: Symbol, different: Symbol) -> Result<(), Fault> {
     let rule_uses: Vec<Uses> =
         program.rules.iter().map(|rule| uses(rule, program.equality, same_as, different)).collect();

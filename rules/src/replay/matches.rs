@@ -27,7 +27,6 @@ pub(super) fn value(term: Term, values: &Values) -> Option<Symbol> {
     }
 }
 
-/// Returns the instance of a relation atom under the values; `None` if a variable is unbound.
 pub(super) fn instance(predicate: Symbol, terms: &[Term], values: &Values) -> Option<Fact> {
     let arguments: Option<Vec<Symbol>> = terms.iter().map(|term| value(*term, values)).collect();
     Some(Fact::new(predicate, arguments?))

@@ -37,9 +37,7 @@ use names::Names;
 
 pub use fault::Fault;
 
-/// Relation of equal names.
 const SAME_AS: &str = "http://www.w3.org/2002/07/owl#sameAs";
-/// Relation of different individuals.
 const DIFFERENT_FROM: &str = "http://www.w3.org/2002/07/owl#differentFrom";
 
 /// Statistics of a successful [`replay`].
@@ -129,7 +127,6 @@ impl Replayer<'_> {
         self.program.equality && fact.predicate == self.same_as && fact.arguments.len() == 2
     }
 
-    /// Checks that each step is stated, or follows from earlier steps.
     fn founded(&mut self, stated: &[Fact], derivation: &Derivation) -> Result<(), Fault> {
         let stated: FxHashSet<&Fact> = stated.iter().collect();
         let mut rules: FxHashMap<&RuleIdentity, Vec<&Rule>> = FxHashMap::default();
@@ -225,8 +222,8 @@ impl Replayer<'_> {
         }
     }
 
-    /// Checks that all stated facts and all conclusions of rules are present. Returns the number of rule
-    /// matches.
+    /// Checks that all stated facts and all conclusions of rules are present, and that no integrity
+    /// constraint is violated. Returns the number of rule matches.
     fn closed(&mut self, stated: &[Fact]) -> Result<usize, Fault> {
         if let Some(fact) =
             stated.iter().find(|fact| !self.matcher.facts.contains(&self.matcher.names.normal(fact)))

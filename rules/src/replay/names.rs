@@ -11,7 +11,6 @@ use crate::symbol::Symbol;
 pub(super) struct Names(FxHashMap<Symbol, Symbol>);
 
 impl Names {
-    /// Returns the first name of the class of a name.
     pub fn find(&self, mut name: Symbol) -> Symbol {
         while let Some(smaller) = self.0.get(&name) {
             name = *smaller;
@@ -28,7 +27,6 @@ impl Names {
         left != right
     }
 
-    /// Returns the fact with all names replaced by first names.
     pub fn normal(&self, fact: &Fact) -> Fact {
         if self.0.is_empty() {
             return fact.clone();

@@ -27,7 +27,6 @@ impl Engine {
     }
 }
 
-/// Returns the positions of all supports of a step, including the matches of aggregates.
 fn supports(reason: &Reason) -> Vec<usize> {
     match reason {
         Reason::Asserted => Vec::new(),

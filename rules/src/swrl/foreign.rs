@@ -5,7 +5,6 @@ use crate::error::Error;
 use crate::rule::{Program, Term};
 use crate::symbol::Symbols;
 
-/// Predicate of an atom that is neither a class nor a property, with its position in the text.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(super) struct ForeignAtom {
     name: String,

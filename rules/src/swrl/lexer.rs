@@ -1,6 +1,5 @@
 //! Lexer: splits rule text into tokens with positions.
 
-/// A token of rule text.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(super) enum Token {
     /// `@prefix`, or `prefix` before a name.
@@ -9,15 +8,10 @@ pub(super) enum Token {
     Iri(String),
     /// `prefix:local`, `:local` or `local`. The prefix is `None` without a colon.
     Name(Option<String>, String),
-    /// A variable `?name`, without the question mark.
     Variable(String),
-    /// A quoted string, unescaped.
     Text(String),
-    /// A language tag `@en`, without the at-sign.
     Language(String),
-    /// A number as written.
     Number(String),
-    /// A rule label `[label]`, without the brackets.
     Label(String),
     Carets,
     Open,
@@ -43,7 +37,6 @@ pub(super) struct Spanned {
     pub column: u32,
 }
 
-/// A lexical error with its position.
 #[derive(Debug)]
 pub(super) struct Fault {
     pub message: String,

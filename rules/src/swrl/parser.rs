@@ -12,7 +12,6 @@ use crate::literal::{Literal, XSD, is_datatype};
 use crate::rule::{Aggregate, Atom, Program, Rule, RuleIdentity, Term, Variable};
 use crate::symbol::{Symbol, Symbols};
 
-/// Namespaces of the built-ins of `SWRLTab` and SQWRL.
 const LIBRARIES: [&str; 2] =
     ["http://swrl.stanford.edu/ontologies/built-ins/", "http://sqwrl.stanford.edu/ontologies/built-ins/"];
 
@@ -157,14 +156,12 @@ impl Parser<'_> {
         token
     }
 
-    /// Consumes a token if it is the next one. Returns `true` on success.
     fn accept(&mut self, token: &Token) -> bool {
         let is_match = self.peek() == token;
         self.cursor += usize::from(is_match);
         is_match
     }
 
-    /// Returns line and column of the next token.
     fn position(&self) -> (u32, u32) {
         let spanned = &self.tokens[self.cursor.min(self.tokens.len() - 1)];
         (spanned.line, spanned.column)
@@ -364,7 +361,6 @@ impl Parser<'_> {
         }
     }
 
-    /// Parses a name or an IRI, and returns the full IRI.
     fn name(&mut self) -> Parsed<String> {
         let (line, column) = self.position();
         let name = match self.peek().clone() {
@@ -447,7 +443,6 @@ impl Parser<'_> {
     }
 }
 
-/// Returns the text of a token for error messages.
 fn describe(token: &Token) -> String {
     match token {
         Token::Prefix => "`@prefix`".into(),

@@ -7,7 +7,6 @@ use metaplan_rules::{
     Aggregate, Atom, BuiltIn, Fact, Literal, Program, Rule, Symbol, Symbols, Term, Variable,
 };
 
-/// Values of the variables of a rule.
 pub type Binding = BTreeMap<Variable, Symbol>;
 
 /// Computes all facts that hold. `level` is the stratum of a predicate. Rules run level by level, so that
@@ -73,13 +72,11 @@ pub fn representatives(symbols: &Symbols, facts: &BTreeSet<Fact>) -> BTreeMap<Sy
         .collect()
 }
 
-/// Replaces the values of a binding by representatives.
 pub fn normal(binding: &Binding, representatives: &BTreeMap<Symbol, Symbol>) -> Binding {
     let find = |symbol| representatives.get(&symbol).copied().unwrap_or(symbol);
     binding.iter().map(|(&variable, &symbol)| (variable, find(symbol))).collect()
 }
 
-/// Returns `true` if a fact is the `owl:sameAs` pair of a symbol with itself.
 pub fn is_reflexive(symbols: &Symbols, fact: &Fact) -> bool {
     symbols.find_name(SAME_AS) == Some(fact.predicate) && fact.arguments[0] == fact.arguments[1]
 }
@@ -122,7 +119,6 @@ fn predicate(atom: &Atom) -> Symbol {
     }
 }
 
-/// Instance of a relation atom or negated atom under a binding of all its variables.
 pub fn ground(atom: &Atom, binding: &Binding) -> Fact {
     Fact::new(predicate(atom), atom.terms().into_iter().map(|term| value(term, binding).expect("bound")))
 }
@@ -140,7 +136,6 @@ pub fn matches(rule: &Rule, symbols: &mut Symbols, facts: &BTreeSet<Fact>) -> BT
     extensions(&rule.body, Binding::new(), symbols, facts)
 }
 
-/// Returns all matches of a conjunction that extend a binding.
 fn extensions(
     body: &[Atom],
     binding: Binding,
@@ -293,7 +288,6 @@ fn bind(term: Term, symbol: Symbol, mut binding: Binding) -> Option<Binding> {
     Some(binding)
 }
 
-/// Returns `true` if a built-in holds for bound arguments.
 pub fn holds(built_in: BuiltIn, arguments: &[Term], binding: &Binding, symbols: &Symbols) -> bool {
     let values: Option<Vec<&Literal>> =
         arguments.iter().map(|&term| literal(term, binding, symbols)).collect();

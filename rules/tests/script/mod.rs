@@ -390,7 +390,6 @@ fn check_replay(engine: &Engine, stated: &BTreeSet<Fact>, facts: &BTreeSet<Fact>
     }
 }
 
-/// Runs a script of changes and compares the engine with naive evaluation after every step.
 pub fn check(rules: &[RawRule], start: &[RawChange], script: &[Vec<RawChange>], equality: bool) {
     let world = World::new(equality);
     let rules = program(rules.iter().enumerate().map(|(at, raw)| world.rule(at, raw)).collect());

@@ -43,7 +43,6 @@ pub fn literal(text: &str) -> Literal {
     symbols.value(fact.arguments[0]).as_literal().expect("a literal").clone()
 }
 
-/// Returns the facts of a violation, on one line.
 pub fn show_violation(engine: &Engine, violation: &Violation) -> String {
     let supports = violation.supports.iter().map(|fact| fact.display(engine.symbols()).to_string());
     supports.collect::<Vec<_>>().join(" and ")

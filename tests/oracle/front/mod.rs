@@ -51,19 +51,16 @@ pub enum Reference {
     Some(Option<BigRational>),
 }
 
-/// An integer as a rational number.
 pub fn whole(value: i64) -> BigRational {
     BigRational::from_integer(value.into())
 }
 
-/// The planner's answer: status, cost of the plan, bound on the cost, and steps.
 #[derive(Debug)]
 struct Answer {
     status: Status,
     cost: Option<BigRational>,
     bound: Option<BigRational>,
     steps: Vec<Step>,
-    /// Whether a limit was reached.
     is_limited: bool,
 }
 
@@ -256,7 +253,6 @@ fn check(sample: &Sample, about: &str, seed: u64, tally: &mut Tally) {
     }
 }
 
-/// Returns the generator of robots' missions, with [`SITUATIONS`] situations per robot.
 fn robots(form: impl Fn(u64) -> Form + 'static) -> Samples {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let mut current: Option<(u64, Robot)> = None;
@@ -292,7 +288,6 @@ fn undefined(seed: u64) -> Sample {
     of_texts(&task.domain(), &task.problem(), false, reference)
 }
 
-/// Returns the generator of a front end, given by name.
 fn samples(front: &str) -> Samples {
     match front {
         "explicit form" => robots(|_| Form::Explicit),

@@ -29,7 +29,6 @@ struct Builder<'r> {
     open: usize,
 }
 
-/// Returns a random arithmetic task.
 pub fn arithmetic(rng: &mut Rng) -> Task {
     let mut builder = Builder::new(rng);
     builder.values();
@@ -109,7 +108,6 @@ impl<'r> Builder<'r> {
         }
     }
 
-    /// Returns a random expression that is linear in the fluents.
     fn linear(&mut self, thing: Option<Term>) -> Expr {
         match self.rng.u32(0..8) {
             0 | 1 => self.fluent(),

@@ -133,7 +133,6 @@ impl Builder<'_> {
         action.start.effects.push(Effect::When(vec![differs], vec![effect]));
     }
 
-    /// Returns an action that performs a task at a place.
     pub fn work(&mut self) -> Action {
         let mut action = self.empty("work".to_owned());
         let names = self.names;
@@ -173,7 +172,6 @@ impl Builder<'_> {
         action
     }
 
-    /// Returns an action that makes a design available.
     pub fn repair(&mut self) -> Action {
         let mut action = self.empty("repair".to_owned());
         let names = self.names;

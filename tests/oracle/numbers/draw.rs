@@ -5,7 +5,6 @@ use num_bigint::BigInt;
 
 use super::model::{Number, Relation, decimal, power_of_ten, whole};
 
-/// Distribution of random numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Style {
     /// 0 to 9.
@@ -53,7 +52,6 @@ pub fn palette(rng: &mut Rng) -> Vec<Style> {
     kind.to_vec()
 }
 
-/// Returns a number of a random style of the list.
 pub fn number(rng: &mut Rng, styles: &[Style]) -> Number {
     match styles[rng.usize(0..styles.len())] {
         Style::Small => whole(rng.i64(0..10)),
@@ -91,7 +89,6 @@ pub fn once_in(rng: &mut Rng, times: u32) -> bool {
     rng.u32(0..times) == 0
 }
 
-/// Returns a random element of the slice.
 pub fn one_of<T: Clone>(rng: &mut Rng, choices: &[T]) -> T {
     choices[rng.usize(0..choices.len())].clone()
 }

@@ -14,7 +14,6 @@ use super::ground::{Act, Ground, Instance, Moment, Test, Value};
 use super::model::{Change, Number};
 use super::step::{State, all_hold, execute, number};
 
-/// A step from one state to another.
 #[derive(Debug, Clone)]
 pub struct Edge {
     pub to: usize,
@@ -51,7 +50,6 @@ impl<'g> Measures<'g> {
         Self { ground, values, counters: counters(ground) }
     }
 
-    /// Returns the initial state.
     pub fn initial(&self) -> State {
         let Ground { atoms, numbers, .. } = self.ground;
         State { atoms: atoms.clone(), numbers: numbers.clone(), time: Number::zero() }
@@ -137,7 +135,6 @@ fn all_acts<'a>(acts: &'a [Act]) -> Vec<&'a Act> {
     acts.iter().flat_map(flattened).collect()
 }
 
-/// Returns for each number whether it is a counter; see the head of the file.
 fn counters(ground: &Ground) -> Vec<bool> {
     let mut counters: Vec<bool> = ground.numbers.iter().map(Option::is_some).collect();
     ground.goal.iter().for_each(|test| mark_test(test, &mut counters));
@@ -202,7 +199,6 @@ fn mark(value: &Value, counters: &mut [bool]) {
     }
 }
 
-/// Table that numbers the distinct states.
 #[derive(Default)]
 pub struct States {
     pub by_number: Vec<State>,
@@ -243,7 +239,6 @@ pub struct Space {
     pub complete: bool,
 }
 
-/// Limits of the exploration.
 #[derive(Debug, Clone, Copy)]
 pub struct Budget {
     pub states: usize,
@@ -251,7 +246,8 @@ pub struct Budget {
     pub attempts: usize,
 }
 
-/// Explores the state space breadth-first. Returns `None` if a measure is undefined in a visited state.
+/// Explores the state space breadth-first, within the budget. Returns `None` if a measure is undefined in a
+/// visited state.
 pub fn explore(ground: &Ground, measures: &Measures<'_>, budget: Budget) -> Option<Space> {
     let mut states = States::default();
     let first = measures.initial();

@@ -5,7 +5,6 @@ use num_traits::Signed as _;
 use super::explore::Space;
 use super::model::Number;
 
-/// Maximum number of labels in the search.
 const MAX_LABELS: usize = 4_000;
 
 /// Returns the values of all Pareto-optimal plans, sorted. The objectives are the measures after the first

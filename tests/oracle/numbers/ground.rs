@@ -13,7 +13,6 @@ use super::model::{
     Action, Applied, Change, Condition, Effect, Expr, Happening, Number, Relation, Task, Term,
 };
 
-/// A ground expression over the numbers of a state.
 #[derive(Debug, Clone)]
 pub enum Value {
     Known(Number),
@@ -27,7 +26,6 @@ pub enum Value {
     Time,
 }
 
-/// A ground condition on a state.
 #[derive(Debug, Clone)]
 pub enum Test {
     Known(bool),
@@ -40,7 +38,6 @@ pub enum Test {
     Open(usize, Value),
 }
 
-/// A ground effect on a state.
 #[derive(Debug, Clone)]
 pub enum Act {
     Add(usize),
@@ -49,14 +46,12 @@ pub enum Act {
     When(Vec<Test>, Vec<Act>),
 }
 
-/// Conditions and effects of the start or the end of an action.
 #[derive(Debug, Clone, Default)]
 pub struct Moment {
     pub tests: Vec<Test>,
     pub acts: Vec<Act>,
 }
 
-/// A ground action.
 #[derive(Debug, Clone)]
 pub struct Instance {
     pub action: usize,

@@ -12,7 +12,6 @@ use super::model::{
 };
 use super::tune::{Wishes, tune};
 
-/// Indices of the types.
 pub const PLACE: usize = 0;
 pub const FUNCTION: usize = 1;
 pub const DESIGN: usize = 2;
@@ -39,7 +38,6 @@ pub struct Names {
     pub cost: usize,
 }
 
-/// A mission under construction.
 #[allow(clippy::struct_excessive_bools)]
 pub struct Builder<'r> {
     pub task: Task,
@@ -164,7 +162,6 @@ impl<'r> Builder<'r> {
         if value > whole(0) { value } else { whole(1) - value }
     }
 
-    /// Draws the initial state.
     fn values(&mut self) {
         let names = self.names;
         for from in self.places.clone() {
@@ -298,7 +295,6 @@ impl<'r> Builder<'r> {
         Expr::Function(applied(function, &[]))
     }
 
-    /// Returns an action that moves the robot to another place.
     fn travel(&mut self, name: String) -> Action {
         let mut action = self.empty(name);
         let names = self.names;

@@ -7,15 +7,12 @@ use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::{One as _, Zero as _};
 
-/// An exact rational number.
 pub type Number = BigRational;
 
-/// Converts an integer to a number.
 pub fn whole(value: i64) -> Number {
     Number::from_integer(BigInt::from(value))
 }
 
-/// Parses a decimal such as `-0.25`.
 pub fn decimal(text: &str) -> Number {
     let (negative, digits) = text.strip_prefix('-').map_or((false, text), |unsigned| (true, unsigned));
     let (whole_digits, fraction_digits) = digits.split_once('.').unwrap_or((digits, ""));
@@ -24,7 +21,6 @@ pub fn decimal(text: &str) -> Number {
     if negative { -value } else { value }
 }
 
-/// 10 to the power of `exponent`.
 pub fn power_of_ten(exponent: usize) -> BigInt {
     BigInt::from(10).pow(u32::try_from(exponent).expect("a small exponent"))
 }
@@ -58,19 +54,16 @@ pub enum Term {
     Object(usize),
 }
 
-/// A predicate or function applied to arguments.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Applied {
     pub symbol: usize,
     pub arguments: Vec<Term>,
 }
 
-/// Applies a predicate or function to arguments.
 pub fn applied(symbol: usize, arguments: &[Term]) -> Applied {
     Applied { symbol, arguments: arguments.to_vec() }
 }
 
-/// An arithmetic expression.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Expr {
     Number(Number),
@@ -84,7 +77,6 @@ pub enum Expr {
     TotalTime,
 }
 
-/// A comparison operator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Relation {
     Less,
@@ -108,7 +100,6 @@ impl Relation {
     }
 }
 
-/// A condition.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Condition {
     Holds(Applied),
@@ -121,7 +112,6 @@ pub enum Condition {
     Open(Relation, Expr, usize),
 }
 
-/// A numeric assignment operator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Change {
     Assign,
@@ -131,7 +121,6 @@ pub enum Change {
     ScaleDown,
 }
 
-/// An effect of an action.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Effect {
     Add(Applied),
@@ -140,7 +129,6 @@ pub enum Effect {
     When(Vec<Condition>, Vec<Effect>),
 }
 
-/// Conditions and effects of the start or the end of an action.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Happening {
     pub conditions: Vec<Condition>,
@@ -172,7 +160,6 @@ pub struct Symbol {
     pub types: Vec<usize>,
 }
 
-/// A domain and a problem.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Task {
     pub types: Vec<String>,
@@ -189,29 +176,24 @@ pub struct Task {
 }
 
 impl Task {
-    /// Returns the objects of a type.
     pub fn of_type(&self, kind: usize) -> impl Iterator<Item = usize> + '_ {
         (0..self.objects.len()).filter(move |object| self.objects[*object].1 == kind)
     }
 
-    /// Returns `true` if the task has a durative action.
     pub fn is_timed(&self) -> bool {
         self.actions.iter().any(|action| action.lasting.is_some())
     }
 
-    /// Declares a predicate and returns its number.
     pub fn predicate(&mut self, name: &str, types: &[usize]) -> usize {
         self.predicates.push(Symbol { name: name.to_owned(), types: types.to_vec() });
         self.predicates.len() - 1
     }
 
-    /// Declares a function and returns its number.
     pub fn function(&mut self, name: &str, types: &[usize]) -> usize {
         self.functions.push(Symbol { name: name.to_owned(), types: types.to_vec() });
         self.functions.len() - 1
     }
 
-    /// Declares an object and returns its number.
     pub fn object(&mut self, name: String, kind: usize) -> usize {
         self.objects.push((name, kind));
         self.objects.len() - 1

@@ -7,7 +7,6 @@ use super::model::{
     text_of,
 };
 
-/// Returns the texts of the domain and the problem.
 pub fn print(task: &Task) -> (String, String) {
     let problem = problem(task);
     (domain(task, &problem), problem)
@@ -76,7 +75,6 @@ fn problem(task: &Task) -> String {
     text + ")\n"
 }
 
-/// Returns the text of an objective, which is an expression without parameters.
 pub fn objective(task: &Task, expression: &Expr) -> String {
     Printer { task, parameters: &[] }.expression(expression)
 }

@@ -63,7 +63,6 @@ fn candidates(task: &Task) -> Vec<Task> {
     candidate_tasks
 }
 
-/// Returns all copies of the list with one element removed.
 fn without_one<T: Clone>(items: &[T]) -> Vec<Vec<T>> {
     let without = |position| {
         let mut remaining = items.to_vec();

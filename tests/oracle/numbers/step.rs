@@ -14,7 +14,6 @@ pub struct State {
     pub time: Number,
 }
 
-/// Returns the value of an expression; `None` if it is undefined.
 pub fn number(value: &Value, state: &State) -> Option<Number> {
     match value {
         Value::Known(value) => Some(value.clone()),
@@ -59,7 +58,6 @@ pub fn all_hold(tests: &[Test], state: &State) -> bool {
     tests.iter().all(|test| holds(test, state) == Some(true))
 }
 
-/// Returns the state after an action; `None` if the action is not executable.
 pub fn execute(instance: &Instance, state: &State) -> Option<State> {
     let mut after = match &instance.end {
         None => happen(&[&instance.start], state)?,
@@ -108,7 +106,7 @@ enum Combined {
 }
 
 /// Evaluates the conditions of all moments in the state, then applies all effects at once. Returns `None` if
-/// this is not possible.
+/// a condition does not hold, a value is undefined or effects conflict.
 fn happen(moments: &[&Moment], state: &State) -> Option<State> {
     let mut acts = Vec::new();
     for moment in moments {
@@ -145,7 +143,8 @@ fn happen(moments: &[&Moment], state: &State) -> Option<State> {
     Some(after)
 }
 
-/// Combines an effect with the previous effects on the same number. Returns `None` if they conflict.
+/// Combines an effect with the previous effects on the same number. Returns `None` if they conflict, and for
+/// a division by zero.
 fn combine(
     numbers: &mut Vec<(usize, Combined)>,
     change: Change,
@@ -173,7 +172,6 @@ fn combine(
     Some(())
 }
 
-/// Facts and numbers that a happening reads and writes, for the interference test.
 #[derive(Default)]
 struct Access {
     read_atoms: Vec<usize>,

@@ -30,7 +30,6 @@ pub enum Outcome {
     Open(Option<ValuedPlan>),
 }
 
-/// The answer for a task, with the explored states.
 pub struct Explored {
     pub outcome: Outcome,
     pub space: Space,
@@ -51,7 +50,6 @@ pub fn truth(ground: &Ground, maximize: bool, budget: Budget) -> Option<Explored
     Some(Explored { outcome, space })
 }
 
-/// Determines the answer from the explored states.
 fn by_states(space: &Space, maximize: bool) -> Outcome {
     let useful = leads_to_goal(space);
     if !useful[0] {
@@ -71,7 +69,6 @@ fn by_states(space: &Space, maximize: bool) -> Outcome {
     }
 }
 
-/// Returns for each state whether a goal is reachable from it.
 fn leads_to_goal(space: &Space) -> Vec<bool> {
     let mut predecessors = vec![Vec::new(); space.edges.len()];
     for (from, edges) in space.edges.iter().enumerate() {
@@ -153,7 +150,6 @@ fn path_to(mut state: usize, parent: &[Option<(usize, usize)>]) -> Vec<usize> {
     plan
 }
 
-/// Returns `true` if the parent links contain a cycle.
 fn has_cycle(parent: &[Option<(usize, usize)>]) -> bool {
     let mut colour = vec![0_usize; parent.len()];
     for start in 0..parent.len() {
@@ -219,7 +215,6 @@ fn dijkstra(ground: &Ground, measures: &Measures<'_>, maximize: bool, budget: Bu
     None
 }
 
-/// Returns the minimum number of steps to a goal.
 pub fn fewest_steps(space: &Space) -> Option<usize> {
     (0..space.goals.len()).filter(|state| space.goals[*state]).map(|state| space.depths[state]).min()
 }

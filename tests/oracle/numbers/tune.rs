@@ -76,7 +76,8 @@ fn walk(ground: &Ground, observed: &mut Vec<Vec<Number>>, rng: &mut Rng) -> Stat
     state
 }
 
-/// Replaces each open comparison by a comparison with an observed value.
+/// Replaces each open comparison by a comparison with an observed value, or with a random value if no value
+/// was observed.
 fn close(task: &mut Task, observed: &[Vec<Number>], rng: &mut Rng) {
     let mut close_all = |conditions: &mut Vec<Condition>| {
         for condition in conditions {

@@ -18,7 +18,6 @@ use super::model::{Expr, Number, applied};
 use super::print::objective;
 use super::truth::{Outcome, fewest_steps, within};
 
-/// Time limit of each call of the planner.
 const LIMIT: Duration = Duration::from_millis(500);
 
 fn config(rng: &mut Rng) -> Config {

@@ -143,7 +143,6 @@ fn vent(random: &mut fastrand::Rng, (stages, length): (usize, i64), unit: Q) -> 
     actions
 }
 
-/// Maximum number of nodes of the oracle.
 const CAP: usize = 3000;
 /// Maximum number of nodes of the oracle for tasks made by [`vent`], where many runs begin.
 const VENT_CAP: usize = 200_000;

@@ -65,7 +65,6 @@ pub fn judged(
     }
 }
 
-/// Returns exact start times for the actions of a path.
 fn scheduled(search: &Search<'_>, edges: &[usize]) -> Schedule {
     let edges: Vec<&Edge> = edges.iter().map(|edge| &search.edges[*edge]).collect();
     let steps = edges.iter().filter(|edge| edge.step.is_some()).count() as i64;
@@ -90,7 +89,6 @@ fn scheduled(search: &Search<'_>, edges: &[usize]) -> Schedule {
     plan
 }
 
-/// Converts a schedule to steps with names of actions and objects.
 pub fn written(world: &World, steps: &[(usize, Q, Q)]) -> Vec<Step> {
     let step = |(instance, start, duration): &(usize, Q, Q)| {
         let (action, objects) = &world.instances[*instance];

@@ -8,7 +8,6 @@ use super::happening::{Atoms, Happening, Obstacle, State, UNDEFINED, World, fit}
 use super::model::{Comparison, Condition, Expression, Q};
 
 impl World {
-    /// Returns the bit set of all ground atoms of a predicate.
     fn atoms_of(&self, predicate: usize) -> Atoms {
         let count = self.task.objects.len().pow(self.task.predicates[predicate].1 as u32);
         ((1 << count) - 1) << self.atoms[predicate]
@@ -160,7 +159,6 @@ impl World {
         Ok(results)
     }
 
-    /// Returns the value of an expression in a state.
     pub fn value(&self, expression: &Expression, state: &State, bound: &[usize]) -> Result<Q, Obstacle> {
         let pair = |left: &Expression, right: &Expression| {
             Ok((self.value(left, state, bound)?, self.value(right, state, bound)?))

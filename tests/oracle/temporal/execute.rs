@@ -3,7 +3,6 @@
 use super::happening::{End, Obstacle, State, World, fit};
 use super::model::{Body, Measure, Q, q};
 
-/// Executes a plan. Returns its value, or the reason why the plan is invalid.
 pub fn execute(world: &World, steps: &[(usize, Q, Q)]) -> Result<Q, Obstacle> {
     let mut run = Run { world, state: world.initial.clone(), applied: 0 };
     let (mut clock, mut total) = (q(0), q(0));
@@ -45,7 +44,6 @@ pub fn goal(world: &World, state: &State) -> Result<(), Obstacle> {
     }
 }
 
-/// Returns the value of a valid plan by the task's measure.
 pub fn value(world: &World, state: &State, time: Q, steps: usize) -> Result<Q, Obstacle> {
     match &world.task.measure {
         Measure::Steps => Ok(q(steps as i64)),
@@ -62,16 +60,13 @@ pub fn value(world: &World, state: &State, time: Q, steps: usize) -> Result<Q, O
     }
 }
 
-/// State of an execution.
 struct Run<'w> {
     world: &'w World,
     state: State,
-    /// Number of events that have already been applied.
     applied: usize,
 }
 
 impl Run<'_> {
-    /// Applies the remaining events up to and including a time.
     fn events(&mut self, until: Q) -> Result<(), Obstacle> {
         while let Some((_, event)) = self.world.events.get(self.applied).filter(|(time, _)| *time <= until) {
             self.state = event.apply(&self.state)?;

@@ -17,7 +17,6 @@ pub type Path = (Vec<usize>, usize);
 
 #[derive(Debug)]
 pub enum Optimum {
-    /// No goal is reachable.
     None,
     /// A cycle of negative cost lies on a path to a goal. The field is any path to a goal.
     Unbounded(Path),
@@ -28,7 +27,6 @@ pub enum Optimum {
 type Distances = Vec<Option<(Q, Option<usize>)>>;
 
 impl Graph {
-    /// Returns the shortest path to a goal.
     pub fn optimum(&self) -> Optimum {
         let useful = self.useful();
         let (distances, cycle) = self.distances(&useful);
@@ -47,7 +45,6 @@ impl Graph {
         }
     }
 
-    /// Returns for each node whether a goal is reachable from it.
     fn useful(&self) -> Vec<bool> {
         let mut useful = vec![false; self.nodes];
         let mut predecessors: Vec<Vec<usize>> = vec![Vec::new(); self.nodes];

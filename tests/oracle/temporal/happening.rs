@@ -8,7 +8,6 @@ use num_traits::Zero as _;
 
 use super::model::{Action, Atom, Body, Effect, Expression, Fluent, Operation, Part, Q, Task, Term, q};
 
-/// Reason why an action cannot be executed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Obstacle {
     /// The semantics forbids the action, for the given reason.
@@ -47,7 +46,6 @@ pub struct Happening {
     pub changes: Vec<(usize, Change)>,
 }
 
-/// A task with numbered ground atoms and function instances.
 #[derive(Debug)]
 pub struct World {
     pub task: Task,
@@ -55,7 +53,6 @@ pub struct World {
     pub(super) atoms: Vec<usize>,
     /// Number of the first instance of each function.
     pub(super) values: Vec<usize>,
-    /// Atoms and numbers on which each derived predicate depends.
     pub(super) depends: HashMap<usize, (Atoms, u64)>,
     /// Ground actions: number of the action schema, and arguments.
     pub instances: Vec<(usize, Vec<usize>)>,
@@ -85,7 +82,6 @@ impl Happening {
         self.adds | self.deletes
     }
 
-    /// Returns `true` if the happenings interfere.
     pub fn interferes(&self, other: &Self) -> bool {
         let atoms = self.writes() & other.reads
             | other.writes() & self.reads
@@ -106,7 +102,6 @@ impl Happening {
         atoms != 0 || reads_changed(self, other) || reads_changed(other, self) || conflicting_changes
     }
 
-    /// Returns the state after the happening.
     pub fn apply(&self, state: &State) -> Result<State, Obstacle> {
         let mut after = state.clone();
         after.atoms = (after.atoms & !self.deletes) | self.adds;

@@ -41,7 +41,6 @@ pub(super) fn constant(value: Q) -> Expression {
     Expression::Number(value)
 }
 
-/// Returns the empty conjunction.
 pub(super) fn always_true() -> Condition {
     Condition::All(Vec::new())
 }
@@ -109,7 +108,6 @@ impl Maker {
         choices[self.random.usize(..choices.len())].clone()
     }
 
-    /// Declares objects, predicates and functions.
     fn declare(&mut self, designs: bool) {
         for kind in 0..self.task.types {
             let count = 1 + self.random.usize(..2);
@@ -171,7 +169,6 @@ impl Maker {
         self.task.axioms.iter().any(|axiom| axiom.predicate == predicate)
     }
 
-    /// Returns `true` if effects and events must not change a predicate.
     pub(super) fn is_fixed(&self, predicate: usize) -> bool {
         self.is_derived(predicate) || self.designs.is_some_and(|(solves, _)| solves == predicate)
     }
@@ -392,7 +389,6 @@ impl Maker {
         Action { name: format!("a{number}"), parameters, body }
     }
 
-    /// Adds effects whose operands depend on the duration of the action.
     fn durations_in_effects(&mut self) {
         for at in 0..self.task.actions.len() {
             let mut action = self.task.actions[at].clone();

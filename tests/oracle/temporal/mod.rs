@@ -29,7 +29,6 @@ const CAP: usize = 400;
 /// Maximum number of nodes of the oracle for concurrent plans.
 const OVERLAP_CAP: usize = 300;
 
-/// Converts steps with names to a schedule of ground actions.
 fn schedule_of(world: &World, steps: &[Step]) -> Result<Vec<(usize, Q, Q)>, String> {
     let to_small = |number: &BigRational| {
         let (numerator, denominator) = (number.numer().to_i64(), number.denom().to_i64());
@@ -67,7 +66,6 @@ pub fn concurrent_unit(seed: u64) -> Q {
     units[(seed % 5) as usize]
 }
 
-/// Returns `true` if larger values are better.
 pub fn maximizes(task: &Task) -> bool {
     matches!(task.measure, Measure::Metric { maximize: true, .. })
 }

@@ -13,12 +13,10 @@ use crate::judge::decimal;
 /// below 2^30, so no operation overflows.
 pub type Q = Ratio<i64>;
 
-/// Converts an integer to a rational number.
 pub fn q(number: i64) -> Q {
     Q::from_integer(number)
 }
 
-/// Converts a rational number to arbitrary precision.
 pub fn big(number: Q) -> num_rational::BigRational {
     num_rational::BigRational::new((*number.numer()).into(), (*number.denom()).into())
 }
@@ -111,7 +109,6 @@ pub enum Body {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Action {
     pub name: String,
-    /// Types of the parameters.
     pub parameters: Vec<usize>,
     pub body: Body,
 }
@@ -123,7 +120,6 @@ pub struct Axiom {
     pub condition: Condition,
 }
 
-/// The quantity that plans minimise or maximise.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Measure {
     /// Number of actions (no metric, sequential).
@@ -137,7 +133,6 @@ pub enum Measure {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Task {
     pub types: usize,
-    /// Type of each object.
     pub objects: Vec<usize>,
     /// Name and arity of each predicate, including derived predicates.
     pub predicates: Vec<(String, usize)>,
@@ -321,7 +316,6 @@ impl Task {
         (actions + &axioms + &self.condition(&self.goal, 0)).contains(&format!("({name}"))
     }
 
-    /// Returns the text of the PDDL domain.
     pub fn domain(&self) -> String {
         let mut text = "(define (domain d) (:requirements :adl :fluents :durative-actions \
                         :timed-initial-literals :derived-predicates)\n (:types"
@@ -350,7 +344,6 @@ impl Task {
         text + ")\n"
     }
 
-    /// Returns the text of the PDDL problem.
     pub fn problem(&self) -> String {
         let mut text = "(define (problem p) (:domain d)\n (:objects".to_owned();
         for (object, kind) in self.objects.iter().enumerate() {

@@ -44,7 +44,6 @@ fn duration(world: &World, instance: usize, state: &State) -> Result<Q, Obstacle
     }
 }
 
-/// Executes a plan. Returns its value, or the reason why the plan is invalid.
 pub fn execute(world: &World, plan: &[(usize, Q, Q)], separation: Q) -> Result<Q, Obstacle> {
     let mut times: Vec<(Q, usize, End)> = Vec::new();
     for (number, (_, start, length)) in plan.iter().enumerate() {
@@ -168,7 +167,6 @@ pub fn best(world: &World, unit: Q, cap: usize) -> Truth {
     judged(world, search.graph.optimum(), empty, search.open, &schedule, &|plan| execute(world, plan, unit))
 }
 
-/// Happenings of one tick, and the instances that run or start at this tick.
 #[derive(Clone)]
 struct Tick {
     happenings: Vec<Happening>,

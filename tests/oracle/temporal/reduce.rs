@@ -7,7 +7,6 @@ use super::model::{Body, Condition, Effect, Expression, Measure, Operation, Q, q
 /// Role of a number in the search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
-    /// Part of the state.
     Kept,
     /// Excluded from the state. Changes of the number are costs, multiplied by the number's weight in the
     /// metric.
@@ -153,7 +152,6 @@ impl Reduction {
         Ok((state, cost))
     }
 
-    /// Returns `true` if a number is part of the reduced state.
     pub fn keeps(&self, at: usize) -> bool {
         self.roles[at] == Role::Kept
     }

@@ -47,7 +47,6 @@ pub struct Edge {
     pub step: Option<(usize, Q, Clock, Option<Q>)>,
 }
 
-/// The graph of all sequential plans of a task.
 pub struct Search<'w> {
     pub world: &'w World,
     reduction: Reduction,
@@ -118,7 +117,6 @@ impl<'w> Search<'w> {
         self.nodes.len() - 1
     }
 
-    /// Adds all edges that leave a node.
     fn expand(&mut self, from: usize) {
         let (state, applied, clock) = self.nodes[from].clone();
         if let Some((time, event)) = self.world.events.get(applied) {
@@ -222,7 +220,6 @@ impl<'w> Search<'w> {
         Ok(())
     }
 
-    /// Adds the edge of an action that ends in the given state.
     fn reach(
         &mut self,
         (from, instance, duration): (usize, usize, Q),

@@ -2,7 +2,7 @@
 
 use super::model::{Body, Condition, Effect, Expression, Measure, Part, Task, q};
 
-/// Returns all tasks in which one part is removed or simplified.
+/// Returns tasks in which one part is removed or simplified.
 pub fn smaller(task: &Task) -> Vec<Task> {
     let mut tasks = Vec::new();
     let mut add_changed = |change: &dyn Fn(&mut Task)| {
@@ -72,7 +72,7 @@ pub fn smaller(task: &Task) -> Vec<Task> {
     tasks
 }
 
-/// Returns all conditions in which one part is removed or simplified.
+/// Returns conditions in which one part is removed or simplified.
 fn conditions(condition: &Condition) -> Vec<Condition> {
     let always_true = Condition::All(Vec::new());
     match condition {
@@ -98,7 +98,6 @@ fn conditions(condition: &Condition) -> Vec<Condition> {
     }
 }
 
-/// Returns all variants of a start or an end in which one part is removed or simplified.
 fn parts(part: &Part) -> Vec<Part> {
     let mut smaller: Vec<Part> = conditions(&part.condition)
         .into_iter()

@@ -35,7 +35,6 @@ impl<'a> Parser<'a> {
         is_next
     }
 
-    /// Consumes and returns the longest prefix of characters with a property.
     fn take(&mut self, belongs: impl Fn(char) -> bool) -> &'a str {
         let end = self.rest.find(|c| !belongs(c)).unwrap_or(self.rest.len());
         let (prefix, remainder) = self.rest.split_at(end);

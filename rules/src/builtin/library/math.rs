@@ -13,15 +13,12 @@ const EVAL: &str = "http://swrl.stanford.edu/ontologies/built-ins/3.4/swrlm.owl#
 const SQRT: &str = "http://swrl.stanford.edu/ontologies/built-ins/3.4/swrlm.owl#sqrt";
 const LOG: &str = "http://swrl.stanford.edu/ontologies/built-ins/3.4/swrlm.owl#log";
 
-/// A function of one number, with its IRI.
 struct Unary(&'static str, fn(f64) -> f64);
 
-/// The function `eval`.
 struct Eval;
 
 pub(super) const ALL: [&dyn Definition; 3] = [&Unary(SQRT, f64::sqrt), &Unary(LOG, f64::ln), &Eval];
 
-/// Returns the result as a double; `None` if it is infinite or NaN.
 fn number(value: f64) -> Option<Literal> {
     value.is_finite().then(|| Literal::double(value))
 }

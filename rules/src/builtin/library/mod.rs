@@ -16,21 +16,17 @@ use std::sync::LazyLock;
 use super::custom::Definition;
 use super::signature::BuiltIn;
 
-/// Common IRI prefix of the libraries of `SWRLTab`, before the version.
 const LIBRARY_ROOT: &str = "http://swrl.stanford.edu/ontologies/built-ins/";
 
-/// All built-ins of both libraries.
 static ALL: LazyLock<Vec<&'static dyn Definition>> =
     LazyLock::new(|| math::ALL.iter().copied().chain(temporal::all()).collect());
 
-/// Returns the built-in with this IRI, in any version of its library.
 pub(super) fn find(iri: &str) -> Option<BuiltIn> {
     let target = name(iri)?;
     let definition = ALL.iter().find(|definition| name(definition.iri()) == Some(target));
     definition.map(|definition| BuiltIn::custom(*definition))
 }
 
-/// Returns the IRIs of all built-ins in the library of an IRI, in any version.
 pub(super) fn names_in_library(iri: &str) -> Vec<&'static str> {
     let library = |iri| name(iri).and_then(|name| name.split_once('#')).map(|(library, _)| library);
     let iris = ALL.iter().map(|definition| definition.iri());

@@ -64,7 +64,6 @@ impl Granularity {
         granules.floor().to_integer().to_i64()
     }
 
-    /// Returns the duration of a number of granules.
     fn duration(self, count: i64) -> Option<Duration> {
         let seconds = |unit: i64| Some(Duration::new(0, Decimal::from(count.checked_mul(unit)?)));
         match self {
@@ -121,10 +120,8 @@ fn difference(arguments: &[&Literal]) -> Option<i64> {
     comparable(&moments).then(|| (to - from).abs())
 }
 
-/// `temporal:duration`: number of granules between two moments.
 struct DurationFunction;
 
-/// `temporal:add`: moment plus a number of granules.
 struct AddFunction;
 
 /// `temporal:durationLessThan` and related tests: compares a number with the number of granules between two
@@ -304,7 +301,6 @@ static ALLEN_RELATIONS: &[AllenRelation] = table!(AllenRelation {
     "notIntersects" true => relation: |a, b| a.0 <= b.1 && b.0 <= a.1,
 });
 
-/// Returns the definitions of all built-ins of the library.
 pub(super) fn all() -> Vec<&'static dyn Definition> {
     let mut definitions: Vec<&'static dyn Definition> = vec![&DurationFunction, &AddFunction];
     definitions.extend(DURATION_COMPARISONS.iter().map(|definition| definition as &dyn Definition));

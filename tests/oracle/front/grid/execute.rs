@@ -117,7 +117,6 @@ impl Task {
         conditions.all(|(_, condition)| condition.holds(state))
     }
 
-    /// Returns the value of a plan; `None` if the plan is invalid.
     fn value(&self, plan: &[Step]) -> Option<i64> {
         let mut times: Vec<i64> =
             plan.iter().flat_map(|(start, _, duration)| [*start, start + duration]).collect();
@@ -176,7 +175,6 @@ impl Task {
         Some(value)
     }
 
-    /// Returns the minimum value among the enumerated plans.
     pub(super) fn best(&self, rng: &mut Rng) -> Option<i64> {
         let mut steps: Vec<Step> = Vec::new();
         for (number, action) in self.actions.iter().enumerate() {

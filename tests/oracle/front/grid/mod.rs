@@ -29,9 +29,7 @@ struct State {
 #[derive(Debug, Clone)]
 enum Formula {
     Fact(usize, bool),
-    /// A number is at least a constant.
     AtLeast(usize, i64),
-    /// A number is at most a constant.
     AtMost(usize, i64),
     And(Box<Formula>, Box<Formula>),
     Or(Box<Formula>, Box<Formula>),
@@ -74,7 +72,6 @@ struct Constraint {
     is_soft: bool,
 }
 
-/// A random task of three actions.
 #[derive(Debug)]
 struct Task {
     actions: [Action; 3],

@@ -97,7 +97,6 @@ impl Robot {
         text
     }
 
-    /// Replaces names in a PDDL text as the form of the mission requires.
     pub(super) fn renamed(&self, text: &str) -> String {
         let names: &[(&str, &str)] = match self.form {
             Form::Explicit | Form::Native => return text.to_owned(),

@@ -22,13 +22,11 @@ use rules::Limits as StepLimits;
 use super::{Reference, Sample, whole};
 use crate::judge::Mode;
 
-/// Charge of a full battery.
 const FULL: i64 = 12;
 /// Price of charging, or its duration in timed missions.
 const CHARGING: i64 = 5;
 const PLACES: usize = 4;
 
-/// Syntactic form of a mission.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Form {
     /// Designs are parameters of actions.
@@ -58,7 +56,6 @@ struct Design {
     energy: i64,
     safety: Option<i64>,
     change: i64,
-    /// Component that the design requires, if any.
     component: Option<usize>,
     /// Minimum visibility with which the design can be used, if any.
     visibility: Option<i64>,
@@ -83,7 +80,6 @@ pub struct Robot {
     knowledge: Knowledge,
 }
 
-/// Initial situation of a mission.
 #[derive(Debug)]
 struct Situation {
     /// For each connected pair of places: `true` for a narrow way, and the length.
@@ -228,7 +224,6 @@ impl Robot {
         combinations
     }
 
-    /// Returns the minimum cost of a plan. `None` if there is no plan.
     fn best(&self, situation: &Situation) -> Option<i64> {
         /// State of the search: place, battery, and current design of each function.
         type Node = (usize, i64, Vec<Option<usize>>);
