@@ -31,7 +31,6 @@ impl<'t> Objects<'t> {
         Self { types: TypeHierarchy::of(domain), all: objects, limits }
     }
 
-    /// Returns the objects that belong to the type `wanted` or to a subtype.
     pub(super) fn members(&self, wanted: &TypeExpression) -> impl Iterator<Item = &'t Name> {
         let fits = |types: &[&TypeExpression]| types.iter().any(|given| self.types.fits(given, wanted));
         self.all.iter().filter(move |(_, types)| fits(types)).map(|(name, _)| *name)

@@ -10,7 +10,6 @@ use super::simplify::{all, identifier};
 /// A preference instance: the name of the preference, and its condition on the last state.
 pub(super) type PreferenceInstance = (Name, Condition);
 
-/// Adds a predicate without parameters to the domain.
 pub(super) fn declare(domain: &mut Domain, name: &str) {
     domain.predicates.push(Declaration { identifier: identifier(name), parameters: Vec::new() });
 }
@@ -37,7 +36,6 @@ pub(super) fn require(action: &mut Action, time: EffectTime, condition: Conditio
     }
 }
 
-/// Adds an effect to an action, at its start or its end.
 pub(super) fn happen(action: &mut Action, time: EffectTime, more: Effect) {
     match &mut action.body {
         ActionBody::Instantaneous { effect, .. } => {
@@ -48,7 +46,6 @@ pub(super) fn happen(action: &mut Action, time: EffectTime, more: Effect) {
     }
 }
 
-/// Creates an error about an unsupported construct; `instead` describes a supported alternative.
 pub(super) fn unsupported(
     construct: impl Into<String>,
     instead: impl Into<String>,

@@ -170,7 +170,6 @@ fn guarded(formula: &Formula, guards: &Guards) -> Formula {
     }
 }
 
-/// Returns the guard atoms of all functions in an expression that have guards.
 fn values_of(expression: &Expression, guards: &Guards) -> Vec<Formula> {
     let mut conditions = Vec::new();
     functions(expression, &mut |function, terms| conditions.extend(has_value(function, terms, guards)));

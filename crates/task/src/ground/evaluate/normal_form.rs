@@ -70,7 +70,6 @@ impl Definitions {
         Ok(())
     }
 
-    /// Returns the disjunction of the parts as a clause, with one literal for each part.
     fn clause(&mut self, world: &mut World<'_>, parts: &[Residual]) -> Vec<GroundLiteral> {
         let mut clause: Vec<_> = parts.iter().map(|part| self.literal(world, part)).collect();
         clause.sort_unstable();

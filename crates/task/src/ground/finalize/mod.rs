@@ -134,7 +134,6 @@ fn operator<N: TaskNumber>(
     }))
 }
 
-/// Returns the name and source location of the operator's action schema, for error messages.
 fn schema_name(lifted: &Lifted, operator: &GroundOperator) -> (String, Option<Place>) {
     let schema = lifted.schemas.get(operator.schema as usize);
     let named = schema.map(|schema| (format!("`{}`", schema.name), Some(schema.place)));
@@ -144,7 +143,6 @@ fn schema_name(lifted: &Lifted, operator: &GroundOperator) -> (String, Option<Pl
 /// Insertion-ordered set of operators.
 struct Distinct<N> {
     operators: Vec<Operator<N>>,
-    /// Positions in `operators` by hash of the operator.
     positions: FxHashMap<u64, SmallVec<[u32; 2]>>,
 }
 

@@ -15,7 +15,7 @@ use crate::task::NumericEffect;
 use crate::task::number::TaskNumber;
 use crate::task::quantity::{Linear, NumericId};
 
-/// The numeric variables that conditions, numeric effects or objectives use, with the common scale of their
+/// The numeric variables that conditions, numeric effects or objectives read, with the common scale of their
 /// values.
 pub(super) struct Numbers<N> {
     pub(super) initial: Vec<N>,

@@ -84,7 +84,6 @@ impl Atoms {
         Literal { fact, positive }
     }
 
-    /// Returns the variable and value of an atom, or `None` if nothing reads the atom.
     pub(super) fn fact(&self, atom: AtomId) -> Option<Fact> {
         self.facts[atom.index()]
     }

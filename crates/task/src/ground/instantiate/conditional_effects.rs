@@ -39,7 +39,6 @@ struct Start {
     adds: Vec<AtomId>,
     deletes: Vec<AtomId>,
     numbers: Numbers,
-    /// Combinations of designs for which a changed number is undefined.
     undefined: Vec<ForbiddenCombinations>,
 }
 
@@ -61,9 +60,7 @@ impl Start {
 
 /// Conditions between the start and end of an instance, and timed events in between.
 pub(super) struct Middle<'m> {
-    /// Conditions that must hold throughout the interval.
     pub(super) over_all: &'m [Residual],
-    /// Conditions that must hold just before the end.
     pub(super) at_end: &'m [Residual],
     /// If the task has timed events: the window of the action, and the conditions under which events
     /// interfere with it.
@@ -151,7 +148,7 @@ pub(super) fn cases(
     Ok(cases)
 }
 
-/// Returns `true` if a part is false, or two literals of the parts contradict each other.
+/// Returns `true` if a conjunct of the parts is false, or if two conjuncts are an atom and its negation.
 fn contradictory(parts: &[Residual]) -> bool {
     fn note(parts: &[Residual], known: &mut FxHashMap<AtomId, bool>) -> bool {
         parts.iter().any(|part| match part {

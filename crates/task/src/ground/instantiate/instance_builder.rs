@@ -22,7 +22,6 @@ use pddl::ast::Span;
 pub(super) struct Apart {
     /// Value of the expression; `None` if it is undefined for every design.
     pub(super) operand: Option<Linear<Rational>>,
-    /// Combinations of designs for which the value is undefined.
     pub(super) undefined: Arc<[ForbiddenCombinations]>,
 }
 
@@ -117,7 +116,6 @@ impl Build<'_, '_> {
         })
     }
 
-    /// Forbids the combinations of designs for which the duration is negative.
     pub(super) fn forbid_negative(&mut self, duration: &Quantity<Rational>) -> Result<(), Failure> {
         let zero = Rational::from_integer(0);
         let least = duration.tables.iter().filter_map(|table| table.values.iter().min());

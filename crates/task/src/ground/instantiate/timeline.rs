@@ -56,7 +56,6 @@ pub(super) struct Timeline {
 }
 
 impl Timeline {
-    /// Returns the timed events of the task, or `None` for a task without timed events.
     #[expect(clippy::arithmetic_side_effects, reason = "phases are objects, which are held in memory")]
     pub(super) fn new(world: &mut World<'_>) -> Option<Self> {
         let events = &world.lifted.events[..];

@@ -84,7 +84,6 @@ fn reachable(task: &GroundTask<'_>) -> Result<Vec<Interval>, Interrupted> {
         }
         round += 1;
         if round > ROUNDS {
-            // Widening: a bound that still changes becomes infinite.
             for (interval, before) in intervals.iter_mut().zip(&before) {
                 interval.low = interval.low.take().filter(|low| before.low.as_ref() == Some(low));
                 interval.high = interval.high.take().filter(|high| before.high.as_ref() == Some(high));
@@ -101,7 +100,6 @@ fn can_hold(condition: &GroundCondition, intervals: &[Interval]) -> bool {
     })
 }
 
-/// Returns bounds for the value of an expression if each variable is within its interval.
 fn range(linear: &Linear<Rational>, intervals: &[Interval]) -> Interval {
     let mut low = Some(extreme(&linear.quantity, Iterator::min));
     let mut high = Some(extreme(&linear.quantity, Iterator::max));
