@@ -19,7 +19,6 @@ pub(super) const ALWAYS: u32 = 0;
 /// Number of the artificial fact that represents the goal.
 pub(super) const GOAL: u32 = 1;
 
-/// Lists of numbers, stored one after another in a single vector.
 #[derive(Default)]
 pub(super) struct Lists {
     ends: Vec<u32>,
@@ -57,7 +56,6 @@ impl Lists {
     }
 }
 
-/// Delete relaxation of a task: rules between facts, without delete effects.
 pub(super) struct DeleteRelaxation {
     /// Cost of each payer. Payers are the operators, followed by one payer without cost.
     pub(super) costs: Vec<u64>,
@@ -69,9 +67,7 @@ pub(super) struct DeleteRelaxation {
     pub(super) given: Lists,
     /// For each payer: its rules.
     pub(super) rules_of: Lists,
-    /// For each fact: the rules that require it.
     pub(super) required_by: Lists,
-    /// For each fact: the rules that add it.
     pub(super) given_by: Lists,
     /// Number of the first fact of each variable.
     first: Vec<u32>,

@@ -89,7 +89,6 @@ impl Projection {
         self.sizes.iter().product()
     }
 
-    /// Returns the index of the abstract state that represents a state.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "an abstract state is below the number of them, which are in memory"

@@ -16,7 +16,6 @@ struct Entry {
     end: u32,
 }
 
-/// Number of extra turns that each list of preferred operators gets after progress.
 const PREFERRED_BOOST: i64 = 1_000;
 
 #[derive(Debug)]

@@ -34,7 +34,6 @@ pub(super) struct NumericCondition<N> {
 }
 
 impl<N: TaskNumber> NumericCondition<N> {
-    /// Returns the value of the expression, or `None` if it overflows.
     pub(super) fn value(&self, numbers: &[N]) -> Option<N> {
         let terms = self.sum.iter().map(|(variable, factor)| (factor, &numbers[variable.index()]));
         sum_of_products(N::zero(), terms)
@@ -50,12 +49,10 @@ pub(super) struct Achiever {
     pub(super) gain: f64,
 }
 
-/// The delete relaxation of a task.
 pub(super) struct Relaxation<N> {
     /// Index of the first fact of each variable, followed by the total number of facts.
     first: Vec<Proposition>,
     pub(super) propositions: usize,
-    /// Propositions that are assumed to be always true.
     pub(super) always: Vec<Proposition>,
     pub(super) directions: Vec<NumericCondition<N>>,
     /// For each node: its operator, or `NO_OPERATOR`.
@@ -69,7 +66,6 @@ pub(super) struct Relaxation<N> {
     pub(super) is_base: Vec<bool>,
     /// Artificial proposition that is true if all conditions of the goal are true.
     pub(super) goal: Proposition,
-    /// Conditions of the goal.
     pub(super) goals: Vec<Proposition>,
 }
 
@@ -82,7 +78,6 @@ impl<N: TaskNumber> Relaxation<N> {
         self.first[fact.variable.index()].saturating_add(fact.value)
     }
 
-    /// Returns the fact of a proposition, or `None` if the proposition is not a fact.
     pub(super) fn fact_of(&self, proposition: Proposition) -> Option<Fact> {
         if proposition >= *self.first.last()? {
             return None;
@@ -92,7 +87,6 @@ impl<N: TaskNumber> Relaxation<N> {
         Some(Fact { variable: VariableId::of(variable), value })
     }
 
-    /// Returns the propositions of the facts that hold in a state.
     pub(super) fn facts<'s>(&'s self, values: &'s [u32]) -> impl Iterator<Item = Proposition> + 's {
         self.first.iter().zip(values).map(|(first, value)| first.saturating_add(*value))
     }

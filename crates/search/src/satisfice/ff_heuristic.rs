@@ -27,7 +27,6 @@ struct Supporter {
     times: u32,
 }
 
-/// The FF heuristic, with scratch buffers for evaluating states.
 pub(super) struct FfHeuristic {
     /// h^add value of each proposition.
     costs: Vec<u32>,
@@ -38,7 +37,6 @@ pub(super) struct FfHeuristic {
     sums: Vec<u32>,
     initially_left: Vec<u32>,
     queue: Queue,
-    /// For each numeric expression: its approximate value in the state.
     values: Vec<f64>,
     /// Operators whose conditions all hold in the state, according to the relaxation.
     pub(super) applicable: Vec<u32>,

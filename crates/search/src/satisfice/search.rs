@@ -41,7 +41,6 @@ struct Node<N> {
     price: u64,
 }
 
-/// Result of running a search with a work budget.
 pub(super) enum Outcome<N> {
     /// A plan that costs less than the limit, if there is a limit.
     Plan(GroundPlan<N>),
@@ -51,7 +50,6 @@ pub(super) enum Outcome<N> {
     Paused,
 }
 
-/// A resumable greedy or weighted A\* search.
 pub(super) struct Search<N> {
     weight: HeuristicWeight,
     prices: Vec<u32>,
@@ -158,7 +156,8 @@ impl<N: TaskNumber> Search<N> {
             } else {
                 self.nodes[id as usize] = node;
                 let start = (id as usize).saturating_mul(stride);
-                // A landmark counts as reached only if it was reached on every known path to the state.
+                // A landmark counts as reached only if it was reached on each path that was the cheapest one to
+                // the state when it was found.
                 for (new, old) in reached.iter_mut().zip(&mut self.reached[start..]) {
                     *new &= *old;
                     *old = *new;

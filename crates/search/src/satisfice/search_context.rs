@@ -24,7 +24,6 @@ struct Step<N> {
     cost: N,
 }
 
-/// Data that all satisficing searches of a task share: relaxation, heuristics, mutexes and steps.
 pub(super) struct SearchContext<'a, N> {
     pub(super) task: &'a Task<N>,
     pub(super) relaxation: Relaxation<N>,
@@ -63,7 +62,6 @@ impl<'a, N: TaskNumber> SearchContext<'a, N> {
         self.relaxation.propositions.saturating_add(self.relaxation.operators.len()) as u64
     }
 
-    /// Returns the operator, the designs and the cost of a step.
     pub(super) fn step(&self, step: u32) -> (OperatorId, &[u32], &N) {
         let Step { operator, choice, cost } = &self.steps[step as usize];
         (*operator, choice, cost)
@@ -109,7 +107,7 @@ impl<'a, N: TaskNumber> SearchContext<'a, N> {
     }
 
     /// Returns operator costs (with the cheapest designs) scaled to integers: positive costs are scaled to a
-    /// mean of about 10, and 1 is added to every cost.
+    /// mean of about 10 and capped at 100,000, and 1 is added to every cost.
     pub(super) fn operator_costs(&self) -> Vec<u32> {
         let costs: Vec<f64> =
             self.task.operators.iter().map(|operator| operator.cost.minimum().approximate()).collect();

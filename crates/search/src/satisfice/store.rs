@@ -7,7 +7,6 @@ use rustc_hash::FxBuildHasher;
 
 use task::task::{State, Task};
 
-/// Bits of a packed state that hold the value of a variable.
 #[derive(Debug, Clone, Copy)]
 struct Field {
     word: usize,

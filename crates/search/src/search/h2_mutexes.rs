@@ -128,7 +128,6 @@ pub struct MutexPairs {
     first: Vec<u32>,
     /// Compatible pairs: pairs that a state on a path from the initial state to the goal may contain.
     alive: Table,
-    /// For each operator: `true` if it is proved that no plan can use the operator.
     useless: Vec<bool>,
 }
 
@@ -195,7 +194,6 @@ impl MutexPairs {
 struct H2Builder<'a, N> {
     task: &'a Task<N>,
     first: Vec<u32>,
-    /// Variable of each fact.
     variables: Vec<VariableId>,
     facts: u32,
     /// Remaining work limit, in bitset words.
@@ -215,7 +213,6 @@ impl<N: TaskNumber> H2Builder<'_, N> {
         self.first[fact.variable.index()].saturating_add(fact.value)
     }
 
-    /// Returns the numbers of a variable's facts.
     fn values(&self, variable: VariableId) -> std::ops::Range<u32> {
         let first = self.first[variable.index()];
         first..first.saturating_add(dense(self.task.variables[variable.index()].values.len()))
@@ -366,7 +363,6 @@ impl<N: TaskNumber> H2Builder<'_, N> {
         }
     }
 
-    /// Returns the facts that hold in some state, according to the table.
     fn facts_of(&self, table: &Table) -> Words {
         let mut facts = vec![0; self.words()];
         (0..self.facts).filter(|fact| table.has(*fact, *fact)).for_each(|fact| insert(&mut facts, fact));

@@ -57,7 +57,6 @@ impl Front {
         front
     }
 
-    /// Returns the approximate memory use in bytes.
     pub(super) fn bytes(&self) -> usize {
         let numbers = self.regions.first().map_or(0, |region| region.best.len());
         let region = numbers.saturating_add(self.most).saturating_mul(8);
@@ -165,7 +164,6 @@ impl Front {
     }
 }
 
-/// Creates a leaf with these labels and their best and worst values.
 fn region(labels: Vec<u32>, criteria: &impl Criteria) -> Region {
     let mut region = Region { best: Vec::new(), worst: Vec::new(), content: Content::Labels(Vec::new()) };
     let mut numbers = Vec::new();

@@ -1,10 +1,10 @@
 //! Scheduling of searches: a first plan, an optimal plan, and the closed states that prove its optimality.
 //!
 //! A\* with pattern databases runs first. If it finds no plan soon, a greedy best-first search looks for some
-//! plan. Then two A\* searches alternate: one uses only pattern databases, the other also LM-cut. The
-//! LM-cut search gets a quarter of the work of the other one at first, and then as much. A search that lags
-//! behind gets half. The result of the search that finishes first is returned. Work is counted in units instead of time,
-//! so the result is deterministic.
+//! plan. Then two A\* searches alternate: one uses only pattern databases, the other also LM-cut. The LM-cut
+//! search gets a quarter of the work of the other one at first, and then as much. A search that lags behind
+//! gets half. The result of the search that finishes first is returned. Work is counted in units instead of
+//! time, so the result is deterministic.
 
 use std::sync::Arc;
 
@@ -155,7 +155,6 @@ pub struct InterleavedSearch<'a, N, E> {
     bound: Option<N>,
     /// Best plan of the abandoned searches.
     best: Option<GroundPlan<N>>,
-    /// Statistics of the abandoned searches.
     figures: SearchStatistics,
 }
 

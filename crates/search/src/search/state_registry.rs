@@ -23,7 +23,6 @@ pub(super) const NONE: u32 = u32::MAX;
 
 const WORD: u32 = u32::BITS;
 
-/// Bits of a packed key that hold the value of a finite-domain variable.
 struct BitField {
     variable: usize,
     word: usize,
@@ -47,13 +46,11 @@ struct Numbers<N> {
     table: HashTable<u32>,
 }
 
-/// Link from a node to its parent in the search space.
 #[derive(Clone, Copy)]
 pub(super) struct ParentLink {
     pub(super) parent: u32,
     /// Index of the operator with its combination of designs, see `SearchTask::step`.
     pub(super) step: u32,
-    /// Number of steps from the initial state to the node.
     pub(super) steps: u32,
 }
 
@@ -75,7 +72,6 @@ enum NodeStatus {
     Dominated,
 }
 
-/// The state registry of A\*, which also stores the search nodes.
 pub(super) struct StateRegistry<N> {
     fields: Vec<BitField>,
     exact: Vec<usize>,
@@ -91,7 +87,6 @@ pub(super) struct StateRegistry<N> {
     /// Maximum number of nodes in a front (non-dominated nodes of a place) that is stored as a linked list. A
     /// longer front is stored as a tree.
     longest: usize,
-    /// Memory use of the trees in bytes.
     tree_bytes: usize,
     table: HashTable<u32>,
     nodes: Vec<Node>,
@@ -177,7 +172,6 @@ fn pack(fields: &[BitField], values: &[u32], words: usize, to: &mut Vec<u32>) {
 }
 
 impl<N: TaskNumber> StateRegistry<N> {
-    /// Creates an empty registry. `polarities` has the polarity by which each numeric variable is compared.
     pub(super) fn new(
         task: &Task<N>,
         polarities: Vec<Polarity>,
@@ -224,7 +218,6 @@ impl<N: TaskNumber> StateRegistry<N> {
         self.nodes.len()
     }
 
-    /// Returns the approximate memory use in bytes.
     pub(super) fn bytes(&self) -> usize {
         let words = [&self.keys, &self.fronts, &self.others, &self.plain]
             .map(|list| list.len().saturating_mul(size_of::<u32>()));
@@ -287,7 +280,6 @@ impl<N: TaskNumber> StateRegistry<N> {
         self.width.saturating_sub(self.exact.len())
     }
 
-    /// Returns the nodes of a linked front, beginning with `first`.
     fn chain(&self, first: u32) -> impl Iterator<Item = u32> {
         let some = |node: u32| (node != NONE).then_some(node);
         std::iter::successors(some(first), move |node| some(self.nodes[*node as usize].next))

@@ -61,9 +61,7 @@ pub(super) struct StubbornSetPruning {
     stubborn: Arc<Stubborn>,
     /// For each operator: whether it is in the stubborn set of the current state.
     is_in: Vec<bool>,
-    /// For each operator: whether it is applicable in the current state.
     can_be_applied: Vec<bool>,
-    /// Operators of the stubborn set that are not processed yet.
     open: Vec<u32>,
     /// All operators of the stubborn set.
     all: Vec<u32>,
@@ -125,7 +123,6 @@ impl Stubborn {
         })
     }
 
-    /// Returns the numbers of a variable's facts.
     fn facts(&self, variable: u32) -> std::ops::Range<u32> {
         let next = self.first.get((variable as usize).saturating_add(1)).copied();
         self.first[variable as usize]..next.unwrap_or_else(|| dense(self.setting.count()))
@@ -296,7 +293,6 @@ impl StubbornSetPruning {
         }
     }
 
-    /// Adds all operators that may set the fact with this number.
     fn add_setting(&mut self, stubborn: &Stubborn, number: u32) {
         if !std::mem::replace(&mut self.is_set[number as usize], true) {
             self.set.push(number);
@@ -331,13 +327,11 @@ pub(super) mod tests {
     use testing::random::Random;
     use testing::{depot, ground_text};
 
-    /// Maximum number of reachable states of a test task.
     const STATES: usize = 3_000;
 
     /// Successors of a state, each with the operator, the index of the successor state, and the cost.
     pub(in crate::search) type Steps = Vec<(OperatorId, usize, Int)>;
 
-    /// Returns all reachable states and their successors, or `None` if there are more than `STATES` states.
     pub(in crate::search) fn reachable(task: &Task) -> Option<(Vec<State>, Vec<Steps>)> {
         let mut indices = FxHashMap::from_iter([(task.initial.clone(), 0)]);
         let (mut states, mut steps): (Vec<State>, Vec<Steps>) = (vec![task.initial.clone()], Vec::new());
@@ -422,7 +416,6 @@ pub(super) mod tests {
         Some(left_out)
     }
 
-    /// Generates a random task whose operators require, set and read mostly neighbouring propositions.
     pub(in crate::search) fn switches(seed: u64) -> (String, String) {
         let mut random = Random(seed);
         let mut below = move |limit: i64| random.below(limit.unsigned_abs());
