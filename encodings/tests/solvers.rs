@@ -7,7 +7,6 @@ use task::limits::Limits;
 use test_resources::{Resource, missing};
 use testing::random::Random;
 
-/// Command lines of SAT solvers that Linux distributions ship.
 const PROGRAMS: [&str; 6] = [
     "minisat -verb=0 /dev/stdin /dev/stdout",
     "glucose -verb=0 /dev/stdin /dev/stdout",
@@ -90,7 +89,6 @@ fn every_back_end_decides_special_formulas() {
     check(&backends, &pigeons(4), Unsatisfiable);
 }
 
-/// Generator of random formulas with three literals per clause.
 struct Formulas(Random);
 
 impl Formulas {
@@ -104,8 +102,6 @@ impl Formulas {
     }
 }
 
-/// Returns `true` if some assignment satisfies the clauses and the assumptions, by trying all
-/// assignments.
 fn by_enumeration(variables: u64, clauses: &[Vec<i32>], assumptions: &[i32]) -> bool {
     (0..1_u32 << variables).any(|bits| {
         let literal = |l: &i32| (bits >> (l.unsigned_abs() - 1) & 1 == 1) == (*l > 0);

@@ -57,7 +57,6 @@ type Point = (f64, f64);
 /// A rectangle that is occupied by a label or symbol: left, top, right, bottom.
 type Taken = (f64, f64, f64, f64);
 
-/// The start and end point of a line.
 type Line = (Point, Point);
 
 /// All moves of a plan from one place to another.
@@ -82,7 +81,6 @@ struct Shape {
     outwards: Point,
 }
 
-/// Draws a map of places and ways with the moves of a plan.
 pub(crate) fn map(plan: &Plan, map: &Map, palette: &Palette, canvas: Canvas) -> Picture {
     let has_loops = plan.steps.iter().any(|step| step.way.is_some_and(|(from, to)| from == to));
     let (points, drawn_width, drawn_height) = pixels(map, canvas, has_loops);
@@ -169,8 +167,8 @@ fn straight((x1, y1): Point, (x2, y2): Point) -> Shape {
     Shape { line: ((x1 + sx, y1 + sy), (x2 + sx, y2 + sy)), centre: None, arrow, along, outwards }
 }
 
-/// Returns the shape of a move that ends at its origin: a loop at a side of the place without ways.
-/// The sides above and below are preferred, because step numbers need least space there.
+/// Returns the shape of a move that ends at its origin: a loop at a side of the place, as far from its ways as
+/// possible. The sides above and below are preferred, because step numbers need least space there.
 fn looped((x, y): Point, neighbours: &[Point]) -> Shape {
     let diagonal = std::f64::consts::FRAC_1_SQRT_2;
     let upright = [(0.0, -1.0), (0.0, 1.0)];

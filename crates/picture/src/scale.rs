@@ -4,7 +4,6 @@
 /// pixels.
 const CHARACTER: f64 = 6.75;
 
-/// A linear map from a range of numbers to a range of pixels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Scale {
     from: (f64, f64),

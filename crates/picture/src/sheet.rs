@@ -167,7 +167,6 @@ fn label(
     Some((start, place, text))
 }
 
-/// Returns the number of ticks that fit on the horizontal axis.
 fn ticks(canvas: Canvas) -> usize {
     (canvas.inner() / 75.0).min(8.0) as usize
 }

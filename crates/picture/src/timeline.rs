@@ -16,9 +16,7 @@ use crate::svg::{Picture, alternative};
 const ROW: f64 = 26.0;
 /// Height of the bars in a row, in pixels.
 const BAR: f64 = 20.0;
-/// Gap between lanes.
 const GAP: f64 = 8.0;
-/// Margin above the lanes.
 const TOP: f64 = 6.0;
 /// Width of the bar of a step without duration.
 const LEAST: f64 = 3.0;
@@ -56,7 +54,6 @@ impl<'p> Lane<'p> {
     }
 }
 
-/// Draws the timeline of a plan.
 pub(crate) fn timeline(plan: &Plan, palette: &Palette, span: &Span, canvas: Canvas) -> Picture {
     let frame = Frame::of(plan, span, canvas);
     let lanes = lanes(plan, &frame);
@@ -166,7 +163,6 @@ fn draw_bar(bar: &Bar<'_>, top: f64, (class, is_action): (&str, bool), about: &s
     }
 }
 
-/// Describes a bar in words, for its tooltip.
 fn about(bar: &Bar<'_>, step: &Step, lane: &str, is_action: bool) -> String {
     let number = bar.step + 1;
     if is_action {

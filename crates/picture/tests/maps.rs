@@ -9,7 +9,6 @@ type Point = (f64, f64);
 /// The width of a character and the height of a line in the pictures' font.
 const CHARACTER: (f64, f64) = (6.75, 13.0);
 
-/// The drawing of all moves from one place to another.
 struct Leg {
     from: String,
     to: String,

@@ -11,7 +11,6 @@ use crate::encode::builder::Builder;
 use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::sat::Lit;
 
-/// A conditional effect of an operator at a step, with its SAT variable.
 pub(super) struct ConditionalEffectVar<'a> {
     operator: OperatorId,
     position: usize,
@@ -20,7 +19,6 @@ pub(super) struct ConditionalEffectVar<'a> {
     pub(super) effects: &'a [Fact],
 }
 
-/// Conditional effects of all operators at a step.
 pub(super) struct FiredEffects<'a>(Vec<ConditionalEffectVar<'a>>);
 
 impl<'a> FiredEffects<'a> {

@@ -141,7 +141,6 @@ impl Cost {
     }
 }
 
-/// State of the encoding of the costs of all steps.
 struct Sum<'s, 'a> {
     builder: &'s mut Builder<'a>,
     cost: &'s CostLimit<'s>,

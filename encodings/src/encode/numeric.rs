@@ -55,13 +55,10 @@ pub(super) fn numeric(builder: &mut Builder<'_>) -> Option<Vec<Vec<Bits>>> {
     Some(numbers_by_step)
 }
 
-/// The update of all numbers at one step.
 struct Transition<'s, 'a> {
     builder: &'s mut Builder<'a>,
     step: usize,
-    /// Bits of the numbers before the step.
     numbers: &'s [Bits],
-    /// Intervals of the numbers before the step.
     ranges: &'s [Range],
 }
 

@@ -25,7 +25,6 @@ const BUDGET_TIME: Duration = Duration::from_secs(2);
 /// Time between two checks of the limits while the program runs.
 const INTERVAL: Duration = Duration::from_millis(5);
 
-/// Formula for an external solver program, and the program's last answer.
 pub(super) struct Program {
     command: Command,
     limits: Limits,
