@@ -48,8 +48,6 @@ fn solver(backend: &Backend, clauses: &[Vec<i32>]) -> Box<dyn Solver> {
     solver
 }
 
-/// Checks that all back ends give the expected answer, and that their assignments satisfy the
-/// clauses.
 fn check(backends: &[Backend], clauses: &[Vec<i32>], expected: Answer) {
     for backend in backends {
         let mut solver = solver(backend, clauses);

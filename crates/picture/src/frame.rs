@@ -39,7 +39,6 @@ pub(crate) const FILE: Canvas =
 pub(crate) const PAGE: [Canvas; 3] = [WIDE, COLUMN, TELEPHONE];
 /// The canvases of the pictures of two plans that a page shows side by side.
 pub(crate) const PAIR: [Canvas; 2] = [COLUMN, TELEPHONE];
-/// Canvas for the full width of a page.
 const WIDE: Canvas = Canvas { width: 1146.0, left: 170.0, has_names_above: false, step: 4.0, apart: 20.0 };
 /// Canvas for half the width of a page.
 const COLUMN: Canvas = Canvas { width: 560.0, left: 60.0, has_names_above: true, step: 4.0, apart: 20.0 };
@@ -114,13 +113,11 @@ fn end(plan: &Plan) -> f64 {
     plan.steps.iter().map(|step| step.end).fold(0.0, f64::max)
 }
 
-/// The horizontal axis of a plan, with the scale from axis positions to pixels.
 pub(crate) struct Frame {
     pub(crate) canvas: Canvas,
     pub(crate) scale: Scale,
     /// End of the plan on the axis.
     pub(crate) end: f64,
-    /// End of the axis.
     until: f64,
     /// Width of the whole picture, in pixels.
     pub(crate) width: f64,

@@ -12,7 +12,6 @@ use crate::svg::Picture;
 
 /// Width reserved for the names of lanes, in pixels.
 const NAMES: f64 = 90.0;
-/// Height of a lane, in pixels.
 const LANE: f64 = 24.0;
 const TOP: f64 = 6.0;
 /// Width of the interval whose happenings (inputs and decisions) share a mark, in pixels.

@@ -1,7 +1,7 @@
 //! Draws the map of the places of a mission, with the moves of a plan coloured by configuration.
 //!
-//! Moves in opposite directions are drawn side by side. Each move has an arrow; its step numbers
-//! are on the outer side of the arrow.
+//! Moves in opposite directions are drawn side by side. Each move has an arrow; its step numbers are on the
+//! outer side of the arrow. All lengths are in pixels, except those of [`Map`].
 
 use std::collections::BTreeMap;
 
@@ -18,7 +18,6 @@ use crate::svg::Picture;
 const MARGIN: f64 = 70.0;
 /// The side margins for the names of places, as a fraction of the width of the picture.
 const MARGIN_PART: f64 = 0.12;
-/// Upper and lower margin, in pixels.
 const UPPER_MARGIN: f64 = 35.0;
 /// Height of a map of a single place without its margins, in pixels.
 const LEAST_HEIGHT: f64 = 60.0;
@@ -32,7 +31,6 @@ const FARTHEST: f64 = 130.0;
 const LARGEST: f64 = 4_000.0;
 /// Radius of the circle of a place, with its surrounding space.
 const RADIUS: f64 = 7.0;
-/// Height of a line of text.
 const LINE: f64 = 13.0;
 /// Offset of a move from the line of its way, so that moves in opposite directions are drawn side
 /// by side.
@@ -258,8 +256,6 @@ fn names(
     labels
 }
 
-/// Draws a leg: the arrow, the step numbers, and a line. If the steps have several configurations,
-/// the line is dashed in their colours.
 fn draw_leg(leg: &Leg, map: &Map, palette: &Palette, number: Option<Point>) -> Markup {
     let mut names: Vec<&String> = Vec::new();
     for name in leg.names.iter().filter(|name| !name.is_empty()) {

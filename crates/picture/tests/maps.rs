@@ -226,7 +226,6 @@ fn places_at_one_position_are_told_apart() {
     }
 }
 
-/// Random walks on random maps; the random numbers come from a linear congruential generator.
 #[test]
 fn no_number_of_a_random_walk_stands_at_another_arrow() {
     let mut seed = 7_u64;

@@ -14,7 +14,6 @@ use crate::sat::Lit;
 pub(super) struct ConditionalEffectVar<'a> {
     operator: OperatorId,
     position: usize,
-    /// Literal that is true if the effect takes place at the step.
     pub(super) literal: Lit,
     pub(super) effects: &'a [Fact],
 }

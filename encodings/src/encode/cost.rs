@@ -394,8 +394,6 @@ fn next_amounts(spent: &BTreeSet<Int>, increments: impl Iterator<Item = Int>, ga
     amounts
 }
 
-/// Returns `true` if the number of possible accumulated amounts up to `gap` is small enough for the order
-/// encoding.
 fn amounts_fit(sources: &[Source], gap: Int) -> bool {
     let mut spent = BTreeSet::new();
     for source in sources {

@@ -73,7 +73,6 @@ struct Uses {
     require: BTreeMap<u32, Vec<OperatorId>>,
     /// Operators that read the variable in another way than by a plain condition.
     read: Vec<OperatorId>,
-    /// Operators that set the variable, each with the new value.
     write: Vec<(OperatorId, u32)>,
 }
 

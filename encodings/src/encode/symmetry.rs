@@ -27,7 +27,6 @@ use crate::sat::Lit;
 
 /// Interchangeable designs and objects of a task.
 pub struct Symmetry {
-    /// Designs that are interchangeable with an earlier design of the same slot.
     designs: Vec<(SlotId, u32)>,
     /// For each pair of neighbouring interchangeable objects: operators that use the first, and
     /// operators that use only the second.

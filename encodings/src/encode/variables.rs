@@ -14,7 +14,6 @@ use crate::sat::Lit;
 pub(super) struct Variables {
     /// For each step: the possible operators in ascending order, each with its variable.
     pub(super) operators: Vec<Vec<(OperatorId, Lit)>>,
-    /// For each step: literal that is true if any operator is executed.
     pub(super) busy: Vec<Lit>,
     /// `values[step][variable][value]`: literal that is true if the state variable has the value
     /// before the step.

@@ -163,7 +163,6 @@ fn has_ended(child: &mut Child, is_over: &dyn Fn() -> bool) -> Result<bool, Stri
     Ok(false)
 }
 
-/// A child process that is killed when this value is dropped.
 struct Process(Child);
 
 impl Drop for Process {
@@ -174,7 +173,6 @@ impl Drop for Process {
     }
 }
 
-/// Parses the output of a program. Returns the answer, and the literals of the assignment.
 fn read(output: &str) -> Result<(Answer, Vec<i32>), String> {
     let mut answer = None;
     let mut literals = Vec::new();

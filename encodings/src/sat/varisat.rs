@@ -33,7 +33,6 @@ pub(super) struct Varisat {
     limits: Limits,
     budget: u64,
     conflicts: Rc<Cell<u64>>,
-    /// Literals of all clauses, one clause after another.
     literals: Vec<varisat::Lit>,
     /// End of each clause in `literals`.
     ends: Vec<usize>,

@@ -63,9 +63,7 @@ pub(super) struct DeleteRelaxation {
     pub(super) payers: Vec<u32>,
     /// For each rule: the facts of its condition, which is never empty.
     pub(super) required: Lists,
-    /// For each rule: the facts that it adds.
     pub(super) given: Lists,
-    /// For each payer: its rules.
     pub(super) rules_of: Lists,
     pub(super) required_by: Lists,
     pub(super) given_by: Lists,
@@ -169,7 +167,6 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Returns the facts that each make the literal true.
     fn literal(&self, literal: Literal) -> Vec<u32> {
         if literal.positive {
             return vec![self.fact(literal.fact)];

@@ -48,7 +48,6 @@ enum CutSide {
 pub struct LandmarkCut {
     relaxed: DeleteRelaxation,
     costs: Vec<u64>,
-    /// For each fact: its h^max value.
     values: Vec<u64>,
     zones: Vec<CutSide>,
     lengths: Vec<u32>,
@@ -56,7 +55,6 @@ pub struct LandmarkCut {
     left: Vec<u32>,
     /// For each rule: its supporter, i.e. the condition with the greatest h^max value.
     supporters: Vec<u32>,
-    /// For each rule: the h^max value of its supporter.
     supports: Vec<u64>,
     queue: BinaryHeap<Reverse<(u64, u32)>>,
     stack: Vec<u32>,

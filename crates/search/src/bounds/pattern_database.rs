@@ -226,8 +226,6 @@ impl Projection {
         self.size() + self.operators.iter().map(|(_, transitions)| transitions.len()).sum::<usize>()
     }
 
-    /// Returns the minimum number of steps from each abstract state to the goal; `None` if the goal is
-    /// unreachable.
     pub(crate) fn steps_to_go(&self, limits: &Limits) -> Result<Vec<Option<Int>>, Interrupted> {
         self.distances(|_| 1, self.goals.iter().map(|goal| (*goal, 0)), limits)
     }

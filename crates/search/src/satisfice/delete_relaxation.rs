@@ -40,7 +40,6 @@ impl<N: TaskNumber> NumericCondition<N> {
     }
 }
 
-/// Contribution of an operator to a linear expression in conditions.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Achiever {
     /// Index of the linear expression in `Relaxation::directions`.
@@ -55,7 +54,6 @@ pub(super) struct Relaxation<N> {
     pub(super) propositions: usize,
     pub(super) always: Vec<Proposition>,
     pub(super) directions: Vec<NumericCondition<N>>,
-    /// For each node: its operator, or `NO_OPERATOR`.
     pub(super) operators: Vec<u32>,
     pub(super) conditions: Lists,
     pub(super) effects: Lists,
@@ -389,7 +387,6 @@ fn negated<N: TaskNumber>(number: N) -> N {
     -number
 }
 
-/// Returns an upper bound on a quantity over all designs, analogous to the lower bound `Quantity::minimum`.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"

@@ -15,7 +15,6 @@ use crate::satisfice::bucket_queue::Queue;
 use crate::satisfice::delete_relaxation::{NO_OPERATOR, Proposition, Relaxation};
 
 const UNREACHED: u32 = u32::MAX;
-/// Upper limit at which sums of costs are capped.
 const MAX_COST: u32 = 1 << 30;
 /// Upper limit on the assumed number of repetitions of an operator until a numeric comparison holds.
 const MAX_REPETITIONS: f64 = 10_000.0;
@@ -38,9 +37,7 @@ pub(super) struct FfHeuristic {
     initially_left: Vec<u32>,
     queue: Queue,
     values: Vec<f64>,
-    /// Operators whose conditions all hold in the state, according to the relaxation.
     pub(super) applicable: Vec<u32>,
-    /// Operators of the relaxed plan that are applicable in the state.
     pub(super) preferred: Vec<u32>,
     marked: Vec<bool>,
     marks: Vec<Proposition>,

@@ -61,7 +61,6 @@ impl LandmarkStatus {
         words(self.landmarks.all.len())
     }
 
-    /// Returns the bitset of the landmarks that are reached in the initial state.
     pub(super) fn initially<N: TaskNumber>(
         &mut self,
         relaxation: &Relaxation<N>,

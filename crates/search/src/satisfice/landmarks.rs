@@ -47,7 +47,6 @@ struct LandmarkFactory<'a, N> {
     known: FxHashMap<Vec<Proposition>, u32>,
     /// Orders between landmarks, as pairs (earlier, later).
     orders: FxHashSet<(u32, u32)>,
-    /// Greedy-necessary orders between landmarks, as pairs (earlier, later).
     needed: FxHashSet<(u32, u32)>,
     exclusive: FxHashMap<Proposition, Vec<usize>>,
 }
@@ -259,7 +258,6 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
         (reached, enabled)
     }
 
-    /// Adds reasonable orders, which prevent that a landmark is achieved, destroyed and achieved again.
     fn reasonable(&mut self, limits: &Limits) -> Result<(), Interrupted> {
         let indices = 0..dense(self.all.len());
         let sides: Vec<Vec<Proposition>> = indices.clone().map(|landmark| self.side(landmark)).collect();

@@ -23,7 +23,6 @@ use crate::search::SearchStatistics;
 /// Work units charged for generating a successor and looking it up in the store.
 const GENERATION_COST: u64 = 200;
 
-/// Weight of the heuristic in the sort key of the open lists.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum HeuristicWeight {
     /// The heuristic value only (greedy best-first search).
@@ -42,11 +41,9 @@ struct Node<N> {
 }
 
 pub(super) enum Outcome<N> {
-    /// A plan that costs less than the limit, if there is a limit.
     Plan(GroundPlan<N>),
     /// The open lists are empty. No plan exists, unless `Search::incomplete` is `true`.
     Exhausted,
-    /// The work budget is used up. The search can be resumed.
     Paused,
 }
 

@@ -17,7 +17,6 @@ use crate::search::{MutexPairs, is_monotone};
 /// Cost of an operator that is never useful according to the h² mutexes.
 pub(super) const USELESS_OPERATOR_COST: u32 = 1 << 20;
 
-/// An operator with chosen designs, and its cost.
 struct Step<N> {
     operator: OperatorId,
     choice: Vec<u32>,

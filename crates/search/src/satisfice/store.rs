@@ -14,8 +14,6 @@ struct Field {
     mask: u64,
 }
 
-/// Registry of all generated states: bit-packed values of finite-domain variables, and values of numeric
-/// variables.
 pub(super) struct Store<N> {
     fields: Vec<Field>,
     stride: usize,

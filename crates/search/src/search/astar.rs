@@ -77,7 +77,6 @@ pub enum OpenListOrder {
 /// Reaction to a forecast that the search will run out of memory before it can finish.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum OutOfMemoryPolicy {
-    /// Stop the search.
     None,
     /// Ignore forecasts; the last forecast was favourable, or nothing was forecast.
     Some,
@@ -110,13 +109,11 @@ pub struct AStar<'a, N, E> {
     pub(super) pruning: Option<StubbornSetPruning>,
     /// Work units already done, without those of the lazy heuristic.
     own_work: u64,
-    /// Number of searches that share the memory limit.
     sharing: usize,
     /// Lower bound on the cost of every plan; `None` before the first expansion.
     bound: Option<N>,
     is_interrupted: bool,
     pub(super) patience: OutOfMemoryPolicy,
-    /// Goal node of the best plan of this search.
     best: Option<u32>,
     /// Cost of the best known plan (the incumbent), or a cost limit set by the caller. More expensive nodes
     /// are pruned.
@@ -131,9 +128,7 @@ pub struct AStar<'a, N, E> {
     /// Lower bound on the plan cost at each doubling of the number of stored states.
     progress: Vec<N>,
     pub(crate) statistics: SearchStatistics,
-    /// Scratch buffer: the state that is being expanded.
     state: State<N>,
-    /// Scratch buffer: the successor that is being generated.
     next: State<N>,
 }
 
@@ -338,7 +333,6 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         self.is_interrupted
     }
 
-    /// Divides the memory limit among `count` searches.
     pub(super) fn set_memory_share(&mut self, count: usize) {
         self.sharing = count.max(1);
     }
@@ -386,7 +380,6 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         reachable_rise.is_none_or(|reachable_rise| reachable_rise >= remaining)
     }
 
-    /// Returns the outcome when no open node can improve the incumbent.
     fn outcome_when_exhausted(&self) -> SearchOutcome<N> {
         match self.best_plan() {
             plan if self.states_dropped || self.order == OpenListOrder::Greedy => {

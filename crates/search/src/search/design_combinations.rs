@@ -280,8 +280,6 @@ mod tests {
         }
     }
 
-    /// Reference implementation of `pareto_optimal_combinations`: compares every combination with every other
-    /// combination.
     fn expected(operator: &Operator, monotone: bool, all: bool) -> Vec<(Vec<u32>, Int)> {
         let sizes = operator.sizes();
         let value = |choice: &Vec<u32>| {

@@ -26,7 +26,6 @@ type Words = Vec<u64>;
 
 /// An operator in terms of numbered facts of basic variables.
 struct Rule {
-    /// Facts that the condition of the operator requires.
     before: Vec<u32>,
     /// Facts that are known to hold after the operator.
     after: Vec<u32>,
@@ -196,7 +195,6 @@ struct H2Builder<'a, N> {
     first: Vec<u32>,
     variables: Vec<VariableId>,
     facts: u32,
-    /// Remaining work limit, in bitset words.
     left: usize,
 }
 

@@ -42,7 +42,6 @@ struct Region {
     content: Content,
 }
 
-/// A Pareto front: labels none of which dominates another, stored as a tree of boxes.
 #[derive(Default)]
 pub(super) struct Front {
     regions: Vec<Region>,

@@ -362,8 +362,6 @@ mod tests {
     use testing::random::Random;
     use testing::{depot, fleet, ground_text, optimum, successors};
 
-    /// Returns the cost and the length of the plan that A\* finds, with or without LM-cut, symmetry reduction
-    /// and stubborn sets.
     fn solve(
         task: &Task,
         order: OpenListOrder,

@@ -59,7 +59,6 @@ struct Node {
     origin: ParentLink,
     /// Path cost, as the index of an interned number.
     cost: u32,
-    /// Next node of the linked front, or `NONE`.
     next: u32,
     state: NodeStatus,
 }
@@ -93,7 +92,6 @@ pub(super) struct StateRegistry<N> {
     /// For each node: the indices of the values of its compared variables, which are not part of the key.
     others: Vec<u32>,
     numbers: Numbers<N>,
-    /// Scratch buffer: the key of the state that is looked up.
     key: Vec<u32>,
     /// Scratch buffer: indices of the compared numbers of the state that is looked up.
     own: Vec<u32>,
@@ -275,7 +273,6 @@ impl<N: TaskNumber> StateRegistry<N> {
         (!is_dominated).then_some(VacantEntry { hash, place, cost })
     }
 
-    /// Returns the number of words of a key that hold finite-domain values.
     fn words(&self) -> usize {
         self.width.saturating_sub(self.exact.len())
     }
@@ -361,7 +358,6 @@ impl<N: TaskNumber> StateRegistry<N> {
         one == other || (!up || number(one) >= number(other)) && (!down || number(one) <= number(other))
     }
 
-    /// Returns `true` if each compared variable is at least as good in `one` as in `other`.
     fn is_no_worse(&self, one: &[u32], other: &[u32]) -> bool {
         let mut pairs = self.compared.iter().zip(one.iter().zip(other));
         pairs.all(|(compared, (one, other))| self.compares(compared.asked, *one, *other))

@@ -56,18 +56,14 @@ pub struct Stubborn {
     required: Lists,
 }
 
-/// State of stubborn-set pruning: scratch buffers, and statistics for disabling it.
 pub(super) struct StubbornSetPruning {
     stubborn: Arc<Stubborn>,
-    /// For each operator: whether it is in the stubborn set of the current state.
     is_in: Vec<bool>,
     can_be_applied: Vec<bool>,
     open: Vec<u32>,
-    /// All operators of the stubborn set.
     all: Vec<u32>,
     /// For each fact: whether all operators that set it are in the stubborn set.
     is_set: Vec<bool>,
-    /// Facts for which `is_set` is `true`.
     set: Vec<u32>,
     /// Number of applicable operators that are not in the stubborn set.
     out: usize,
@@ -75,9 +71,7 @@ pub(super) struct StubbornSetPruning {
     trial: u64,
     /// Number of states that were expanded with pruning.
     looked: u64,
-    /// Sum of the numbers of applicable operators over the states expanded with pruning.
     applicable: u64,
-    /// Number of operators that were pruned, over all expanded states.
     left_out: u64,
 }
 
@@ -212,8 +206,8 @@ impl StubbornSetPruning {
         }
     }
 
-    /// Adds all operators that achieve one unsatisfied part of a condition. Returns `false` if the condition
-    /// holds.
+    /// Ensures that the set contains all operators that achieve one unsatisfied part of a condition. Returns
+    /// `false` if the condition holds.
     fn enable<N>(
         &mut self,
         stubborn: &Stubborn,
@@ -329,7 +323,6 @@ pub(super) mod tests {
 
     const STATES: usize = 3_000;
 
-    /// Successors of a state, each with the operator, the index of the successor state, and the cost.
     pub(in crate::search) type Steps = Vec<(OperatorId, usize, Int)>;
 
     pub(in crate::search) fn reachable(task: &Task) -> Option<(Vec<State>, Vec<Steps>)> {
