@@ -101,6 +101,7 @@ impl Variables {
 fn values(formula: &mut Formula, possible: &[Vec<bool>], step: usize) -> Vec<Vec<Lit>> {
     let mut literals_by_variable = Vec::with_capacity(possible.len());
     for (variable, values) in possible.iter().enumerate() {
+        // A value that is the only possible one is a constant and needs no variable.
         let single = values.iter().filter(|possible| **possible).count() == 1;
         let mut literals = Vec::with_capacity(values.len());
         for (value, possible) in values.iter().enumerate() {

@@ -254,7 +254,6 @@ impl LandmarkCut {
     }
 }
 
-/// Lowers the value of each fact to `total` if it is greater, and queues the facts whose values changed.
 fn offer(facts: &[u32], total: u64, values: &mut [u64], queue: &mut BinaryHeap<Reverse<(u64, u32)>>) {
     for fact in facts {
         let value = &mut values[*fact as usize];

@@ -22,7 +22,6 @@ use task::task::{Condition, Fact, Literal, Operator, OperatorId, State, Task, Va
 /// Index of a proposition: a fact, a disjunction, a numeric comparison, or the artificial goal.
 pub(super) type Proposition = u32;
 
-/// Operator index of a node that does not belong to an operator.
 pub(super) const NO_OPERATOR: u32 = u32::MAX;
 
 /// A linear expression, and all thresholds with which conditions compare it.
@@ -62,7 +61,6 @@ pub(super) struct Relaxation<N> {
     pub(super) waiting: Lists,
     /// For each node: `true` if it represents the unconditional part of an operator.
     pub(super) is_base: Vec<bool>,
-    /// Artificial proposition that is true if all conditions of the goal are true.
     pub(super) goal: Proposition,
     pub(super) goals: Vec<Proposition>,
 }

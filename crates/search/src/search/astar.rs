@@ -88,7 +88,6 @@ pub(super) enum OutOfMemoryPolicy {
 /// tie-breaker that prefers deep nodes.
 type NodeKey<N> = (N, u32, u32);
 
-/// Returns a tie-breaker that decreases with the depth `steps` of a node, so that deep nodes come first.
 fn later(steps: u32) -> u32 {
     u32::MAX.saturating_sub(steps)
 }

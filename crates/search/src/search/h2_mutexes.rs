@@ -123,7 +123,6 @@ fn without(words: &[u64], others: &[u64]) -> Words {
 
 /// The h² mutexes of a task, from forward and backward analysis.
 pub struct MutexPairs {
-    /// Number of the first fact of each basic variable.
     first: Vec<u32>,
     /// Compatible pairs: pairs that a state on a path from the initial state to the goal may contain.
     alive: Table,

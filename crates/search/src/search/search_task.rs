@@ -52,7 +52,6 @@ impl<N: TaskNumber> SearchTask<N> {
         Ok(Some(Self { choices, numbers, index: SuccessorGenerator::new(task), dearest: max_cost }))
     }
 
-    /// Returns the operator and the designs of the combination with this index.
     pub(super) fn step(&self, number: u32) -> GroundStep {
         let operator = self.numbers.partition_point(|first| *first <= number).saturating_sub(1);
         let choice = number.saturating_sub(self.numbers[operator]);

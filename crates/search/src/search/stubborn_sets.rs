@@ -42,7 +42,6 @@ const MIN_PRUNED_FRACTION: u64 = 5;
 
 /// Indices of a task: the operators that require, set or read each fact or variable.
 pub struct Stubborn {
-    /// Number of the first fact of each variable.
     first: Vec<u32>,
     /// For each fact: operators that require it.
     requiring: Lists,

@@ -48,6 +48,7 @@ pub(super) fn install(
     for (deadline, conditions, noted) in deadlines {
         let effects = [vec![], vec![noted]];
         for ((name, condition), mut effects) in deadline.actions().iter().zip(conditions).zip(effects) {
+            // Actions without effects would be pruned.
             effects.push(Effect::Add(flag(LOOKED_AT)));
             let precondition = all([condition, not(holds(LOOKED_AT))]);
             let body = ActionBody::Instantaneous { precondition, effect: Effect::And(effects) };

@@ -6,7 +6,6 @@ use pddl::ast::{Atom, Condition, Domain, Expression, Name, Problem, Term, TypeEx
 
 use super::simplify::identifier;
 
-/// The objects of a task, each with the types of all its declarations.
 pub(super) struct Objects<'t> {
     types: TypeHierarchy,
     all: Vec<(&'t Name, Vec<&'t TypeExpression>)>,

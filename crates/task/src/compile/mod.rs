@@ -146,7 +146,6 @@ fn constraints<'t>(
     of_domain.chain(problem.constraints.iter().map(|constraint| (File::Problem, constraint)))
 }
 
-/// Returns the preference name of an expression `(is-violated NAME)`, and `None` for other expressions.
 fn violation(expression: &Expression) -> Option<&Name> {
     match expression {
         Expression::Fluent(atom) if atom.predicate.name == Name::new("is-violated") => {

@@ -25,14 +25,12 @@ use super::syntax_edits::{PreferenceInstance, declare, happen, hidden, require};
 /// Auxiliary atom that holds until the evaluation of preferences begins. Actions of the domain require it.
 const GOING_ON: &str = "the plan goes on";
 
-/// Suffix of the name of each hidden action that evaluates a preference instance as violated.
 pub(super) const VIOLATION: &str = " is violated";
 
 /// Auxiliary atom that is never true. Hidden actions that are never executed add it, so that they have an
 /// effect.
 const VIOLATED: &str = "a preference is violated";
 
-/// Returns the numeric function that counts the violations of a preference.
 pub(super) fn count(preference: &Name) -> Atom {
     flag(&format!("violations of {preference}"))
 }
@@ -104,6 +102,7 @@ fn look_up(domain: &mut Domain, span: Span, wanted: Vec<PreferenceInstance>) {
         declare(domain, VIOLATED);
     }
     for ((name, condition), number) in wanted.into_iter().zip(1_u64..) {
+        // Actions without effects would be pruned.
         let precondition = all([not(condition), not(holds(VIOLATED))]);
         let effect = Effect::And(vec![violate(&name), Effect::Add(flag(VIOLATED))]);
         let body = ActionBody::Instantaneous { precondition, effect };

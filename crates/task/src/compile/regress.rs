@@ -12,7 +12,6 @@ use super::simplify::{all, any, equal, exists, falsity, is_false, not};
 /// change.
 const MAX_CASES: usize = 64;
 
-/// The effects of one happening of an action: its start or its end.
 pub(super) struct Happening {
     changes: Vec<Change>,
 }

@@ -23,7 +23,6 @@ use super::syntax_edits::{PreferenceInstance, declare, happen, require, unsuppor
 /// Limit on the total number of ground instances of trajectory constraints, including those of preferences.
 const INSTANCES: usize = 20_000;
 
-/// Collects the auxiliary atoms, conditions and effects for all trajectory constraints of a task.
 pub(super) struct Monitors<'t> {
     domain: &'t Domain,
     problem: &'t Problem,

@@ -204,7 +204,6 @@ impl ScaledQuantities {
     }
 }
 
-/// Returns the cost of applying the operator: its weighted duration and its weighted changes of fluents.
 fn cost(
     operator: &GroundOperator,
     metric: &Linear<Rational>,

@@ -13,7 +13,6 @@ use num_rational::{BigRational, Ratio};
 /// Maximum number of decimal places; 10^76 has fewer than 254 bits.
 const PLACES: u32 = 76;
 
-/// Maximum number of bits of the magnitude of a mantissa.
 const BITS: u32 = 254;
 
 const FIVES: [u128; 56] = powers(5);
@@ -47,8 +46,8 @@ fn fits(mantissa: I256) -> bool {
     mantissa.unsigned_abs().leading_zeros() >= U256::BITS - BITS
 }
 
-/// Returns the exponent e if the number is 5^e, and `None` otherwise.
 fn exponent_of_five(power: u128) -> Option<u32> {
+    // Powers of 5 are sorted, so the exponent is found by binary search.
     FIVES.binary_search(&power).ok().and_then(|exponent| u32::try_from(exponent).ok())
 }
 

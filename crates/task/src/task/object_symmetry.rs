@@ -82,7 +82,6 @@ struct Parts<'t> {
     /// For each variable and value: the words of the atom as indices in `all_words`, or `None` for a value
     /// without an atom.
     words: Vec<Vec<Option<Vec<usize>>>>,
-    /// Fact of each atom, by the words of the atom.
     facts: FxHashMap<Vec<usize>, Fact>,
     all_words: FxHashMap<&'t str, usize>,
     /// Operator for each schema and argument list, or `None` if several operators have this schema and these

@@ -19,7 +19,6 @@ pub(super) struct Denominator {
     what: &'static str,
     /// Least common denominator of the visited numbers; `None` on overflow.
     common: Option<Int>,
-    /// Description and source location of the number that caused the overflow.
     culprit: Option<(String, Option<Place>)>,
     /// Visited tables by address. The values are stored so that the address stays unique.
     seen: FxHashMap<*const Rational, Arc<[Rational]>>,

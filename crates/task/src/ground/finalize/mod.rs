@@ -162,8 +162,6 @@ impl<N: TaskNumber> Distinct<N> {
     }
 }
 
-/// Converts the objectives to the number type of the task. Also returns, for each objective, the conversion
-/// of its costs.
 #[expect(clippy::type_complexity, reason = "a list for each of two things")]
 fn objectives<N: TaskNumber>(
     task: &GroundTask<'_>,

@@ -11,7 +11,6 @@ use crate::limits::Interrupted;
 use crate::number::dense;
 use crate::task::{ConditionalEffect, Fact, Literal, Variable, VariableId};
 
-/// The finite-domain variables of a task, and the variable and value of each atom.
 pub(super) struct Atoms {
     pub(super) variables: Vec<Variable>,
     /// Number of non-derived variables, which precede the derived variables.

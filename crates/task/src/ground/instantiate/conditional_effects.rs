@@ -33,7 +33,6 @@ pub(super) struct Case {
     end: Vec<(Residual, GroundChange)>,
 }
 
-/// Changes at the start of an instance, without conditions.
 #[derive(Clone)]
 struct Start {
     adds: Vec<AtomId>,

@@ -28,7 +28,6 @@ use crate::task::quantity::{Linear, Quantity};
 /// i.e. the parameters that occur together with slots or in the duration.
 pub(super) struct SharedInstanceData<'a> {
     pub(super) designs: Slots<'a>,
-    /// Function and suitable designs of each slot.
     pub(super) slots: Arc<GroundSlots>,
     pub(super) forbidden: Arc<[ForbiddenCombinations]>,
     /// Residuals of the conjuncts at the start that mention slots.

@@ -25,7 +25,6 @@ pub(super) struct Apart {
     pub(super) undefined: Arc<[ForbiddenCombinations]>,
 }
 
-/// An action instance whose conditions and effects are being evaluated.
 pub(super) struct Build<'w, 'a> {
     pub(super) world: &'w mut World<'a>,
     pub(super) binding: Binding,
@@ -85,7 +84,6 @@ impl Build<'_, '_> {
         open(self.world, expression, &mut self.binding, self.slots, &mut undefined)
     }
 
-    /// Forbids the combinations of designs for which a static comparison is false.
     fn forbid(&mut self, mentioned: &SlotSet, residual: &Residual) -> Result<(), Failure> {
         match residual {
             Residual::And(parts) => parts.iter().try_for_each(|part| self.forbid(mentioned, part)),

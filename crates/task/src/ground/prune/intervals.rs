@@ -84,6 +84,7 @@ fn reachable(task: &GroundTask<'_>) -> Result<Vec<Interval>, Interrupted> {
         }
         round += 1;
         if round > ROUNDS {
+            // Widening: a bound that still changes becomes infinite.
             for (interval, before) in intervals.iter_mut().zip(&before) {
                 interval.low = interval.low.take().filter(|low| before.low.as_ref() == Some(low));
                 interval.high = interval.high.take().filter(|high| before.high.as_ref() == Some(high));

@@ -80,7 +80,6 @@ impl<'a> ReachabilityProgramBuilder<'a> {
             .collect()
     }
 
-    /// Returns the symbol of a unary relation that contains exactly the candidate objects.
     fn candidates(&mut self, candidates: &Arc<[ObjectId]>) -> Symbol {
         if let Some(symbol) = self.types.get(candidates) {
             return *symbol;
@@ -254,7 +253,6 @@ fn satisfying(
     Ok(rows)
 }
 
-/// Returns the variables that a quantifier binds, and the candidates of all variables in its scope.
 pub(super) fn with_bound(candidates: &Candidates, bound: &[Bound]) -> (Vec<u32>, Candidates) {
     let mut inner = candidates.clone();
     inner.extend(bound.iter().map(|b| (b.variable, b.candidates.clone())));

@@ -17,7 +17,6 @@ use crate::number::dense;
 use crate::task::quantity::NumericId;
 use pddl::ast::Name;
 
-/// Number of enumeration steps between two checks of the limits.
 const BETWEEN_LOOKS: u32 = 256;
 
 type AtomIndex<K> = IndexMap<(K, Arguments), (), FxBuildHasher>;
