@@ -21,7 +21,8 @@ const PREFERRED_BOOST: i64 = 1_000;
 #[derive(Debug)]
 struct List<K> {
     buckets: BTreeMap<K, VecDeque<Entry>>,
-    /// Number of turns taken. The non-empty list with the fewest turns is used next.
+    /// Number of turns taken, minus the extra turns that `boost` has granted. The non-empty list with the
+    /// lowest number is used next.
     turns: i64,
     preferred: bool,
 }

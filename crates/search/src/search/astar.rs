@@ -44,7 +44,7 @@ pub enum SearchOutcome<N = Int> {
     /// A cheapest plan. With the order `OpenListOrder::Fewest`, also the shortest among the cheapest plans.
     Optimal(GroundPlan<N>),
     /// Proof that no plan exists (within the cost limit of the search, if it has one): no open node remains,
-    /// and the pruning preserves a cheapest plan.
+    /// and pruning never removes all cheapest plans.
     None,
     /// No proof. Contains the best plan found if a limit on time, memory or states was reached, a number
     /// overflowed, or the search was greedy. Contains `None` if no plan was found, or if the search proved that

@@ -67,8 +67,8 @@ pub(super) struct Middle<'m> {
 }
 
 impl Middle<'_> {
-    /// Adds all conditions to `parts`, rewritten over the state before the start. Adds the changes of the
-    /// timed events up to the end to `start`.
+    /// Adds all conditions to `parts`, rewritten over the state before the start. Adds the changes of the timed
+    /// events up to the end, and the changes of phase and clock, to `start`.
     fn pass(&self, start: &mut Start, parts: &mut Vec<Residual>) {
         let Some((passage, interference)) = self.passage else {
             let conditions = self.over_all.iter().chain(self.at_end);
@@ -92,10 +92,10 @@ impl Middle<'_> {
     }
 }
 
-/// Returns the cases of an instance, i.e. the combinations of truth values of its effect conditions. There is
-/// a single case unless the start effects or numeric effects have conditions. Contradictory cases and cases
-/// with undefined values are dropped (PDDL 2.1, section 8: an effect whose condition is false does not
-/// occur). Fails if there are more than `CASE_LIMIT` combinations.
+/// Returns the cases of an instance, i.e. the combinations of truth values of its effect conditions. There is a
+/// single case unless the start effects or numeric effects have conditions. An effect whose condition is false
+/// does not occur (PDDL 2.1, section 8). Contradictory cases and cases with undefined values are dropped. Fails
+/// if there are more than `CASE_LIMIT` combinations for the start, or for the numeric effects of the end.
 pub(super) fn cases(
     schema: &Schema,
     before: &[Residual],
