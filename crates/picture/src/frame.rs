@@ -31,13 +31,11 @@ pub(crate) struct Canvas {
     pub(crate) apart: f64,
 }
 
-/// The canvas of a picture in a separate file.
 pub(crate) const FILE: Canvas =
     Canvas { width: 826.0, left: 170.0, has_names_above: false, step: 60.0, apart: 46.0 };
 /// The canvases of the pictures in a page, in descending width. The page shows the first picture
 /// that fits its column; `page.css` must contain the same widths.
 pub(crate) const PAGE: [Canvas; 3] = [WIDE, COLUMN, TELEPHONE];
-/// The canvases of the pictures of two plans that a page shows side by side.
 pub(crate) const PAIR: [Canvas; 2] = [COLUMN, TELEPHONE];
 const WIDE: Canvas = Canvas { width: 1146.0, left: 170.0, has_names_above: false, step: 4.0, apart: 20.0 };
 /// Canvas for half the width of a page.
@@ -78,7 +76,6 @@ pub(crate) struct NamePlace {
 /// so have the same scales.
 pub(crate) struct Span {
     steps: usize,
-    /// Latest end over all plans, as a position on the horizontal axis.
     until: f64,
     /// Minimum and maximum of each numeric fluent over all plans, including bounds of conditions.
     values: BTreeMap<String, (f64, f64)>,
@@ -116,7 +113,6 @@ fn end(plan: &Plan) -> f64 {
 pub(crate) struct Frame {
     pub(crate) canvas: Canvas,
     pub(crate) scale: Scale,
-    /// End of the plan on the axis.
     pub(crate) end: f64,
     until: f64,
     /// Width of the whole picture, in pixels.

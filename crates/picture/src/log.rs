@@ -114,7 +114,6 @@ fn draw(kind: Kind, marks: &BTreeMap<i64, Vec<&Happening>>, (left, right): (f64,
     }
 }
 
-/// Returns the tooltip of a mark: descriptions of its first happenings, and the number of the others.
 fn titled(marked: &[&Happening]) -> String {
     let named = marked
         .iter()

@@ -39,11 +39,9 @@ const ASIDE: f64 = 2.5;
 const TIP: f64 = 7.0;
 /// Distance from the centre of an arrow to its sides, in pixels.
 const SIDE: f64 = 6.0;
-/// Radius of the loop that represents a move to its origin.
 const LOOP: f64 = 10.0;
 /// Distance in pixels below which two places count as coinciding, and are separated.
 const SAME: f64 = 2.0;
-/// Minimum margin of a map that contains loops.
 const LOOP_MARGIN: f64 = 58.0;
 /// Additional distance of a name from its place, if no nearby position is free of lines.
 const FARTHER: f64 = 9.0;
@@ -57,13 +55,11 @@ type Taken = (f64, f64, f64, f64);
 
 type Line = (Point, Point);
 
-/// All moves of a plan from one place to another.
 struct Leg {
     from: usize,
     to: usize,
     /// The numbers of the steps that are these moves, from 1.
     steps: Vec<usize>,
-    /// The name of the configuration of each step.
     names: Vec<String>,
     shape: Shape,
 }

@@ -90,7 +90,6 @@ fn drawn(part: &Part, number: i32, palette: &Palette) -> Markup {
     }
 }
 
-/// Creates a scale that covers the values with a margin on both sides.
 fn scale(values: impl Iterator<Item = f64>, to: (f64, f64)) -> Scale {
     let (low, high) = range(values);
     let margin = ((high - low) * 0.08).max(high.abs() * 1e-6);

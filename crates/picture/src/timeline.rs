@@ -17,7 +17,6 @@ const ROW: f64 = 26.0;
 const BAR: f64 = 20.0;
 const GAP: f64 = 8.0;
 const TOP: f64 = 6.0;
-/// Width of the bar of a step without duration.
 const LEAST: f64 = 3.0;
 /// Minimum number of characters of a shortened name, including the ellipsis. A shorter remainder is replaced by
 /// the step number (for actions) or omitted (for designs).

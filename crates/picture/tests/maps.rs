@@ -128,7 +128,6 @@ fn check(name: &str, picture: Node<'_, '_>, moves: &[(usize, usize)]) -> usize {
     legs.iter().filter(|leg| leg.label.is_none()).count()
 }
 
-/// Returns the map of a plan as drawn in a separate file, and as drawn for each column of a page.
 fn drawings(plan: &Plan) -> Vec<(String, String)> {
     let report = Report { plan: plan.clone(), before: Some(plan.clone()), ..Report::default() };
     let file = report.pictures().into_iter().find(|(name, _)| name == "map.svg").expect("a map").1;

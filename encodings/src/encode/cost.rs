@@ -54,7 +54,6 @@ type Increments = Vec<(Vec<Lit>, Int)>;
 /// design tables of one set of slots.
 struct Source {
     step: u32,
-    /// Index of this source of cost within its step.
     stage: u32,
     increments: Increments,
 }
@@ -380,7 +379,6 @@ fn residual_tables(operator: &Operator) -> Vec<(Vec<Vec<(usize, usize)>>, Vec<In
         .collect()
 }
 
-/// Returns the accumulated amounts that are possible after one more source, up to the gap.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "amounts are at most the gap, which is at most GROWTH_LIMIT"

@@ -8,7 +8,6 @@ use crate::sat::solver::{Answer, Lit, Solver};
 
 pub(super) struct Cadical {
     solver: cadical::Solver<Watch>,
-    /// Values of all variables in the last satisfying assignment.
     assignment: Vec<bool>,
     variables: u32,
     conflicts: u64,

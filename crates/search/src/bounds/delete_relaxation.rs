@@ -67,7 +67,6 @@ pub(super) struct DeleteRelaxation {
     pub(super) rules_of: Lists,
     pub(super) required_by: Lists,
     pub(super) given_by: Lists,
-    /// Number of the first fact of each variable.
     first: Vec<u32>,
     basic: usize,
 }

@@ -27,7 +27,6 @@ struct Supporter {
 }
 
 pub(super) struct FfHeuristic {
-    /// h^add value of each proposition.
     costs: Vec<u32>,
     supporters: Vec<Supporter>,
     /// For each node: the number of its unreached conditions.

@@ -33,10 +33,8 @@ use crate::search::successor_generator::SuccessorGenerator;
 
 /// Maximum number of labels (partial plans) that are stored in both searches together.
 const LABEL_LIMIT: usize = 100_000;
-/// Maximum number of comparisons between labels in both searches together.
 const PAIR_LIMIT: usize = 50_000_000;
 
-/// A label of the search: a partial plan, represented by the state that it reaches and by its quality.
 #[derive(Debug, Clone)]
 struct Label {
     state: State,

@@ -153,7 +153,6 @@ pub struct InterleavedSearch<'a, N, E> {
     is_patient: bool,
     /// Greatest proved lower bound on the cost of every plan.
     bound: Option<N>,
-    /// Best plan of the abandoned searches.
     best: Option<GroundPlan<N>>,
     figures: SearchStatistics,
 }

@@ -14,7 +14,6 @@ use crate::search::successor_generator::SuccessorGenerator;
 
 /// Precomputed operator data of a task, independent of the initial state.
 pub struct SearchTask<N = Int> {
-    /// For each operator: its Pareto-optimal combinations of designs, with their costs.
     pub(super) choices: Vec<CostedCombinations<N>>,
     /// For each operator: the index of its first combination among all combinations. The last element is the
     /// total number of combinations.

@@ -14,7 +14,6 @@ pub(super) fn declare(domain: &mut Domain, name: &str) {
     domain.predicates.push(Declaration { identifier: identifier(name), parameters: Vec::new() });
 }
 
-/// Returns an auxiliary action without parameters, which plans do not show.
 pub(super) fn hidden(name: &str, body: ActionBody, span: Span) -> Action {
     Action { identifier: identifier(name), parameters: Vec::new(), body, preferences: Vec::new(), span }
 }

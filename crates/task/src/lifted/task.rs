@@ -129,7 +129,6 @@ pub struct Joint {
 #[derive(Debug, Clone, Copy)]
 pub struct Time {
     pub(crate) clock: FunctionId,
-    /// Length of one moment: an interval so short that distinct times differ by at least two moments.
     pub(crate) moment: FunctionId,
     /// Predicate `(phase NUMBER)`: the number of past events.
     pub phase: PredicateId,

@@ -91,7 +91,6 @@ impl Definitions {
         (atom, true)
     }
 
-    /// Creates an auxiliary derived atom that represents a subcondition.
     fn name(&mut self, world: &mut World<'_>, residual: Residual) -> AtomId {
         // Auxiliary atoms use the first predicate id after those of the declared predicates.
         let predicate = PredicateId(dense(world.lifted.predicates.len()));
@@ -101,7 +100,6 @@ impl Definitions {
         atom
     }
 
-    /// Adds rules by which the derived atom `head` is true if the residual condition holds.
     pub(crate) fn define(&mut self, world: &mut World<'_>, head: AtomId, residual: &Residual) {
         if let Residual::Or(parts) = residual {
             for part in parts {

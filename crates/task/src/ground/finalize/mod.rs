@@ -140,7 +140,6 @@ fn schema_name(lifted: &Lifted, operator: &GroundOperator) -> (String, Option<Pl
     named.unwrap_or_else(|| ("a wait".to_owned(), None))
 }
 
-/// Insertion-ordered set of operators.
 struct Distinct<N> {
     operators: Vec<Operator<N>>,
     positions: FxHashMap<u64, SmallVec<[u32; 2]>>,

@@ -80,7 +80,6 @@ impl<N: TaskNumber> Numbers<N> {
         Ok(Linear { coefficients, quantity: self.integers.quantity(&linear.quantity)? })
     }
 
-    /// Converts the weighted numeric variables of an objective to the ids and multiples of the final task.
     pub(super) fn rest(&self, rest: &[(NumericId, Rational)]) -> Vec<(NumericId, Rational)> {
         let converted = |(variable, factor): &(NumericId, Rational)| {
             (self.ids[variable], factor.clone() / Rational::from_integer(self.multiple(*variable)))

@@ -13,7 +13,6 @@ use crate::task::{ConditionalEffect, Fact, Literal, Variable, VariableId};
 
 pub(super) struct Atoms {
     pub(super) variables: Vec<Variable>,
-    /// Number of non-derived variables, which precede the derived variables.
     pub(super) basic: usize,
     pub(super) initial: Vec<u32>,
     /// Variable and value of each atom; `None` for an atom that nothing reads.

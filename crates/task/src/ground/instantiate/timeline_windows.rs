@@ -122,7 +122,6 @@ impl<'t> TimelineWindow<'t> {
         windows
     }
 
-    /// Returns the start time as an expression over the clock before the action.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"

@@ -69,7 +69,6 @@ impl<'a> ReachabilityProgramBuilder<'a> {
         self.names.table.name(&format!("{kind} {}", self.relations))
     }
 
-    /// Returns rule atoms that restrict each variable to its candidate objects.
     pub(super) fn types(&mut self, variables: &[u32], candidates: &Candidates) -> Vec<Atom> {
         variables
             .iter()

@@ -21,7 +21,6 @@ const BETWEEN_LOOKS: u32 = 256;
 
 type AtomIndex<K> = IndexMap<(K, Arguments), (), FxBuildHasher>;
 
-/// Tuples of a relation, indexed by the values of some of its columns.
 type Rows = FxHashMap<Arguments, Vec<Arguments>>;
 
 /// Working data of grounding: the lifted task, its facts and values, the ids of atoms and numeric variables,
