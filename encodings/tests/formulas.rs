@@ -19,7 +19,6 @@ use testing::{costs_by_steps, depot, fleet, ground_text, optimum};
 /// Lower limit on the step bound up to which formulas are tested.
 const STEPS: usize = 6;
 
-/// Upper limit on the step bound up to which formulas are tested.
 const MOST_STEPS: usize = 16;
 
 /// A cost that exceeds the cost of every plan of the small tasks in these tests.

@@ -7,7 +7,6 @@ use task::limits::Limits;
 use test_resources::{Resource, missing};
 use testing::random::Random;
 
-/// Command lines of SAT solvers that Linux distributions ship.
 const PROGRAMS: [&str; 6] = [
     "minisat -verb=0 /dev/stdin /dev/stdout",
     "glucose -verb=0 /dev/stdin /dev/stdout",
@@ -49,8 +48,6 @@ fn solver(backend: &Backend, clauses: &[Vec<i32>]) -> Box<dyn Solver> {
     solver
 }
 
-/// Checks that all back ends give the expected answer, and that their assignments satisfy the
-/// clauses.
 fn check(backends: &[Backend], clauses: &[Vec<i32>], expected: Answer) {
     for backend in backends {
         let mut solver = solver(backend, clauses);
@@ -90,7 +87,6 @@ fn every_back_end_decides_special_formulas() {
     check(&backends, &pigeons(4), Unsatisfiable);
 }
 
-/// Generator of random formulas with three literals per clause.
 struct Formulas(Random);
 
 impl Formulas {
@@ -104,8 +100,6 @@ impl Formulas {
     }
 }
 
-/// Returns `true` if some assignment satisfies the clauses and the assumptions, by trying all
-/// assignments.
 fn by_enumeration(variables: u64, clauses: &[Vec<i32>], assumptions: &[i32]) -> bool {
     (0..1_u32 << variables).any(|bits| {
         let literal = |l: &i32| (bits >> (l.unsigned_abs() - 1) & 1 == 1) == (*l > 0);

@@ -11,7 +11,6 @@ use crate::svg::Picture;
 const HEIGHT: f64 = 110.0;
 const TOP: f64 = 10.0;
 
-/// Draws a numeric fluent over a plan, with the bounds that conditions impose.
 pub(crate) fn curve(plan: &Plan, curve: &Curve, span: &Span, canvas: Canvas) -> Picture {
     let frame = Frame::of(plan, span, canvas);
     let top = TOP + canvas.name_height();

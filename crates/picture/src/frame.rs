@@ -31,23 +31,18 @@ pub(crate) struct Canvas {
     pub(crate) apart: f64,
 }
 
-/// The canvas of a picture in a separate file.
 pub(crate) const FILE: Canvas =
     Canvas { width: 826.0, left: 170.0, has_names_above: false, step: 60.0, apart: 46.0 };
 /// The canvases of the pictures in a page, in descending width. The page shows the first picture
 /// that fits its column; `page.css` must contain the same widths.
 pub(crate) const PAGE: [Canvas; 3] = [WIDE, COLUMN, TELEPHONE];
-/// The canvases of the pictures of two plans that a page shows side by side.
 pub(crate) const PAIR: [Canvas; 2] = [COLUMN, TELEPHONE];
-/// Canvas for the full width of a page.
 const WIDE: Canvas = Canvas { width: 1146.0, left: 170.0, has_names_above: false, step: 4.0, apart: 20.0 };
 /// Canvas for half the width of a page.
 const COLUMN: Canvas = Canvas { width: 560.0, left: 60.0, has_names_above: true, step: 4.0, apart: 20.0 };
-/// Canvas for a telephone in portrait orientation.
 const TELEPHONE: Canvas = Canvas { width: 328.0, left: 60.0, has_names_above: true, step: 4.0, apart: 20.0 };
 
 impl Canvas {
-    /// Returns the width between the margins.
     pub(crate) fn inner(&self) -> f64 {
         self.width - self.left - RIGHT
     }
@@ -68,7 +63,6 @@ impl Canvas {
     }
 }
 
-/// Position of a row's name.
 pub(crate) struct NamePlace {
     pub(crate) x: f64,
     pub(crate) y: f64,
@@ -81,9 +75,7 @@ pub(crate) struct NamePlace {
 /// Ranges of the axes over several plans. Plans that are shown side by side share these ranges, and
 /// so have the same scales.
 pub(crate) struct Span {
-    /// Greatest number of steps over all plans.
     steps: usize,
-    /// Latest end over all plans, as a position on the horizontal axis.
     until: f64,
     /// Minimum and maximum of each numeric fluent over all plans, including bounds of conditions.
     values: BTreeMap<String, (f64, f64)>,
@@ -104,7 +96,6 @@ impl Span {
     }
 }
 
-/// Computes the range of each numeric fluent over the given plans, including bounds of conditions.
 fn values(plans: &[&Plan]) -> BTreeMap<String, (f64, f64)> {
     let mut by_name: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     for curve in plans.iter().flat_map(|plan| &plan.curves) {
@@ -115,18 +106,14 @@ fn values(plans: &[&Plan]) -> BTreeMap<String, (f64, f64)> {
     by_name.into_iter().map(|(name, values)| (name, range(values))).collect()
 }
 
-/// Returns the end of a plan on its horizontal axis.
 fn end(plan: &Plan) -> f64 {
     plan.steps.iter().map(|step| step.end).fold(0.0, f64::max)
 }
 
-/// The horizontal axis of a plan, with the scale from axis positions to pixels.
 pub(crate) struct Frame {
     pub(crate) canvas: Canvas,
     pub(crate) scale: Scale,
-    /// End of the plan on the axis.
     pub(crate) end: f64,
-    /// End of the axis.
     until: f64,
     /// Width of the whole picture, in pixels.
     pub(crate) width: f64,

@@ -39,7 +39,6 @@ pub(crate) fn layout(places: usize, ways: &[(usize, usize)]) -> Vec<(f64, f64)> 
     points
 }
 
-/// Returns the connected components of the places, each in ascending order.
 fn components(neighbours: &[Vec<usize>]) -> Vec<Vec<usize>> {
     let mut visited = vec![false; neighbours.len()];
     let mut groups = Vec::new();
@@ -73,7 +72,6 @@ fn distances(from: usize, neighbours: &[Vec<usize>]) -> Vec<Option<u32>> {
     distances
 }
 
-/// Computes coordinates for the places of a connected component.
 fn placed(group: &[usize], neighbours: &[Vec<usize>]) -> Vec<(f64, f64)> {
     let of = |from: usize| -> Vec<f64> {
         let distances_from = distances(from, neighbours);
@@ -195,7 +193,6 @@ mod tests {
         }
     }
 
-    /// Returns the edges of a square grid.
     fn grid(side: usize) -> Vec<(usize, usize)> {
         let at = |row: usize, column: usize| row * side + column;
         let rows =

@@ -12,15 +12,14 @@ use crate::svg::Picture;
 
 /// Width reserved for the names of lanes, in pixels.
 const NAMES: f64 = 90.0;
-/// Height of a lane, in pixels.
 const LANE: f64 = 24.0;
 const TOP: f64 = 6.0;
-/// Width of the interval whose events share a mark, in pixels.
+/// Width of the interval whose happenings (inputs and decisions) share a mark, in pixels.
 const MARK: f64 = 4.0;
-/// Upper limit on the number of events in the tooltip of a mark.
+/// Upper limit on the number of happenings in the tooltip of a mark.
 const NAMED: usize = 5;
-/// Upper limit on the number of listed events. Otherwise the page of a long journal would be too
-/// large for browsers.
+/// Upper limit on the number of listed happenings. Otherwise the page of a long journal would be too large for
+/// browsers.
 const LISTED: usize = 1000;
 
 impl Log {
@@ -52,8 +51,8 @@ impl Log {
         self.picture(PAGE[0]).file()
     }
 
-    /// Returns the events that the page lists, in chronological order. If there are too many,
-    /// reports from the robot are omitted first, then the latest events.
+    /// Returns the happenings that the page lists, in chronological order. If there are too many, reports from
+    /// the robot are omitted first, beginning with the latest, then the latest of the others.
     fn listed(&self) -> Vec<&Happening> {
         if self.happenings.len() <= LISTED {
             return self.happenings.iter().collect();
@@ -90,7 +89,7 @@ impl Log {
         Picture { width: canvas.width, height: bottom + 24.0, title, description, body }
     }
 
-    /// Groups the events of a kind into marks, by their positions in pixels.
+    /// Groups the happenings of a kind into marks, by their positions in pixels divided by [`MARK`].
     fn marks(&self, kind: Kind, scale: &Scale) -> BTreeMap<i64, Vec<&Happening>> {
         let mut marks: BTreeMap<i64, Vec<&Happening>> = BTreeMap::new();
         for happening in self.happenings.iter().filter(|happening| happening.kind == kind) {
@@ -115,7 +114,6 @@ fn draw(kind: Kind, marks: &BTreeMap<i64, Vec<&Happening>>, (left, right): (f64,
     }
 }
 
-/// Returns the tooltip of a mark: descriptions of its first events, and the number of the others.
 fn titled(marked: &[&Happening]) -> String {
     let named = marked
         .iter()

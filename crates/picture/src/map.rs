@@ -1,7 +1,7 @@
 //! Draws the map of the places of a mission, with the moves of a plan coloured by configuration.
 //!
-//! Moves in opposite directions are drawn side by side. Each move has an arrow; its step numbers
-//! are on the outer side of the arrow.
+//! Moves in opposite directions are drawn side by side. Each move has an arrow; its step numbers are on the
+//! outer side of the arrow. All lengths are in pixels, except those of [`Map`].
 
 use std::collections::BTreeMap;
 
@@ -18,7 +18,6 @@ use crate::svg::Picture;
 const MARGIN: f64 = 70.0;
 /// The side margins for the names of places, as a fraction of the width of the picture.
 const MARGIN_PART: f64 = 0.12;
-/// Upper and lower margin, in pixels.
 const UPPER_MARGIN: f64 = 35.0;
 /// Height of a map of a single place without its margins, in pixels.
 const LEAST_HEIGHT: f64 = 60.0;
@@ -32,7 +31,6 @@ const FARTHEST: f64 = 130.0;
 const LARGEST: f64 = 4_000.0;
 /// Radius of the circle of a place, with its surrounding space.
 const RADIUS: f64 = 7.0;
-/// Height of a line of text.
 const LINE: f64 = 13.0;
 /// Offset of a move from the line of its way, so that moves in opposite directions are drawn side
 /// by side.
@@ -41,11 +39,9 @@ const ASIDE: f64 = 2.5;
 const TIP: f64 = 7.0;
 /// Distance from the centre of an arrow to its sides, in pixels.
 const SIDE: f64 = 6.0;
-/// Radius of the loop that represents a move to its origin.
 const LOOP: f64 = 10.0;
 /// Distance in pixels below which two places count as coinciding, and are separated.
 const SAME: f64 = 2.0;
-/// Minimum margin of a map that contains loops.
 const LOOP_MARGIN: f64 = 58.0;
 /// Additional distance of a name from its place, if no nearby position is free of lines.
 const FARTHER: f64 = 9.0;
@@ -57,16 +53,13 @@ type Point = (f64, f64);
 /// A rectangle that is occupied by a label or symbol: left, top, right, bottom.
 type Taken = (f64, f64, f64, f64);
 
-/// The start and end point of a line.
 type Line = (Point, Point);
 
-/// All moves of a plan from one place to another.
 struct Leg {
     from: usize,
     to: usize,
     /// The numbers of the steps that are these moves, from 1.
     steps: Vec<usize>,
-    /// The name of the configuration of each step.
     names: Vec<String>,
     shape: Shape,
 }
@@ -82,7 +75,6 @@ struct Shape {
     outwards: Point,
 }
 
-/// Draws a map of places and ways with the moves of a plan.
 pub(crate) fn map(plan: &Plan, map: &Map, palette: &Palette, canvas: Canvas) -> Picture {
     let has_loops = plan.steps.iter().any(|step| step.way.is_some_and(|(from, to)| from == to));
     let (points, drawn_width, drawn_height) = pixels(map, canvas, has_loops);
@@ -169,8 +161,8 @@ fn straight((x1, y1): Point, (x2, y2): Point) -> Shape {
     Shape { line: ((x1 + sx, y1 + sy), (x2 + sx, y2 + sy)), centre: None, arrow, along, outwards }
 }
 
-/// Returns the shape of a move that ends at its origin: a loop at a side of the place without ways.
-/// The sides above and below are preferred, because step numbers need least space there.
+/// Returns the shape of a move that ends at its origin: a loop at a side of the place, as far from its ways as
+/// possible. The sides above and below are preferred, because step numbers need least space there.
 fn looped((x, y): Point, neighbours: &[Point]) -> Shape {
     let diagonal = std::f64::consts::FRAC_1_SQRT_2;
     let upright = [(0.0, -1.0), (0.0, 1.0)];
@@ -260,8 +252,6 @@ fn names(
     labels
 }
 
-/// Draws a leg: the arrow, the step numbers, and a line. If the steps have several configurations,
-/// the line is dashed in their colours.
 fn draw_leg(leg: &Leg, map: &Map, palette: &Palette, number: Option<Point>) -> Markup {
     let mut names: Vec<&String> = Vec::new();
     for name in leg.names.iter().filter(|name| !name.is_empty()) {

@@ -22,7 +22,6 @@ const COLUMNS: [&str; 3] = ["in-wide", "in-half", "in-narrow"];
 /// ellipsis.
 const DEPTH: usize = 24;
 
-/// Renders a complete HTML page.
 pub(crate) fn page(title: &str, description: &str, body: &Markup) -> String {
     let policy =
         format!("default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src '{DIGEST}'");
@@ -90,7 +89,6 @@ pub(crate) fn shown(name: &str, canvases: &[Canvas], draw: &dyn Fn(Canvas) -> Pi
     }
 }
 
-/// Renders a table that can be scrolled horizontally.
 pub(crate) fn table(name: &str, header: &[&str], rows: &Markup) -> Markup {
     html! {
         div class="scroll" tabindex="0" role="group" aria-label=(name) {
@@ -102,7 +100,6 @@ pub(crate) fn table(name: &str, header: &[&str], rows: &Markup) -> Markup {
     }
 }
 
-/// Renders derivations as expandable lists of premises.
 pub(crate) fn reasons(reasons: &[Reason]) -> Markup {
     unfolding(reasons, 0)
 }

@@ -7,7 +7,6 @@ use crate::data::{Plan, Step};
 /// Number of colours; further names reuse the colours.
 pub(crate) const COLOURS: usize = 10;
 
-/// An assignment of colours to the names of designs and configurations.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Palette {
     colours: BTreeMap<String, usize>,

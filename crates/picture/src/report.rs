@@ -95,7 +95,6 @@ pub(crate) fn alone(own: &Plan, name: &str, palette: &Palette) -> Markup {
     plan(own, name, palette, (&Span::of(&[own]), &PAGE))
 }
 
-/// Renders a plan on the given canvases. `name` must be unique on the page.
 fn plan(plan: &Plan, name: &str, palette: &Palette, (span, canvases): (&Span, &[Canvas])) -> Markup {
     html! {
         @if plan.steps.is_empty() {
@@ -138,7 +137,6 @@ fn plan(plan: &Plan, name: &str, palette: &Palette, (span, canvases): (&Span, &[
     }
 }
 
-/// Renders the legend: the colours of designs and configurations, and the reconfiguration mark.
 fn legend(plan: &Plan, palette: &Palette) -> Markup {
     let mut names: Vec<String> =
         plan.steps.iter().flat_map(|step| &step.configuration).map(|(_, design)| design.clone()).collect();

@@ -4,7 +4,6 @@
 /// pixels.
 const CHARACTER: f64 = 6.75;
 
-/// A linear map from a range of numbers to a range of pixels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Scale {
     from: (f64, f64),
@@ -58,7 +57,8 @@ pub(crate) fn px(value: f64) -> String {
     number((value * 10.0).round() / 10.0)
 }
 
-/// Formats a number without superfluous zeros, rounded to ten significant digits or to an integer.
+/// Formats a number without superfluous zeros, rounded to ten digits in total and at most nine decimals, but
+/// never coarser than to an integer.
 pub(crate) fn number(value: f64) -> String {
     let digits = 9 - value.abs().max(1.0).log10().floor() as i32;
     let text = format!("{value:.*}", digits.clamp(0, 9) as usize);

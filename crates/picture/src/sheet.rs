@@ -90,7 +90,6 @@ fn drawn(part: &Part, number: i32, palette: &Palette) -> Markup {
     }
 }
 
-/// Creates a scale that covers the values with a margin on both sides.
 fn scale(values: impl Iterator<Item = f64>, to: (f64, f64)) -> Scale {
     let (low, high) = range(values);
     let margin = ((high - low) * 0.08).max(high.abs() * 1e-6);
@@ -167,7 +166,6 @@ fn label(
     Some((start, place, text))
 }
 
-/// Returns the number of ticks that fit on the horizontal axis.
 fn ticks(canvas: Canvas) -> usize {
     (canvas.inner() / 75.0).min(8.0) as usize
 }

@@ -11,9 +11,7 @@ const STYLE: &str = include_str!("picture.css");
 pub(crate) struct Picture {
     pub(crate) width: f64,
     pub(crate) height: f64,
-    /// The title in a few words.
     pub(crate) title: String,
-    /// A description of how to read the picture.
     pub(crate) description: String,
     pub(crate) body: Markup,
 }

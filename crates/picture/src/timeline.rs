@@ -14,22 +14,17 @@ use crate::svg::{Picture, alternative};
 
 /// Height of a row of a lane, in pixels.
 const ROW: f64 = 26.0;
-/// Height of the bars in a row, in pixels.
 const BAR: f64 = 20.0;
-/// Gap between lanes.
 const GAP: f64 = 8.0;
-/// Margin above the lanes.
 const TOP: f64 = 6.0;
-/// Width of the bar of a step without duration.
 const LEAST: f64 = 3.0;
-/// Minimum number of characters of a shortened name, including the ellipsis; shorter names are
-/// replaced by step numbers.
+/// Minimum number of characters of a shortened name, including the ellipsis. A shorter remainder is replaced by
+/// the step number (for actions) or omitted (for designs).
 const SHORTEST: usize = 5;
 /// Number of pixels by which a step number may be nearer to the ends of a bar than a name, for both
 /// ends together.
 const SLACK: f64 = 5.0;
 
-/// A bar of a lane: a step, its horizontal extent, and the text in the bar.
 struct Bar<'p> {
     step: usize,
     from: f64,
@@ -38,7 +33,6 @@ struct Bar<'p> {
     is_changed: bool,
 }
 
-/// A lane of the timeline: its name, its bars, and the row of each bar.
 struct Lane<'p> {
     name: &'p str,
     bars: Vec<Bar<'p>>,
@@ -56,7 +50,6 @@ impl<'p> Lane<'p> {
     }
 }
 
-/// Draws the timeline of a plan.
 pub(crate) fn timeline(plan: &Plan, palette: &Palette, span: &Span, canvas: Canvas) -> Picture {
     let frame = Frame::of(plan, span, canvas);
     let lanes = lanes(plan, &frame);
@@ -166,7 +159,6 @@ fn draw_bar(bar: &Bar<'_>, top: f64, (class, is_action): (&str, bool), about: &s
     }
 }
 
-/// Describes a bar in words, for its tooltip.
 fn about(bar: &Bar<'_>, step: &Step, lane: &str, is_action: bool) -> String {
     let number = bar.step + 1;
     if is_action {

@@ -9,7 +9,6 @@ type Point = (f64, f64);
 /// The width of a character and the height of a line in the pictures' font.
 const CHARACTER: (f64, f64) = (6.75, 13.0);
 
-/// The drawing of all moves from one place to another.
 struct Leg {
     from: String,
     to: String,
@@ -129,7 +128,6 @@ fn check(name: &str, picture: Node<'_, '_>, moves: &[(usize, usize)]) -> usize {
     legs.iter().filter(|leg| leg.label.is_none()).count()
 }
 
-/// Returns the map of a plan as drawn in a separate file, and as drawn for each column of a page.
 fn drawings(plan: &Plan) -> Vec<(String, String)> {
     let report = Report { plan: plan.clone(), before: Some(plan.clone()), ..Report::default() };
     let file = report.pictures().into_iter().find(|(name, _)| name == "map.svg").expect("a map").1;
@@ -227,7 +225,6 @@ fn places_at_one_position_are_told_apart() {
     }
 }
 
-/// Random walks on random maps; the random numbers come from a linear congruential generator.
 #[test]
 fn no_number_of_a_random_walk_stands_at_another_arrow() {
     let mut seed = 7_u64;

@@ -10,7 +10,6 @@ use roxmltree::Document;
 
 const HOSTILE: &str = "</title></text><script>alert(1)</script>\"'&\u{1}\u{202e}";
 
-/// Creates a plan of `steps` steps around a ring of places. All names start with `name`.
 fn plan(steps: usize, name: &str) -> Plan {
     let count = steps.max(3);
     let step = |index: usize| Step {
@@ -86,7 +85,6 @@ fn report(steps: usize, name: &str) -> Report {
     }
 }
 
-/// Returns the values of an attribute in a document, in document order.
 fn values<'a>(document: &'a Document<'_>, attribute: &str) -> Vec<&'a str> {
     document.descendants().filter_map(|node| node.attribute(attribute)).collect()
 }
@@ -160,7 +158,6 @@ fn a_thousand_steps_are_drawn_at_once() {
     assert!(begun.elapsed().as_secs_f64() < 10.0, "{:?}", begun.elapsed());
 }
 
-/// Overlapping actions are drawn in different rows.
 #[test]
 fn overlapping_actions_do_not_cover_each_other() {
     let mut plan = plan(3, "");
@@ -377,8 +374,6 @@ fn nothing_is_said_in_words() {
     assert_eq!(some.pictures()[0].1.matches("none of its 20").count(), 1);
 }
 
-/// Creates a log with the given number of events. Every tenth event is a decision with a
-/// derivation.
 fn log(events: u64, name: &str) -> Log {
     let happening = |record: u64| Happening {
         record,
@@ -416,7 +411,6 @@ fn a_long_journal_is_a_page_that_opens() {
     assert_eq!(values(&document, "data-lane"), ["events", "inferences", "plans", "effects", "refusals"]);
 }
 
-/// Creates a page with all kinds of parts.
 fn sheet(name: &str) -> Sheet {
     let points = Points {
         title: name.to_owned(),

@@ -17,7 +17,6 @@ use crate::thresholds::Thresholds;
 #[derive(Debug, Clone, Default)]
 pub struct Limits {
     deadline: Option<Instant>,
-    /// Time limit as a duration, from which the deadline was computed.
     time: Duration,
     interrupt: Arc<AtomicBool>,
     room: Option<usize>,
@@ -28,7 +27,6 @@ pub struct Limits {
 /// than the 0.2 s tolerance of a command, because the process must also start and print.
 const GRACE: Duration = Duration::from_millis(120);
 
-/// Default memory limit of a search in bytes.
 const DEFAULT_MEMORY: usize = 1 << 31;
 
 impl Limits {
@@ -45,8 +43,8 @@ impl Limits {
         self
     }
 
-    /// Returns limits with half of the remaining time, so that time remains for a later computation. The
-    /// interrupt flag is shared.
+    /// Returns limits with half of the remaining time, so that time remains for a later computation. Without a
+    /// deadline, returns equal limits. The interrupt flag is shared.
     #[must_use]
     pub fn half(&self) -> Self {
         let remaining = self.deadline.map(|deadline| deadline.saturating_duration_since(Instant::now()));
@@ -150,15 +148,12 @@ pub struct Interrupted;
 #[derive(Debug)]
 pub struct LimitPoll<'a> {
     limits: &'a Limits,
-    /// Number of beats until the next check of the clock.
     left: u32,
     stride: u32,
     last: Option<Instant>,
 }
 
-/// Maximum number of beats between two checks of the clock.
 const LONGEST_STRIDE: u32 = 1 << 14;
-/// Target time between two checks of the clock.
 const POLL_INTERVAL: Duration = Duration::from_millis(2);
 
 impl LimitPoll<'_> {

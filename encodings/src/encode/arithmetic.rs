@@ -43,7 +43,6 @@ impl Arithmetic<'_> {
         bits.iter().copied().chain(std::iter::repeat(sign)).take(width.max(bits.len())).collect()
     }
 
-    /// Returns a literal that is equivalent to the conjunction of two literals.
     pub(crate) fn and(&mut self, a: Lit, b: Lit) -> Lit {
         let (truth, falsum) = (Formula::truth(), !Formula::truth());
         match (a, b) {
@@ -166,7 +165,6 @@ impl Arithmetic<'_> {
             .collect()
     }
 
-    /// Adds clauses by which two numbers are equal if the premise is true.
     pub(crate) fn equal_if(&mut self, premise: Lit, a: &Bits, b: &Bits) {
         let width = a.len().max(b.len());
         for (a, b) in Self::extend(a, width).into_iter().zip(Self::extend(b, width)) {
@@ -175,7 +173,6 @@ impl Arithmetic<'_> {
         }
     }
 
-    /// Adds clauses by which a number is at most `limit`.
     #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     pub(crate) fn at_most(&mut self, bits: &Bits, limit: Int) {
         let width = bits.len().max(width(limit, limit));
@@ -205,7 +202,6 @@ mod tests {
     use crate::sat::{Answer, Backend};
     use task::limits::Limits;
 
-    /// Returns `true` if the formula has a satisfying assignment in which the bits have this value.
     fn can_be(formula: &Formula, bits: &Bits, value: Int) -> bool {
         let mut solver = Backend::default().start(&Limits::none(), u64::MAX);
         formula.clauses().for_each(|(_, clause)| solver.add_clause(clause));

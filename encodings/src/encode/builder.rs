@@ -16,7 +16,6 @@ use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::encode::variables::Variables;
 use crate::sat::Lit;
 
-/// A task with limits, an unfinished formula, and the meaning of the formula's variables.
 pub(super) struct Builder<'a> {
     pub(super) task: &'a Task,
     pub(super) limits: &'a Limits,

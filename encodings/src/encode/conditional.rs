@@ -11,16 +11,13 @@ use crate::encode::builder::Builder;
 use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::sat::Lit;
 
-/// A conditional effect of an operator at a step, with its SAT variable.
 pub(super) struct ConditionalEffectVar<'a> {
     operator: OperatorId,
     position: usize,
-    /// Literal that is true if the effect takes place at the step.
     pub(super) literal: Lit,
     pub(super) effects: &'a [Fact],
 }
 
-/// Conditional effects of all operators at a step.
 pub(super) struct FiredEffects<'a>(Vec<ConditionalEffectVar<'a>>);
 
 impl<'a> FiredEffects<'a> {

@@ -54,7 +54,6 @@ type Increments = Vec<(Vec<Lit>, Int)>;
 /// design tables of one set of slots.
 struct Source {
     step: u32,
-    /// Index of this source of cost within its step.
     stage: u32,
     increments: Increments,
 }
@@ -141,7 +140,6 @@ impl Cost {
     }
 }
 
-/// State of the encoding of the costs of all steps.
 struct Sum<'s, 'a> {
     builder: &'s mut Builder<'a>,
     cost: &'s CostLimit<'s>,
@@ -381,7 +379,6 @@ fn residual_tables(operator: &Operator) -> Vec<(Vec<Vec<(usize, usize)>>, Vec<In
         .collect()
 }
 
-/// Returns the accumulated amounts that are possible after one more source, up to the gap.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "amounts are at most the gap, which is at most GROWTH_LIMIT"
@@ -395,8 +392,6 @@ fn next_amounts(spent: &BTreeSet<Int>, increments: impl Iterator<Item = Int>, ga
     amounts
 }
 
-/// Returns `true` if the number of possible accumulated amounts up to `gap` is small enough for the order
-/// encoding.
 fn amounts_fit(sources: &[Source], gap: Int) -> bool {
     let mut spent = BTreeSet::new();
     for source in sources {

@@ -60,7 +60,6 @@ impl Family {
         Self::Bound,
     ];
 
-    /// Returns the name of the family in statistics.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Domain => "domain",
@@ -132,7 +131,6 @@ pub struct Formula {
 }
 
 impl Formula {
-    /// Creates a formula that contains only the constant true.
     pub(crate) fn new() -> Self {
         let mut formula = Self::default();
         let truth = formula.fresh(VariableMeaning::True);
@@ -141,7 +139,6 @@ impl Formula {
         formula
     }
 
-    /// Returns the literal that is always true.
     pub(crate) const fn truth() -> Lit {
         Lit::TRUE
     }

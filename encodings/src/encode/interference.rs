@@ -10,8 +10,9 @@
 //! - ∃-step: `¬o@t ∨ ¬p@t` for o ∈ E before p ∈ R in the order, by a ladder: `o@t → a@t`,
 //!   `a@t → a'@t`, `a@t → ¬p@t`;
 //! - ∀-step: these clauses, and again in the reverse order;
-//! - exclusion: at most one of the operators that share a slot, a numeric variable, or a transition
-//!   of the cost potential (the projection that reduces costs). So numbers, designs and costs are
+//! - exclusion: at most one of the operators that use the same slot or the same numeric variable, at most
+//!   one that changes the abstract state of the cost potential (the projection that reduces costs), and at
+//!   most one with a comparison that contains no numeric variable. So numbers, designs and costs are
 //!   encoded as in sequential semantics.
 //!
 //! Every sequential plan is also a plan in these semantics, so bounds on the length of sequential
@@ -49,7 +50,6 @@ words! {
     StepSemantics, "semantics": Sequential = "sequential", ForAllStep = "for-all-step", ExistsStep = "exists-step"
 }
 
-/// Interference relation between the operators of a task, the same for all steps.
 pub(super) struct Interference {
     /// `true` if conflicts apply in the reverse order as well (∀-step semantics).
     both_orders: bool,
@@ -67,14 +67,12 @@ struct Conflict {
     need: Vec<OperatorId>,
 }
 
-/// Operators that read and write a state variable.
 #[derive(Default)]
 struct Uses {
     /// Operators with a plain condition on the variable, by required value.
     require: BTreeMap<u32, Vec<OperatorId>>,
     /// Operators that read the variable in another way than by a plain condition.
     read: Vec<OperatorId>,
-    /// Operators that set the variable, each with the new value.
     write: Vec<(OperatorId, u32)>,
 }
 
@@ -151,7 +149,6 @@ impl Interference {
         self.classes[operator.index()]
     }
 
-    /// Adds the clauses that exclude interference at a step.
     pub(super) fn add(&self, builder: &mut Builder<'_>, step: usize) -> Result<(), Interrupted> {
         for group in &self.exclusions {
             let literals: Vec<_> =
@@ -260,7 +257,6 @@ impl Support {
         direct.chain(self.derived(condition).flat_map(|(variables, _)| variables.iter().copied())).collect()
     }
 
-    /// Returns the numeric variables on which a condition depends.
     fn numbers_of(&self, condition: &Condition) -> Vec<usize> {
         let direct = condition.comparisons.iter().flat_map(|linear| &linear.coefficients);
         let direct = direct.map(|(variable, _)| variable.index());

@@ -23,7 +23,6 @@ use crate::sat::Lit;
 /// Conjunctions of literals, each with the number that is selected if the conjunction is true.
 type Premises = Vec<(Vec<Lit>, Int)>;
 
-/// Linear combination: numeric variables with their coefficients.
 type Shape = Vec<(NumericId, Int)>;
 
 /// Identity of a table: combinations of (slot, design) in the numbering of the task, and the value
@@ -55,13 +54,10 @@ pub(super) fn numeric(builder: &mut Builder<'_>) -> Option<Vec<Vec<Bits>>> {
     Some(numbers_by_step)
 }
 
-/// The update of all numbers at one step.
 struct Transition<'s, 'a> {
     builder: &'s mut Builder<'a>,
     step: usize,
-    /// Bits of the numbers before the step.
     numbers: &'s [Bits],
-    /// Intervals of the numbers before the step.
     ranges: &'s [Range],
 }
 
@@ -78,8 +74,6 @@ impl Transition<'_, '_> {
         Some((next, ranges))
     }
 
-    /// Returns the intervals of the numbers after the step, or `None` if a number can exceed the
-    /// available bits.
     fn next_ranges(&self) -> Option<Vec<Range>> {
         let mut next = self.ranges.to_vec();
         for (id, _) in &self.builder.variables.operators[self.step] {
@@ -319,7 +313,6 @@ pub(super) fn is_at_least_zero(
     Some(sum.last().map_or(Formula::truth(), |sign| !*sign))
 }
 
-/// Returns the interval of a linear expression, or `None` if it exceeds the available bits.
 fn linear_range(linear: &Linear<Int>, ranges: &[Range]) -> Option<Range> {
     let (mut low, mut high) = (linear.quantity.minimum(), linear.quantity.maximum());
     for (variable, factor) in &linear.coefficients {

@@ -14,7 +14,6 @@ use crate::encode::conditional::FiredEffects;
 use crate::encode::formula::{Family, Formula};
 use crate::sat::Lit;
 
-/// Adds clauses by which every state variable has exactly one value before the step.
 pub(super) fn domain(builder: &mut Builder<'_>, step: usize) {
     for variable in 0..builder.task.variables.len() {
         let falsum = !Formula::truth();

@@ -27,7 +27,6 @@ use crate::sat::Lit;
 
 /// Interchangeable designs and objects of a task.
 pub struct Symmetry {
-    /// Designs that are interchangeable with an earlier design of the same slot.
     designs: Vec<(SlotId, u32)>,
     /// For each pair of neighbouring interchangeable objects: operators that use the first, and
     /// operators that use only the second.
@@ -44,7 +43,6 @@ impl Symmetry {
         Ok(Self { designs, objects: equal_objects(context)? })
     }
 
-    /// Adds the symmetry-breaking clauses for all steps.
     pub(super) fn add(&self, builder: &mut Builder<'_>) -> Result<(), Interrupted> {
         let horizon = builder.variables.horizon();
         for step in 0..horizon {
@@ -73,7 +71,6 @@ impl Symmetry {
     }
 }
 
-/// For each pair of objects: operators that use the first, and operators that use only the second.
 type Pairs = Vec<(Vec<OperatorId>, Vec<OperatorId>)>;
 
 /// Returns the pairs of neighbouring objects in each class of interchangeable objects, as lists of

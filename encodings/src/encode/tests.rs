@@ -196,7 +196,6 @@ fn goal() {
     assert_snapshot!(check(Family::Goal));
 }
 
-/// Returns the clauses that `write` adds for both steps of the task, without the other families.
 fn alone(family: Family, write: impl Fn(&mut Builder<'_>, usize)) -> String {
     let (task, limits) = (task(), Limits::none());
     let allowed = vec![vec![true; task.operators.len()]; 2];

@@ -10,12 +10,10 @@ use task::task::{Fact, Literal, OperatorId, Task};
 use crate::encode::formula::{Formula, VariableMeaning};
 use crate::sat::Lit;
 
-/// SAT variables for operators, values of state variables, and designs, by step.
 #[derive(Default)]
 pub(super) struct Variables {
     /// For each step: the possible operators in ascending order, each with its variable.
     pub(super) operators: Vec<Vec<(OperatorId, Lit)>>,
-    /// For each step: literal that is true if any operator is executed.
     pub(super) busy: Vec<Lit>,
     /// `values[step][variable][value]`: literal that is true if the state variable has the value
     /// before the step.
@@ -77,7 +75,6 @@ impl Variables {
         Ok(declared)
     }
 
-    /// Returns the number of steps.
     pub(super) fn horizon(&self) -> usize {
         self.operators.len()
     }
@@ -87,7 +84,6 @@ impl Variables {
         self.values[step][fact.variable.index()][fact.value as usize]
     }
 
-    /// Returns the SAT literal of a literal of the task before a step.
     pub(super) fn literal(&self, literal: Literal, step: usize) -> Lit {
         let fact = self.fact(literal.fact, step);
         if literal.positive { fact } else { !fact }
@@ -100,8 +96,8 @@ impl Variables {
     }
 }
 
-/// Creates the variables for the values of state variables before a step. Impossible values are the
-/// constant false.
+/// Creates the variables for the values of state variables before a step. Impossible values are the constant
+/// false, and a value that is the only possible one is the constant true.
 fn values(formula: &mut Formula, possible: &[Vec<bool>], step: usize) -> Vec<Vec<Lit>> {
     let mut literals_by_variable = Vec::with_capacity(possible.len());
     for (variable, values) in possible.iter().enumerate() {

@@ -14,7 +14,6 @@ use crate::sat::solver::{Answer, Lit, Solver};
 /// Number of decisions of the solver between two checks of the limits.
 const CLOCK_INTERVAL: u32 = 64;
 
-/// A `BatSat` solver.
 pub(super) struct Batsat {
     solver: batsat::Solver<Watch>,
     buffer: Vec<batsat::Lit>,
@@ -49,8 +48,6 @@ impl Callbacks for Watch {
 }
 
 impl Batsat {
-    /// Creates a solver that stops at the deadline, at an interruption, or after more than `budget`
-    /// conflicts.
     pub(super) fn new(limits: &Limits, budget: u64) -> Self {
         let watch = Watch {
             limits: limits.clone(),
@@ -63,7 +60,6 @@ impl Batsat {
         Self { solver, buffer: Vec::new(), core: Vec::new() }
     }
 
-    /// Translates literals to `BatSat`'s type and stores them in `buffer`.
     fn translate(&mut self, literals: &[Lit]) {
         self.buffer.clear();
         for literal in literals {

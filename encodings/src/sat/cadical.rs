@@ -6,10 +6,8 @@ use task::limits::Limits;
 
 use crate::sat::solver::{Answer, Lit, Solver};
 
-/// A `CaDiCaL` solver.
 pub(super) struct Cadical {
     solver: cadical::Solver<Watch>,
-    /// Values of all variables in the last satisfying assignment.
     assignment: Vec<bool>,
     variables: u32,
     conflicts: u64,
@@ -39,8 +37,6 @@ impl cadical::Callbacks for Watch {
 }
 
 impl Cadical {
-    /// Creates a solver that stops at the deadline, at an interruption, or after more than `budget`
-    /// conflicts.
     pub(super) fn new(limits: &Limits, budget: u64) -> Self {
         let mut solver = cadical::Solver::new();
         solver.set_callbacks(Some(Watch { limits: limits.clone(), budget, conflicts: 0 }));

@@ -25,7 +25,6 @@ const BUDGET_TIME: Duration = Duration::from_secs(2);
 /// Time between two checks of the limits while the program runs.
 const INTERVAL: Duration = Duration::from_millis(5);
 
-/// Formula for an external solver program, and the program's last answer.
 pub(super) struct Program {
     command: Command,
     limits: Limits,
@@ -164,7 +163,6 @@ fn has_ended(child: &mut Child, is_over: &dyn Fn() -> bool) -> Result<bool, Stri
     Ok(false)
 }
 
-/// A child process that is killed when this value is dropped.
 struct Process(Child);
 
 impl Drop for Process {
@@ -175,7 +173,6 @@ impl Drop for Process {
     }
 }
 
-/// Parses the output of a program. Returns the answer, and the literals of the assignment.
 fn read(output: &str) -> Result<(Answer, Vec<i32>), String> {
     let mut answer = None;
     let mut literals = Vec::new();

@@ -22,7 +22,6 @@ use varisat::ExtendFormula as _;
 
 use crate::sat::solver::{Answer, Lit, Solver};
 
-/// A Varisat solver.
 pub(super) struct Varisat {
     solver: varisat::Solver<'static>,
     /// `true` if an earlier call was unsatisfiable because of assumptions; later cores need
@@ -34,7 +33,6 @@ pub(super) struct Varisat {
     limits: Limits,
     budget: u64,
     conflicts: Rc<Cell<u64>>,
-    /// Literals of all clauses, one clause after another.
     literals: Vec<varisat::Lit>,
     /// End of each clause in `literals`.
     ends: Vec<usize>,
@@ -43,8 +41,6 @@ pub(super) struct Varisat {
 }
 
 impl Varisat {
-    /// Creates a solver that stops at the deadline, at an interruption, or after more than `budget`
-    /// conflicts.
     pub(super) fn new(limits: &Limits, budget: u64) -> Self {
         let conflicts = Rc::new(Cell::new(0));
         Self {
@@ -97,7 +93,6 @@ impl Varisat {
         }
     }
 
-    /// Replaces the solver by a new one that contains the same clauses.
     fn renew(&mut self) {
         self.solver = start(&self.limits, self.budget, &self.conflicts);
         let mut begin = 0;
@@ -203,7 +198,6 @@ enum Part {
 /// Streaming parser of Varisat's proof format that recognises learnt clauses.
 struct Steps {
     part: Part,
-    /// Partially read number.
     number: u128,
     /// Number of bytes of `number` that were read.
     bytes: u32,

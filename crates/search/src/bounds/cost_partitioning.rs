@@ -18,9 +18,7 @@ use task::number::{GROWTH_LIMIT, Int};
 
 use crate::bounds::pattern_database::Projection;
 
-/// Maximum number of cost partitionings that are kept.
 const MAX_PARTITIONINGS: usize = 4;
-/// Maximum number of orders of projections that are tried.
 const MAX_ORDERS: usize = 60;
 /// Limit on the work for all tried orders together, as the number of visited abstract states and transitions.
 /// If a single order would exceed it, no cost partitioning is computed.

@@ -19,7 +19,6 @@ pub(super) const ALWAYS: u32 = 0;
 /// Number of the artificial fact that represents the goal.
 pub(super) const GOAL: u32 = 1;
 
-/// Lists of numbers, stored one after another in a single vector.
 #[derive(Default)]
 pub(super) struct Lists {
     ends: Vec<u32>,
@@ -57,7 +56,6 @@ impl Lists {
     }
 }
 
-/// Delete relaxation of a task: rules between facts, without delete effects.
 pub(super) struct DeleteRelaxation {
     /// Cost of each payer. Payers are the operators, followed by one payer without cost.
     pub(super) costs: Vec<u64>,
@@ -65,15 +63,10 @@ pub(super) struct DeleteRelaxation {
     pub(super) payers: Vec<u32>,
     /// For each rule: the facts of its condition, which is never empty.
     pub(super) required: Lists,
-    /// For each rule: the facts that it adds.
     pub(super) given: Lists,
-    /// For each payer: its rules.
     pub(super) rules_of: Lists,
-    /// For each fact: the rules that require it.
     pub(super) required_by: Lists,
-    /// For each fact: the rules that add it.
     pub(super) given_by: Lists,
-    /// Number of the first fact of each variable.
     first: Vec<u32>,
     basic: usize,
 }
@@ -173,7 +166,6 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Returns the facts that each make the literal true.
     fn literal(&self, literal: Literal) -> Vec<u32> {
         if literal.positive {
             return vec![self.fact(literal.fact)];

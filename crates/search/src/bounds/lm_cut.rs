@@ -23,9 +23,7 @@ use crate::bounds::delete_relaxation::{ALWAYS, DeleteRelaxation, GOAL};
 const MAX_WORK: u64 = 100_000_000;
 /// Work units per visited fact or rule.
 const WORK_PER_VISIT: u64 = 8;
-/// h^max value of an unreachable fact.
 const UNREACHABLE: u64 = u64::MAX;
-/// Number that represents a missing fact.
 const NONE: u32 = u32::MAX;
 
 /// LM-cut value of the initial state, or the part of it that was computed when a limit was reached:
@@ -50,23 +48,18 @@ enum CutSide {
 pub struct LandmarkCut {
     relaxed: DeleteRelaxation,
     costs: Vec<u64>,
-    /// For each fact: its h^max value.
     values: Vec<u64>,
-    /// For each fact: its side of the cut.
     zones: Vec<CutSide>,
-    /// For each rule: the number of its conditions.
     lengths: Vec<u32>,
     /// For each rule: the number of its unreached conditions.
     left: Vec<u32>,
     /// For each rule: its supporter, i.e. the condition with the greatest h^max value.
     supporters: Vec<u32>,
-    /// For each rule: the h^max value of its supporter.
     supports: Vec<u64>,
     queue: BinaryHeap<Reverse<(u64, u32)>>,
     stack: Vec<u32>,
     /// Payers (operators, or the payer without cost) of the rules in the current cut.
     cut: Vec<u32>,
-    /// For each payer: `true` if it is in `cut`.
     in_cut: Vec<bool>,
     work: u64,
 }
@@ -99,7 +92,6 @@ impl LandmarkCut {
         })
     }
 
-    /// Returns the work done since creation, in work units.
     pub(crate) fn work(&self) -> u64 {
         self.work.saturating_mul(WORK_PER_VISIT)
     }
@@ -262,7 +254,6 @@ impl LandmarkCut {
     }
 }
 
-/// Lowers the value of each fact to `total` if it is greater, and queues the facts whose values changed.
 fn offer(facts: &[u32], total: u64, values: &mut [u64], queue: &mut BinaryHeap<Reverse<(u64, u32)>>) {
     for fact in facts {
         let value = &mut values[*fact as usize];

@@ -56,8 +56,8 @@ pub struct ReachableWindow {
     /// Upper bound on the number of steps of plans within the cost limit. `None` if there is no cost limit,
     /// or no projection yields a bound of at most `STEP_LIMIT`.
     pub steps: Option<usize>,
-    /// For each step and each operator: whether the operator can occur at the step. The number of steps is
-    /// the lesser of `steps` and the horizon of the query.
+    /// For each step and each operator: whether the operator can occur at the step. The number of steps is the
+    /// lesser of `steps` and the horizon of the query; 0 if there is neither.
     pub allowed: Vec<Vec<bool>>,
 }
 

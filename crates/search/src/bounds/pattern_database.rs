@@ -89,7 +89,6 @@ impl Projection {
         self.sizes.iter().product()
     }
 
-    /// Returns the index of the abstract state that represents a state.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "an abstract state is below the number of them, which are in memory"
@@ -227,8 +226,6 @@ impl Projection {
         self.size() + self.operators.iter().map(|(_, transitions)| transitions.len()).sum::<usize>()
     }
 
-    /// Returns the minimum number of steps from each abstract state to the goal; `None` if the goal is
-    /// unreachable.
     pub(crate) fn steps_to_go(&self, limits: &Limits) -> Result<Vec<Option<Int>>, Interrupted> {
         self.distances(|_| 1, self.goals.iter().map(|goal| (*goal, 0)), limits)
     }

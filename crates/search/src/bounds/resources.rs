@@ -16,7 +16,6 @@ use task::task::{Operator, State};
 
 use crate::bounds::pattern_database::Projection;
 
-/// A resource, with lower bounds on its amount for the abstract states of some projections.
 pub(super) struct Resource {
     pub(super) variable: NumericId,
     /// Index of a projection, with the amount of the resource that is required in each of its abstract

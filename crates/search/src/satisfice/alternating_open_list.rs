@@ -16,13 +16,13 @@ struct Entry {
     end: u32,
 }
 
-/// Number of extra turns that each list of preferred operators gets after progress.
 const PREFERRED_BOOST: i64 = 1_000;
 
 #[derive(Debug)]
 struct List<K> {
     buckets: BTreeMap<K, VecDeque<Entry>>,
-    /// Number of turns taken. The non-empty list with the fewest turns is used next.
+    /// Number of turns taken, minus the extra turns that `boost` has granted. The non-empty list with the
+    /// lowest number is used next.
     turns: i64,
     preferred: bool,
 }

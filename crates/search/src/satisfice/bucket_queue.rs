@@ -10,7 +10,6 @@ pub struct Queue {
     at: usize,
     /// Number of items of the cheapest bucket that [`Queue::pop_first`] has already returned.
     taken: usize,
-    /// Number of items in the buckets, without the heap.
     count: usize,
     dear: std::collections::BinaryHeap<std::cmp::Reverse<(u32, u32)>>,
 }

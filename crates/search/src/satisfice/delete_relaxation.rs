@@ -22,7 +22,6 @@ use task::task::{Condition, Fact, Literal, Operator, OperatorId, State, Task, Va
 /// Index of a proposition: a fact, a disjunction, a numeric comparison, or the artificial goal.
 pub(super) type Proposition = u32;
 
-/// Operator index of a node that does not belong to an operator.
 pub(super) const NO_OPERATOR: u32 = u32::MAX;
 
 /// A linear expression, and all thresholds with which conditions compare it.
@@ -34,14 +33,12 @@ pub(super) struct NumericCondition<N> {
 }
 
 impl<N: TaskNumber> NumericCondition<N> {
-    /// Returns the value of the expression, or `None` if it overflows.
     pub(super) fn value(&self, numbers: &[N]) -> Option<N> {
         let terms = self.sum.iter().map(|(variable, factor)| (factor, &numbers[variable.index()]));
         sum_of_products(N::zero(), terms)
     }
 }
 
-/// Contribution of an operator to a linear expression in conditions.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Achiever {
     /// Index of the linear expression in `Relaxation::directions`.
@@ -50,15 +47,12 @@ pub(super) struct Achiever {
     pub(super) gain: f64,
 }
 
-/// The delete relaxation of a task.
 pub(super) struct Relaxation<N> {
     /// Index of the first fact of each variable, followed by the total number of facts.
     first: Vec<Proposition>,
     pub(super) propositions: usize,
-    /// Propositions that are assumed to be always true.
     pub(super) always: Vec<Proposition>,
     pub(super) directions: Vec<NumericCondition<N>>,
-    /// For each node: its operator, or `NO_OPERATOR`.
     pub(super) operators: Vec<u32>,
     pub(super) conditions: Lists,
     pub(super) effects: Lists,
@@ -67,9 +61,7 @@ pub(super) struct Relaxation<N> {
     pub(super) waiting: Lists,
     /// For each node: `true` if it represents the unconditional part of an operator.
     pub(super) is_base: Vec<bool>,
-    /// Artificial proposition that is true if all conditions of the goal are true.
     pub(super) goal: Proposition,
-    /// Conditions of the goal.
     pub(super) goals: Vec<Proposition>,
 }
 
@@ -82,7 +74,6 @@ impl<N: TaskNumber> Relaxation<N> {
         self.first[fact.variable.index()].saturating_add(fact.value)
     }
 
-    /// Returns the fact of a proposition, or `None` if the proposition is not a fact.
     pub(super) fn fact_of(&self, proposition: Proposition) -> Option<Fact> {
         if proposition >= *self.first.last()? {
             return None;
@@ -92,7 +83,6 @@ impl<N: TaskNumber> Relaxation<N> {
         Some(Fact { variable: VariableId::of(variable), value })
     }
 
-    /// Returns the propositions of the facts that hold in a state.
     pub(super) fn facts<'s>(&'s self, values: &'s [u32]) -> impl Iterator<Item = Proposition> + 's {
         self.first.iter().zip(values).map(|(first, value)| first.saturating_add(*value))
     }
@@ -395,7 +385,6 @@ fn negated<N: TaskNumber>(number: N) -> N {
     -number
 }
 
-/// Returns an upper bound on a quantity over all designs, analogous to the lower bound `Quantity::minimum`.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"

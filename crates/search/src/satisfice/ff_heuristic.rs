@@ -15,7 +15,6 @@ use crate::satisfice::bucket_queue::Queue;
 use crate::satisfice::delete_relaxation::{NO_OPERATOR, Proposition, Relaxation};
 
 const UNREACHED: u32 = u32::MAX;
-/// Upper limit at which sums of costs are capped.
 const MAX_COST: u32 = 1 << 30;
 /// Upper limit on the assumed number of repetitions of an operator until a numeric comparison holds.
 const MAX_REPETITIONS: f64 = 10_000.0;
@@ -27,9 +26,7 @@ struct Supporter {
     times: u32,
 }
 
-/// The FF heuristic, with scratch buffers for evaluating states.
 pub(super) struct FfHeuristic {
-    /// h^add value of each proposition.
     costs: Vec<u32>,
     supporters: Vec<Supporter>,
     /// For each node: the number of its unreached conditions.
@@ -38,11 +35,8 @@ pub(super) struct FfHeuristic {
     sums: Vec<u32>,
     initially_left: Vec<u32>,
     queue: Queue,
-    /// For each numeric expression: its approximate value in the state.
     values: Vec<f64>,
-    /// Operators whose conditions all hold in the state, according to the relaxation.
     pub(super) applicable: Vec<u32>,
-    /// Operators of the relaxed plan that are applicable in the state.
     pub(super) preferred: Vec<u32>,
     marked: Vec<bool>,
     marks: Vec<Proposition>,

@@ -13,7 +13,6 @@ use task::task::{Fact, State};
 use crate::satisfice::delete_relaxation::{Proposition, Relaxation};
 use crate::satisfice::landmarks::Landmarks;
 
-/// Landmarks of a task, with scratch buffers for evaluating states.
 pub(super) struct LandmarkStatus {
     landmarks: Landmarks,
     /// For each landmark: the facts among its propositions, and the other propositions.
@@ -24,7 +23,6 @@ pub(super) struct LandmarkStatus {
     holds: Vec<bool>,
 }
 
-/// Returns the number of 64-bit words of a bitset with `count` bits.
 fn words(count: usize) -> usize {
     count.div_ceil(64)
 }
@@ -63,7 +61,6 @@ impl LandmarkStatus {
         words(self.landmarks.all.len())
     }
 
-    /// Returns the bitset of the landmarks that are reached in the initial state.
     pub(super) fn initially<N: TaskNumber>(
         &mut self,
         relaxation: &Relaxation<N>,

@@ -16,9 +16,7 @@ use task::task::{Fact, Task};
 
 use crate::satisfice::delete_relaxation::{NO_OPERATOR, Proposition, Relaxation};
 
-/// Maximum number of facts in a disjunctive landmark.
 const MAX_DISJUNCTION: usize = 4;
-/// Maximum number of landmarks.
 const MAX_LANDMARKS: usize = 500;
 /// Limit on the number of landmarks times the number of propositions and nodes of the relaxation.
 const MAX_WORK: usize = 400_000_000;
@@ -35,7 +33,6 @@ pub(super) struct Landmark {
     pub(super) is_goal: bool,
 }
 
-/// The landmarks that were found for a task, with their orders.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Landmarks {
     pub(super) all: Vec<Landmark>,
@@ -50,7 +47,6 @@ struct LandmarkFactory<'a, N> {
     known: FxHashMap<Vec<Proposition>, u32>,
     /// Orders between landmarks, as pairs (earlier, later).
     orders: FxHashSet<(u32, u32)>,
-    /// Greedy-necessary orders between landmarks, as pairs (earlier, later).
     needed: FxHashSet<(u32, u32)>,
     exclusive: FxHashMap<Proposition, Vec<usize>>,
 }
@@ -262,7 +258,6 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
         (reached, enabled)
     }
 
-    /// Adds reasonable orders, which prevent that a landmark is achieved, destroyed and achieved again.
     fn reasonable(&mut self, limits: &Limits) -> Result<(), Interrupted> {
         let indices = 0..dense(self.all.len());
         let sides: Vec<Vec<Proposition>> = indices.clone().map(|landmark| self.side(landmark)).collect();
@@ -385,7 +380,6 @@ fn join(reach: &mut [Vec<u64>], landmark: u32, further: &[u64]) {
     }
 }
 
-/// Adds an order to the transitive closure.
 fn connect(reach: &mut [Vec<u64>], sooner: u32, later: u32) {
     let mut further = reach[later as usize].clone();
     further[(later >> 6) as usize] |= 1 << (later & 63);

@@ -64,7 +64,6 @@ pub struct Satisficer<'a, N> {
     limits: &'a Limits,
     phase: usize,
     search: Option<Search<N>>,
-    /// `true` if the computation of h² mutexes was attempted.
     knows_pairs: bool,
     pub figures: SearchStatistics,
 }

@@ -23,7 +23,6 @@ use crate::search::SearchStatistics;
 /// Work units charged for generating a successor and looking it up in the store.
 const GENERATION_COST: u64 = 200;
 
-/// Weight of the heuristic in the sort key of the open lists.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum HeuristicWeight {
     /// The heuristic value only (greedy best-first search).
@@ -41,17 +40,13 @@ struct Node<N> {
     price: u64,
 }
 
-/// Result of running a search with a work budget.
 pub(super) enum Outcome<N> {
-    /// A plan that costs less than the limit, if there is a limit.
     Plan(GroundPlan<N>),
     /// The open lists are empty. No plan exists, unless `Search::incomplete` is `true`.
     Exhausted,
-    /// The work budget is used up. The search can be resumed.
     Paused,
 }
 
-/// A resumable greedy or weighted A\* search.
 pub(super) struct Search<N> {
     weight: HeuristicWeight,
     prices: Vec<u32>,
@@ -158,7 +153,8 @@ impl<N: TaskNumber> Search<N> {
             } else {
                 self.nodes[id as usize] = node;
                 let start = (id as usize).saturating_mul(stride);
-                // A landmark counts as reached only if it was reached on every known path to the state.
+                // A landmark counts as reached only if it was reached on each path that was the cheapest one to
+                // the state when it was found.
                 for (new, old) in reached.iter_mut().zip(&mut self.reached[start..]) {
                     *new &= *old;
                     *old = *new;

@@ -17,14 +17,12 @@ use crate::search::{MutexPairs, is_monotone};
 /// Cost of an operator that is never useful according to the h² mutexes.
 pub(super) const USELESS_OPERATOR_COST: u32 = 1 << 20;
 
-/// An operator with chosen designs, and its cost.
 struct Step<N> {
     operator: OperatorId,
     choice: Vec<u32>,
     cost: N,
 }
 
-/// Data that all satisficing searches of a task share: relaxation, heuristics, mutexes and steps.
 pub(super) struct SearchContext<'a, N> {
     pub(super) task: &'a Task<N>,
     pub(super) relaxation: Relaxation<N>,
@@ -63,7 +61,6 @@ impl<'a, N: TaskNumber> SearchContext<'a, N> {
         self.relaxation.propositions.saturating_add(self.relaxation.operators.len()) as u64
     }
 
-    /// Returns the operator, the designs and the cost of a step.
     pub(super) fn step(&self, step: u32) -> (OperatorId, &[u32], &N) {
         let Step { operator, choice, cost } = &self.steps[step as usize];
         (*operator, choice, cost)
@@ -109,7 +106,7 @@ impl<'a, N: TaskNumber> SearchContext<'a, N> {
     }
 
     /// Returns operator costs (with the cheapest designs) scaled to integers: positive costs are scaled to a
-    /// mean of about 10, and 1 is added to every cost.
+    /// mean of about 10 and capped at 100,000, and 1 is added to every cost.
     pub(super) fn operator_costs(&self) -> Vec<u32> {
         let costs: Vec<f64> =
             self.task.operators.iter().map(|operator| operator.cost.minimum().approximate()).collect();

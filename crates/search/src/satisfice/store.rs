@@ -7,7 +7,6 @@ use rustc_hash::FxBuildHasher;
 
 use task::task::{State, Task};
 
-/// Bits of a packed state that hold the value of a variable.
 #[derive(Debug, Clone, Copy)]
 struct Field {
     word: usize,
@@ -15,8 +14,6 @@ struct Field {
     mask: u64,
 }
 
-/// Registry of all generated states: bit-packed values of finite-domain variables, and values of numeric
-/// variables.
 pub(super) struct Store<N> {
     fields: Vec<Field>,
     stride: usize,

@@ -43,12 +43,12 @@ const STUBBORN_SET_COST: u64 = 10;
 pub enum SearchOutcome<N = Int> {
     /// A cheapest plan. With the order `OpenListOrder::Fewest`, also the shortest among the cheapest plans.
     Optimal(GroundPlan<N>),
-    /// Proof that no plan exists (within the cost limit of the search, if it has one): every reachable state
-    /// was expanded, is dominated, or cannot lead to a plan.
+    /// Proof that no plan exists (within the cost limit of the search, if it has one): no open node remains,
+    /// and pruning never removes all cheapest plans.
     None,
-    /// No proof. Contains the best plan found if a limit on time, memory or states was reached. Contains
-    /// `None` if no plan was found, or if the search proved that no plan is cheaper than an external
-    /// incumbent.
+    /// No proof. Contains the best plan found if a limit on time, memory or states was reached, a number
+    /// overflowed, or the search was greedy. Contains `None` if no plan was found, or if the search proved that
+    /// no plan is cheaper than an external incumbent.
     Unknown(Option<GroundPlan<N>>),
 }
 
@@ -77,7 +77,6 @@ pub enum OpenListOrder {
 /// Reaction to a forecast that the search will run out of memory before it can finish.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum OutOfMemoryPolicy {
-    /// Stop the search.
     None,
     /// Ignore forecasts; the last forecast was favourable, or nothing was forecast.
     Some,
@@ -89,7 +88,6 @@ pub(super) enum OutOfMemoryPolicy {
 /// tie-breaker that prefers deep nodes.
 type NodeKey<N> = (N, u32, u32);
 
-/// Returns a tie-breaker that decreases with the depth `steps` of a node, so that deep nodes come first.
 fn later(steps: u32) -> u32 {
     u32::MAX.saturating_sub(steps)
 }
@@ -107,17 +105,14 @@ pub struct AStar<'a, N, E> {
     order: OpenListOrder,
     /// More accurate heuristic that is evaluated only when a node is about to be expanded (lazy A\*).
     pub(super) lazy_heuristic: Option<Box<dyn LazyHeuristic<N>>>,
-    /// Stubborn-set pruning, if enabled.
     pub(super) pruning: Option<StubbornSetPruning>,
     /// Work units already done, without those of the lazy heuristic.
     own_work: u64,
-    /// Number of searches that share the memory limit.
     sharing: usize,
     /// Lower bound on the cost of every plan; `None` before the first expansion.
     bound: Option<N>,
     is_interrupted: bool,
     pub(super) patience: OutOfMemoryPolicy,
-    /// Goal node of the best plan of this search.
     best: Option<u32>,
     /// Cost of the best known plan (the incumbent), or a cost limit set by the caller. More expensive nodes
     /// are pruned.
@@ -132,9 +127,7 @@ pub struct AStar<'a, N, E> {
     /// Lower bound on the plan cost at each doubling of the number of stored states.
     progress: Vec<N>,
     pub(crate) statistics: SearchStatistics,
-    /// Scratch buffer: the state that is being expanded.
     state: State<N>,
-    /// Scratch buffer: the successor that is being generated.
     next: State<N>,
 }
 
@@ -152,7 +145,6 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         Self::with_polarities(space, initial, order, limit, directions(space.context.task))
     }
 
-    /// Creates a search that compares the numeric variables by these polarities.
     pub(super) fn with_polarities(
         space: &SearchProblem<'a, N, E>,
         initial: &State<N>,
@@ -308,7 +300,6 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         (limit, if self.order == OpenListOrder::Nearest { 0 } else { fewest }) <= (cost, steps)
     }
 
-    /// Returns the cost of the incumbent, if any.
     pub(super) fn upper_bound(&self) -> Option<&N> {
         self.limit.as_ref()
     }
@@ -337,17 +328,14 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         self.incumbent_is_external && self.limit == self.bound
     }
 
-    /// Returns `true` if the deadline or an interruption ended the search.
     pub(super) fn is_interrupted(&self) -> bool {
         self.is_interrupted
     }
 
-    /// Divides the memory limit among `count` searches.
     pub(super) fn set_memory_share(&mut self, count: usize) {
         self.sharing = count.max(1);
     }
 
-    /// Returns the lower bound on the cost of every plan; `None` before the first expansion.
     pub(super) fn bound(&self) -> Option<&N> {
         self.bound.as_ref()
     }
@@ -366,7 +354,6 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         self.limits.room().checked_div(self.sharing).unwrap_or(0)
     }
 
-    /// Returns `true` if the search is within its share of the memory limit.
     fn has_memory(&self) -> bool {
         self.store.bytes().saturating_add(self.open.bytes()) <= self.room()
     }
@@ -392,7 +379,6 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         reachable_rise.is_none_or(|reachable_rise| reachable_rise >= remaining)
     }
 
-    /// Returns the outcome when no open node can improve the incumbent.
     fn outcome_when_exhausted(&self) -> SearchOutcome<N> {
         match self.best_plan() {
             plan if self.states_dropped || self.order == OpenListOrder::Greedy => {
@@ -422,8 +408,9 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         applicable
     }
 
-    /// Generates all successors of a node, whose state is in `self.state`. If interrupted, the node counts as
-    /// not expanded, and the search must end.
+    /// Generates the successors of a node, whose state is in `self.state`, with the combinations of designs
+    /// that are not dominated. Operators that stubborn sets exclude are skipped. If interrupted, the node
+    /// counts as not expanded, and the search must end.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "steps are fewer than nodes, combinations are numbered"

@@ -12,7 +12,8 @@ use task::task::quantity::{Quantity, SlotSet};
 
 /// Maximum number of combinations of designs that are enumerated for one group of slots.
 const COMBINATION_LIMIT: usize = 2_000_000;
-/// Maximum number of Pareto-optimal combinations of one operator.
+/// Maximum number of combinations of one operator, after dominated combinations have been removed within each
+/// group of slots.
 const CHOICE_LIMIT: usize = 100_000;
 
 /// A combination of designs for some slots. `cost` is its contribution to the operator's cost, and `profile`
@@ -241,7 +242,6 @@ mod tests {
 
     const SIZES: [usize; 4] = [2, 3, 2, 2];
 
-    /// Creates a quantity with a table over each list of slots, filled with the given numbers.
     fn quantity(tables: &[Vec<u32>], numbers: &mut impl Iterator<Item = Int>) -> Quantity<Int> {
         let mut quantity = Quantity::constant(numbers.next().unwrap_or(0));
         for slots in tables {
@@ -261,7 +261,6 @@ mod tests {
             slot: SlotId(slot),
             designs: (0..*size as u32).collect(),
         };
-        // Some pairs of designs for slots 0 and 1 are forbidden.
         let combinations = excluded.iter().map(|(a, b)| [*a, *b].into()).collect();
         Operator {
             schema: 0,
@@ -281,8 +280,6 @@ mod tests {
         }
     }
 
-    /// Reference implementation of `pareto_optimal_combinations`: compares every combination with every other
-    /// combination.
     fn expected(operator: &Operator, monotone: bool, all: bool) -> Vec<(Vec<u32>, Int)> {
         let sizes = operator.sizes();
         let value = |choice: &Vec<u32>| {

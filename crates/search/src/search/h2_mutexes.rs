@@ -26,7 +26,6 @@ type Words = Vec<u64>;
 
 /// An operator in terms of numbered facts of basic variables.
 struct Rule {
-    /// Facts that the condition of the operator requires.
     before: Vec<u32>,
     /// Facts that are known to hold after the operator.
     after: Vec<u32>,
@@ -124,11 +123,9 @@ fn without(words: &[u64], others: &[u64]) -> Words {
 
 /// The h² mutexes of a task, from forward and backward analysis.
 pub struct MutexPairs {
-    /// Number of the first fact of each basic variable.
     first: Vec<u32>,
     /// Compatible pairs: pairs that a state on a path from the initial state to the goal may contain.
     alive: Table,
-    /// For each operator: `true` if it is proved that no plan can use the operator.
     useless: Vec<bool>,
 }
 
@@ -195,10 +192,8 @@ impl MutexPairs {
 struct H2Builder<'a, N> {
     task: &'a Task<N>,
     first: Vec<u32>,
-    /// Variable of each fact.
     variables: Vec<VariableId>,
     facts: u32,
-    /// Remaining work limit, in bitset words.
     left: usize,
 }
 
@@ -215,7 +210,6 @@ impl<N: TaskNumber> H2Builder<'_, N> {
         self.first[fact.variable.index()].saturating_add(fact.value)
     }
 
-    /// Returns the numbers of a variable's facts.
     fn values(&self, variable: VariableId) -> std::ops::Range<u32> {
         let first = self.first[variable.index()];
         first..first.saturating_add(dense(self.task.variables[variable.index()].values.len()))
@@ -366,7 +360,6 @@ impl<N: TaskNumber> H2Builder<'_, N> {
         }
     }
 
-    /// Returns the facts that hold in some state, according to the table.
     fn facts_of(&self, table: &Table) -> Words {
         let mut facts = vec![0; self.words()];
         (0..self.facts).filter(|fact| table.has(*fact, *fact)).for_each(|fact| insert(&mut facts, fact));

@@ -36,7 +36,6 @@ impl Polarity {
     }
 }
 
-/// Fixpoint computation of the polarities of all numeric variables and derived variables.
 struct PolarityAnalysis<'a, N> {
     task: &'a Task<N>,
     numbers: Vec<Polarity>,

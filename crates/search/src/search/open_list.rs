@@ -1,9 +1,8 @@
-//! Open list of a best-first search: one bucket for each key. Nodes of a bucket are popped in last-in,
-//! first-out order.
+//! Open list of a best-first search: one bucket for each key. Nodes with the smallest key are popped first;
+//! among nodes of one bucket, the node that was added last.
 
 use std::collections::BTreeMap;
 
-/// Open list. A node with the smallest key is popped first.
 pub(super) struct OpenList<K> {
     buckets: BTreeMap<K, Vec<u32>>,
     length: usize,

@@ -42,7 +42,6 @@ struct Region {
     content: Content,
 }
 
-/// A Pareto front: labels none of which dominates another, stored as a tree of boxes.
 #[derive(Default)]
 pub(super) struct Front {
     regions: Vec<Region>,
@@ -57,7 +56,6 @@ impl Front {
         front
     }
 
-    /// Returns the approximate memory use in bytes.
     pub(super) fn bytes(&self) -> usize {
         let numbers = self.regions.first().map_or(0, |region| region.best.len());
         let region = numbers.saturating_add(self.most).saturating_mul(8);
@@ -165,7 +163,6 @@ impl Front {
     }
 }
 
-/// Creates a leaf with these labels and their best and worst values.
 fn region(labels: Vec<u32>, criteria: &impl Criteria) -> Region {
     let mut region = Region { best: Vec::new(), worst: Vec::new(), content: Content::Labels(Vec::new()) };
     let mut numbers = Vec::new();

@@ -33,10 +33,8 @@ use crate::search::successor_generator::SuccessorGenerator;
 
 /// Maximum number of labels (partial plans) that are stored in both searches together.
 const LABEL_LIMIT: usize = 100_000;
-/// Maximum number of comparisons between labels in both searches together.
 const PAIR_LIMIT: usize = 50_000_000;
 
-/// A label of the search: a partial plan, represented by the state that it reaches and by its quality.
 #[derive(Debug, Clone)]
 struct Label {
     state: State,
@@ -60,7 +58,6 @@ impl Label {
 /// the reference plan (0 without a reference plan), and the number of changes of a function's design.
 pub type Changes = (usize, usize);
 
-/// A combination of designs for the slots of an operator.
 struct Choice {
     designs: Vec<u32>,
     cost: Int,
@@ -77,7 +74,6 @@ type Choices = Option<Vec<Choice>>;
 /// number may be worse (the task is not monotone), numbers.
 type Place = (Box<[u32]>, Vec<Option<ObjectId>>, Vec<Int>);
 
-/// All labels of a search, and their indices by Pareto front.
 #[derive(Default)]
 struct Labels {
     all: Vec<Label>,
@@ -228,7 +224,6 @@ pub fn choose_from(
     }
 }
 
-/// A node of the depth-first search, with its untried successors.
 struct Branch<'a> {
     label: usize,
     operators: std::vec::IntoIter<OperatorId>,
@@ -390,7 +385,6 @@ impl Ties<'_> {
         })
     }
 
-    /// Polls deadline and interrupt flag. Returns `None` if the search must stop.
     fn beat(&self) -> Option<()> {
         self.pulse.borrow_mut().beat().ok()
     }

@@ -1,10 +1,10 @@
 //! Scheduling of searches: a first plan, an optimal plan, and the closed states that prove its optimality.
 //!
 //! A\* with pattern databases runs first. If it finds no plan soon, a greedy best-first search looks for some
-//! plan. Then two A\* searches alternate: one uses only pattern databases, the other also LM-cut. The
-//! LM-cut search gets a quarter of the work of the other one at first, and then as much. A search that lags
-//! behind gets half. The result of the search that finishes first is returned. Work is counted in units instead of time,
-//! so the result is deterministic.
+//! plan. Then two A\* searches alternate: one uses only pattern databases, the other also LM-cut. The LM-cut
+//! search gets a quarter of the work of the other one at first, and then as much. A search that lags behind
+//! gets half. The result of the search that finishes first is returned. Work is counted in units instead of
+//! time, so the result is deterministic.
 
 use std::sync::Arc;
 
@@ -153,9 +153,7 @@ pub struct InterleavedSearch<'a, N, E> {
     is_patient: bool,
     /// Greatest proved lower bound on the cost of every plan.
     bound: Option<N>,
-    /// Best plan of the abandoned searches.
     best: Option<GroundPlan<N>>,
-    /// Statistics of the abandoned searches.
     figures: SearchStatistics,
 }
 
@@ -363,8 +361,6 @@ mod tests {
     use testing::random::Random;
     use testing::{depot, fleet, ground_text, optimum, successors};
 
-    /// Returns the cost and the length of the plan that A\* finds, with or without LM-cut, symmetry reduction
-    /// and stubborn sets.
     fn solve(
         task: &Task,
         order: OpenListOrder,

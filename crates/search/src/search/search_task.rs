@@ -14,7 +14,6 @@ use crate::search::successor_generator::SuccessorGenerator;
 
 /// Precomputed operator data of a task, independent of the initial state.
 pub struct SearchTask<N = Int> {
-    /// For each operator: its Pareto-optimal combinations of designs, with their costs.
     pub(super) choices: Vec<CostedCombinations<N>>,
     /// For each operator: the index of its first combination among all combinations. The last element is the
     /// total number of combinations.
@@ -52,7 +51,6 @@ impl<N: TaskNumber> SearchTask<N> {
         Ok(Some(Self { choices, numbers, index: SuccessorGenerator::new(task), dearest: max_cost }))
     }
 
-    /// Returns the operator and the designs of the combination with this index.
     pub(super) fn step(&self, number: u32) -> GroundStep {
         let operator = self.numbers.partition_point(|first| *first <= number).saturating_sub(1);
         let choice = number.saturating_sub(self.numbers[operator]);

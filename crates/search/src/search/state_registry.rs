@@ -23,7 +23,6 @@ pub(super) const NONE: u32 = u32::MAX;
 
 const WORD: u32 = u32::BITS;
 
-/// Bits of a packed key that hold the value of a finite-domain variable.
 struct BitField {
     variable: usize,
     word: usize,
@@ -47,13 +46,11 @@ struct Numbers<N> {
     table: HashTable<u32>,
 }
 
-/// Link from a node to its parent in the search space.
 #[derive(Clone, Copy)]
 pub(super) struct ParentLink {
     pub(super) parent: u32,
     /// Index of the operator with its combination of designs, see `SearchTask::step`.
     pub(super) step: u32,
-    /// Number of steps from the initial state to the node.
     pub(super) steps: u32,
 }
 
@@ -62,7 +59,6 @@ struct Node {
     origin: ParentLink,
     /// Path cost, as the index of an interned number.
     cost: u32,
-    /// Next node of the linked front, or `NONE`.
     next: u32,
     state: NodeStatus,
 }
@@ -75,7 +71,6 @@ enum NodeStatus {
     Dominated,
 }
 
-/// The state registry of A\*, which also stores the search nodes.
 pub(super) struct StateRegistry<N> {
     fields: Vec<BitField>,
     exact: Vec<usize>,
@@ -91,14 +86,12 @@ pub(super) struct StateRegistry<N> {
     /// Maximum number of nodes in a front (non-dominated nodes of a place) that is stored as a linked list. A
     /// longer front is stored as a tree.
     longest: usize,
-    /// Memory use of the trees in bytes.
     tree_bytes: usize,
     table: HashTable<u32>,
     nodes: Vec<Node>,
     /// For each node: the indices of the values of its compared variables, which are not part of the key.
     others: Vec<u32>,
     numbers: Numbers<N>,
-    /// Scratch buffer: the key of the state that is looked up.
     key: Vec<u32>,
     /// Scratch buffer: indices of the compared numbers of the state that is looked up.
     own: Vec<u32>,
@@ -177,7 +170,6 @@ fn pack(fields: &[BitField], values: &[u32], words: usize, to: &mut Vec<u32>) {
 }
 
 impl<N: TaskNumber> StateRegistry<N> {
-    /// Creates an empty registry. `polarities` has the polarity by which each numeric variable is compared.
     pub(super) fn new(
         task: &Task<N>,
         polarities: Vec<Polarity>,
@@ -224,7 +216,6 @@ impl<N: TaskNumber> StateRegistry<N> {
         self.nodes.len()
     }
 
-    /// Returns the approximate memory use in bytes.
     pub(super) fn bytes(&self) -> usize {
         let words = [&self.keys, &self.fronts, &self.others, &self.plain]
             .map(|list| list.len().saturating_mul(size_of::<u32>()));
@@ -282,12 +273,10 @@ impl<N: TaskNumber> StateRegistry<N> {
         (!is_dominated).then_some(VacantEntry { hash, place, cost })
     }
 
-    /// Returns the number of words of a key that hold finite-domain values.
     fn words(&self) -> usize {
         self.width.saturating_sub(self.exact.len())
     }
 
-    /// Returns the nodes of a linked front, beginning with `first`.
     fn chain(&self, first: u32) -> impl Iterator<Item = u32> {
         let some = |node: u32| (node != NONE).then_some(node);
         std::iter::successors(some(first), move |node| some(self.nodes[*node as usize].next))
@@ -369,7 +358,6 @@ impl<N: TaskNumber> StateRegistry<N> {
         one == other || (!up || number(one) >= number(other)) && (!down || number(one) <= number(other))
     }
 
-    /// Returns `true` if each compared variable is at least as good in `one` as in `other`.
     fn is_no_worse(&self, one: &[u32], other: &[u32]) -> bool {
         let mut pairs = self.compared.iter().zip(one.iter().zip(other));
         pairs.all(|(compared, (one, other))| self.compares(compared.asked, *one, *other))

@@ -42,7 +42,6 @@ const MIN_PRUNED_FRACTION: u64 = 5;
 
 /// Indices of a task: the operators that require, set or read each fact or variable.
 pub struct Stubborn {
-    /// Number of the first fact of each variable.
     first: Vec<u32>,
     /// For each fact: operators that require it.
     requiring: Lists,
@@ -56,20 +55,14 @@ pub struct Stubborn {
     required: Lists,
 }
 
-/// State of stubborn-set pruning: scratch buffers, and statistics for disabling it.
 pub(super) struct StubbornSetPruning {
     stubborn: Arc<Stubborn>,
-    /// For each operator: whether it is in the stubborn set of the current state.
     is_in: Vec<bool>,
-    /// For each operator: whether it is applicable in the current state.
     can_be_applied: Vec<bool>,
-    /// Operators of the stubborn set that are not processed yet.
     open: Vec<u32>,
-    /// All operators of the stubborn set.
     all: Vec<u32>,
     /// For each fact: whether all operators that set it are in the stubborn set.
     is_set: Vec<bool>,
-    /// Facts for which `is_set` is `true`.
     set: Vec<u32>,
     /// Number of applicable operators that are not in the stubborn set.
     out: usize,
@@ -77,9 +70,7 @@ pub(super) struct StubbornSetPruning {
     trial: u64,
     /// Number of states that were expanded with pruning.
     looked: u64,
-    /// Sum of the numbers of applicable operators over the states expanded with pruning.
     applicable: u64,
-    /// Number of operators that were pruned, over all expanded states.
     left_out: u64,
 }
 
@@ -125,7 +116,6 @@ impl Stubborn {
         })
     }
 
-    /// Returns the numbers of a variable's facts.
     fn facts(&self, variable: u32) -> std::ops::Range<u32> {
         let next = self.first.get((variable as usize).saturating_add(1)).copied();
         self.first[variable as usize]..next.unwrap_or_else(|| dense(self.setting.count()))
@@ -215,8 +205,8 @@ impl StubbornSetPruning {
         }
     }
 
-    /// Adds all operators that achieve one unsatisfied part of a condition. Returns `false` if the condition
-    /// holds.
+    /// Ensures that the set contains all operators that achieve one unsatisfied part of a condition. Returns
+    /// `false` if the condition holds.
     fn enable<N>(
         &mut self,
         stubborn: &Stubborn,
@@ -296,7 +286,6 @@ impl StubbornSetPruning {
         }
     }
 
-    /// Adds all operators that may set the fact with this number.
     fn add_setting(&mut self, stubborn: &Stubborn, number: u32) {
         if !std::mem::replace(&mut self.is_set[number as usize], true) {
             self.set.push(number);
@@ -331,13 +320,10 @@ pub(super) mod tests {
     use testing::random::Random;
     use testing::{depot, ground_text};
 
-    /// Maximum number of reachable states of a test task.
     const STATES: usize = 3_000;
 
-    /// Successors of a state, each with the operator, the index of the successor state, and the cost.
     pub(in crate::search) type Steps = Vec<(OperatorId, usize, Int)>;
 
-    /// Returns all reachable states and their successors, or `None` if there are more than `STATES` states.
     pub(in crate::search) fn reachable(task: &Task) -> Option<(Vec<State>, Vec<Steps>)> {
         let mut indices = FxHashMap::from_iter([(task.initial.clone(), 0)]);
         let (mut states, mut steps): (Vec<State>, Vec<Steps>) = (vec![task.initial.clone()], Vec::new());
@@ -422,7 +408,6 @@ pub(super) mod tests {
         Some(left_out)
     }
 
-    /// Generates a random task whose operators require, set and read mostly neighbouring propositions.
     pub(in crate::search) fn switches(seed: u64) -> (String, String) {
         let mut random = Random(seed);
         let mut below = move |limit: i64| random.below(limit.unsigned_abs());

@@ -9,14 +9,12 @@
 use task::number::dense;
 use task::task::{OperatorId, State, Task};
 
-/// Index of a missing node.
 const NONE: u32 = u32::MAX;
 
 #[derive(Default)]
 struct Node {
     /// Operators whose preconditions have all been tested at this node, as a range of `operators`.
     complete: (u32, u32),
-    /// Variable whose value this node tests.
     variable: u32,
     /// Children by ascending value, as a range of `children`.
     children: (u32, u32),

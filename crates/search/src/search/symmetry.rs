@@ -24,7 +24,6 @@ struct Move {
 
 /// Symmetries of a task: exchanges of two interchangeable objects.
 pub struct Orbits {
-    /// For each exchange: its moves in ascending order of their target variables.
     exchanges: Vec<Vec<Move>>,
 }
 

@@ -172,7 +172,6 @@ impl<'t> Initial<'t> {
     }
 }
 
-/// Disjunction or conjunction of truth values in Kleene's three-valued logic; `None` is the unknown value.
 fn kleene(truths: &[Option<bool>], is_disjunction: bool) -> Option<bool> {
     if truths.contains(&Some(is_disjunction)) {
         return Some(is_disjunction);

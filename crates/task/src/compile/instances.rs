@@ -6,7 +6,6 @@ use pddl::ast::{Atom, Condition, Domain, Expression, Name, Problem, Term, TypeEx
 
 use super::simplify::identifier;
 
-/// The objects of a task, each with the types of all its declarations.
 pub(super) struct Objects<'t> {
     types: TypeHierarchy,
     all: Vec<(&'t Name, Vec<&'t TypeExpression>)>,
@@ -31,7 +30,6 @@ impl<'t> Objects<'t> {
         Self { types: TypeHierarchy::of(domain), all: objects, limits }
     }
 
-    /// Returns the objects that belong to the type `wanted` or to a subtype.
     pub(super) fn members(&self, wanted: &TypeExpression) -> impl Iterator<Item = &'t Name> {
         let fits = |types: &[&TypeExpression]| types.iter().any(|given| self.types.fits(given, wanted));
         self.all.iter().filter(move |(_, types)| fits(types)).map(|(name, _)| *name)

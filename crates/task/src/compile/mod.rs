@@ -70,8 +70,8 @@ pub fn is_violation(action: &str) -> bool {
 /// Compiles preferences and trajectory constraints away. Preferences that no objective mentions are dropped.
 ///
 /// # Errors
-/// Returns all unsupported constraints with their source locations, or an error if the deadline passes or the
-/// run is interrupted.
+/// Returns the unsupported constraints and preferences with their source locations, or an error if the deadline passes
+/// or the run is interrupted.
 pub fn compile<'t>(
     domain: &'t Domain,
     problem: &'t Problem,
@@ -146,7 +146,6 @@ fn constraints<'t>(
     of_domain.chain(problem.constraints.iter().map(|constraint| (File::Problem, constraint)))
 }
 
-/// Returns the preference name of an expression `(is-violated NAME)`, and `None` for other expressions.
 fn violation(expression: &Expression) -> Option<&Name> {
     match expression {
         Expression::Fluent(atom) if atom.predicate.name == Name::new("is-violated") => {
@@ -159,7 +158,6 @@ fn violation(expression: &Expression) -> Option<&Name> {
     }
 }
 
-/// Returns the names of the preferences that the objectives mention, without duplicates.
 fn preferences_in(objectives: &[Metric]) -> Vec<Name> {
     fn walk(expression: &Expression, found: &mut Vec<Name>) {
         if let Some(name) = violation(expression).filter(|name| !found.contains(name)) {

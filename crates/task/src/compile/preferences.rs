@@ -25,14 +25,12 @@ use super::syntax_edits::{PreferenceInstance, declare, happen, hidden, require};
 /// Auxiliary atom that holds until the evaluation of preferences begins. Actions of the domain require it.
 const GOING_ON: &str = "the plan goes on";
 
-/// Suffix of the name of each hidden action that evaluates a preference instance as violated.
 pub(super) const VIOLATION: &str = " is violated";
 
 /// Auxiliary atom that is never true. Hidden actions that are never executed add it, so that they have an
 /// effect.
 const VIOLATED: &str = "a preference is violated";
 
-/// Returns the numeric function that counts the violations of a preference.
 pub(super) fn count(preference: &Name) -> Atom {
     flag(&format!("violations of {preference}"))
 }

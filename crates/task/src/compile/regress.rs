@@ -12,12 +12,10 @@ use super::simplify::{all, any, equal, exists, falsity, is_false, not};
 /// change.
 const MAX_CASES: usize = 64;
 
-/// The effects of one happening of an action: its start or its end.
 pub(super) struct Happening {
     changes: Vec<Change>,
 }
 
-/// A single effect with the quantified variables and conditions around it.
 struct Change {
     bound: Vec<TypedName>,
     conditions: Vec<Condition>,
@@ -50,7 +48,6 @@ impl Happening {
         Self { changes }
     }
 
-    /// Returns `true` if an effect of the happening assigns to a numeric function with this name.
     pub(super) fn changes_function(&self, name: &Name) -> bool {
         self.changes
             .iter()
@@ -253,7 +250,6 @@ fn is_same(left: &Atom, right: &Atom) -> bool {
     is_same_symbol(left, right) && left.arguments.iter().zip(&right.arguments).all(is_equal)
 }
 
-/// Adds the numeric functions of an expression to `found`, without duplicates.
 fn functions_of(expression: &Expression, found: &mut Vec<Atom>) {
     expression.walk_fluents(&mut |atom| {
         if !found.iter().any(|known| is_same(known, atom)) {
@@ -276,8 +272,6 @@ fn substitute(expression: &Expression, values: &[(Atom, Expression)]) -> Express
     }
 }
 
-/// Returns the value of a function after an assignment, where `value` is its value before and `by` is the
-/// operand.
 fn changed(kind: Assignment, value: &Expression, by: &Expression) -> Expression {
     let with = |operation| Expression::Operation(operation, vec![value.clone(), by.clone()], Span::default());
     match kind {

@@ -6,7 +6,6 @@ pub(super) fn identifier(name: &str) -> Identifier {
     Identifier { name: Name::new(name), span: Span::default() }
 }
 
-/// Returns an atom without arguments with this predicate name.
 pub(super) fn flag(name: &str) -> Atom {
     Atom { predicate: identifier(name), arguments: Vec::new(), span: Span::default() }
 }

@@ -10,12 +10,10 @@ use super::simplify::{all, identifier};
 /// A preference instance: the name of the preference, and its condition on the last state.
 pub(super) type PreferenceInstance = (Name, Condition);
 
-/// Adds a predicate without parameters to the domain.
 pub(super) fn declare(domain: &mut Domain, name: &str) {
     domain.predicates.push(Declaration { identifier: identifier(name), parameters: Vec::new() });
 }
 
-/// Returns an auxiliary action without parameters, which plans do not show.
 pub(super) fn hidden(name: &str, body: ActionBody, span: Span) -> Action {
     Action { identifier: identifier(name), parameters: Vec::new(), body, preferences: Vec::new(), span }
 }
@@ -37,7 +35,6 @@ pub(super) fn require(action: &mut Action, time: EffectTime, condition: Conditio
     }
 }
 
-/// Adds an effect to an action, at its start or its end.
 pub(super) fn happen(action: &mut Action, time: EffectTime, more: Effect) {
     match &mut action.body {
         ActionBody::Instantaneous { effect, .. } => {
@@ -48,7 +45,6 @@ pub(super) fn happen(action: &mut Action, time: EffectTime, more: Effect) {
     }
 }
 
-/// Creates an error about an unsupported construct; `instead` describes a supported alternative.
 pub(super) fn unsupported(
     construct: impl Into<String>,
     instead: impl Into<String>,

@@ -23,7 +23,6 @@ use super::syntax_edits::{PreferenceInstance, declare, happen, require, unsuppor
 /// Limit on the total number of ground instances of trajectory constraints, including those of preferences.
 const INSTANCES: usize = 20_000;
 
-/// Collects the auxiliary atoms, conditions and effects for all trajectory constraints of a task.
 pub(super) struct Monitors<'t> {
     domain: &'t Domain,
     problem: &'t Problem,
@@ -31,15 +30,12 @@ pub(super) struct Monitors<'t> {
     pub(super) initial: Initial<'t>,
     /// Additional conditions and effects of each action: at its start, and at its end.
     additions: Vec<[Addition; 2]>,
-    /// Names of the auxiliary atoms, with their initial truth values.
     memory: Vec<(String, bool)>,
-    /// Additional goal conditions from hard constraints.
     goals: Vec<Condition>,
     wanted: Vec<PreferenceInstance>,
     /// Names of the auxiliary atoms that timed initial literals add, with their times.
     pub(super) moments: Vec<(String, BigRational)>,
     pub(super) course: PlanSemantics<'t>,
-    /// Deadlines, each with its two conditions and the effect that records its satisfaction.
     pub(super) deadlines: Vec<(Deadline, [Condition; 2], Effect)>,
     /// `true` if an action gets a condition that its duration is positive, although the PDDL files allow 0.
     narrows: bool,
@@ -47,7 +43,6 @@ pub(super) struct Monitors<'t> {
     fresh: u64,
 }
 
-/// Conditions and effects that monitors add to the start or the end of an action.
 #[derive(Default)]
 pub(super) struct Addition {
     conditions: Vec<Condition>,
@@ -81,8 +76,6 @@ impl<'t> Monitors<'t> {
         }
     }
 
-    /// Checks that all numeric functions in a condition have initial values. Returns an error at `place` if
-    /// not.
     pub(super) fn is_defined(&self, condition: &Condition, place: (File, Span)) -> Result<(), Error> {
         self.initial.is_defined(condition, place)
     }
@@ -179,10 +172,13 @@ impl<'t> Monitors<'t> {
         name
     }
 
-    /// Calls `make` for each start or end of an action that may change one of the conditions, and adds the
-    /// result to the action. The arguments of `make` are the condition under which a change occurs, and the
-    /// regressed conditions. If start and end may coincide and both may change the conditions, the action
-    /// also gets the condition that its duration is positive. Fails if this or a regression is not possible.
+    /// Adds the result of `make` to each start or end of an action that may change one of the conditions.
+    /// `make` is called with a condition under which the change may occur, and with the conditions regressed to
+    /// the state before it; it is called once for each disjunct of the former. If start and end may coincide
+    /// and both may change the conditions, the action also gets the condition that its duration is positive.
+    ///
+    /// Fails if this or a regression is not possible, or if derived predicates or timed initial literals occur
+    /// in the conditions.
     pub(super) fn after_each(
         &mut self,
         conditions: &[&Condition],
@@ -355,8 +351,6 @@ impl<'t> Monitors<'t> {
         Ok(broken.map_or(decided(!at_first), |broken| not(holds(&broken))))
     }
 
-    /// Adds the collected atoms, conditions, effects and goals to the task. Returns the preference instances
-    /// and the deadlines.
     pub(super) fn install(
         self,
         domain: &mut Domain,
@@ -403,8 +397,8 @@ impl Addition {
         Self { conditions: Vec::new(), effects: vec![effect] }
     }
 
-    /// Forbids the state transition in which `what` holds, or records the violation in the atom `broken` if
-    /// one is given.
+    /// Adds the precondition that `what` is false. If an atom `broken` is given, adds an effect instead that
+    /// makes `broken` true if `what` holds.
     pub(super) fn forbid(&mut self, what: Condition, broken: Option<&str>) {
         match broken {
             None => self.conditions.push(not(what)),
@@ -413,8 +407,6 @@ impl Addition {
     }
 }
 
-/// Returns `true` if a condition contains no atoms and no numeric comparisons, and so does not depend on the
-/// state.
 fn reads_nothing(condition: &Condition) -> bool {
     let mut reads = false;
     condition.walk(&mut |node| {

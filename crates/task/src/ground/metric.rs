@@ -22,12 +22,12 @@ use crate::task::quantity::{Linear, NumericId, Quantity};
 use crate::task::table_map::TableMap;
 use pddl::ast::Direction;
 
-/// Computes the costs of all operators, and stores the parts of the metrics that are not operator costs in
-/// the task.
+/// Computes the costs of all operators, and stores the parts of the metrics that are not operator costs in the
+/// task.
 ///
 /// # Errors
-/// A metric is not linear, or contains a fluent with state-dependent changes and `generality` does not allow
-/// this.
+/// A metric is not linear, reads a function without a value, or contains a fluent with state-dependent changes
+/// although `generality` does not allow this.
 pub fn attach_costs(task: &mut GroundTask<'_>, generality: &Generality) -> Result<(), Errors> {
     let lifted = task.world.lifted;
     if lifted.metrics.is_empty() {
@@ -47,7 +47,6 @@ pub fn attach_costs(task: &mut GroundTask<'_>, generality: &Generality) -> Resul
     if errors.is_empty() { Ok(()) } else { Err(errors.into()) }
 }
 
-/// Computes the operator costs of a single metric and adds the metric as an objective.
 fn attach(task: &mut GroundTask<'_>, metric: &Metric, generality: &Generality) -> Result<(), Error> {
     let limits = task.world.limits;
     let (mut linear, mut time) = split(&mut task.world, &metric.expression, metric.place)?;
@@ -205,7 +204,6 @@ impl ScaledQuantities {
     }
 }
 
-/// Returns the cost of applying the operator: its weighted duration and its weighted changes of fluents.
 fn cost(
     operator: &GroundOperator,
     metric: &Linear<Rational>,

@@ -69,8 +69,8 @@ use vocabulary::world::World;
 /// ```
 ///
 /// # Errors
-/// Returns all unsupported constructs with their source locations, or an error if the deadline passes or the
-/// run is interrupted.
+/// Returns unsupported constructs with their source locations (of each action schema at least the first one), or an
+/// error if numbers overflow, the deadline passes or the run is interrupted.
 pub fn ground(domain: &Domain, problem: &Problem, config: &GroundConfig) -> Result<Task, Errors> {
     let measures_ends = config.objectives.len() <= 1;
     ground_for(domain, problem, config, &Generality { measures_ends, ..Generality::default() })
@@ -80,7 +80,7 @@ pub fn ground(domain: &Domain, problem: &Problem, config: &GroundConfig) -> Resu
 /// `generality`.
 ///
 /// # Errors
-/// Returns all unsupported constructs, or an error if the deadline passes or the run is interrupted.
+/// See [`ground`].
 pub fn ground_for<N: TaskNumber>(
     domain: &Domain,
     problem: &Problem,

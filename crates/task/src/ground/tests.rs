@@ -34,7 +34,6 @@ fn lifted() -> Lifted {
     normalize(&domain, &problem, &[]).expect("a lifted task")
 }
 
-/// Returns empty slot lists, so that no parameter is a design.
 fn none(lifted: &Lifted) -> Vec<Vec<SlotParameter>> {
     vec![Vec::new(); lifted.schemas.len()]
 }
@@ -43,14 +42,12 @@ fn reached(lifted: &Lifted) -> RelaxedReachability {
     relaxed_reachability::reach(lifted, &none(lifted), &Limits::none()).expect("no limit")
 }
 
-/// Returns the number of operators of each schema.
 fn counts(lifted: &Lifted, task: &GroundTask<'_>) -> Vec<(String, usize)> {
     let schemas = lifted.schemas.iter().zip(0_u32..);
     let count = |schema| task.operators.iter().filter(|operator| operator.schema == schema).count();
     schemas.map(|(schema, number)| (schema.name.to_string(), count(number))).collect()
 }
 
-/// Calls `check` with the lifted task and with the ground task after instantiation.
 fn instantiated(check: impl FnOnce(&Lifted, GroundTask<'_>)) {
     let (lifted, limits) = (lifted(), Limits::none());
     let reached = reached(&lifted);

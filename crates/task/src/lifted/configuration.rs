@@ -213,7 +213,6 @@ pub fn recursive_through_forall(lifted: &Lifted) -> Vec<PredicateId> {
     recursive
 }
 
-/// Calls `visit` with the predicate of every atom below a universal quantifier.
 fn universal_atoms(formula: &Formula, visit: &mut dyn FnMut(PredicateId)) {
     match formula {
         Formula::And(parts) | Formula::Or(parts) => {

@@ -54,13 +54,11 @@ pub struct Lifted {
     pub axioms: Vec<Axiom>,
     /// Initial facts in file order, without duplicates.
     pub(crate) facts: Vec<(PredicateId, Arguments)>,
-    /// Initial values of numeric functions.
     pub(crate) values: Vec<(FunctionId, Arguments, Rational)>,
     /// Timed initial literals in chronological order.
     pub events: Vec<Event>,
     pub time: Time,
     pub goal: Formula,
-    /// Number of variables that the quantifiers of the goal bind.
     pub(crate) goal_variables: usize,
     /// Metrics in lexicographic order; empty if the files have none.
     pub metrics: Vec<Metric>,
@@ -121,9 +119,7 @@ pub struct Schema {
 /// Separate conditions of the start and end of an action with duration 0, and the split of their effects.
 #[derive(Debug, Clone)]
 pub struct Joint {
-    /// Condition of the start.
     pub(crate) start: Formula,
-    /// Condition of the end.
     pub(crate) end: Formula,
     /// Number of effects that belong to the start; they precede those of the end in `end_effects`.
     pub(crate) start_effects: usize,
@@ -133,7 +129,6 @@ pub struct Joint {
 #[derive(Debug, Clone, Copy)]
 pub struct Time {
     pub(crate) clock: FunctionId,
-    /// Length of one moment: an interval so short that distinct times differ by at least two moments.
     pub(crate) moment: FunctionId,
     /// Predicate `(phase NUMBER)`: the number of past events.
     pub phase: PredicateId,
@@ -157,7 +152,6 @@ pub struct Event {
 pub struct Axiom {
     pub(crate) predicate: PredicateId,
     pub(crate) parameters: Vec<Parameter>,
-    /// Number of parameters and quantified variables.
     pub(crate) variables: usize,
     pub condition: Formula,
 }
@@ -201,7 +195,6 @@ impl Formula {
         Self::And(Vec::new())
     }
 
-    /// Returns the negation in negation normal form.
     pub(crate) fn negated(&self) -> Self {
         use Comparison as Op;
         let each = |parts: &[Self]| parts.iter().map(Self::negated).collect();

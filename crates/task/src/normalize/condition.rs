@@ -107,7 +107,6 @@ pub(super) fn effect(names: &mut Names, written: &ast::Effect, scope: &mut Scope
     out.push(Effect { bound: Vec::new(), condition: Formula::truth(), change });
 }
 
-/// Converts a numeric expression and resolves its names.
 pub(super) fn expression(names: &mut Names, written: &ast::Expression, scope: &mut Scope) -> Expression {
     use ast::Arithmetic as Op;
     match written {

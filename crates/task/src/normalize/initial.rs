@@ -36,8 +36,8 @@ pub(super) fn initial_state(
     (facts, values)
 }
 
-/// Creates the auxiliary symbols for time if there are timed events. Their names contain a space, so no name
-/// in a PDDL file can equal them.
+/// Creates the auxiliary symbols for time if there are timed events. Their names contain a space, so no name in
+/// a PDDL file can equal them. Without timed events, the returned ids refer to no symbol.
 #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
 pub(super) fn time(names: &mut Names, events: &[Event]) -> Time {
     let time = Time {

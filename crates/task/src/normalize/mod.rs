@@ -96,7 +96,6 @@ fn named(
     Ok(lifted)
 }
 
-/// Converts an action to a lifted schema, with conditions and effects separated by time.
 fn schema(names: &mut Names, longest: Option<bool>, action: &ast::Action, index: u32) -> Schema {
     let mut scope = Scope::new(File::Domain);
     let mut schema = Schema {
@@ -152,7 +151,6 @@ fn schema(names: &mut Names, longest: Option<bool>, action: &ast::Action, index:
     schema
 }
 
-/// Converts a derived predicate rule to a lifted axiom.
 fn axiom(names: &mut Names, axiom: &ast::Derived) -> Axiom {
     let mut scope = Scope::new(File::Domain);
     let parameters = names.parameters(&axiom.head.parameters, &mut scope);

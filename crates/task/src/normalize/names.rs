@@ -11,18 +11,14 @@ use crate::lifted::{
 use crate::number::dense;
 use pddl::ast::{self, Identifier, Name, Span, TypeExpression, TypedName};
 
-/// Meaning of the variable `?duration` in an action.
 pub(super) enum Duration {
-    /// The action has no duration.
     Instantaneous,
-    /// The value of an expression.
     Fixed(Expression),
     /// The duration is variable, and the planner takes its shortest or longest value. Effects must not depend
     /// on it.
     Open,
 }
 
-/// Variables in scope with their terms, and the current PDDL file.
 pub(super) struct Scope {
     pub(super) file: File,
     variables: Vec<Name>,
@@ -30,7 +26,6 @@ pub(super) struct Scope {
     terms: FxHashMap<Name, Vec<Term>>,
     /// Total number of bound variables, including those that are out of scope.
     pub(super) bound: u32,
-    /// Meaning of `?duration` in the current action.
     pub(super) duration: Duration,
 }
 
@@ -49,7 +44,6 @@ impl Scope {
         self.terms.entry(name.clone()).or_default().push(term);
     }
 
-    /// Removes the last `count` variables from the scope.
     pub(super) fn pop(&mut self, count: usize) {
         for name in self.variables.drain(self.variables.len().saturating_sub(count)..) {
             self.terms.get_mut(&name).map(Vec::pop);
@@ -61,7 +55,6 @@ impl Scope {
     }
 }
 
-/// Symbol tables of a domain and problem, and the errors found during normalisation.
 pub(super) struct Names {
     pub(super) objects: Vec<Name>,
     object_ids: FxHashMap<Name, ObjectId>,
@@ -77,7 +70,6 @@ pub(super) struct Names {
 }
 
 impl Names {
-    /// Reads the declarations of a domain and a problem.
     pub(super) fn new(domain: &ast::Domain, problem: &ast::Problem) -> Self {
         let predicates: Vec<_> = domain
             .predicates
@@ -154,7 +146,6 @@ impl Names {
         }
     }
 
-    /// Returns the objects of a type in ascending order.
     fn candidates(&self, expression: &TypeExpression) -> Arc<[ObjectId]> {
         let object = Identifier { name: Name::new("object"), span: Span::default() };
         let alternatives = if expression.alternatives.is_empty() {
@@ -200,7 +191,6 @@ impl Names {
         bound_variables
     }
 
-    /// Adds the parameters of a schema or axiom to the scope and returns them with their candidates.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(super) fn bind(&mut self, variables: &[TypedName], scope: &mut Scope) -> Vec<Bound> {
         let mut parameters = Vec::with_capacity(variables.len());

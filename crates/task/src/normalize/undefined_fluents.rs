@@ -15,7 +15,6 @@ use crate::lifted::{
 use crate::number::dense;
 use pddl::ast::{Assignment, Name};
 
-/// Guard predicate of each numeric function that may be undefined.
 type Guards = FxHashMap<FunctionId, PredicateId>;
 
 /// Adds guards (predicates that are true where the function has a value) to all numeric fluents except
@@ -154,7 +153,6 @@ fn compares(formula: &Formula) -> bool {
     }
 }
 
-/// Adds the guards of its functions to each comparison in a condition.
 fn guarded(formula: &Formula, guards: &Guards) -> Formula {
     let each = |parts: &[Formula]| parts.iter().map(|part| guarded(part, guards)).collect();
     match formula {
@@ -170,7 +168,6 @@ fn guarded(formula: &Formula, guards: &Guards) -> Formula {
     }
 }
 
-/// Returns the guard atoms of all functions in an expression that have guards.
 fn values_of(expression: &Expression, guards: &Guards) -> Vec<Formula> {
     let mut conditions = Vec::new();
     functions(expression, &mut |function, terms| conditions.extend(has_value(function, terms, guards)));

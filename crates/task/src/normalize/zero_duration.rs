@@ -65,7 +65,6 @@ pub fn split(lifted: &mut Lifted) -> Result<(), Errors> {
     if errors.is_empty() { Ok(()) } else { Err(errors.into()) }
 }
 
-/// Returns the copy of a schema for duration 0, in which start and end are simultaneous.
 fn instant(schema: &Schema) -> Schema {
     let condition = Formula::And(vec![schema.start_condition.clone(), schema.at_end.clone()]);
     Schema {

@@ -13,13 +13,10 @@ use num_rational::{BigRational, Ratio};
 /// Maximum number of decimal places; 10^76 has fewer than 254 bits.
 const PLACES: u32 = 76;
 
-/// Maximum number of bits of the magnitude of a mantissa.
 const BITS: u32 = 254;
 
-/// Powers of 5 below 2^128.
 const FIVES: [u128; 56] = powers(5);
 
-/// Powers of 10 below 2^128.
 const TENS: [u128; 39] = powers(10);
 
 #[expect(clippy::arithmetic_side_effects, reason = "what does not fit is an error when this is compiled")]
@@ -49,7 +46,6 @@ fn fits(mantissa: I256) -> bool {
     mantissa.unsigned_abs().leading_zeros() >= U256::BITS - BITS
 }
 
-/// Returns the exponent e if the number is 5^e, and `None` otherwise.
 fn exponent_of_five(power: u128) -> Option<u32> {
     // Powers of 5 are sorted, so the exponent is found by binary search.
     FIVES.binary_search(&power).ok().and_then(|exponent| u32::try_from(exponent).ok())

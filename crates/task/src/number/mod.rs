@@ -321,7 +321,6 @@ impl Ord for Rational {
     }
 }
 
-/// Formats the number as a fraction or integer.
 impl std::fmt::Debug for Rational {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}", self.to_big())
@@ -334,7 +333,6 @@ mod tests {
 
     use super::*;
 
-    /// Generates rationals of all sizes, including numbers near the limits of 128-bit integers.
     fn number() -> impl Strategy<Value = BigRational> {
         let integer = prop_oneof![
             (-20_i128..20).prop_map(BigInt::from),

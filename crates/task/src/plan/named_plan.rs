@@ -178,7 +178,8 @@ pub fn decode<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) -> P
     plan
 }
 
-/// Returns the value of the state-dependent part of the metric in a state, in the task's cost unit.
+/// Returns the value of the state-dependent part of the metric in a state, in the task's cost unit. The value
+/// is negated if the metric is maximised.
 pub fn rest<N: TaskNumber>(task: &Task<N>, state: &State<N>) -> Rational {
     let unit = Rational::from_integer(task.objective.scale) / Rational::from_integer(task.number_scale);
     let terms = task.objective.rest.iter();
@@ -186,8 +187,9 @@ pub fn rest<N: TaskNumber>(task: &Task<N>, state: &State<N>) -> Rational {
     terms.fold(Rational::zero(), |sum, term| sum + term) * &unit
 }
 
-/// Executes the steps and returns their contributions to the state-dependent part of the metric, and its
-/// final value. All values are in the task's cost unit; they are 0 if the metric has no such part.
+/// Executes the steps and returns their contributions to the state-dependent part of the metric, and its final
+/// value. All values are in the task's cost unit and negated if the metric is maximised. They are 0 if the
+/// metric has no such part.
 pub fn measured<'s, N: TaskNumber>(
     task: &Task<N>,
     steps: impl Iterator<Item = (OperatorId, &'s [u32])>,
@@ -273,7 +275,6 @@ impl<N: TaskNumber> Objective<N> {
         Exact::scaled(&self.signed(&(cost.to_rational() + self.offset.to_rational())), self.scale)
     }
 
-    /// Returns the cost, negated if the metric is maximised.
     fn signed(&self, cost: &impl TaskNumber) -> Rational {
         let cost = cost.to_rational();
         if self.maximize { -cost } else { cost }

@@ -12,8 +12,9 @@ use crate::plan::ground::{GroundPlan, GroundStep, replay};
 use crate::task::number::TaskNumber;
 use crate::task::{Operator, OperatorId, Task};
 
-/// Returns a plan with the same actions, in which each action starts as early as the other actions allow.
-/// Stops improving once the deadline passes or the run is interrupted.
+/// Returns a plan with the same actions and possibly earlier starts. The operator of one action is replaced at
+/// a time, as long as this makes the start times lexicographically smaller. Stops improving once the deadline
+/// passes or the run is interrupted.
 pub fn earliest<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) -> GroundPlan<N> {
     let Context { task, limits } = context;
     let mut plan = plan.clone();

@@ -42,7 +42,8 @@ pub enum Proof {
     /// The cost of the plan equals a lower bound on the cost of all plans: the goal distance in a projection,
     /// or the sum of individual minimum costs.
     Bound,
-    /// A* with an admissible heuristic has terminated, and every pruned node is dominated by another node.
+    /// A\* with an admissible heuristic has terminated. Its pruning preserves at least one optimal plan, if
+    /// there is a plan.
     Search,
     /// The goal is unreachable in a relaxation or projection of the task. The text describes the reason.
     Relaxation(String),

@@ -1,6 +1,5 @@
 //! Macro that implements dense ids, i.e. newtypes of `u32` that count from 0.
 
-/// Implements conversions between an id type and indices.
 macro_rules! dense_ids {
     ($($id:ident),+) => {$(
         impl $id {

@@ -288,7 +288,6 @@ impl<N> Iterator for Choices<'_, N> {
 }
 
 impl<N: TaskNumber> Linear<N> {
-    /// Returns each coefficient together with the value of its variable.
     fn terms<'n>(&'n self, numbers: &'n [N]) -> impl Iterator<Item = (&'n N, &'n N)> + Clone {
         self.coefficients.iter().map(|(variable, factor)| (factor, &numbers[variable.index()]))
     }

@@ -77,13 +77,11 @@ pub fn symmetry_generators(context: Context<'_>, initially: bool) -> Result<Vec<
     Ok(exchanges)
 }
 
-/// Indices of a task, used to look up the images of its facts and operators under an exchange.
 struct Parts<'t> {
     task: &'t Task,
     /// For each variable and value: the words of the atom as indices in `all_words`, or `None` for a value
     /// without an atom.
     words: Vec<Vec<Option<Vec<usize>>>>,
-    /// Fact of each atom, by the words of the atom.
     facts: FxHashMap<Vec<usize>, Fact>,
     all_words: FxHashMap<&'t str, usize>,
     /// Operator for each schema and argument list, or `None` if several operators have this schema and these
@@ -231,8 +229,6 @@ impl Exchange {
         Condition { facts: self.facts(&condition.facts), clauses, comparisons, above: Vec::new() }
     }
 
-    /// Returns `true` if the exchange maps the operators and the goal to themselves and, if `initially`, also
-    /// the initial state.
     fn keeps(&self, parts: &Parts<'_>, initially: bool, limits: &Limits) -> Result<bool, Interrupted> {
         let task = parts.task;
         let initial = |(variable, value): (usize, &u32)| {

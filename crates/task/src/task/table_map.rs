@@ -8,7 +8,6 @@ use rustc_hash::FxHashMap;
 use crate::number::Rational;
 use crate::task::quantity::{Quantity, Table};
 
-/// The original values of a table, and the mapped values.
 type MappedTable<M> = (Arc<[Rational]>, Arc<[M]>);
 
 /// Applies a function to the numbers of quantities. Tables that operators share remain shared.

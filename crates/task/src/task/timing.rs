@@ -3,9 +3,7 @@
 /// Earliest times of an operator, in addition to the end of the previous action.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Timing<N> {
-    /// Lower bound on the start time, if any.
     pub(crate) start: Option<N>,
-    /// Lower bound on the end time, if any.
     pub(crate) end: Option<N>,
 }
 

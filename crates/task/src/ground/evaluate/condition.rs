@@ -35,7 +35,6 @@ pub fn residual_of_effect(
     Evaluation { refuses_undefined: true }.residual(world, formula, binding)
 }
 
-/// Treatment of undefined numeric values in comparisons.
 #[derive(Clone, Copy)]
 struct Evaluation {
     /// `true` if an undefined value in a comparison is an error; `false` if the comparison is then false.

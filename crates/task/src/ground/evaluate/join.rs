@@ -82,7 +82,6 @@ pub fn each_binding<'a>(
     }
 }
 
-/// The quantified variables and guards (necessary atoms) of an enumeration of bindings.
 struct Join<'j> {
     /// Variables with their candidates, in ascending order of the variables.
     bound: &'j [Bound],
@@ -91,7 +90,6 @@ struct Join<'j> {
     is_used: Vec<bool>,
 }
 
-/// A level of the backtracking search: its remaining options, and the variables bound by the current option.
 struct Level {
     options: Options,
     fresh: Vec<u32>,

@@ -70,7 +70,6 @@ impl Definitions {
         Ok(())
     }
 
-    /// Returns the disjunction of the parts as a clause, with one literal for each part.
     fn clause(&mut self, world: &mut World<'_>, parts: &[Residual]) -> Vec<GroundLiteral> {
         let mut clause: Vec<_> = parts.iter().map(|part| self.literal(world, part)).collect();
         clause.sort_unstable();
@@ -92,7 +91,6 @@ impl Definitions {
         (atom, true)
     }
 
-    /// Creates an auxiliary derived atom that represents a subcondition.
     fn name(&mut self, world: &mut World<'_>, residual: Residual) -> AtomId {
         // Auxiliary atoms use the first predicate id after those of the declared predicates.
         let predicate = PredicateId(dense(world.lifted.predicates.len()));
@@ -102,7 +100,6 @@ impl Definitions {
         atom
     }
 
-    /// Adds rules by which the derived atom `head` is true if the residual condition holds.
     pub(crate) fn define(&mut self, world: &mut World<'_>, head: AtomId, residual: &Residual) {
         if let Residual::Or(parts) = residual {
             for part in parts {

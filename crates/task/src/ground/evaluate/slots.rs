@@ -18,7 +18,6 @@ pub struct Slots<'a> {
 }
 
 impl Slots<'_> {
-    /// Returns the number of remaining designs of each slot.
     pub(crate) fn sizes(&self) -> Vec<usize> {
         self.designs.iter().map(Vec::len).collect()
     }

@@ -10,7 +10,6 @@ use crate::number::checked_lcm;
 use crate::task::number::TaskNumber;
 use crate::task::{Axiom, Condition, Fact, Layer};
 
-/// Converts a condition over atoms to a condition over finite-domain and numeric variables.
 #[expect(clippy::arithmetic_side_effects, reason = "above the least number of its type")]
 pub(super) fn condition<N: TaskNumber>(
     ground: &GroundCondition,

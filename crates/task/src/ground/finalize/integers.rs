@@ -19,14 +19,12 @@ pub(super) struct Denominator {
     what: &'static str,
     /// Least common denominator of the visited numbers; `None` on overflow.
     common: Option<Int>,
-    /// Description and source location of the number that caused the overflow.
     culprit: Option<(String, Option<Place>)>,
     /// Visited tables by address. The values are stored so that the address stays unique.
     seen: FxHashMap<*const Rational, Arc<[Rational]>>,
 }
 
 impl Denominator {
-    /// Creates an empty accumulator; `what` describes the kind of numbers in error messages.
     pub(super) fn new(what: &'static str) -> Self {
         Self { what, common: Some(1), culprit: None, seen: FxHashMap::default() }
     }
@@ -106,8 +104,6 @@ mod tests {
     use super::*;
     use crate::task::quantity::Table;
 
-    /// Creates a sum of tables over distinct slots. Each of the `tables` tables has the values 0 and
-    /// `number`.
     fn quantity(tables: u32, number: Int) -> Quantity<Rational> {
         let values: Arc<[Rational]> = [Rational::zero(), Rational::from_integer(number)].into();
         let table = |slot| Table { slots: [slot].into_iter().collect(), values: values.clone() };

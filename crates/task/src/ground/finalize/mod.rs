@@ -134,17 +134,14 @@ fn operator<N: TaskNumber>(
     }))
 }
 
-/// Returns the name and source location of the operator's action schema, for error messages.
 fn schema_name(lifted: &Lifted, operator: &GroundOperator) -> (String, Option<Place>) {
     let schema = lifted.schemas.get(operator.schema as usize);
     let named = schema.map(|schema| (format!("`{}`", schema.name), Some(schema.place)));
     named.unwrap_or_else(|| ("a wait".to_owned(), None))
 }
 
-/// Insertion-ordered set of operators.
 struct Distinct<N> {
     operators: Vec<Operator<N>>,
-    /// Positions in `operators` by hash of the operator.
     positions: FxHashMap<u64, SmallVec<[u32; 2]>>,
 }
 
@@ -164,8 +161,6 @@ impl<N: TaskNumber> Distinct<N> {
     }
 }
 
-/// Converts the objectives to the number type of the task. Also returns, for each objective, the conversion
-/// of its costs.
 #[expect(clippy::type_complexity, reason = "a list for each of two things")]
 fn objectives<N: TaskNumber>(
     task: &GroundTask<'_>,

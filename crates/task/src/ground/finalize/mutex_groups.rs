@@ -35,7 +35,6 @@ struct Part {
 type Candidate = Vec<Part>;
 type Key = SmallVec<[ObjectId; 4]>;
 
-/// Limit on the number of invariant candidates that are checked.
 const CANDIDATE_LIMIT: usize = 500;
 
 /// A mutex group whose atoms become the values of a finite-domain variable.

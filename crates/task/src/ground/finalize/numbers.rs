@@ -15,7 +15,7 @@ use crate::task::NumericEffect;
 use crate::task::number::TaskNumber;
 use crate::task::quantity::{Linear, NumericId};
 
-/// The numeric variables that conditions, numeric effects or objectives use, with the common scale of their
+/// The numeric variables that conditions, numeric effects or objectives read, with the common scale of their
 /// values.
 pub(super) struct Numbers<N> {
     pub(super) initial: Vec<N>,
@@ -80,7 +80,6 @@ impl<N: TaskNumber> Numbers<N> {
         Ok(Linear { coefficients, quantity: self.integers.quantity(&linear.quantity)? })
     }
 
-    /// Converts the weighted numeric variables of an objective to the ids and multiples of the final task.
     pub(super) fn rest(&self, rest: &[(NumericId, Rational)]) -> Vec<(NumericId, Rational)> {
         let converted = |(variable, factor): &(NumericId, Rational)| {
             (self.ids[variable], factor.clone() / Rational::from_integer(self.multiple(*variable)))

@@ -25,7 +25,7 @@ fn slot_keys(slots: &GroundSlots) -> impl Iterator<Item = (SlotKey, &Vec<ObjectI
 pub(super) struct Slots {
     pub(super) all: Vec<Slot>,
     ids: FxHashMap<SlotKey, SlotId>,
-    /// Converted slot uses by address of the shared ground slots.
+    /// Cache of converted slots, by address of the slot list that several ground operators share.
     uses: FxHashMap<*const (ObjectId, Vec<ObjectId>), Arc<[SlotUse]>>,
 }
 

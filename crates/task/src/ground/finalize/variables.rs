@@ -11,10 +11,8 @@ use crate::limits::Interrupted;
 use crate::number::dense;
 use crate::task::{ConditionalEffect, Fact, Literal, Variable, VariableId};
 
-/// The finite-domain variables of a task, and the variable and value of each atom.
 pub(super) struct Atoms {
     pub(super) variables: Vec<Variable>,
-    /// Number of non-derived variables, which precede the derived variables.
     pub(super) basic: usize,
     pub(super) initial: Vec<u32>,
     /// Variable and value of each atom; `None` for an atom that nothing reads.
@@ -84,7 +82,6 @@ impl Atoms {
         Literal { fact, positive }
     }
 
-    /// Returns the variable and value of an atom, or `None` if nothing reads the atom.
     pub(super) fn fact(&self, atom: AtomId) -> Option<Fact> {
         self.facts[atom.index()]
     }

@@ -14,7 +14,6 @@ use crate::task::ForbiddenCombinations;
 use crate::task::quantity::{Linear, NumericId};
 use pddl::ast::Assignment;
 
-/// A ground change of an atom or a numeric variable.
 #[derive(Clone)]
 pub(super) enum GroundChange {
     /// Makes the atom true or false.
@@ -25,7 +24,6 @@ pub(super) enum GroundChange {
         /// Operand of the assignment. `None` if it is undefined; an operator with this change is then not
         /// instantiated.
         operand: Option<Linear<Rational>>,
-        /// Combinations of designs for which the operand is undefined.
         undefined: Arc<[ForbiddenCombinations]>,
         place: Place,
     },
@@ -166,7 +164,6 @@ fn scaled(
     Ok(value)
 }
 
-/// Replaces each numeric variable in an expression by its value in `before`, if there is one.
 pub(super) fn substitute(linear: &mut Linear<Rational>, before: &Numbers) {
     if !linear.coefficients.iter().any(|(variable, _)| before.get(*variable).is_some()) {
         return;

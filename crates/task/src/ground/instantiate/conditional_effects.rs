@@ -33,13 +33,11 @@ pub(super) struct Case {
     end: Vec<(Residual, GroundChange)>,
 }
 
-/// Changes at the start of an instance, without conditions.
 #[derive(Clone)]
 struct Start {
     adds: Vec<AtomId>,
     deletes: Vec<AtomId>,
     numbers: Numbers,
-    /// Combinations of designs for which a changed number is undefined.
     undefined: Vec<ForbiddenCombinations>,
 }
 
@@ -61,9 +59,7 @@ impl Start {
 
 /// Conditions between the start and end of an instance, and timed events in between.
 pub(super) struct Middle<'m> {
-    /// Conditions that must hold throughout the interval.
     pub(super) over_all: &'m [Residual],
-    /// Conditions that must hold just before the end.
     pub(super) at_end: &'m [Residual],
     /// If the task has timed events: the window of the action, and the conditions under which events
     /// interfere with it.
@@ -71,8 +67,8 @@ pub(super) struct Middle<'m> {
 }
 
 impl Middle<'_> {
-    /// Adds all conditions to `parts`, rewritten over the state before the start. Adds the changes of the
-    /// timed events up to the end to `start`.
+    /// Adds all conditions to `parts`, rewritten over the state before the start. Adds the changes of the timed
+    /// events up to the end, and the changes of phase and clock, to `start`.
     fn pass(&self, start: &mut Start, parts: &mut Vec<Residual>) {
         let Some((passage, interference)) = self.passage else {
             let conditions = self.over_all.iter().chain(self.at_end);
@@ -96,10 +92,10 @@ impl Middle<'_> {
     }
 }
 
-/// Returns the cases of an instance, i.e. the combinations of truth values of its effect conditions. There is
-/// a single case unless the start effects or numeric effects have conditions. Contradictory cases and cases
-/// with undefined values are dropped (PDDL 2.1, section 8: an effect whose condition is false does not
-/// occur). Fails if there are more than `CASE_LIMIT` combinations.
+/// Returns the cases of an instance, i.e. the combinations of truth values of its effect conditions. There is a
+/// single case unless the start effects or numeric effects have conditions. An effect whose condition is false
+/// does not occur (PDDL 2.1, section 8). Contradictory cases and cases with undefined values are dropped. Fails
+/// if there are more than `CASE_LIMIT` combinations for the start, or for the numeric effects of the end.
 pub(super) fn cases(
     schema: &Schema,
     before: &[Residual],
@@ -151,7 +147,7 @@ pub(super) fn cases(
     Ok(cases)
 }
 
-/// Returns `true` if a part is false, or two literals of the parts contradict each other.
+/// Returns `true` if a conjunct of the parts is false, or if two conjuncts are an atom and its negation.
 fn contradictory(parts: &[Residual]) -> bool {
     fn note(parts: &[Residual], known: &mut FxHashMap<AtomId, bool>) -> bool {
         parts.iter().any(|part| match part {

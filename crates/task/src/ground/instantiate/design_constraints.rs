@@ -6,7 +6,6 @@ use crate::limits::{Interrupted, LimitPoll, Limits};
 use crate::task::ForbiddenCombinations;
 use crate::task::quantity::SlotSet;
 
-/// Adds a combination of designs for these slots to the forbidden combinations, without duplicates.
 pub(super) fn forbid(forbidden: &mut Vec<ForbiddenCombinations>, slots: &SlotSet, combination: SlotSet) {
     match forbidden.iter_mut().find(|rule| rule.slots == *slots) {
         Some(rule) if rule.combinations.contains(&combination) => {}
@@ -77,7 +76,6 @@ fn extends(
     Ok(false)
 }
 
-/// Returns the connected components of slots that share constraints, each sorted in ascending order.
 fn joined(forbidden: &[ForbiddenCombinations]) -> Vec<Vec<u32>> {
     let mut groups: Vec<Vec<u32>> = Vec::new();
     for rule in forbidden {
@@ -133,7 +131,6 @@ mod tests {
         }
     }
 
-    /// With five slots of 100 designs, every pair of designs of the first two slots is forbidden.
     #[test]
     fn a_large_product_is_not_enumerated() {
         let pairs = (0..100).flat_map(|a| (0..100).map(move |b| [a, b].into())).collect();

@@ -27,25 +27,24 @@ use crate::task::quantity::{Linear, Quantity};
 /// Data that all instances of an action schema share if they agree in the objects for the key parameters,
 /// i.e. the parameters that occur together with slots or in the duration.
 pub(super) struct SharedInstanceData<'a> {
-    /// Slots of the schema with their suitable designs.
     pub(super) designs: Slots<'a>,
-    /// Function and suitable designs of each slot.
     pub(super) slots: Arc<GroundSlots>,
     pub(super) forbidden: Arc<[ForbiddenCombinations]>,
     /// Residuals of the conjuncts at the start that mention slots.
     pub(super) start: Vec<Residual>,
     pub(super) over_all: Vec<Residual>,
     pub(super) at_end: Vec<Residual>,
-    /// Operands of the numeric start effects, by the position of the effect.
+    /// For each start effect, its operand; [`Operand::Closed`] if the effect is not numeric.
     pub(super) start_operands: Vec<Operand>,
     pub(super) end_operands: Vec<Operand>,
     pub(super) duration: Quantity<Rational>,
 }
 
-/// Operand of a numeric effect. It is evaluated here, for the key parameters, only if it mentions slots.
+/// Operand of a numeric effect. It is evaluated once for all instances that share the data, but only if it
+/// mentions slots.
 pub(super) enum Operand {
-    /// The operand mentions no slot, or the effect has quantified variables. It is evaluated separately for
-    /// each instance.
+    /// The operand mentions no slot, or the effect has quantified variables or is not numeric. The operand is
+    /// evaluated separately for each instance.
     Closed,
     Undefined,
     /// The operand mentions slots. The second field holds the combinations of designs for which the operand

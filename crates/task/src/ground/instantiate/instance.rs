@@ -24,7 +24,6 @@ use crate::lifted::{Effect, Formula, Joint, Lifted, ObjectId, Schema, Term};
 use crate::task::timing::Timing;
 use crate::task::{Argument, ForbiddenCombinations};
 
-/// State that the instantiation of all schemas shares.
 pub(super) struct Instantiation<'a> {
     pub(super) world: World<'a>,
     pub(super) definitions: Definitions,
@@ -179,7 +178,6 @@ fn conflicts(
     }
 }
 
-/// Returns the atoms and fluents that the start or end of an action reads in its condition and effects.
 fn reads(lifted: &Lifted, condition: &Formula, effects: &[Effect], binding: &Binding) -> Reads {
     let mut reads = Reads::default();
     reads.condition(lifted, condition, binding);

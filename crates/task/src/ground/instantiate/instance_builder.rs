@@ -22,11 +22,9 @@ use pddl::ast::Span;
 pub(super) struct Apart {
     /// Value of the expression; `None` if it is undefined for every design.
     pub(super) operand: Option<Linear<Rational>>,
-    /// Combinations of designs for which the value is undefined.
     pub(super) undefined: Arc<[ForbiddenCombinations]>,
 }
 
-/// An action instance whose conditions and effects are being evaluated.
 pub(super) struct Build<'w, 'a> {
     pub(super) world: &'w mut World<'a>,
     pub(super) binding: Binding,
@@ -86,7 +84,6 @@ impl Build<'_, '_> {
         open(self.world, expression, &mut self.binding, self.slots, &mut undefined)
     }
 
-    /// Forbids the combinations of designs for which a static comparison is false.
     fn forbid(&mut self, mentioned: &SlotSet, residual: &Residual) -> Result<(), Failure> {
         match residual {
             Residual::And(parts) => parts.iter().try_for_each(|part| self.forbid(mentioned, part)),
@@ -117,7 +114,6 @@ impl Build<'_, '_> {
         })
     }
 
-    /// Forbids the combinations of designs for which the duration is negative.
     pub(super) fn forbid_negative(&mut self, duration: &Quantity<Rational>) -> Result<(), Failure> {
         let zero = Rational::from_integer(0);
         let least = duration.tables.iter().filter_map(|table| table.values.iter().min());

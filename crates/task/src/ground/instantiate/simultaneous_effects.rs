@@ -15,14 +15,12 @@ use crate::ground::vocabulary::world::World;
 use crate::lifted::{Change, Effect};
 use crate::task::ForbiddenCombinations;
 
-/// Ground changes at the start or the end of an instance, each with its condition.
 #[derive(Clone)]
 pub(super) struct SimultaneousEffects {
     pub(super) changes: Vec<(Residual, GroundChange)>,
 }
 
 impl SimultaneousEffects {
-    /// Returns an empty set of changes.
     pub(super) fn nothing() -> Self {
         Self { changes: Vec::new() }
     }

@@ -11,7 +11,6 @@ use crate::task::quantity::SlotSet;
 /// selection assigns).
 pub(super) struct SplitSchema<'a> {
     pub(super) schema: &'a Schema,
-    /// The parameters that are designs, with their functions.
     pub(super) designs: &'a [SlotParameter],
     /// The design parameters that are slots, i.e. that selection assigns instead of grounding.
     pub(super) parameters: &'a [SlotParameter],
@@ -23,11 +22,9 @@ pub(super) struct SplitSchema<'a> {
     pub(super) at_end: Conjuncts<'a>,
 }
 
-/// The conjuncts of a condition, separated by whether they mention slots (design parameters that selection
-/// assigns).
 pub(super) struct Conjuncts<'a> {
-    /// Conjuncts that mention no slot. Static literals are omitted, because relaxed reachability has already
-    /// decided them.
+    /// Conjuncts that mention no slot. Literals of static predicates that are not derived are omitted, because
+    /// relaxed reachability has already decided them.
     pub(super) closed: Vec<&'a Formula>,
     /// Conjuncts that mention slots, each with the positions of its slots.
     pub(super) open: Vec<(&'a Formula, SlotSet)>,
@@ -97,8 +94,6 @@ impl<'a> SplitSchema<'a> {
         Self { schema, designs, parameters, key, start, over_all, at_end }
     }
 
-    /// Returns the objects of the key parameters, i.e. the parameters that occur together with slots or in
-    /// the duration. They determine the shared data of an instance.
     pub(super) fn key(&self, binding: &Binding) -> Row {
         self.key.iter().filter_map(|parameter| binding[*parameter as usize]).collect()
     }

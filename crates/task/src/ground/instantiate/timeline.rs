@@ -47,7 +47,6 @@ pub(super) struct Timeline {
     /// durations are known.
     pub(super) moment: NumericId,
     pub(super) phases: Vec<AtomId>,
-    /// Auxiliary atom that is true if the last step was a wait.
     pub(super) waited: AtomId,
     /// Time of each event, with the changed atoms and their new truth values.
     pub(super) events: Vec<(Rational, Vec<(AtomId, bool)>)>,
@@ -56,7 +55,6 @@ pub(super) struct Timeline {
 }
 
 impl Timeline {
-    /// Returns the timed events of the task, or `None` for a task without timed events.
     #[expect(clippy::arithmetic_side_effects, reason = "phases are objects, which are held in memory")]
     pub(super) fn new(world: &mut World<'_>) -> Option<Self> {
         let events = &world.lifted.events[..];
@@ -90,7 +88,6 @@ impl Timeline {
         Residual::Literal { atom: self.waited, positive: false }
     }
 
-    /// Returns the operators that wait until the next event, one for each event after time 0.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"

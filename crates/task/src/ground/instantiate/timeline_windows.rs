@@ -20,15 +20,13 @@ use crate::task::timing::Timing;
 pub(super) struct TimelineWindow<'t> {
     timeline: &'t Timeline,
     duration: &'t Quantity<Rational>,
-    /// Phase of the start, as the number of events before or at it.
+    /// Phases of the start (`from`) and of the end (`to`): the number of events before or at the start or end.
     from: usize,
-    /// Phase of the end, as the number of events before or at it.
     to: usize,
     start: Start,
     end: End,
 }
 
-/// Rule that determines the start time of the action.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Start {
     /// At the end of the previous action, possibly at the time of an event.
@@ -124,7 +122,6 @@ impl<'t> TimelineWindow<'t> {
         windows
     }
 
-    /// Returns the start time as an expression over the clock before the action.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"

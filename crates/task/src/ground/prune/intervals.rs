@@ -101,7 +101,6 @@ fn can_hold(condition: &GroundCondition, intervals: &[Interval]) -> bool {
     })
 }
 
-/// Returns bounds for the value of an expression if each variable is within its interval.
 fn range(linear: &Linear<Rational>, intervals: &[Interval]) -> Interval {
     let mut low = Some(extreme(&linear.quantity, Iterator::min));
     let mut high = Some(extreme(&linear.quantity, Iterator::max));

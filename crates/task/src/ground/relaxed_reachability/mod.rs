@@ -97,7 +97,6 @@ pub fn reach(
     Ok(RelaxedReachability { instances, atoms, derived })
 }
 
-/// Converts errors of the Datalog engine to an error of this crate.
 fn refusal(errors: &[rules::Error]) -> Error {
     if errors.iter().any(|error| matches!(error, rules::Error::Interrupted { .. })) {
         return Error::Interrupted;

@@ -19,17 +19,14 @@ use crate::lifted::{Arguments, Bound, Formula, Lifted, ObjectId, PredicateId, Te
 use crate::limits::{Interrupted, Limits};
 use crate::number::dense;
 
-/// Candidate objects for each variable.
 pub(super) type Candidates = BTreeMap<u32, Arc<[ObjectId]>>;
 
-/// Symbols of the Datalog program for the objects and predicates of the task.
 pub(super) struct Names {
     pub(super) table: Symbols,
     pub(super) objects: Vec<Symbol>,
     pub(super) predicates: Vec<Symbol>,
 }
 
-/// Builder of the Datalog program for relaxed reachability: collects its facts and rules.
 pub(super) struct ReachabilityProgramBuilder<'a> {
     pub(super) lifted: &'a Lifted,
     limits: &'a Limits,
@@ -66,14 +63,12 @@ impl<'a> ReachabilityProgramBuilder<'a> {
         (self.names, self.rules, self.facts)
     }
 
-    /// Creates a relation symbol that the program does not use yet.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(super) fn fresh(&mut self, kind: &str) -> Symbol {
         self.relations += 1;
         self.names.table.name(&format!("{kind} {}", self.relations))
     }
 
-    /// Returns rule atoms that restrict each variable to its candidate objects.
     pub(super) fn types(&mut self, variables: &[u32], candidates: &Candidates) -> Vec<Atom> {
         variables
             .iter()
@@ -84,7 +79,6 @@ impl<'a> ReachabilityProgramBuilder<'a> {
             .collect()
     }
 
-    /// Returns the symbol of a unary relation that contains exactly the candidate objects.
     fn candidates(&mut self, candidates: &Arc<[ObjectId]>) -> Symbol {
         if let Some(symbol) = self.types.get(candidates) {
             return *symbol;
@@ -227,12 +221,10 @@ impl<'a> ReachabilityProgramBuilder<'a> {
     }
 }
 
-/// Returns the Datalog variable for a parameter or quantified variable.
 fn variable(number: u32) -> RuleTerm {
     RuleTerm::Variable(Variable(u16::try_from(number).expect("invariant: `reach` refuses more variables")))
 }
 
-/// Returns all bindings of `variables` that satisfy a static comparison.
 #[expect(clippy::arithmetic_side_effects, reason = "variables of a condition are numbered in memory")]
 fn satisfying(
     lifted: &Lifted,
@@ -260,14 +252,12 @@ fn satisfying(
     Ok(rows)
 }
 
-/// Returns the variables that a quantifier binds, and the candidates of all variables in its scope.
 pub(super) fn with_bound(candidates: &Candidates, bound: &[Bound]) -> (Vec<u32>, Candidates) {
     let mut inner = candidates.clone();
     inner.extend(bound.iter().map(|b| (b.variable, b.candidates.clone())));
     (bound.iter().map(|b| b.variable).collect(), inner)
 }
 
-/// Returns the free variables of a condition in ascending order.
 pub(super) fn free(formula: &Formula) -> Vec<u32> {
     fn bound_in(formula: &Formula, out: &mut Vec<u32>) {
         match formula {

@@ -27,7 +27,6 @@ impl GroundCondition {
         self.literals.windows(2).all(|pair| pair[0].0 != pair[1].0)
     }
 
-    /// Returns all atoms in the literals and clauses of the condition.
     pub(crate) fn atoms(&self) -> impl Iterator<Item = AtomId> + '_ {
         self.literals.iter().chain(self.clauses.iter().flatten()).map(|(atom, _)| *atom)
     }

@@ -7,7 +7,6 @@ use crate::task::quantity::{Linear, NumericId};
 /// operator. A sorted list, because an operator changes few variables.
 #[derive(Debug, Clone, Default)]
 pub struct Numbers {
-    /// Changed variables in ascending order, with their new values.
     changes: Vec<(NumericId, Linear<Rational>)>,
 }
 
@@ -29,12 +28,10 @@ impl Numbers {
         self.changes.retain(|(variable, _)| keep(*variable));
     }
 
-    /// Creates the change of a single variable.
     pub(crate) fn one(variable: NumericId, value: Linear<Rational>) -> Self {
         Self { changes: vec![(variable, value)] }
     }
 
-    /// Applies a function to every new value.
     pub(crate) fn each(&mut self, change: &mut dyn FnMut(&mut Linear<Rational>)) {
         self.changes.iter_mut().for_each(|(_, value)| change(value));
     }

@@ -29,7 +29,6 @@ pub struct GroundOperator {
     /// simultaneous; additions take precedence over deletions.
     pub(crate) conditional: Vec<GroundConditional>,
     pub(crate) numeric_effects: Numbers,
-    /// Cost under each objective.
     pub(crate) costs: Vec<Quantity<Rational>>,
     pub(crate) duration: Quantity<Rational>,
     /// Time of the end if the operator is a wait; `None` if it is an action.

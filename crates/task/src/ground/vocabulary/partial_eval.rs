@@ -24,7 +24,6 @@ pub enum Residual {
 }
 
 impl Residual {
-    /// Returns the simplified conjunction or disjunction of the parts.
     pub(crate) fn junction(parts: impl IntoIterator<Item = Self>, conjunction: bool) -> Self {
         let mut simplified = Vec::new();
         for part in parts {

@@ -8,7 +8,6 @@ use crate::lifted::{Arguments, PredicateId};
 pub struct RelaxedReachability {
     /// For each schema: the reachable bindings in ascending order. Slots are unassigned.
     pub(crate) instances: Vec<Vec<Binding>>,
-    /// Reachable fluent atoms.
     pub(crate) atoms: AtomSet,
     /// True atoms of static derived predicates.
     pub(crate) derived: Vec<(PredicateId, Arguments)>,

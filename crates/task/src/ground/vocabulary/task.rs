@@ -14,7 +14,6 @@ use crate::task::quantity::NumericId;
 pub struct GroundTask<'a> {
     pub(crate) world: World<'a>,
     pub(crate) operators: Vec<GroundOperator>,
-    /// Rules of derived atoms.
     pub(crate) axioms: Vec<GroundAxiom>,
     /// `None` if the goal is false in all states.
     pub(crate) goal: Option<GroundCondition>,

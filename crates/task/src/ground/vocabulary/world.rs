@@ -17,12 +17,10 @@ use crate::number::dense;
 use crate::task::quantity::NumericId;
 use pddl::ast::Name;
 
-/// Number of enumeration steps between two checks of the limits.
 const BETWEEN_LOOKS: u32 = 256;
 
 type AtomIndex<K> = IndexMap<(K, Arguments), (), FxBuildHasher>;
 
-/// Tuples of a relation, indexed by the values of some of its columns.
 type Rows = FxHashMap<Arguments, Vec<Arguments>>;
 
 /// Working data of grounding: the lifted task, its facts and values, the ids of atoms and numeric variables,
@@ -37,7 +35,6 @@ pub struct World<'a> {
     pub numerics: AtomIndex<FunctionId>,
     /// Indices of relations. The key holds the predicate and the set of indexed columns (bit i for column i).
     joins: FxHashMap<(PredicateId, u64), Rows>,
-    /// Number of enumeration steps, modulo 2^32.
     visited: Wrapping<u32>,
 }
 
@@ -108,7 +105,6 @@ impl<'a> World<'a> {
         self.joins[&(predicate, mask)].get(key.as_slice()).cloned().unwrap_or_default()
     }
 
-    /// Returns `true` if a fluent atom is reachable in the delete relaxation.
     pub(crate) fn is_reached(&self, predicate: PredicateId, arguments: &[ObjectId]) -> bool {
         self.reached.atoms.contains(&Key(predicate, arguments))
     }
@@ -117,7 +113,6 @@ impl<'a> World<'a> {
         self.facts.contains(&Key(predicate, arguments))
     }
 
-    /// Returns `true` if an atom is true initially or reachable in the delete relaxation.
     pub(crate) fn can_hold(&self, predicate: PredicateId, arguments: &[ObjectId]) -> bool {
         self.holds_initially(predicate, arguments) || self.is_reached(predicate, arguments)
     }
@@ -128,7 +123,6 @@ impl<'a> World<'a> {
         AtomId(dense(index.unwrap_or_else(|| self.atoms.insert_full((predicate, arguments.into()), ()).0)))
     }
 
-    /// Returns the predicate and the arguments of an atom.
     pub(crate) fn atom_key(&self, atom: AtomId) -> (&PredicateId, &[ObjectId]) {
         let ((predicate, arguments), ()) =
             self.atoms.get_index(atom.index()).expect("invariant: an atom's number is its place");
@@ -143,7 +137,6 @@ impl<'a> World<'a> {
         })
     }
 
-    /// Returns the function and the arguments of a numeric variable.
     pub(crate) fn numeric_key(&self, variable: NumericId) -> (&FunctionId, &[ObjectId]) {
         let ((function, arguments), ()) =
             self.numerics.get_index(variable.index()).expect("invariant: a variable's number is its place");
@@ -190,19 +183,16 @@ impl<'a> World<'a> {
         NumericId(dense(self.numerics.insert_full((function, Box::default()), ()).0))
     }
 
-    /// Returns `true` if an atom is true initially.
     pub(crate) fn is_initial(&self, atom: AtomId) -> bool {
         let key = self.atoms.get_index(atom.index());
         key.is_some_and(|((predicate, arguments), ())| self.holds_initially(*predicate, arguments))
     }
 
-    /// Formats an atom in PDDL: `(predicate arguments)`.
     pub(crate) fn atom_name(&self, atom: AtomId) -> String {
         let key = self.atoms.get_index(atom.index());
         key.map_or_else(String::new, |((predicate, arguments), ())| self.name(*predicate, arguments))
     }
 
-    /// Formats a fluent in PDDL: `(function arguments)`.
     pub(crate) fn numeric_name(&self, variable: NumericId) -> String {
         let key = self.numerics.get_index(variable.index());
         key.map_or_else(String::new, |((function, arguments), ())| {
