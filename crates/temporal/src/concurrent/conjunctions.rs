@@ -25,7 +25,6 @@ const MAX_VISITS_PER_RULE: usize = 64;
 /// A conjunction proposition, followed by its two members.
 pub(super) type Conjunction = [Proposition; 3];
 
-/// The relaxed task to which conjunctions are added.
 pub(super) struct Scope<'a> {
     pub(super) rules: &'a mut Vec<Rule>,
     pub(super) goal: &'a mut Vec<Proposition>,

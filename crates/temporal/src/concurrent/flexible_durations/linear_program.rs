@@ -38,7 +38,6 @@ impl Program {
         &self.objective.constant
     }
 
-    /// Approximate memory use in bytes.
     pub(super) fn bytes(&self) -> usize {
         self.rows.iter().fold(self.objective.bytes(), |sum, (_, row)| sum.saturating_add(row.bytes()))
     }
