@@ -34,7 +34,6 @@ const MAX_BACKOFF: u32 = 3;
 /// a better plan is probably easier to find than a proof.
 const NEAR_OPTIMAL_RATIO: (Int, Int) = (3, 2);
 
-/// The portfolio: its active components, the best known plan and the lower bound.
 struct Portfolio<'r, 'a> {
     run: Run<'a>,
     bounds: &'r Bounds,

@@ -145,7 +145,6 @@ fn old_plan(task: &Task, state: &State, query: &Query<'_>, old: &[Option<GroundS
     Some(GroundPlan { steps, cost })
 }
 
-/// A plan for the query; it need not be optimal.
 #[derive(Clone)]
 struct Candidate {
     first: Option<usize>,
@@ -190,7 +189,8 @@ fn starts(base: &GroundBase, situation: &ReplanState, query: &Query<'_>) -> Opti
     query.first.iter().enumerate().map(start).collect()
 }
 
-/// Selects one of several optimal plans. Also returns the index of its first step.
+/// Selects one of several optimal plans by the tie-breaking rules of this file. Also returns the index of its
+/// first step.
 fn choose(
     set: &AvailabilityContext,
     query: &Query<'_>,
