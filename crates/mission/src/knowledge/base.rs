@@ -134,8 +134,6 @@ impl Knowledge {
         Self { terms, stated: Some(stated.into()), ..self }
     }
 
-    /// Returns the translation of the ontology to PDDL, if the documents were read for a domain in
-    /// PLANTA's form.
     pub(crate) fn terms(&self) -> Option<&Arc<Terms>> {
         self.terms.as_ref()
     }
