@@ -158,7 +158,7 @@ fn optimal_makespans_and_bounds_agree_with_brute_force() {
     }
 }
 
-/// Two robots of three equal jobs: the work per robot is one and a half jobs, the longest job one.
+/// Two robots share six equal jobs: the work per robot is three jobs, the longest job is one.
 #[test]
 fn the_bound_counts_the_work_of_all_robots() {
     let (solution, makespan) = solve(2, &[40; 6], 0);

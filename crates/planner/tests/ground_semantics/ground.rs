@@ -86,7 +86,8 @@ struct Pair {
     steps: Option<usize>,
 }
 
-/// Compares corresponding states up to the limit. Returns `None` if grounding rejects the task.
+/// Compares corresponding states up to the limit, and returns the number of compared pairs (0 if grounding
+/// finds the goal unreachable). Returns `None` if grounding rejects the task.
 pub fn check(task: &Task, (domain, problem): &(Domain, Problem)) -> Option<usize> {
     let context = || format!("{}\n{}", task.domain(), task.problem());
     let ground = match ground(domain, problem, &GroundConfig::default()) {
