@@ -62,12 +62,10 @@ impl Catalogue {
         &self.designs
     }
 
-    /// Returns the cached [`View::actions`].
     pub(crate) fn actions(&self) -> &[Action] {
         &self.actions
     }
 
-    /// Returns the cached [`View::measurements`].
     pub(crate) fn measurements(&self) -> &[Measurement] {
         &self.measurements
     }

@@ -35,7 +35,6 @@ pub(super) struct Role {
     pub(super) class: String,
     /// The types of the domain that are bound to the class.
     pub(super) types: TypeExpression,
-    /// Members of the class in the knowledge base.
     pub(super) individuals: Vec<Individual>,
     /// Objects with this role, each once, in the order of the files.
     pub(super) objects: Vec<Object>,

@@ -193,7 +193,6 @@ struct Search<'a> {
 enum Stopped {
     /// An operator has too many combinations of designs.
     TooMany,
-    /// A limit was reached.
     AtLimit,
 }
 

@@ -303,7 +303,6 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
     }
 }
 
-/// Records the numbers of expanded and generated states of all searches in the tracing span.
 fn record(span: &Span, statistics: &Statistics) {
     span.record("expanded", statistics.expanded).record("generated", statistics.generated);
 }

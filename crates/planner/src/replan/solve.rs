@@ -229,7 +229,6 @@ fn fewer((departures, reconfigurations): plan_tiebreak::Changes) -> Option<plan_
     }
 }
 
-/// Returns the step of the task for an action that is given by names, or `None` if there is no such step.
 fn find(task: &Task, (action, arguments): &(String, Vec<String>)) -> Option<GroundStep> {
     let same = |object: ObjectId, name: &String| task.object_names[object.index()].eq_ignore_ascii_case(name);
     for (operator, id) in task.operators.iter().zip((0..).map(task::task::OperatorId)) {

@@ -29,7 +29,6 @@ pub(super) struct Index<'a> {
 #[derive(Default)]
 pub(super) struct Invariant {
     pub(super) facts: Vec<Fact>,
-    /// Subset of the facts that the condition over all requires.
     pub(super) over_all: Vec<Fact>,
 }
 

@@ -103,7 +103,6 @@ type Value = (bool, u64, Int);
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Outcome {
-    /// Found a plan that is better than the incumbent.
     Found,
     /// The open list is empty or the memory share is used up.
     Exhausted,

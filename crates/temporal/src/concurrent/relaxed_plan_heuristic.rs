@@ -19,9 +19,7 @@ use crate::concurrent::rule::Proposition;
 use crate::concurrent::successors::TemporalState;
 use crate::concurrent::temporal_relaxation::TemporalRelaxation;
 
-/// Cost of unreachable propositions.
 const UNREACHABLE: u32 = u32::MAX;
-/// Cap on costs.
 const MAX_COST: u32 = 1 << 30;
 /// Cap on the number of applications of one rule.
 const MAX_REPETITIONS: u32 = 1 << 20;

@@ -115,7 +115,6 @@ impl SimpleTemporalNetwork {
         dense(self.opens.iter().filter(|open| open.instance == instance).count())
     }
 
-    /// Time of the last timed initial literals that were applied; negative before the first ones.
     pub(super) fn floor(&self) -> Int {
         self.floor
     }
@@ -277,7 +276,6 @@ impl SimpleTemporalNetwork {
         time
     }
 
-    /// Records the accesses and changes of a happening that takes place at `time`.
     fn note(&mut self, happening: &Happening<'_>, time: &TimeExpression) {
         for key in happening.marks {
             match self.entries.binary_search_by_key(key, |(candidate, _)| *candidate) {

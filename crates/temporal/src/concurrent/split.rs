@@ -129,7 +129,6 @@ fn literal(predicate: PredicateId, terms: &[Term]) -> Formula {
     Formula::Literal { positive: true, predicate, terms: terms.to_vec() }
 }
 
-/// Splits a schema into its happenings and auxiliary operators.
 fn parts(lifted: &mut Lifted, schema: &Schema, timer: Option<&Timer>) -> Vec<(Half, Schema)> {
     let instantaneous = |condition: Vec<Formula>, effects: Vec<Effect>| Schema {
         start_condition: Formula::And(condition),

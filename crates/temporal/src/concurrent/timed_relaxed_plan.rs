@@ -29,7 +29,6 @@ use crate::concurrent::temporal_task::TemporalTask;
 /// A time of the relaxation. Times only guide the search, so larger ones saturate.
 type Time = i64;
 
-/// Time of propositions and actions that are not reached.
 const NEVER: Time = Time::MAX;
 /// Upper limit on the number of repetitions of one action in a relaxed plan.
 const MAX_REPETITIONS: u32 = 8;

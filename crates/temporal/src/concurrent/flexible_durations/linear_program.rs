@@ -33,7 +33,6 @@ impl Program {
         Self { rows: Vec::new(), objective, slacks: FIRST_SLACK_COLUMN }
     }
 
-    /// Minimum of the current objective.
     pub(super) fn least(&self) -> &Rational {
         &self.objective.constant
     }

@@ -22,7 +22,6 @@ use crate::concurrent::happening::{Instance, Role};
 use crate::concurrent::simple_temporal_network::Key;
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// Column of the makespan.
 pub(super) const MAKESPAN: Column = 0;
 
 /// Column of the time of the happening at a position in the sequence. Ends and timed initial
