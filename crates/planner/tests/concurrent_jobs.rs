@@ -79,7 +79,6 @@ fn longest_job_first(robots: usize, lengths: &[i64]) -> i64 {
     makespan(robots, lengths, assignment.into_iter())
 }
 
-/// Smallest makespan over all assignments.
 fn optimum(robots: usize, lengths: &[i64]) -> i64 {
     let count = robots.pow(u32::try_from(lengths.len()).expect("few jobs"));
     let digits = |code: usize| (0..lengths.len()).map(move |job| code / robots.pow(job as u32) % robots);

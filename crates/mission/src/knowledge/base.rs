@@ -31,7 +31,6 @@ pub struct Knowledge {
     pub(super) runtime: Runtime,
     /// Cached queries of planning, kept consistent with `runtime`.
     pub(super) catalogue: OnceLock<Arc<Catalogue>>,
-    /// Reports whose inferred consequences are not known yet.
     pub(super) waiting: Waiting,
     /// State after reading the documents. Shares all unchanged data with `runtime`.
     origin: Runtime,

@@ -19,7 +19,6 @@ const LARGE: i128 = 100_000;
 /// numbers.
 const REFUSALS: [&str; 3] = ["E301", "E303", "E304"];
 
-/// Returns `true` if the metric rewards time.
 fn rewards_time(task: &Task) -> bool {
     let Some((maximize, Expression::Sum(parts))) = &task.metric else { return false };
     let weights = parts.iter().filter_map(|part| match part {

@@ -244,7 +244,6 @@ impl State {
         Some(after)
     }
 
-    /// Applies the timed literals that are due.
     fn pass(&mut self, task: &Task, is_due: impl Fn(Number) -> bool) {
         while let Some((time, atom, holds)) = task.timed.get(self.timed).filter(|(time, ..)| is_due(*time)) {
             let _ = time;
