@@ -58,7 +58,6 @@ pub struct Bindings {
     own: BTreeMap<Name, Query>,
     /// Explicit bindings as text, for reports.
     written: BTreeMap<String, String>,
-    /// Object names that replace the local names of individuals.
     names: Names,
 }
 

@@ -19,7 +19,6 @@ pub struct Names {
     entries: Vec<Naming>,
 }
 
-/// A single entry of `[bindings.names]` or `--name`.
 #[derive(Debug, Clone)]
 pub(crate) struct Naming {
     /// The local name or IRI of an individual, or a pattern with one `*`.
@@ -69,7 +68,6 @@ impl fmt::Debug for Names {
 }
 
 impl Naming {
-    /// Returns `true` if the entry is a pattern, which can apply to several individuals.
     pub(crate) fn is_pattern(&self) -> bool {
         self.individual.contains('*')
     }

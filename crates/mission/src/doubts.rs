@@ -149,7 +149,6 @@ impl Mission {
     }
 }
 
-/// Returns the attributes for which a design has an estimation.
 fn estimates(design: &FunctionDesign) -> impl Iterator<Item = &str> {
     design.estimations.keys().map(String::as_str)
 }

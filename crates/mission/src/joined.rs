@@ -28,8 +28,6 @@ pub struct Mission {
     pub(super) adaptation: Option<CoAdaptation>,
     /// Designs whose availability is stated by the problem, not inferred from the knowledge base.
     pub(super) own: BTreeSet<Name>,
-    /// The IRI of the first design of the knowledge base that the problem does not name, and the text of the
-    /// warning. `None` if no warning is needed (see [`NeverNamed`]).
     pub(super) never_named: NeverNamed,
     pub(super) planta: Option<Planta>,
     warnings: Vec<Message>,

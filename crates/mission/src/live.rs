@@ -46,8 +46,8 @@ impl Mission {
         &self.problem
     }
 
-    /// Returns the numeric function of the domain whose value is a measured attribute, given by
-    /// local name.
+    /// Returns the first numeric function of the domain whose value is the measured value of an attribute,
+    /// given by local name.
     pub fn fed_by(&self, attribute: &str) -> Option<String> {
         let fed = |declared: &&Declaration| self.bindings.is_measured(declared, attribute);
         self.domain.functions.iter().find(fed).map(|declared| declared.identifier.name.to_string())

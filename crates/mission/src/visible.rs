@@ -5,9 +5,9 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
-/// Escapes control characters except line breaks and tabs, marks of bidirectional text, and
-/// characters of zero width. Such characters could change what a terminal displays, and names
-/// originate from files that may be hostile. Joiners are kept, because some languages need them.
+/// Escapes marks of bidirectional text, characters of zero width, and control characters except line breaks
+/// and tabs. Such characters could change what a terminal displays, and names originate from files that may
+/// be hostile. Zero-width joiners and non-joiners are kept, because some languages need them.
 pub fn visible(text: &str) -> Cow<'_, str> {
     escaped(text, |character, all| {
         let _ = write!(all, "\\u{{{:x}}}", u32::from(character));

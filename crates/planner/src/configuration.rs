@@ -77,7 +77,6 @@ pub fn configure(functions: &[Vec<DesignChoice>], budgets: &[BigRational], limit
     Assignment { designs, utility, optimal }
 }
 
-/// A design with its numbers scaled to integers.
 struct Item {
     worth: BigInt,
     demands: Vec<BigInt>,

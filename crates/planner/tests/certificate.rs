@@ -13,7 +13,6 @@ use serde_json::{Value, json};
 use testing::missions::Mission;
 use testing::random::Random;
 
-/// Returns the domain and the problem of a random mission.
 fn files(seed: u64) -> (Domain, Problem) {
     let mission = Mission::random(seed);
     let (domain, problem) = (mission.domain(), mission.problem());
@@ -41,7 +40,6 @@ fn false_claims(cost: &BigRational) -> [Option<BigRational>; 2] {
     [Some(cost + BigRational::from_integer(1.into())), None]
 }
 
-/// Returns the result of comparing a task of a certificate with the files of a mission.
 fn compared((domain, problem): &(Domain, Problem), task: &str) -> Faithful {
     match witness(domain, problem, task, &|| false) {
         Ok(witness) => faithful(domain, problem, task, &witness, &|| false),
@@ -151,7 +149,7 @@ fn mutate(value: &mut Value, random: &mut Random) {
 }
 
 /// Checks that a changed argument proves no false claim, and that a changed task fails the comparison with
-/// the files.
+/// the files or proves no false claim.
 fn withstands(seed: u64, mutants: usize) {
     let (certificate, cost) = certified(seed);
     let files = files(seed);

@@ -258,7 +258,6 @@ fn timed(random: &mut Random, times: &[&str], most: u64, part: fn(&mut Random) -
     text + ")"
 }
 
-/// A random task, and the data that the brute-force search needs.
 struct Sample {
     durations: [i64; 3],
     domain: String,
@@ -409,7 +408,7 @@ fn plans_are_as_good_as_the_validator_admits() {
     all_agree(0..120);
 }
 
-/// Every search takes part from the first node on, and in half of the tasks all actions use one
+/// Every search takes part from the first node on. In half of the tasks, all actions with a duration use one
 /// resource, so that the lower bound from the work of a resource is at its highest.
 fn all_searches_agree(seeds: std::ops::Range<u64>) {
     let count = 2 * (seeds.end - seeds.start);

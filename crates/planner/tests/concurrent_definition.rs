@@ -45,7 +45,6 @@ fn proved(domain: &str, problem: &str) -> String {
     plan.cost.to_string()
 }
 
-/// Returns the text of a durative action.
 fn durative(name: &str, duration: &str, condition: &str, effect: &str) -> String {
     format!(
         "(:durative-action {name} :parameters () :duration (= ?duration {duration})

@@ -80,7 +80,6 @@ fn durative(name: &str, duration: &str, condition: &str, effect: &str) -> String
     )
 }
 
-/// Returns the text of a domain with some atoms, numbers and the given actions.
 fn domain(actions: &[String]) -> String {
     format!(
         "(define (domain d) (:predicates (p) (q) (g) (h) (busy))

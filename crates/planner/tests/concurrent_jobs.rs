@@ -79,7 +79,6 @@ fn longest_job_first(robots: usize, lengths: &[i64]) -> i64 {
     makespan(robots, lengths, assignment.into_iter())
 }
 
-/// Smallest makespan over all assignments.
 fn optimum(robots: usize, lengths: &[i64]) -> i64 {
     let count = robots.pow(u32::try_from(lengths.len()).expect("few jobs"));
     let digits = |code: usize| (0..lengths.len()).map(move |job| code / robots.pow(job as u32) % robots);
@@ -158,7 +157,7 @@ fn optimal_makespans_and_bounds_agree_with_brute_force() {
     }
 }
 
-/// Two robots of three equal jobs: the work per robot is one and a half jobs, the longest job one.
+/// Two robots share six equal jobs: the work per robot is three jobs, the longest job is one.
 #[test]
 fn the_bound_counts_the_work_of_all_robots() {
     let (solution, makespan) = solve(2, &[40; 6], 0);

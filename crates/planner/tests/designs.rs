@@ -13,7 +13,6 @@ fn solve(domain: &str, problem: &str) -> Solution {
     optimize(&task, &Config::default(), &mut |_| {})
 }
 
-/// Returns the cost and the steps of the plan as text.
 fn answer(solution: &Solution) -> Option<(String, Vec<String>)> {
     let plan = solution.plan.as_ref()?;
     let step = |step: &metaplan_planner::Step| {

@@ -24,7 +24,6 @@ fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
     (domain, problem)
 }
 
-/// Parses a decimal number.
 fn number(decimal: &str) -> BigRational {
     let (whole, fraction) = decimal.split_once('.').unwrap_or((decimal, ""));
     let digits: BigInt = format!("{whole}{fraction}").parse().expect("digits");
@@ -69,7 +68,6 @@ fn too_large(domain: &Domain, problem: &Problem) -> bool {
 const STEPS: usize = 4;
 const NUMBERS: [&str; 2] = ["x", "y"];
 
-/// Effect on a number in a random model.
 #[derive(Debug, Clone)]
 enum Change {
     ScaleUp(String),

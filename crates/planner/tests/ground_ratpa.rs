@@ -201,8 +201,8 @@ impl<'d> World<'d> {
         }
     }
 
-    /// Returns `true` if the comparisons of an instance can hold within the intervals, and all numbers that
-    /// it changes are defined.
+    /// Returns `true` if the comparisons of an instance can hold within the intervals, and the expressions of
+    /// its numeric effects are defined.
     fn is_possible(&self, instance: &Instance, numbers: &BTreeMap<Fact, Interval>) -> bool {
         let schema = &self.schemas[instance.schema];
         let value = |expression| self.interval(expression, instance, numbers);

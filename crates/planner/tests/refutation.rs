@@ -27,7 +27,6 @@ fn certified(seed: u64) -> Option<(Certificate, BigRational)> {
     Some((certify(&task, &solution, &Limits::none()).expect("a certificate"), cost))
 }
 
-/// A file in memory that implements `Write`.
 #[derive(Clone, Default)]
 struct Memory(Rc<RefCell<Vec<u8>>>);
 
@@ -130,7 +129,8 @@ fn there_are_refutations_of_many_false_claims_only() {
     (1_000..3_000).for_each(|seed| check(seed, StepBound::Spent));
 }
 
-/// Returns a text in which a word or a line is changed.
+/// Returns the text with one random change: a line is removed, two lines are swapped, or a word is negated.
+/// Swapping a line with itself changes nothing.
 fn mutate(text: &str, random: &mut Random) -> String {
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     let line = random.below(lines.len() as u64) as usize;

@@ -66,7 +66,6 @@ impl Changes {
         Self { at, places: of_type(place), designs: of_type(design), capacity }
     }
 
-    /// Applies a random change to the problem.
     fn happen(&self, problem: &mut Problem, random: &mut Random) {
         match random.below(5) {
             0 => {

@@ -26,7 +26,7 @@ pub fn solve(domain: &Domain, problem: &Problem, reason: &str) -> Option<Solutio
     Some(optimize(&task, &Config::default().with_limits(limits), &mut |_| {}))
 }
 
-/// Number of tested tasks, and of tasks that were decided.
+/// Numbers of tested tasks, of tasks with a proved optimum, and of tasks that are proved unsolvable.
 pub struct Tally {
     seeds: u64,
     proved: u64,

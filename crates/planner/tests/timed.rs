@@ -16,8 +16,8 @@ fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
     (domain, problem)
 }
 
-/// Returns a cheapest plan, or `None` if it is proved that no plan exists. `Engine::Sat` uses only the SAT
-/// solver.
+/// Returns the best plan, or `None` if there is no plan within the limits. With `Engine::Sat`, only the SAT
+/// solver is used, up to horizon 8.
 fn plan(domain: &Domain, problem: &Problem, engine: Engine) -> Option<Plan> {
     let task =
         ground(domain, problem, &GroundConfig::default()).unwrap_or_else(|errors| panic!("{errors:?}"));
@@ -162,7 +162,6 @@ fn timed(random: &mut Random, times: &[&str], most: u64) -> String {
     text + ")"
 }
 
-/// A random task, and the data that the brute-force search needs.
 struct Sample {
     durations: [i64; 3],
     events: Vec<i64>,

@@ -16,7 +16,6 @@ use tempfile::{NamedTempFile, TempDir, TempPath};
 
 use crate::message::Message;
 
-/// Path that denotes standard output.
 const STDOUT: &str = "-";
 
 /// Limit on consecutive symbolic links, as in Linux; more are treated as a loop.

@@ -31,7 +31,6 @@ pub struct Knowledge {
     pub(super) runtime: Runtime,
     /// Cached queries of planning, kept consistent with `runtime`.
     pub(super) catalogue: OnceLock<Arc<Catalogue>>,
-    /// Reports whose inferred consequences are not known yet.
     pub(super) waiting: Waiting,
     /// State after reading the documents. Shares all unchanged data with `runtime`.
     origin: Runtime,
@@ -134,8 +133,6 @@ impl Knowledge {
         Self { terms, stated: Some(stated.into()), ..self }
     }
 
-    /// Returns the translation of the ontology to PDDL, if the documents were read for a domain in
-    /// PLANTA's form.
     pub(crate) fn terms(&self) -> Option<&Arc<Terms>> {
         self.terms.as_ref()
     }

@@ -48,7 +48,6 @@ const OTHERS: [&str; 12] = [
 const OTHER_CLASSES: [&str; 2] = [tomasys::OBJECTIVE, tomasys::FUNCTION_GROUNDING];
 
 impl Catalogue {
-    /// Runs all queries and fills the cache.
     pub(super) fn new(view: &View<'_>) -> Self {
         Self {
             designs: view.function_designs(),
@@ -63,12 +62,10 @@ impl Catalogue {
         &self.designs
     }
 
-    /// Returns the cached [`View::actions`].
     pub(crate) fn actions(&self) -> &[Action] {
         &self.actions
     }
 
-    /// Returns the cached [`View::measurements`].
     pub(crate) fn measurements(&self) -> &[Measurement] {
         &self.measurements
     }
@@ -132,7 +129,6 @@ impl Catalogue {
     }
 }
 
-/// Returns the literal values that an individual has for a property.
 fn values<'a>(engine: &'a Engine, subject: Symbol, property: &str) -> impl Iterator<Item = &'a Literal> {
     let symbols = engine.symbols();
     let rows: Vec<Symbol> = symbols.find_name(property).map_or_else(Vec::new, |property| {

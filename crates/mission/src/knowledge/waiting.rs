@@ -131,7 +131,6 @@ impl Waiting {
     }
 }
 
-/// Describes an error of the engine as a fault.
 pub(super) fn fault(error: &ontology::Error) -> Fault {
     let message = Message::from_ontology(error);
     let rule = match error {

@@ -84,7 +84,6 @@ pub(super) fn entries(pairs: &[(&str, &str)]) -> Vec<String> {
     entries
 }
 
-/// Formats a name as a TOML key, quoted if necessary.
 fn key(name: &str) -> String {
     let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     if name.chars().all(bare) { name.to_owned() } else { format!("\"{name}\"") }

@@ -32,7 +32,6 @@ pub(crate) struct Meeting {
     pub(crate) errors: Vec<Message>,
     /// Warnings about names that occur only in the problem or only in the knowledge base.
     pub(crate) warnings: Vec<Message>,
-    /// The first design of the knowledge base that the problem never names.
     pub(crate) never_named: NeverNamed,
 }
 
@@ -41,7 +40,6 @@ pub(crate) struct Meeting {
 /// functions, or if it names designs that the knowledge base does not have (a different warning).
 pub(crate) type NeverNamed = Option<(String, String)>;
 
-/// Compares the names in the PDDL files with those in the knowledge base.
 pub(crate) fn meet(
     (domain, domain_source): (&Domain, &Source),
     (problem, problem_source): (&Problem, &Source),
@@ -76,7 +74,6 @@ pub(crate) fn meet(
     meeting
 }
 
-/// Text of an error or warning, with its location in the problem or in the domain.
 struct Finding {
     in_domain: bool,
     span: Span,
@@ -132,9 +129,9 @@ impl Comparison<'_> {
             .collect()
     }
 
-    /// Returns the functions that actions require according to the problem or, if they have a counterpart in
-    /// the domain, to the knowledge base. The position is that of the fact if the problem states the
-    /// requirement, otherwise `None`.
+    /// Returns the functions that actions require according to the problem or, for actions with a counterpart
+    /// in the domain, according to the knowledge base. The position is that of the fact if the problem states
+    /// the requirement, and otherwise `None`.
     fn required(&self) -> Vec<(Name, Option<Span>)> {
         let functions = self.roles.of(FUNCTION);
         let mut required: Vec<(Name, Option<Span>)> = Vec::new();
@@ -306,7 +303,6 @@ impl Comparison<'_> {
     }
 }
 
-/// Returns the plural noun for the members of a class in messages.
 fn noun(class: &str) -> String {
     match class {
         FUNCTION => "functions".to_owned(),

@@ -21,7 +21,6 @@ pub(super) const DESIGN: &str = "FunctionDesign";
 pub(super) const ACTION: &str = "Action";
 const COMPONENT: &str = "Component";
 
-/// An object with its source location, in the problem or among the constants of the domain.
 #[derive(Debug, Clone)]
 pub(super) struct Object {
     pub(super) name: Name,
@@ -36,20 +35,17 @@ pub(super) struct Role {
     pub(super) class: String,
     /// The types of the domain that are bound to the class.
     pub(super) types: TypeExpression,
-    /// Members of the class, by IRI.
     pub(super) individuals: Vec<Individual>,
     /// Objects with this role, each once, in the order of the files.
     pub(super) objects: Vec<Object>,
 }
 
-/// All roles of a mission: the classes within which names are compared.
 #[derive(Debug)]
 pub(super) struct Roles {
     roles: Vec<Role>,
 }
 
 impl Roles {
-    /// Determines the roles of the objects and individuals of a mission.
     pub(super) fn new(
         domain: &Domain,
         problem: &Problem,
@@ -94,7 +90,6 @@ impl Roles {
         roles
     }
 
-    /// Returns all roles (classes within which names are compared).
     pub(super) fn all(&self) -> &[Role] {
         &self.roles
     }
@@ -155,7 +150,6 @@ impl Role {
     }
 }
 
-/// Returns the facts that a problem states.
 pub(super) fn facts(problem: &Problem) -> impl Iterator<Item = &Atom> {
     problem.init.iter().filter_map(|element| match element {
         InitialElement::Fact(atom) => Some(atom),
@@ -163,7 +157,6 @@ pub(super) fn facts(problem: &Problem) -> impl Iterator<Item = &Atom> {
     })
 }
 
-/// Returns the names of the arguments of a fact.
 pub(super) fn arguments(atom: &Atom) -> Vec<&Name> {
     let name = |term| match term {
         &Term::Constant(ref identifier) | &Term::Variable(ref identifier) => &identifier.name,

@@ -5,7 +5,6 @@ use std::collections::BTreeSet;
 use pddl::Mentioned;
 use pddl::ast::{Domain, Name, Problem, TypeExpression};
 
-/// Returns the predicates that a domain uses but does not declare.
 pub(super) fn undeclared(domain: &Domain) -> BTreeSet<Name> {
     let mut used = Mentioned::by_domain(domain).predicates;
     for declared in &domain.predicates {

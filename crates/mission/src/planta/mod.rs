@@ -86,7 +86,6 @@ impl Planta {
         (Self { terms: Arc::new(terms_of_mission), number, known: predicates }, completed, warnings)
     }
 
-    /// Returns the predicates of the knowledge base and of numeric comparisons.
     pub(crate) fn known(&self) -> &HashSet<Name> {
         &self.known
     }
@@ -159,7 +158,6 @@ impl Planta {
         domain
     }
 
-    /// Returns `true` if a predicate belongs to the knowledge base or is a numeric comparison.
     fn is_known(&self, predicate: &Name) -> bool {
         self.known.contains(predicate)
     }
@@ -174,7 +172,6 @@ impl Planta {
         problem.init.iter().filter(is_known).filter_map(InitialElement::fact)
     }
 
-    /// Translates asserted facts to PDDL.
     fn stated(&self, engine: &Engine, stated: impl Iterator<Item = Fact>) -> impl Iterator<Item = PddlFact> {
         stated.filter_map(|fact| self.fact(&fact, engine))
     }

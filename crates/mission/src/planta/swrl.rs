@@ -103,8 +103,8 @@ fn term(argument: &Argument, variables: &mut Variables, terms: &mut Terms) -> Te
     }
 }
 
-/// Translates a body atom of a rule. Returns `None` for an atom of `owl:Thing` or `owl:Nothing`, which have
-/// no predicate.
+/// Translates a body atom of a rule. Returns `None` for an atom of `owl:Thing`, to which every individual
+/// belongs. Returns an error with the reason if the atom has no translation.
 fn condition(
     stated: &Atom,
     variables: &mut Variables,
@@ -151,7 +151,7 @@ fn condition(
     Ok(Some(condition))
 }
 
-/// Translates a SWRL built-in that compares two numbers.
+/// Translates a SWRL built-in that compares two numbers. Returns an error for any other built-in.
 fn comparison(iri: &str, left: &Term, right: &Term) -> Result<Condition, String> {
     let relation = |name: &str, left: &Term, right: &Term| {
         Condition::Atom(atom(Name::new(name), vec![left.clone(), right.clone()]))

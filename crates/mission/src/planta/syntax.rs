@@ -13,19 +13,16 @@ pub(super) fn atom(predicate: Name, arguments: Vec<Term>) -> Atom {
     Atom { predicate: predicate.into(), arguments, span: Span::default() }
 }
 
-/// Builds the entries of a typed list without types.
 pub(super) fn untyped(names: &[&str]) -> Vec<TypedName> {
     let entry =
         |name: &&str| TypedName { identifier: Name::new(name).into(), r#type: TypeExpression::default() };
     names.iter().map(entry).collect()
 }
 
-/// Quantifies a condition existentially over the variables `bound`.
 pub(super) fn exists(bound: &[&str], condition: Condition) -> Condition {
     if bound.is_empty() { condition } else { Condition::Exists(untyped(bound), Box::new(condition)) }
 }
 
-/// Builds a derived predicate with untyped parameters.
 pub(super) fn axiom(head: Name, parameters: &[&str], condition: Condition) -> Derived {
     let head = Declaration { identifier: head.into(), parameters: untyped(parameters) };
     Derived { head, condition, span: Span::default() }

@@ -25,16 +25,13 @@ pub struct Terms {
     pub(super) symbols: BTreeMap<Iri, Name>,
     /// Plain predicates of functional data properties.
     pub(super) functional: BTreeSet<Name>,
-    /// Derived predicates, translated from axioms and rules.
     pub(super) derived: Vec<Derived>,
     /// Constants for individuals and for values other than numbers, each with its type if it has
     /// one.
     pub(super) constants: BTreeMap<Name, Option<Name>>,
     /// Names of the numbers that occur in rules.
     pub(super) numbers: BTreeSet<Name>,
-    /// PDDL names of literals.
     pub(super) literals: Literals,
-    /// Warnings about axioms and rules without a translation.
     pub(super) warnings: Vec<Message>,
 }
 
@@ -44,7 +41,8 @@ impl Terms {
         self.predicates.contains_key(predicate)
     }
 
-    /// Declares the plain and inferred predicates of all classes and properties.
+    /// Declares the plain and inferred predicates of all classes and properties, except PLANTA's annotations,
+    /// `owl:Thing` and `owl:Nothing`.
     pub(super) fn signature(&mut self, ontology: &Ontology) {
         for (kind, arity) in
             [(EntityKind::Class, 1), (EntityKind::ObjectProperty, 2), (EntityKind::DataProperty, 2)]
@@ -81,7 +79,7 @@ impl Terms {
         Ok(Condition::Atom(atom(names::inferred(&plain), arguments)))
     }
 
-    /// Collects the constants: named individuals with their types, and values in assertions.
+    /// Collects the constants: named individuals with their types, and values in assertions, except numbers.
     pub(super) fn types(&mut self, ontology: &Ontology) {
         let (mut kinds, mut spelled) = (BTreeMap::new(), BTreeMap::new());
         for annotated in &ontology.axioms {

@@ -41,7 +41,6 @@ pub(super) struct Choice {
 }
 
 impl Choice {
-    /// Returns all choices of a plan.
     pub(super) fn all(plan: &[GroundStep]) -> Vec<Self> {
         let choices = plan.iter().enumerate().flat_map(|(step, content)| {
             let slots = (0..dense(content.choice.len())).map(Some);

@@ -49,7 +49,6 @@ pub(super) struct Edge {
 pub(super) struct Graph {
     /// Edges in ascending order of [`Edge::from`], and then of their steps.
     pub(super) edges: Vec<Edge>,
-    /// Distinct steps.
     pub(super) steps: Vec<GroundStep>,
     /// For each label (node): whether it satisfies the goal and its cost is that of a cheapest plan.
     pub(super) goals: Vec<bool>,
@@ -120,7 +119,6 @@ impl Labels {
         Self::new(task, asked.filter(|(_, asked)| !(asked.up && asked.down)).collect())
     }
 
-    /// Creates an empty set of labels (nodes) in which each label represents a single state.
     fn exact(task: &Task) -> Self {
         Self::new(task, Vec::new())
     }
@@ -192,11 +190,9 @@ struct Search<'a> {
     all: Vec<Choices>,
 }
 
-/// Reason why an expansion ended early.
 enum Stopped {
     /// An operator has too many combinations of designs.
     TooMany,
-    /// A limit was reached.
     AtLimit,
 }
 
@@ -206,7 +202,6 @@ impl From<Interrupted> for Stopped {
     }
 }
 
-/// A graph that is being built.
 struct Growth {
     labels: Labels,
     edges: Vec<Edge>,
@@ -241,7 +236,6 @@ impl Growth {
         Graph { edges, steps, goals, alive, is_complete: self.is_complete, is_exact }
     }
 
-    /// Returns the approximate memory use in bytes.
     fn bytes(&self) -> usize {
         let label = self.labels.all.first().map_or(0, |(state, _)| {
             let words = state.values.len().saturating_mul(8);
@@ -252,7 +246,6 @@ impl Growth {
     }
 }
 
-/// Returns, for each label (node), whether a goal label can be reached from it.
 fn alive(edges: &[Edge], goals: &[bool]) -> Vec<bool> {
     let mut before: Vec<u32> = (0..dense(edges.len())).collect();
     before.sort_by_key(|position| edges[*position as usize].to);

@@ -9,10 +9,8 @@ use crate::alternatives::graph::{Edge, Graph, ROOT};
 /// Maximum number of edges that an enumeration follows.
 const MAX_WORK: usize = 2_000_000;
 
-/// Outcome of an enumeration of paths.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum End {
-    /// There are no further paths.
     Exhausted,
     /// The enumeration stopped early, so there may be further paths.
     Stopped,

@@ -35,7 +35,6 @@ fn all(task: &Task, state: &State, left: Int, path: &mut Vec<GroundStep>, found:
     }
 }
 
-/// Returns the steps of a plan as text.
 fn steps(plan: &Plan) -> Vec<String> {
     plan.steps
         .iter()

@@ -24,7 +24,6 @@ pub(super) struct Scales {
 }
 
 impl Scales {
-    /// Returns the scales of a task whose numbers are integers already.
     pub(super) fn one() -> Self {
         let unit = || Integer::from(1);
         Self { numbers: unit(), costs: unit(), times: unit(), bounds: unit() }

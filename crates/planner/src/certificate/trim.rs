@@ -18,7 +18,6 @@ use task::limits::Limits;
 
 /// Maximum total number of literals in all clauses.
 const LITERAL_LIMIT: usize = 1 << 26;
-/// Index that represents a missing clause.
 const NONE: u32 = u32::MAX;
 
 /// Reads the solver's proof `draft` for the given clauses, and writes the trimmed proof and its hints, line
@@ -69,14 +68,12 @@ struct Trimmer {
     clauses: Vec<Vec<Literal>>,
     /// Number of clauses that belong to the formula.
     given: usize,
-    /// Hints of each derived clause.
     hints: Vec<Vec<u32>>,
     /// For each clause: whether the solver has deleted it.
     is_gone: Vec<bool>,
     watches: Vec<Vec<u32>>,
     /// Indices of the clauses that are not deleted, by their sorted literals.
     positions: FxHashMap<Vec<Literal>, Vec<u32>>,
-    /// For each literal: whether it is true.
     is_true: Vec<bool>,
     /// True literals in the order of their assignment.
     trail: Vec<Literal>,
@@ -89,9 +86,7 @@ struct Trimmer {
     is_seen: Vec<bool>,
     /// A clause whose literals are all false, if known.
     conflict: Option<u32>,
-    /// `true` if the empty clause has been derived.
     is_done: bool,
-    /// Total number of literals in all clauses.
     size: usize,
 }
 

@@ -120,7 +120,6 @@ fn written(task: &Model, argument: &Argument) -> Option<Certificate> {
     Some(Certificate { task, argument: serde_json::to_string(argument).ok()? })
 }
 
-/// Table that stores each distinct key once and numbers its entries.
 struct Pool<K, V> {
     positions: FxHashMap<K, u32>,
     all: Vec<V>,

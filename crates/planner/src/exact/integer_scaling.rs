@@ -43,7 +43,6 @@ fn scale(denominator: CommonDenominator) -> Rational {
     denominator.get().map_or_else(Rational::one, scale)
 }
 
-/// Multiplies all numbers of a quantity by `scale`.
 fn multiply(quantity: &mut Quantity<Rational>, scale: &Rational, tables: &mut TableMap<Rational>) {
     let product = |number: &Rational| Ok::<_, Infallible>(number.clone() * scale);
     let Ok(scaled) = tables.map(quantity, &product);

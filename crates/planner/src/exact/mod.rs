@@ -44,7 +44,7 @@ pub struct ExactTask(pub Task<Rational>);
 /// supports more kinds of proofs.
 ///
 /// # Errors
-/// Returns all unsupported constructs with their source locations.
+/// Returns all unsupported constructs with their source locations, or an error if a limit is reached.
 pub fn ground_exact(domain: &Domain, problem: &Problem, config: &GroundConfig) -> Result<ExactTask, Errors> {
     ground_for(domain, problem, config, &Generality::default()).map(ExactTask)
 }
@@ -78,7 +78,6 @@ pub fn optimize_exact(task: &ExactTask, config: &Config) -> Solution {
     solution
 }
 
-/// Solves a task whose operators have non-negative costs.
 fn cheapest(task: &Task<Rational>, config: &Config) -> Solution {
     let context = Context::new(task, &config.limits);
     let outcome = explore(context);
@@ -158,7 +157,6 @@ fn fewest_steps(task: &Task<Rational>, config: &Config) -> Solution {
     }
 }
 
-/// Outcome of a search in exact rationals.
 enum ExactOutcome {
     Optimal(GroundPlan<Rational>),
     /// It is proved that there is no plan; the solution contains the proof.
@@ -328,13 +326,11 @@ fn without_numbers(state: &State<Rational>) -> State {
     State { values: state.values.clone(), numbers: Vec::new() }
 }
 
-/// Returns the facts and clauses of a condition, without comparisons.
 fn bare_condition(condition: &Condition<Rational>) -> Condition {
     let (facts, clauses) = (condition.facts.clone(), condition.clauses.clone());
     Condition { facts, clauses, ..Condition::default() }
 }
 
-/// Returns an operator with only the parts that heuristics need, without numeric effects and slots.
 fn bare_operator(operator: &Operator<Rational>, cost: Int) -> Operator {
     Operator {
         schema: operator.schema,

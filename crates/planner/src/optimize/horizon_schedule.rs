@@ -28,14 +28,13 @@ pub(super) struct HorizonSchedule {
     refuted: usize,
 }
 
-/// Outcome of one turn of the schedule.
 pub(super) enum FirstPlanOutcome {
     Plan(GroundPlan),
     /// There is no plan of any length, or no plan within the configured horizon.
     Refuted(Box<Solution>),
     /// The budget is used up; the schedule can be resumed.
     Paused,
-    /// A limit was reached, or the formulas become too large.
+    /// A limit was reached, the formulas become too large, or the cost of a plan overflows.
     Over,
 }
 

@@ -127,7 +127,8 @@ pub fn pareto(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement))
 }
 
 /// Optimises the objectives lexicographically in the order of the indices `order`, until the optimum under an
-/// objective is not proved. Each budget is an objective with the maximum cost under it.
+/// objective is not proved. Each budget is the index of an objective and the maximum cost under this
+/// objective.
 fn in_order(
     task: &Task,
     order: &[usize],
@@ -194,12 +195,10 @@ fn finish(context: Context<'_>, mut solution: Solution) -> Point {
     Point { solution, values }
 }
 
-/// Returns the cost of an operator under the objective with this index.
 fn cost(operator: &Operator, objective: usize) -> &Quantity<Int> {
     objective.checked_sub(1).map_or(&operator.cost, |other| &operator.others[other])
 }
 
-/// Returns the costs of the steps of a plan under the objective with this index.
 fn costs_by(task: &Task, objective: usize, plan: &GroundPlan) -> impl Iterator<Item = Int> {
     plan.steps.iter().map(move |step| {
         let operator = &task.operators[step.operator.index()];
@@ -212,7 +211,6 @@ fn cost_by(task: &Task, objective: usize, plan: &GroundPlan) -> Option<Int> {
     costs_by(task, objective, plan).try_fold(0, Int::checked_add)
 }
 
-/// Returns the exact cost of a plan under the objective with this index.
 fn exact_cost_by(task: &Task, objective: usize, plan: &GroundPlan) -> Rational {
     costs_by(task, objective, plan).map(Rational::from_integer).sum()
 }
@@ -240,7 +238,6 @@ fn limit(task: &mut Task, objective: usize, budget: Int) {
     task.goal.comparisons.push(Linear::variable(variable));
 }
 
-/// Swaps the objective with this index and the first objective of the task.
 fn swap_objective(task: &mut Task, objective: usize) {
     let Some(index) = objective.checked_sub(1) else { return };
     std::mem::swap(&mut task.objective, &mut task.others[index]);

@@ -22,7 +22,6 @@ use crate::optimize::config::Config;
 /// the bound reaches the cost of the best plan.
 const REPORT_STEP: Int = 100;
 
-/// State of one optimizer run.
 pub(super) struct Run<'a> {
     pub(super) task: &'a Task,
     pub(super) config: &'a Config,
@@ -35,9 +34,7 @@ pub(super) struct Run<'a> {
     symmetry: OnceCell<Symmetry>,
 }
 
-/// The best known plan and the lower bound.
 pub(super) struct Best {
-    /// The cheapest known plan.
     pub(super) plan: GroundPlan,
     /// Lower bound on the cost of every plan.
     pub(super) lower: Int,
@@ -46,7 +43,6 @@ pub(super) struct Best {
 /// Scope of a formula: the cost limit of the plans, the operators that are allowed at each step, and the
 /// proved bound on the number of steps.
 pub(super) struct FormulaScope {
-    /// Maximum cost of the plans that the formula describes.
     pub(super) limit: Int,
     /// For each step and each operator: whether the operator may occur at the step.
     pub(super) allowed: Vec<Vec<bool>>,
@@ -63,7 +59,6 @@ impl FormulaScope {
     }
 }
 
-/// Outcome of an optimisation strategy for one formula.
 pub(super) enum StrategyOutcome {
     /// The formula has no plan that is within its cost limit and cheaper than the best known plan.
     Exhausted,
@@ -74,7 +69,6 @@ pub(super) enum StrategyOutcome {
 /// A SAT solver that has already received the first clauses of a formula.
 pub(super) struct IncrementalSolver {
     pub(super) solver: Box<dyn Solver>,
-    /// Number of clauses that the solver has received.
     known: usize,
     /// Number of conflicts that have been added to the statistics.
     conflicts: u64,
@@ -122,7 +116,6 @@ impl<'a> Run<'a> {
         });
     }
 
-    /// Records and reports the best plan and the lower bound.
     pub(super) fn announce(&mut self, best: &Best, horizon: usize) {
         self.note(Some(best.plan.cost), best.lower);
         let improvement = Improvement {
@@ -287,7 +280,6 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Builds a solution without a plan.
     pub(super) fn without_plan(&self, status: Status, horizon: usize, proof: Option<Proof>) -> Solution {
         Solution {
             status,

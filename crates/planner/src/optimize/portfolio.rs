@@ -34,7 +34,6 @@ const MAX_BACKOFF: u32 = 3;
 /// a better plan is probably easier to find than a proof.
 const NEAR_OPTIMAL_RATIO: (Int, Int) = (3, 2);
 
-/// The portfolio: its active components, the best known plan and the lower bound.
 struct Portfolio<'r, 'a> {
     run: Run<'a>,
     bounds: &'r Bounds,
@@ -304,7 +303,6 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
     }
 }
 
-/// Records the numbers of expanded and generated states of all searches in the tracing span.
 fn record(span: &Span, statistics: &Statistics) {
     span.record("expanded", statistics.expanded).record("generated", statistics.generated);
 }

@@ -17,7 +17,6 @@ use crate::optimize::sat_budget::{FORMULA_LIMIT, SatBudget};
 /// further formula covers twice as much as the previous one.
 const STAGES: Int = 8;
 
-/// Optimality prover: formulas for plans cheaper than the best known plan, in stages of increasing cost.
 #[derive(Default)]
 pub(super) struct Prover {
     stage: Option<Int>,
@@ -27,7 +26,6 @@ pub(super) struct Prover {
     pub(super) step_bound: usize,
 }
 
-/// Outcome of one turn of the prover.
 pub(super) enum ProverOutcome {
     /// The best known plan is optimal.
     Proved(Proof),
@@ -38,8 +36,8 @@ pub(super) enum ProverOutcome {
 }
 
 impl Prover {
-    /// Solves formulas, each within a budget, until the best known plan is proved optimal or the prover
-    /// cannot continue. Improves the best known plan and the lower bound.
+    /// Solves formulas, each within a budget, until the best known plan is proved optimal, a budget does not
+    /// suffice, or the prover cannot continue. Improves the best known plan and the lower bound.
     pub(super) fn advance(
         &mut self,
         run: &mut Run<'_>,

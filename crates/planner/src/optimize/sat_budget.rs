@@ -3,7 +3,6 @@
 /// Number of clauses above which conflicts become noticeably slower.
 const LARGE: usize = 50_000;
 
-/// Budget of the SAT solver for one formula.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SatBudget {
     /// Maximum number of clauses.
@@ -23,7 +22,6 @@ impl SatBudget {
         self.conflicts.checked_div(factor as u64).unwrap_or(self.conflicts)
     }
 
-    /// Budget without limits.
     pub(super) const UNLIMITED: Self = Self { clauses: usize::MAX, conflicts: u64::MAX };
 }
 

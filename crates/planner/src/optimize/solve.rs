@@ -16,7 +16,6 @@ use crate::optimize::prover::{Prover, ProverOutcome};
 use crate::optimize::sat_budget::SatBudget;
 use crate::optimize::sat_confirmation::{into_solution, proved_by_bound, proved_by_search};
 
-/// Solves a task whose operators have non-negative costs, with the configured engine.
 pub(super) fn solve(mut run: Run<'_>) -> Solution {
     let started = Instant::now();
     let Ok(bounds) = Bounds::new(run.context()) else {

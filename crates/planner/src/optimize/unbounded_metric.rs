@@ -85,7 +85,6 @@ pub(super) fn shortest_then_best(original: Run<'_>) -> Solution {
     }
 }
 
-/// Returns an unknown solution with the statistics of the solution `by_steps`.
 fn unknown(by_steps: Solution) -> Solution {
     Solution { status: Status::Unknown, plan: None, ground: None, lower_bound: None, proof: None, ..by_steps }
 }

@@ -174,7 +174,7 @@ impl Replanner {
     }
 }
 
-/// Returns a copy of the problem in which every object is available.
+/// Returns a copy of the problem in which every object of a suitable type is available.
 fn with_all(domain: &Domain, problem: &Problem, available: &[Name]) -> Problem {
     let hierarchy = TypeHierarchy::of(domain);
     let mut full = problem.clone();

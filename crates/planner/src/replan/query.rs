@@ -35,7 +35,8 @@ pub struct Query<'a> {
     /// Current plan: names and arguments of its actions after the first step. If the plan is still valid, its
     /// metric is an upper bound for the search.
     pub old: Option<&'a [(String, Vec<String>)]>,
-    /// Whether, among equally good plans, a plan with as many of these actions as possible is selected.
+    /// Whether, among the best plans with the fewest steps, a plan that keeps as many steps of `old` as
+    /// possible is selected.
     pub stay_close: bool,
     /// Time and memory limits.
     pub limits: &'a Limits,
@@ -78,6 +79,6 @@ pub enum ReplanOutcome {
 pub struct Progress {
     /// Metric of the mission with the best known plan, if there is one.
     pub metric: Option<BigRational>,
-    /// Lower bound on the metric of every plan.
+    /// Bound on the metric of every plan: a lower bound, or an upper bound if the metric is maximised.
     pub bound: BigRational,
 }

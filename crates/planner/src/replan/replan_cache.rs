@@ -11,7 +11,6 @@ use task::task::{Argument, Task};
 use crate::replan::restrict_designs;
 use crate::replan::state_mapping::Layout;
 
-/// Data that all queries of a replanner share.
 pub(super) struct GroundBase {
     /// Ground task with all objects available.
     pub(super) task: Task,
@@ -41,7 +40,6 @@ impl GroundBase {
         restrict_designs::restrict(&self.task, &is_allowed, limits)
     }
 
-    /// Computes the restricted task and its search data for a set of available objects.
     pub(super) fn restrict(
         &self,
         available: &[Vec<ObjectId>],

@@ -143,8 +143,6 @@ impl SharedTables {
     }
 }
 
-/// Returns the remaining designs of an operator's slots (parameters whose designs are not grounded), and the
-/// slots restricted to them.
 fn left(task: &Task, operator: &Operator, allowed: &dyn Fn(usize, ObjectId) -> bool) -> RestrictedSlots {
     let arguments = |slot: usize| {
         let is_in_slot = move |argument: &Argument| *argument == Argument::Slot(dense(slot));

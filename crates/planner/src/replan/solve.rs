@@ -145,7 +145,6 @@ fn old_plan(task: &Task, state: &State, query: &Query<'_>, old: &[Option<GroundS
     Some(GroundPlan { steps, cost })
 }
 
-/// A plan for the query; it need not be optimal.
 #[derive(Clone)]
 struct Candidate {
     first: Option<usize>,
@@ -190,7 +189,8 @@ fn starts(base: &GroundBase, situation: &ReplanState, query: &Query<'_>) -> Opti
     query.first.iter().enumerate().map(start).collect()
 }
 
-/// Selects one of several optimal plans. Also returns the index of its first step.
+/// Selects one of several optimal plans by the tie-breaking rules of this file. Also returns the index of its
+/// first step.
 fn choose(
     set: &AvailabilityContext,
     query: &Query<'_>,
@@ -229,7 +229,6 @@ fn fewer((departures, reconfigurations): plan_tiebreak::Changes) -> Option<plan_
     }
 }
 
-/// Returns the step of the task for an action that is given by names, or `None` if there is no such step.
 fn find(task: &Task, (action, arguments): &(String, Vec<String>)) -> Option<GroundStep> {
     let same = |object: ObjectId, name: &String| task.object_names[object.index()].eq_ignore_ascii_case(name);
     for (operator, id) in task.operators.iter().zip((0..).map(task::task::OperatorId)) {

@@ -24,11 +24,10 @@ pub(super) struct Layout {
     /// Predicates that state availability. Each has one parameter.
     assumed: Vec<Name>,
     objects: FxHashMap<String, ObjectId>,
-    /// Text of the problem without its initial state. All supported problems have this text.
+    /// Objects, goal and metric of the problem as text. All supported problems have this text.
     frame: String,
     /// Variable and value of each fact, and whether the fact is reachable in the relaxation.
     facts: FxHashMap<String, (Fact, bool)>,
-    /// Index of each numeric variable.
     numbers: FxHashMap<String, usize>,
     scale: BigRational,
     /// Static facts that must be true in every problem, each with an index from 0.
@@ -39,7 +38,6 @@ pub(super) struct Layout {
     nothing: Vec<u32>,
 }
 
-/// A state of the task, and the objects that are available.
 #[derive(Debug, Clone)]
 pub(super) struct ReplanState {
     pub(super) state: State,
@@ -48,7 +46,6 @@ pub(super) struct ReplanState {
 }
 
 impl Layout {
-    /// Computes the mapping for the problem from which the task was grounded.
     #[expect(clippy::arithmetic_side_effects, reason = "every variable has a value")]
     pub(super) fn new(usage: Usage, assumed: &[Name], problem: &Problem, task: &Task) -> Self {
         let names = task.object_names.iter().map(|name| name.to_ascii_lowercase());
@@ -176,7 +173,8 @@ impl Layout {
         scaled.is_integer().then(|| scaled.to_integer().to_i128()).flatten()
     }
 
-    /// Returns the state after a step, or `None` if the step changes facts or values that must not change.
+    /// Returns the state after a step. Returns `None` if the step changes facts or values that must not
+    /// change, or if the task cannot represent the new state.
     pub(super) fn advance(&self, task: &Task, state: &State, step: &Advance) -> Option<State> {
         let mut next = state.clone();
         for atom in &step.deleted {
@@ -225,7 +223,6 @@ fn respects_exclusion(task: &Task, state: &State) -> bool {
     task.exclusive.iter().all(|group| group.iter().filter(|fact| fact.holds(&state.values)).count() <= 1)
 }
 
-/// Partial state while the initial state of a problem is read.
 struct Reading {
     values: Vec<u32>,
     numbers: Vec<Option<Int>>,
@@ -235,7 +232,7 @@ struct Reading {
     fixed_values: Vec<bool>,
 }
 
-/// Returns all parts of a problem except its initial state, as text.
+/// Returns the objects, the goal and the metric of a problem as text.
 fn frame(problem: &Problem) -> String {
     use std::fmt::Write as _;
     let mut text = String::new();

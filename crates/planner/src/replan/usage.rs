@@ -9,7 +9,6 @@ use rustc_hash::FxHashSet;
 use pddl::ast::{Atom, Condition, Domain, Effect, Expression, Name, Problem, Term};
 use pddl::visit::Node;
 
-/// Predicates and functions of a domain and problem, by their usage.
 #[derive(Debug, Default)]
 pub(super) struct Usage {
     /// Predicates that are read by conditions of actions and effects, by axioms, or below quantifiers of the
@@ -37,7 +36,6 @@ impl Usage {
         usage
     }
 
-    /// Returns `true` if an effect or axiom changes the predicate or function.
     pub(super) fn is_changed(&self, name: &Name) -> bool {
         self.changed.contains(name)
     }
@@ -95,7 +93,6 @@ pub(super) fn key(atom: &Atom) -> String {
     text
 }
 
-/// Returns the name of a variable or constant.
 pub(super) fn identifier(term: &Term) -> &Name {
     match term {
         Term::Variable(identifier) | Term::Constant(identifier) => &identifier.name,
@@ -126,7 +123,7 @@ pub(super) fn requirements(domain: &Domain, predicates: &[Name]) -> Option<Vec<V
     (total == mentions).then_some(requirements)
 }
 
-/// Returns the atoms of a conjunction.
+/// Returns the atoms that are conjuncts of a condition.
 fn conjuncts(condition: &Condition) -> Vec<&Atom> {
     match condition {
         Condition::And(parts) => parts.iter().flat_map(conjuncts).collect(),

@@ -19,7 +19,6 @@ const LARGE: i128 = 100_000;
 /// numbers.
 const REFUSALS: [&str; 3] = ["E301", "E303", "E304"];
 
-/// Returns `true` if the metric rewards time.
 fn rewards_time(task: &Task) -> bool {
     let Some((maximize, Expression::Sum(parts))) = &task.metric else { return false };
     let weights = parts.iter().filter_map(|part| match part {
@@ -86,7 +85,8 @@ struct Pair {
     steps: Option<usize>,
 }
 
-/// Compares corresponding states up to the limit. Returns `None` if grounding rejects the task.
+/// Compares corresponding states up to the limit, and returns the number of compared pairs (0 if grounding
+/// finds the goal unreachable). Returns `None` if grounding rejects the task.
 pub fn check(task: &Task, (domain, problem): &(Domain, Problem)) -> Option<usize> {
     let context = || format!("{}\n{}", task.domain(), task.problem());
     let ground = match ground(domain, problem, &GroundConfig::default()) {

@@ -41,7 +41,7 @@ fn disjunction(parts: impl Iterator<Item = Truth>) -> Truth {
     negation(conjunction(parts.map(negation)))
 }
 
-/// A state with its derived atoms, and the variables in scope.
+/// A state with its derived atoms, and the value of `?duration` (`None` outside of actions).
 struct View<'a> {
     state: &'a State,
     derived: BTreeSet<Atom>,
@@ -244,7 +244,6 @@ impl State {
         Some(after)
     }
 
-    /// Applies the timed literals that are due.
     fn pass(&mut self, task: &Task, is_due: impl Fn(Number) -> bool) {
         while let Some((time, atom, holds)) = task.timed.get(self.timed).filter(|(time, ..)| is_due(*time)) {
             let _ = time;
@@ -286,8 +285,9 @@ impl State {
         View::new(task, self, None).value(expression, scope)
     }
 
-    /// Returns the state after a happening. All its effects read this state. Returns `None` if its parts
-    /// interfere with each other or with a simultaneous event.
+    /// Returns the state after a happening. All its effects read this state. Returns `None` if a condition
+    /// does not hold, an effect is undefined, or its parts interfere with each other or with a simultaneous
+    /// event.
     fn happen(
         &self,
         task: &Task,
@@ -392,7 +392,7 @@ impl State {
         View::new(task, self, None).holds(&task.goal, &[])
     }
 
-    /// Returns the value of the metric in this state, or `None` without a metric.
+    /// Returns the value of the metric in this state, or `None` if there is no metric or it is undefined.
     pub fn metric(&self, task: &Task) -> Option<Number> {
         let (_, value) = task.metric.as_ref()?;
         View::new(task, self, None).value(value, &[])

@@ -221,7 +221,7 @@ fn bound(range: Range, depth: usize) -> String {
 }
 
 impl Formula {
-    /// Formats the expression in PDDL. `depth` is the number of variables bound around it.
+    /// Formats the formula in PDDL. `depth` is the number of variables bound around it.
     pub fn text(&self, depth: usize) -> String {
         match self {
             Self::Fact(predicate, terms) => applied(PREDICATES[*predicate].0, terms),
@@ -277,7 +277,7 @@ impl Effect {
 }
 
 impl Action {
-    /// Returns `true` if the effects of the action depend on the state.
+    /// Returns `true` if the action has a conditional effect.
     pub fn is_conditional(&self) -> bool {
         self.start_effects.iter().chain(&self.end_effects).any(Effect::is_conditional)
     }

@@ -72,7 +72,7 @@ fn difference(before: &State, after: &State) -> Formula {
     Formula::And(gained.chain(lost).chain(values).collect())
 }
 
-/// Returns the plan with a single change.
+/// Returns the plan after one random change, which may have no effect.
 fn changed(draw: &mut Draw<'_>, task: &Task, plan: &[Step]) -> Vec<Step> {
     let mut plan = plan.to_vec();
     let place = draw.below(plan.len());

@@ -108,7 +108,6 @@ fn changes(value: &Value, path: &str, found: &mut Vec<(String, Option<Value>)>) 
     }
 }
 
-/// Returns a document with one change applied.
 fn changed(document: &Value, (path, new): &(String, Option<Value>)) -> Value {
     let mut document = document.clone();
     if let Some(new) = new {

@@ -21,7 +21,6 @@ enum Number {
 #[derive(Debug, Clone)]
 enum Formula {
     Fact(usize),
-    /// The first number is less than the second.
     Less(Number, Number),
     Not(Box<Formula>),
     And(Box<Formula>, Box<Formula>),

@@ -12,7 +12,6 @@ use crate::concurrent::simple_temporal_network::Key;
 /// limit get no bounds.
 pub(super) const MAX_PAIR_CHECKS: usize = 20_000_000;
 
-/// Index of the operators by access key, set variable and changed number.
 pub(super) struct Index<'a> {
     pub(super) task: &'a Task,
     pub(super) happenings: &'a [Happening],
@@ -30,7 +29,6 @@ pub(super) struct Index<'a> {
 #[derive(Default)]
 pub(super) struct Invariant {
     pub(super) facts: Vec<Fact>,
-    /// Subset of the facts that the condition over all requires.
     pub(super) over_all: Vec<Fact>,
 }
 
@@ -197,14 +195,11 @@ impl<'a> Index<'a> {
         })
     }
 
-    /// Facts that the condition over all of an instance requires; empty without such a condition.
     pub(super) fn over_all(&self, instance: u32) -> &[Fact] {
         let over_all = self.instances[instance as usize].over_all;
         over_all.map_or(&[], |id| &self.task.operators[id.index()].condition.facts)
     }
 
-    /// Duration of an instance in internal time units; a lower bound if the duration is not
-    /// constant.
     pub(super) fn duration(&self, instance: u32) -> Int {
         self.instances[instance as usize].duration
     }

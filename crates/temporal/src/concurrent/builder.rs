@@ -50,7 +50,6 @@ fn binding(operator: &Operator, variables: usize) -> Binding {
     binding
 }
 
-/// Identifies an action instance: index of the schema in the domain, and arguments.
 type InstanceKey = (usize, Vec<ObjectId>);
 
 pub(super) struct Builder<'a> {
@@ -58,7 +57,6 @@ pub(super) struct Builder<'a> {
     split: &'a Split,
     /// Separation in internal time units; 0 until the unit is known.
     pub(super) separation: Int,
-    /// Write set of each operator.
     written: Vec<Footprint>,
     /// Operators of duration 0 that combine a start and an end, with the write sets of start and
     /// end.
@@ -415,7 +413,6 @@ fn is_joint(task: &Task, over_all: OperatorId) -> bool {
         || condition.facts.iter().any(|fact| fact.variable.index() >= task.basic)
 }
 
-/// Written atoms and numbers, numbered by [`ids`].
 fn writes(written: &Footprint) -> Vec<u32> {
     let atoms: Vec<AtomId> = written.added.iter().chain(&written.deleted).copied().collect();
     ids(&atoms, written.numbers.iter().map(|(number, _)| *number))

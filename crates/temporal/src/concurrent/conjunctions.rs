@@ -17,7 +17,6 @@ use crate::concurrent::rule::{Proposition, Rule};
 
 /// Upper limit on added rules, per rule of the relaxed task. `EXTRA_RULES` is added to the limit.
 const MAX_RULES_PER_RULE: usize = 2;
-/// Constant part of the upper limit on added rules.
 const EXTRA_RULES: usize = 1_000;
 /// Work limit of the selection of conjunctions, in rule visits per rule.
 const MAX_VISITS_PER_RULE: usize = 64;
@@ -25,7 +24,6 @@ const MAX_VISITS_PER_RULE: usize = 64;
 /// A conjunction proposition, followed by its two members.
 pub(super) type Conjunction = [Proposition; 3];
 
-/// The relaxed task to which conjunctions are added.
 pub(super) struct Scope<'a> {
     pub(super) rules: &'a mut Vec<Rule>,
     pub(super) goal: &'a mut Vec<Proposition>,
@@ -34,7 +32,6 @@ pub(super) struct Scope<'a> {
     pub(super) propositions: &'a mut u32,
 }
 
-/// Index of the rules by proposition and by variable.
 struct Index {
     /// Conditions of each rule; the last entry holds the conditions of the goal.
     needs: Lists,

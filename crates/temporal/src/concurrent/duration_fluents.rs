@@ -71,7 +71,6 @@ impl Timer {
         Self { function, terms, numerator: Some(numerator), divisor }
     }
 
-    /// Returns `true` if the planner chooses the duration.
     pub(super) fn is_chosen(&self) -> bool {
         self.numerator.is_none()
     }
@@ -112,7 +111,6 @@ impl Timer {
         Effect { bound: Vec::new(), condition: Formula::truth(), change }
     }
 
-    /// Effect of the end that sets the fluent to 0.
     pub(super) fn clear(&self, schema: &Schema) -> Effect {
         self.assign(schema, Assignment::Assign, Expression::Number(Rational::from_integer(0)))
     }
@@ -140,7 +138,6 @@ impl Timer {
     }
 }
 
-/// Replaces each occurrence of the subexpression `part` by `other`.
 fn replaced(expression: &Expression, part: &Expression, other: &Expression) -> Expression {
     let each = |parts: &[Expression]| parts.iter().map(|inner| replaced(inner, part, other)).collect();
     if expression == part {

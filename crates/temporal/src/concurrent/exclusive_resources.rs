@@ -46,13 +46,12 @@ const MAX_GROUPS: usize = 6;
 /// Costs are divided by a power of two until their maximum is below this limit of LM-cut.
 const COST_LIMIT: Int = 1 << 39;
 
-/// An exclusive resource: the instances that occupy it.
 #[derive(Clone)]
 struct Resource {
     instances: Vec<u32>,
 }
 
-/// Lower bound on the makespan of every plan, in the task's time unit.
+/// Lower bound on the makespan of every plan, in internal time units; 0 if there is no exclusive resource.
 pub(super) fn makespan_bound(concurrent: &TemporalTask, limits: &Limits) -> Int {
     let mut by_schemas: BTreeMap<Vec<u32>, Vec<Resource>> = BTreeMap::new();
     let mut by_size: BTreeMap<(Vec<u32>, usize), Vec<Resource>> = BTreeMap::new();
@@ -96,7 +95,8 @@ pub(super) fn makespan_bound(concurrent: &TemporalTask, limits: &Limits) -> Int 
     best
 }
 
-/// Lower bound from one group of resources. Sets the costs of `task` to the work of the group.
+/// Lower bound on the makespan from one group of resources. Sets the costs of `task` to the work of the
+/// group.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "durations and the separation are below 2^90, and an instance occupies fewer than 2^32 variables"
@@ -142,7 +142,6 @@ fn without_costs(concurrent: &TemporalTask) -> Task {
     task
 }
 
-/// All exclusive resources of a task.
 fn resources(concurrent: &TemporalTask) -> Vec<Resource> {
     let task = &concurrent.task;
     let mut setters: Vec<Vec<OperatorId>> = vec![Vec::new(); task.basic];
@@ -161,18 +160,15 @@ fn resources(concurrent: &TemporalTask) -> Vec<Resource> {
     ids.zip(setters).filter_map(|(variable, setters)| resource(concurrent, variable, &setters)).collect()
 }
 
-/// Effects of an operator, conditional or not.
 fn effects(operator: &Operator) -> impl Iterator<Item = Fact> {
     let conditional = operator.conditional.iter().flat_map(|effect| &effect.effects);
     operator.effects.iter().chain(conditional).copied()
 }
 
-/// Values that an operator may set a variable to.
 fn set_values(operator: &Operator, variable: VariableId) -> impl Iterator<Item = u32> {
     effects(operator).filter(move |fact| fact.variable == variable).map(|fact| fact.value)
 }
 
-/// Value of a variable in a list of facts.
 fn value_in(facts: &[Fact], variable: VariableId) -> Option<u32> {
     facts.iter().find(|fact| fact.variable == variable).map(|fact| fact.value)
 }

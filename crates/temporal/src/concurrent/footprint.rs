@@ -154,7 +154,6 @@ impl<'a> Footprints<'a> {
         Ok(())
     }
 
-    /// Builds an index of all atoms and numbers in the collected write sets.
     pub(super) fn index(&self) -> WriteIndex {
         let mut written = WriteIndex::default();
         for (index, (predicate, arguments)) in self.world.atoms.keys().enumerate() {
@@ -176,10 +175,8 @@ impl<'a> Footprints<'a> {
     }
 }
 
-/// Argument lists of one predicate or function, each with the id of its atom or number.
 type Rows<V> = Vec<(Box<[ObjectId]>, V)>;
 
-/// Index of written atoms and numbers: by predicate or function, and atoms also by exact arguments.
 #[derive(Default)]
 pub(super) struct WriteIndex {
     atoms: FxHashMap<PredicateId, Rows<AtomId>>,

@@ -55,7 +55,7 @@ const MAX_STALE: u64 = 200_000;
 const NEIGHBOURS: usize = 12;
 /// Number of random moves of a perturbation.
 const KICK: usize = 3;
-/// Fraction of the memory limit that the states of an order may take.
+/// The states of an order may take at most 1/`MEMORY_FRACTION` of the memory limit.
 const MEMORY_FRACTION: usize = 8;
 
 /// Deterministic pseudo-random numbers (`SplitMix64`).
@@ -83,28 +83,23 @@ struct Stage {
     happenings: usize,
 }
 
-/// An order with its plan.
 #[derive(Clone)]
 struct Decoded {
     /// Indices of goals.
     order: Vec<usize>,
-    /// Per position: state before this goal.
     stages: Vec<Stage>,
     links: Vec<Link>,
-    /// Metric in integers, then makespan.
+    /// Metric (scaled to an integer) and makespan (in internal time units).
     value: (Int, Int),
 }
 
-/// Outcome of decoding.
 enum Decoding {
     Plan(Box<Decoded>, Sequence),
     /// A goal was not achieved, or the plan is worse than required.
     Failed,
-    /// Stopped at a limit.
     Interrupted,
 }
 
-/// Local search over goal orders. It can be resumed.
 pub(super) struct GoalOrders<'a> {
     concurrent: &'a TemporalTask,
     expansion: &'a Expansion<'a>,
@@ -113,23 +108,24 @@ pub(super) struct GoalOrders<'a> {
     goals: Vec<Fact>,
     /// Orders that are decoded before local search begins, last one first.
     initial: Vec<Vec<usize>>,
-    /// Makespan of the plan whose order of goals was decoded last.
+    /// Metric and makespan of the last plan whose order of goals was added to `initial`, or of the last plan
+    /// that this search returned.
     seen: Option<(Int, Int)>,
     current: Option<Decoded>,
     best: Option<Decoded>,
-    /// Number of neighbours without improvement since the last perturbation.
+    /// Number of neighbours tried since the last perturbation or the last best plan.
     rejected: usize,
     failures: usize,
-    /// Work at the last improvement.
+    /// Work at the last improvement of `best`.
     improved_at: u64,
-    /// Number of orders that were decoded.
     decoded: u64,
     random: Random,
     pub(super) figures: SearchStatistics,
 }
 
 impl<'a> GoalOrders<'a> {
-    /// Returns `None` if there is nothing to order, or the metric does not depend on the makespan.
+    /// Returns `None` if there is no goal fact to order, a goal is unreachable, the metric does not depend on
+    /// the makespan, the states would take too much memory, or a limit is reached.
     pub(super) fn new(
         concurrent: &'a TemporalTask,
         expansion: &'a Expansion<'a>,
@@ -177,7 +173,8 @@ impl<'a> GoalOrders<'a> {
         })
     }
 
-    /// Returns `true` if the search has ended: it found no plan at all, or no better one for long.
+    /// Returns `true` if the search has ended: it found no plan at all, no better plan for long, or the task
+    /// has a single goal whose plan is found.
     pub(super) fn is_over(&self) -> bool {
         self.best.is_none() && self.failures >= MAX_FAILURES
             || self.best.is_some() && self.goals.len() < 2 && self.initial.is_empty()
@@ -189,8 +186,8 @@ impl<'a> GoalOrders<'a> {
         self.figures.evaluated.saturating_add(self.decoded)
     }
 
-    /// Decodes orders until a plan is better than the incumbent, `work` units were spent, or a limit
-    /// is reached. Returns the better plan.
+    /// Decodes orders until a plan is better than the incumbent, `work` units were spent, a limit is reached,
+    /// or the search has ended. Returns the better plan.
     pub(super) fn run(
         &mut self,
         incumbent: Option<&Sequence>,
@@ -255,8 +252,8 @@ impl<'a> GoalOrders<'a> {
         order
     }
 
-    /// Next order, its first position that differs from the current order, and the worst acceptable
-    /// value.
+    /// Next order, its first position that differs from the current order, and the worst acceptable value
+    /// (`None` if any value is acceptable).
     fn next_order(&mut self) -> (Vec<usize>, usize, Option<(Int, Int)>) {
         if let Some(order) = self.initial.pop() {
             return (order, 0, None);
@@ -283,8 +280,8 @@ impl<'a> GoalOrders<'a> {
         (order, from, Some(limit))
     }
 
-    /// Decodes an order, from a position on if a decoded order has the same goals before it. Gives up
-    /// when the value exceeds `limit`.
+    /// Decodes an order. `base` is a decoded order with the same goals before the given position, so decoding
+    /// begins at this position. Fails if a goal is not achieved or the value exceeds `limit`.
     fn decode(
         &mut self,
         order: &[usize],
@@ -363,7 +360,7 @@ impl<'a> GoalOrders<'a> {
     }
 }
 
-/// Moves one goal or swaps two. Returns the first position that changes.
+/// Moves one goal or swaps two. Returns the first position that may change.
 fn change(random: &mut Random, order: &mut Vec<usize>) -> usize {
     let [first, second] = [random.below(order.len()), random.below(order.len())];
     if random.below(2) == 0 {
@@ -379,14 +376,12 @@ fn proposition(relaxed: &TemporalRelaxation, fact: Fact) -> Proposition {
     relaxed.first[fact.variable.index()].saturating_add(fact.value)
 }
 
-/// A condition that a short plan achieves.
 #[derive(Clone, Copy)]
 struct Goal<'g> {
     targets: &'g [Proposition],
     is_reached: &'g dyn Fn(&TemporalState) -> bool,
 }
 
-/// A limit was reached.
 struct Stopped;
 
 /// Hash of a state and the timed initial literals that have taken place. A collision only loses a
@@ -397,8 +392,8 @@ fn key(TemporalState { state, clocks, .. }: &TemporalState) -> u64 {
     hasher.finish()
 }
 
-/// Extends a sequence of happenings until a goal is reached, by executable parts of relaxed plans.
-/// Returns `None` if none is found.
+/// Extends a sequence of happenings until a goal is reached, by executable parts of relaxed plans. Returns
+/// `None` if the goal is unreachable or the limits on the number of relaxed plans are exceeded.
 fn achieve(
     relaxation: &mut TimedRelaxation<'_>,
     (concurrent, expansion): (&TemporalTask, &Expansion<'_>),
@@ -475,7 +470,6 @@ fn execute(
     }
 }
 
-/// Executes an action from its start to its end.
 fn act(
     (concurrent, expansion): (&TemporalTask, &Expansion<'_>),
     situation: &TemporalState,
@@ -494,7 +488,9 @@ fn act(
     Some((next, links))
 }
 
-/// Best-first search for a state whose relaxed plan is smaller than `size`.
+/// Best-first search for a state that reaches the goal, or whose relaxed plan has fewer happenings than
+/// `size`. Returns the state and the happenings that lead to it. Returns `None` after [`MAX_ESCAPE`]
+/// evaluations, or if no state is left.
 fn escape(
     relaxation: &mut TimedRelaxation<'_>,
     context: (&TemporalTask, &Expansion<'_>),

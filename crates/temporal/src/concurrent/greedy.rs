@@ -54,9 +54,9 @@ pub(super) enum Mode {
 }
 
 impl Mode {
-    /// Returns the successor by a happening, after applying timed initial literals that must
-    /// precede it. Appends all applied happenings to `links`. Returns `None` if the happening is
-    /// not applicable.
+    /// Returns the successor by a happening, after applying timed initial literals that must precede it.
+    /// Appends all applied happenings to `links`. Returns `None` if the happening is not applicable or,
+    /// except in mode `Sooner`, leaves a condition over all violated.
     pub(super) fn apply_happening(
         self,
         concurrent: &TemporalTask,
@@ -94,7 +94,6 @@ impl Mode {
 struct Node {
     packed: PackedNode,
     parent: u32,
-    /// Happenings that lead from the parent to this node.
     links: Links,
 }
 
@@ -102,14 +101,12 @@ struct Node {
 /// makespan. Smaller keys come first.
 type Value = (bool, u64, Int);
 
-/// Outcome of one call of [`Greedy::run`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Outcome {
-    /// Found a plan that is better than the incumbent.
     Found,
     /// The open list is empty or the memory share is used up.
     Exhausted,
-    /// Stopped at a limit of time or work.
+    /// Stopped by an interrupt, or at a limit of time or work.
     Stopped,
 }
 
@@ -125,7 +122,6 @@ pub(super) struct Greedy<'a> {
     latest: Option<(u32, TemporalState)>,
     /// Least lower bound on the makespan of each visited state, by a hash of the state.
     seen: FxHashMap<u64, Int>,
-    /// Approximate memory use of the nodes in bytes.
     bytes: usize,
     /// Three queues: all happenings and preferred happenings by heuristic value, and all happenings
     /// with successors of novel states first.
@@ -209,9 +205,8 @@ impl<'a> Greedy<'a> {
         }
     }
 
-    /// Returns the successor of a node by a happening or, in sequential mode, by a start and its
-    /// end. Timed initial literals that must precede a happening are applied first. The second part
-    /// lists the applied happenings.
+    /// Returns the successor of a node by a happening or, in sequential mode, by a start and its end, and the
+    /// list of applied happenings. Timed initial literals that must precede a happening are applied first.
     fn follow(&mut self, parent: u32, operator: OperatorId) -> Option<(TemporalState, Links)> {
         let cached = self.latest.take().filter(|(id, _)| *id == parent);
         let unpack = || (parent, self.packing.unpack(&self.nodes[parent as usize].packed));
@@ -228,8 +223,9 @@ impl<'a> Greedy<'a> {
         Some((next, links))
     }
 
-    /// Evaluates a state and queues its successors. Returns `Found` if the state completes a plan
-    /// that is better than the incumbent; the plan then becomes the incumbent.
+    /// Evaluates a state and queues its successors, unless the state is a duplicate or cannot lead to a
+    /// better plan. Returns `Found` if the state completes a plan that is better than the incumbent; the plan
+    /// then becomes the incumbent.
     fn take_up(
         &mut self,
         situation: &TemporalState,
@@ -253,7 +249,8 @@ impl<'a> Greedy<'a> {
         } else {
             None
         };
-        // With violated preferences, a longer plan may be better.
+        // If the task has preferences, a longer plan may violate fewer of them, so the goal state is expanded
+        // as well.
         if outcome.is_some() && self.concurrent.violations.is_empty() {
             return outcome;
         }

@@ -10,7 +10,6 @@ use crate::concurrent::interference::{Designs, InterferenceConstraints};
 pub(super) enum Role {
     /// Start of the durative action with this instance index.
     Start(u32),
-    /// End of the durative action with this instance index.
     End(u32),
     /// A whole action: instantaneous or of duration 0.
     Whole,
@@ -31,8 +30,8 @@ pub(super) struct Happening {
     /// Atoms and numbers that the happening writes, ascending. Atom `a` has the id `2a`, number `n`
     /// the id `2n + 1`.
     pub(super) writes: Vec<u32>,
-    /// Variables that the happening sets, ascending. Limited to guards of accesses and goal
-    /// variables, because only the times of their changes are recorded.
+    /// Variables that the happening sets, ascending. Limited to goal variables and guards (variables in
+    /// `guards` of the task), because only the times of their changes are recorded.
     pub(super) sets: Vec<u32>,
 }
 

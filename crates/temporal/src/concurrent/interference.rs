@@ -62,7 +62,6 @@ impl Keys {
         dense(self.known.insert_full(access, ()).0)
     }
 
-    /// Interference constraints of a happening with the given read and write sets.
     pub(super) fn of(&mut self, footprint: &Footprint) -> InterferenceConstraints {
         use Access::{Added, Changed, Deleted, Held, HeldNumber, Read, ReadNumber};
         let mut collector = InterferenceCollector::default();

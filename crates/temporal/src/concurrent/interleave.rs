@@ -27,8 +27,9 @@ const EXACT_BUDGET: usize = 4;
 /// best plan is an upper bound.
 const WHOLE: usize = 2;
 
-/// Interleaves the searches until the exact one is exhausted, a limit is reached, or `rounds`
-/// rounds are over. Better plans and lower bounds are reported to `record`.
+/// Interleaves the searches until optimality is proved, no search can continue, a limit is reached, or
+/// `rounds` rounds are over. Returns the outcome and the best plan. Better plans and lower bounds are also
+/// reported to `record`.
 pub(super) fn interleave_searches(
     concurrent: &TemporalTask,
     bounds: Option<&Bounds>,

@@ -22,7 +22,6 @@ struct Path {
     left: Vec<Option<Int>>,
 }
 
-/// Makespan heuristic of a task: the least remaining times of all goal variables.
 pub(super) struct Estimate {
     paths: Vec<Path>,
     separation: Int,
@@ -32,7 +31,6 @@ pub(super) struct Estimate {
 /// previous change.
 type Edge = (Option<u32>, u32, Int);
 
-/// Estimates for a search node.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RemainingTime {
     /// Lower bound on the makespan.

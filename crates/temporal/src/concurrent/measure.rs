@@ -53,7 +53,6 @@ impl Measure {
         Exact::scaled(&if self.maximize { -sum } else { sum }, self.scale)
     }
 
-    /// Converts a metric of the PDDL problem to an integer value.
     pub(super) fn total_of(&self, metric: &Exact) -> Rational {
         let scaled = Rational::from_big(metric.to_rational()) * Rational::from_integer(self.scale);
         (if self.maximize { -scaled } else { scaled }) - &Rational::from_integer(self.offset)

@@ -73,15 +73,15 @@ use search_log::Record;
 use solution::{ended, in_names};
 use source_task::SourceTask;
 
-/// Precision with chosen durations: a strict comparison requires a difference of at least 1 /
-/// `PRECISION`.
+/// If durations are chosen, a strict comparison requires a difference of at least 1 / `PRECISION`.
 const PRECISION: Int = 1_000_000;
 
 /// Grounds a domain and a problem that have passed `pddl::check`, for plans with overlapping
 /// actions. Interfering happenings are at least `separation` apart, in the domain's time unit.
 ///
 /// # Errors
-/// Fails with every unsupported construct and its place.
+/// Fails if a construct is unsupported (with its place), `separation` is not positive, a number overflows, or
+/// a limit is reached.
 pub fn ground_concurrent(
     domain: &Domain,
     problem: &Problem,
@@ -123,7 +123,9 @@ impl TemporalTask {
     }
 }
 
-/// Grounds a task whose trajectory constraints were compiled away.
+/// Grounds a task whose trajectory constraints were compiled away. If the planner can choose durations, the
+/// variant with the shortest durations is kept in `shortest`. With compiled constraints (hidden actions), or
+/// if chosen durations are not supported, only the shortest durations are possible.
 fn ground_plain(files: Files<'_>) -> Result<TemporalTask, Errors> {
     let shortest = ground_with(files, &normalize);
     let is_judged = files.0.actions.iter().any(|action| is_hidden(action.identifier.name.as_str()));
@@ -141,13 +143,12 @@ fn ground_plain(files: Files<'_>) -> Result<TemporalTask, Errors> {
     }
 }
 
-/// Domain, problem, grounding options and separation.
 type Files<'f> = (&'f Domain, &'f Problem, &'f GroundConfig, &'f Rational);
 
-/// A function that lowers the files to a lifted task.
 type Normalize = dyn Fn(&Domain, &Problem, &[ast::Metric]) -> Result<Lifted, Errors>;
 
-/// Grounds a task. Guards fluents without an initial value if some are read.
+/// Grounds a task. If a value is missing because a fluent has no initial value, grounds the task again with
+/// guards (atoms that state that a fluent has a value).
 fn ground_with(
     (domain, problem, config, separation): Files<'_>,
     normalize: &Normalize,
@@ -168,7 +169,6 @@ fn ground_with(
     }
 }
 
-/// Grounds a normalised task.
 fn ground_normal(
     domain: &Domain,
     mut lifted: Lifted,
@@ -206,7 +206,8 @@ fn ground_normal(
     temporal_task::compile(task, &split, &reached, separation, weight, &config.limits)
 }
 
-/// Returns `true` if every action has exactly one possible duration.
+/// Returns `true` if the duration of every action is fixed, by an equality or by two equal bounds that are
+/// numbers.
 fn is_fixed(domain: &Domain) -> bool {
     let number = |constraint: &ast::DurationConstraint| match &constraint.expression {
         ast::Expression::Number(number, _) => Some(number.clone()),
@@ -227,7 +228,7 @@ fn is_fixed(domain: &Domain) -> bool {
     })
 }
 
-/// Returns `true` if the end of an action mentions `?duration`.
+/// Returns `true` if an effect at the end of an action mentions `?duration`.
 fn mentions_duration(domain: &Domain, action: u32) -> bool {
     let Some(action) = domain.actions.get(action as usize) else { return false };
     let ActionBody::Durative { effects, .. } = &action.body else { return false };
@@ -250,8 +251,9 @@ fn measures(effect: &ast::Effect) -> bool {
     }
 }
 
-/// Finds an optimal plan with overlapping actions. Among optimal plans it returns one with the
-/// least makespan, if the search proves it. Calls `report` for every improvement.
+/// Searches for an optimal plan with overlapping actions, until a limit is reached. Among optimal plans it
+/// returns one with the least makespan, if the search proves it and no duration is chosen. Calls `report` for
+/// every improvement.
 pub fn optimize_concurrent(
     concurrent: &TemporalTask,
     limits: &Limits,

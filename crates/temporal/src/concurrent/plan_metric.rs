@@ -8,7 +8,6 @@ use crate::concurrent::search::Sequence;
 use crate::concurrent::successors::TemporalState;
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// Error: a plan violates a hard deadline.
 pub(super) struct DeadlineMissed;
 
 impl TemporalTask {

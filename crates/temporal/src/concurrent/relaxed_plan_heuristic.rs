@@ -19,14 +19,11 @@ use crate::concurrent::rule::Proposition;
 use crate::concurrent::successors::TemporalState;
 use crate::concurrent::temporal_relaxation::TemporalRelaxation;
 
-/// Cost of unreachable propositions.
 const UNREACHABLE: u32 = u32::MAX;
-/// Cap on costs.
 const MAX_COST: u32 = 1 << 30;
 /// Cap on the number of applications of one rule.
 const MAX_REPETITIONS: u32 = 1 << 20;
 
-/// Value of the relaxed-plan heuristic.
 #[derive(Debug, Clone)]
 pub(super) struct HeuristicValue {
     /// Weight of the relaxed plan.
@@ -35,10 +32,8 @@ pub(super) struct HeuristicValue {
     pub(super) preferred: Vec<OperatorId>,
 }
 
-/// The relaxed-plan heuristic, with scratch buffers for one evaluation at a time.
 pub(super) struct RelaxedPlanHeuristic<'a> {
     relaxed: &'a TemporalRelaxation,
-    /// Cost of each proposition.
     costs: Vec<u32>,
     /// Cheapest rule that adds each proposition, and its number of applications.
     supporters: Vec<Option<(u32, u32)>>,
@@ -49,7 +44,6 @@ pub(super) struct RelaxedPlanHeuristic<'a> {
     /// Per numeric condition: amount that is missing. `None` if unknown.
     missing: Vec<Option<Int>>,
     open: Queue,
-    /// Propositions that a relaxed plan must reach.
     targets: Vec<Proposition>,
 }
 
@@ -207,7 +201,8 @@ impl<'a> RelaxedPlanHeuristic<'a> {
     }
 }
 
-/// Number of applications that add the missing amount.
+/// Number of applications that add the missing amount, at most [`MAX_REPETITIONS`]; 1 if an amount is
+/// unknown.
 pub(super) fn repetitions(missing: Option<Int>, by: Option<Int>) -> u32 {
     let (Some(missing), Some(by)) = (missing, by) else { return 1 };
     let times = missing.checked_add(by.saturating_sub(1)).and_then(|sum| sum.checked_div(by));

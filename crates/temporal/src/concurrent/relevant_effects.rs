@@ -21,7 +21,6 @@ pub(super) struct RelevanceContext<'k> {
     pub(super) asked: &'k [Polarity],
 }
 
-/// Constant effect on a number.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Change {
     Sets(Int),

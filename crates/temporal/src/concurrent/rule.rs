@@ -9,7 +9,6 @@ use task::task::OperatorId;
 /// two facts.
 pub(super) type Proposition = u32;
 
-/// A rule of the delete relaxation.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Rule {
     /// Conditions of the rule, ascending.
@@ -20,7 +19,6 @@ pub(super) struct Rule {
     pub(super) sets: Vec<Proposition>,
     /// Numeric conditions that the rule increases.
     pub(super) raises: Vec<NumericEffect>,
-    /// Cost of the rule in a relaxed plan.
     pub(super) weight: u32,
     /// Happening that the rule represents. `None` for clauses and derived facts.
     pub(super) origin: Option<OperatorId>,

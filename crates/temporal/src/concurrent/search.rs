@@ -31,7 +31,7 @@ const COMPARED: usize = 4;
 /// A plan as a sequence of happenings.
 #[derive(Debug, Clone)]
 pub(super) struct Sequence {
-    /// Metric in integers, then makespan.
+    /// Metric (scaled to an integer) and makespan (in internal time units).
     pub(super) value: (Int, Int),
     pub(super) happenings: Vec<OperatorId>,
     /// Per happening: whether it takes place at the time of the previous one.
@@ -39,19 +39,18 @@ pub(super) struct Sequence {
 }
 
 impl Sequence {
-    /// Reports an improved plan and the lower bound to the search log.
+    /// Reports this plan as an improvement. `lower` is a lower bound on the metric of plans not found yet.
     pub(super) fn tell(&self, lower: Int, part: PlannerPart, record: &mut Record<'_>) {
         let [value, lower] = [self.value.0, lower].map(Rational::from_integer);
         record.improve(&value, self.happenings.len(), lower, part);
     }
 }
 
-/// Outcome of a search.
 pub(super) enum SearchEnd {
-    /// No open node can be better than the incumbent.
+    /// No further plan can be better than the incumbent.
     Exhausted,
-    /// Stopped at a limit. The value is a lower bound on the metric of plans not found yet, in
-    /// integers.
+    /// Stopped at a limit, or nodes were dropped. The value is a lower bound on the metric of plans not found
+    /// yet, scaled to an integer.
     Stopped(Int),
 }
 
@@ -67,8 +66,8 @@ pub(super) struct Search<'a> {
     store: Store<'a>,
     open: BinaryHeap<Reverse<Priority>>,
     pub(super) incumbent: Option<Sequence>,
-    /// Lower bound on the metric of plans below nodes that were dropped because their numbers
-    /// overflow.
+    /// Lower bound on the metric of plans through nodes that were dropped: numbers overflowed, or a hard
+    /// deadline was violated. `None` if no node was dropped.
     left_out: Option<Int>,
     /// Lower bound on the makespan of every plan.
     floor: Int,
@@ -103,18 +102,16 @@ impl<'a> Search<'a> {
         search
     }
 
-    /// Sets a lower bound on the makespan of every plan.
     pub(super) fn raise_floor(&mut self, makespan: Int) {
         self.floor = self.floor.max(makespan);
     }
 
-    /// Lower bound on the makespan of every plan, as far as it was set.
     pub(super) fn floor(&self) -> Int {
         self.floor
     }
 
-    /// Lower bounds on the metric and the makespan of plans below a node, given bounds that do not
-    /// use the lower bound for all plans.
+    /// Raises lower bounds on the metric and the makespan of plans through a node to the bounds that hold for
+    /// all plans.
     fn at_least(&self, (total, makespan): (Int, Int)) -> (Int, Int) {
         // Costs are not negative.
         let floor = self.concurrent.measure.total(self.floor, 0).unwrap_or(0);
@@ -179,7 +176,6 @@ impl<'a> Search<'a> {
         value.is_none_or(|value| lower < value || lower == value && !is_time())
     }
 
-    /// Returns `true` if no node is open.
     pub(super) fn is_over(&self) -> bool {
         self.open.is_empty()
     }
@@ -201,7 +197,6 @@ impl<'a> Search<'a> {
         self.at_least((bound, 0)).0
     }
 
-    /// Records that nodes below a node with lower bound `lower` were dropped.
     fn leave_out(&mut self, lower: Int) {
         self.left_out = Some(self.left_out.map_or(lower, |bound| bound.min(lower)));
     }
@@ -210,7 +205,8 @@ impl<'a> Search<'a> {
         self.incumbent.as_ref().is_none_or(|incumbent| value < incumbent.value)
     }
 
-    /// Expands a node whose lower bound on the metric is `lower`. Returns the work in nodes.
+    /// Expands a node whose lower bound on the metric is `lower`. Returns the work done: 1 for the node, 1
+    /// for each candidate, and 1 for every [`COMPARED`] comparisons.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "a node is no deeper than twice as many as there are nodes; what is done is counted by 64 bits"
@@ -237,7 +233,8 @@ impl<'a> Search<'a> {
         count + 1 + (self.store.compared - compared) / COMPARED
     }
 
-    /// Adds a node below a node with lower bound `lower`.
+    /// Adds a node, unless it is a dead end, dominated, or no better than the incumbent. If its metric
+    /// overflows, the node is dropped, and the lower bound `lower` of its parent is recorded.
     fn push(&mut self, situation: &TemporalState, origin: Option<Origin>, lower: Int) {
         let TemporalState { state, clocks, cost } = situation;
         self.figures.evaluated = self.figures.evaluated.saturating_add(1);
@@ -265,8 +262,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Plan that leads to a goal node. Returns `None` if its metric overflows or it violates a
-    /// deadline.
+    /// Plan that leads to a goal node. Returns `None` if its metric overflows or it violates a hard deadline.
     fn sequence(&self, goal: u32, situation: &TemporalState) -> Option<Sequence> {
         let value = self.concurrent.value(situation)?;
         let (mut happenings, mut together) = (Vec::new(), Vec::new());

@@ -12,7 +12,6 @@ use crate::concurrent::temporal_task::TemporalTask;
 /// bound that reaches the cost of the incumbent is always reported.
 const REPORT_STEP: Int = 100;
 
-/// Log of one temporal search: reports improvements, and collects statistics.
 pub(super) struct Record<'r> {
     concurrent: &'r TemporalTask,
     report: &'r mut dyn FnMut(Improvement),
@@ -36,7 +35,6 @@ impl<'r> Record<'r> {
         Self { concurrent, report, started, noted: None, cost: None, ceiling: None, statistics }
     }
 
-    /// Records the initial lower bound.
     pub(super) fn begin(&mut self, root: Rational) {
         self.ceiling = (!self.concurrent.is_exact).then(|| root.clone());
         self.report_lower_bound(root);
@@ -81,7 +79,6 @@ impl<'r> Record<'r> {
         lower
     }
 
-    /// Ends the log, and returns the statistics of the search.
     pub(super) fn end(mut self) -> Statistics {
         self.statistics.search = self.started.elapsed();
         self.statistics

@@ -17,7 +17,7 @@ use crate::concurrent::happening::{Happening, Instance, Role};
 use crate::concurrent::relevant_effects::{Change, RelevanceContext, asked, change, needed};
 use crate::concurrent::split::UNDER_WAY;
 
-/// Number of iterations of the analysis: a bound for one instance can improve the bounds of others.
+/// Maximum number of iterations of the analysis: a bound for one instance can improve the bounds of others.
 const FIXPOINT_ROUNDS: usize = 2;
 
 /// Sets `most`, `under_way` and `counts_by_end` of each instance: the bound on useful simultaneous
@@ -355,7 +355,6 @@ impl Index<'_> {
     }
 }
 
-/// Returns `true` if a condition or effect of the operator mentions the variable.
 fn mentions(operator: &Operator, variable: VariableId) -> bool {
     let facts = operator.condition.facts.iter().chain(&operator.effects);
     let conditional = operator.conditional.iter().flat_map(|effect| &effect.effects);
@@ -383,7 +382,6 @@ fn counts_by_end(task: &Task, own: &Instance, under_way: Fact, known: &Relevance
         && assigns_constants(own, end)
 }
 
-/// Returns `true` if `number` holds the duration of the instance.
 fn is_timer(own: &Instance, number: NumericId) -> bool {
     own.timer.is_some_and(|(timer, _)| timer == number)
 }

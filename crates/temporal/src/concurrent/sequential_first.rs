@@ -42,10 +42,8 @@ const STATES: usize = 4;
 /// Upper limit on the number of stored states of the optimal search.
 const MOST_STATES: usize = 1_000_000;
 
-/// Name and arguments of an action.
 type Call = (String, Vec<String>);
 
-/// The ground sequential task, in which actions do not overlap.
 pub(super) struct SequentialTask {
     task: Task,
     /// Operators of the temporal task that start each action.
@@ -84,8 +82,8 @@ impl SequentialTask {
         Some(SearchProblem { context, bounds, prepared, orbits: None })
     }
 
-    /// Translates a sequential plan into happenings of the temporal task at their earliest times.
-    /// Returns `None` if the happenings cannot be executed or the metric overflows.
+    /// Translates a sequential plan into happenings of the temporal task at their earliest times. Returns
+    /// `None` if they cannot be executed, miss the goal, violate a hard deadline, or the metric overflows.
     fn sequence(
         &self,
         concurrent: &TemporalTask,

@@ -1,12 +1,13 @@
 //! The temporal part of a search node: an incrementally propagated simple temporal network \[1\].
 //!
-//! The times of a sequence of happenings and the constraints between them form a simple temporal
-//! network. Later happenings only add lower bounds: a time may not be before an earlier time, or
-//! must keep the separation from it. The network therefore keeps only the latest time of each kind
-//! of access to each atom. Starts of running actions are *time points* that can still be delayed,
-//! together with the happenings that depend on them, so that an end meets its constraints. An end
-//! fixes its time point at the earliest possible time. Happenings that do not interfere are not
-//! ordered by their position in the sequence \[2\].
+//! The times of a sequence of happenings and the constraints between them form a simple temporal network. A
+//! later happening adds lower bounds: it takes place at or after an earlier time, or at least the separation
+//! after it. The network therefore keeps only the latest time of each kind of access to each atom. Upper
+//! bounds come only from timed initial literals, which earlier happenings must not follow. Happenings that
+//! must be simultaneous share a *time point*. Starts of running actions are time points that can still be
+//! delayed, together with the happenings that depend on them, so that an end meets its constraints. An end
+//! fixes its time point at the earliest possible time. Happenings that do not interfere are not ordered by
+//! their position in the sequence \[2\].
 //!
 //! Times are sums over the happenings of a sequence: fewer than 2^32 terms, each below 2^91 (a
 //! duration plus the separation). Missing upper bounds (`Int::MAX`) take no part in arithmetic.
@@ -65,7 +66,6 @@ pub(super) struct SimpleTemporalNetwork {
     floor: Int,
 }
 
-/// Kind of a happening: start, end, or whole action.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     Start,
@@ -73,7 +73,6 @@ pub(super) enum Kind {
     Whole,
 }
 
-/// Temporal constraints and accesses of a happening.
 pub(super) struct Happening<'h> {
     pub(super) kind: Kind,
     pub(super) instance: u32,
@@ -87,19 +86,15 @@ pub(super) struct Happening<'h> {
     /// Returns `true` if the happening writes an atom or number in a condition over all that
     /// several happenings can maintain jointly. The argument is the instance with this condition.
     pub(super) touches: &'h dyn Fn(u32) -> bool,
-    /// Variables whose value changes.
     pub(super) changes: &'h [u32],
     /// Whether every condition over all of a running action holds after the happening.
     pub(super) settled: bool,
 }
 
-/// Temporal constraints and accesses of timed initial literals.
 pub(super) struct Event<'h> {
     pub(super) time: Int,
-    /// Access kinds that the literals must follow, each with the required distance.
     pub(super) after: &'h [(Key, Int)],
     pub(super) marks: &'h [Key],
-    /// Variables whose value changes.
     pub(super) changes: &'h [u32],
     /// Whether every condition over all of a running action holds after the literals.
     pub(super) settled: bool,
@@ -116,12 +111,10 @@ impl SimpleTemporalNetwork {
         self.group.is_some()
     }
 
-    /// Number of simultaneous runs of an instance.
     pub(super) fn runs(&self, instance: u32) -> u32 {
         dense(self.opens.iter().filter(|open| open.instance == instance).count())
     }
 
-    /// Time of the last timed initial literals that were applied; negative before the first ones.
     pub(super) fn floor(&self) -> Int {
         self.floor
     }
@@ -145,7 +138,6 @@ impl SimpleTemporalNetwork {
         self.latest.lags.is_empty() && self.latest() <= time
     }
 
-    /// Network without happenings: the initial network.
     pub(super) fn new() -> Self {
         Self {
             entries: Vec::new(),
@@ -278,14 +270,12 @@ impl SimpleTemporalNetwork {
         self.opens.insert(position, RunningAction { instance, float, offset, duration, last: None });
     }
 
-    /// Time expression for the time `offset` after a time point.
     fn at(&self, float: TimePoint, offset: Int) -> TimeExpression {
         let mut time = self.floats[place(float)].lower.shifted(offset);
         time.put_off_after(float, offset);
         time
     }
 
-    /// Records the accesses and changes of a happening that takes place at `time`.
     fn note(&mut self, happening: &Happening<'_>, time: &TimeExpression) {
         for key in happening.marks {
             match self.entries.binary_search_by_key(key, |(candidate, _)| *candidate) {

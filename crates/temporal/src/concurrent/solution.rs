@@ -15,7 +15,6 @@ use crate::concurrent::search::Sequence;
 use crate::concurrent::search_log::Record;
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// Solution without a plan, with the given status and proof and the statistics of the run.
 pub(super) fn ended(status: Status, proof: Option<Proof>, record: Record<'_>) -> Solution {
     Solution {
         status,

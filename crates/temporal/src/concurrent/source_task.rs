@@ -9,7 +9,6 @@ use task::ground::GroundConfig;
 /// Upper limit on the number of initial facts and values of a kept problem.
 const MAX_INITIAL_FACTS: usize = 20_000;
 
-/// PDDL domain, problem and grounding options of a temporal task.
 #[derive(Debug, Clone)]
 pub(super) struct SourceTask(Arc<(Domain, Problem, GroundConfig)>);
 

@@ -42,7 +42,6 @@ pub(super) enum Half {
 /// parentheses, so no clash is possible.
 pub(super) const UNDER_WAY: &str = "((running) ";
 
-/// Origin of a schema of the split task: a schema of the domain and its part.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Origin {
     /// Index of the schema of the domain; `usize::MAX` for timed initial literals.
@@ -68,7 +67,8 @@ pub(super) struct Split {
     /// Per schema of the domain: static divisor of its duration. The duration is the number that
     /// holds it, divided by this value.
     pub(super) divisors: Vec<Option<Expression>>,
-    /// Whether no duration was fixed although another duration could be better.
+    /// Whether the split task keeps every optimal plan. `false` if a duration was fixed although the planner
+    /// could choose it, or if durations are chosen and a condition contains a strict comparison.
     pub(super) is_exact: bool,
 }
 
@@ -129,7 +129,6 @@ fn literal(predicate: PredicateId, terms: &[Term]) -> Formula {
     Formula::Literal { positive: true, predicate, terms: terms.to_vec() }
 }
 
-/// Splits a schema into its happenings and auxiliary operators.
 fn parts(lifted: &mut Lifted, schema: &Schema, timer: Option<&Timer>) -> Vec<(Half, Schema)> {
     let instantaneous = |condition: Vec<Formula>, effects: Vec<Effect>| Schema {
         start_condition: Formula::And(condition),
@@ -196,7 +195,6 @@ fn parts(lifted: &mut Lifted, schema: &Schema, timer: Option<&Timer>) -> Vec<(Ha
     happenings
 }
 
-/// Static conjuncts of the conditions.
 fn settled_of(lifted: &Lifted, conditions: &[Formula]) -> Vec<Formula> {
     let conjuncts_of_all = conditions.iter().flat_map(conjuncts);
     conjuncts_of_all.filter(|conjunct| is_static(lifted, conjunct)).cloned().collect()

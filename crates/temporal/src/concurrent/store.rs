@@ -52,14 +52,12 @@ struct Place {
     front: Vec<u32>,
 }
 
-/// Packs temporal states into compact form and unpacks them.
 pub(super) struct Packing<'a> {
     concurrent: &'a TemporalTask,
     fields: Vec<Field>,
     width: usize,
 }
 
-/// A temporal state in packed form: values, numbers, temporal network and cost.
 pub(super) struct PackedNode {
     values: Box<[u32]>,
     numbers: Box<[Int]>,
@@ -68,14 +66,12 @@ pub(super) struct PackedNode {
 }
 
 impl PackedNode {
-    /// Approximate heap use in bytes.
     pub(super) fn bytes(&self) -> usize {
         let values = size_of_val(&*self.values).saturating_add(size_of_val(&*self.numbers));
         values.saturating_add(self.clocks.len())
     }
 }
 
-/// Registry of packed temporal states, with detection of dominated states.
 pub(super) struct Store<'a> {
     concurrent: &'a TemporalTask,
     packing: Packing<'a>,
@@ -163,7 +159,6 @@ impl<'a> Store<'a> {
         }
     }
 
-    /// Approximate memory use in bytes.
     pub(super) fn bytes(&self) -> usize {
         self.bytes
     }

@@ -25,19 +25,18 @@ pub(super) struct TemporalState {
     pub(super) cost: Int,
 }
 
-/// Reason why a happening has no successor state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum DeadEnd {
-    /// The happening is not applicable, or its temporal constraints are inconsistent.
+    /// The happening is not applicable or certainly useless, or its temporal constraints are inconsistent.
     Impossible,
     /// Timed initial literals must take place before the happening.
     TooLate,
-    /// Numbers overflow, or an instance has too many simultaneous runs or simultaneous runs of
-    /// different durations. Discarding such a successor makes the search incomplete.
+    /// Numbers overflow, a duration is shorter than the separation, or an instance has too many simultaneous
+    /// runs or simultaneous runs of different durations. Discarding such a successor makes the search
+    /// incomplete.
     Unfit,
 }
 
-/// Successor function of the temporal state space: applicable happenings and resulting states.
 pub(super) struct Expansion<'a> {
     concurrent: &'a TemporalTask,
     index: SuccessorGenerator,
@@ -52,7 +51,6 @@ impl<'a> Expansion<'a> {
         Self { concurrent, index: SuccessorGenerator::over(&concurrent.task, operators) }
     }
 
-    /// Initial temporal state.
     pub(super) fn root(&self) -> TemporalState {
         TemporalState {
             state: self.concurrent.task.initial.clone(),
@@ -136,7 +134,6 @@ impl<'a> Expansion<'a> {
         (is_first && instance.compressible && !started.clocks.unsettled()).then_some(instance.end)
     }
 
-    /// Returns the successor of a state by one happening.
     pub(super) fn step(
         &self,
         situation: &TemporalState,

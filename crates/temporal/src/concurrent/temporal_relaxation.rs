@@ -44,12 +44,10 @@ pub(super) struct TemporalRelaxation {
     /// Numeric conditions that each rule makes easier to satisfy, with the amounts by which their
     /// linear expressions grow. An amount is `None` if it depends on the state.
     pub(super) raises: Vec<Box<[NumericEffect]>>,
-    /// Weight of each rule in a relaxed plan.
     pub(super) weights: Vec<u32>,
     /// Operator (start, end or instantaneous action) of each rule. `None` for the rules of clauses
     /// and derived facts.
     pub(super) origins: Vec<Option<OperatorId>>,
-    /// Rules that have each proposition as a condition.
     pub(super) needing: Lists,
     pub(super) numeric: Vec<Numeric>,
     /// Propositions that the goal requires, ascending.

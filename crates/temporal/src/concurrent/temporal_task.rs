@@ -60,7 +60,6 @@ pub struct TemporalTask {
     pub(super) kept: Option<SourceTask>,
 }
 
-/// Builds the temporal task from a ground split task.
 pub(super) fn compile(
     mut task: Task,
     split: &Split,
@@ -226,7 +225,6 @@ impl TemporalTask {
         }
     }
 
-    /// Returns `true` if the condition over all of an instance holds in `state` or is absent.
     pub(super) fn holds_over_all(&self, instance: u32, state: &State) -> bool {
         let condition = self.instances[instance as usize].over_all;
         let condition = condition.map(|id| &self.task.operators[id.index()].condition);
@@ -254,7 +252,6 @@ impl TemporalTask {
     }
 }
 
-/// Operators that detect violations, grouped by preference.
 fn violations(task: &Task) -> Vec<Vec<OperatorId>> {
     let mut violations: BTreeMap<u32, Vec<OperatorId>> = BTreeMap::new();
     for (operator, id) in task.operators.iter().zip((0..).map(OperatorId)) {

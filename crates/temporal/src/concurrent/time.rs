@@ -7,7 +7,6 @@ use task::number::Int;
 /// Index of a time point of the network: the start of a running action, which can still be delayed.
 pub(super) type TimePoint = u32;
 
-/// Position of a time point in a vector.
 pub(super) fn place(float: TimePoint) -> usize {
     float as usize
 }
@@ -33,12 +32,10 @@ impl TimeExpression {
         Self { base, lags: SmallVec::new() }
     }
 
-    /// Lag after a time point. Returns `None` if the expression does not depend on it.
     pub(super) fn lag(&self, float: TimePoint) -> Option<Int> {
         self.lags.iter().find(|(point, _)| *point == float).map(|(_, lag)| *lag)
     }
 
-    /// Expression shifted by `by`, which may be negative.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     pub(super) fn shifted(&self, by: Int) -> Self {
         Self { base: self.base + by, lags: self.lags.iter().map(|(float, lag)| (*float, lag + by)).collect() }
@@ -61,8 +58,6 @@ impl TimeExpression {
         }
     }
 
-    /// Removes a time point from the expression. Returns the lag after it, or `None` if the
-    /// expression did not contain it.
     pub(super) fn forget(&mut self, float: TimePoint) -> Option<Int> {
         let position = self.lags.iter().position(|(point, _)| *point == float)?;
         Some(self.lags.remove(position).1)

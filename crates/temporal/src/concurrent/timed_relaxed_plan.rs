@@ -29,30 +29,25 @@ use crate::concurrent::temporal_task::TemporalTask;
 /// A time of the relaxation. Times only guide the search, so larger ones saturate.
 type Time = i64;
 
-/// Time of propositions and actions that are not reached.
 const NEVER: Time = Time::MAX;
 /// Upper limit on the number of repetitions of one action in a relaxed plan.
 const MAX_REPETITIONS: u32 = 8;
 
-/// A relaxed plan with times.
 #[derive(Debug, Clone)]
 pub(super) struct TimedRelaxedPlan {
     /// Time at which the last target holds.
     pub(super) finish: i64,
-    /// Starts, actions without duration, and timed initial literals, by their latest time.
+    /// Starts, actions without duration, and timed initial literals, sorted by their latest time. A happening
+    /// occurs once for each of its repetitions.
     pub(super) happenings: Vec<OperatorId>,
 }
 
-/// Temporal properties of a rule.
 #[derive(Debug, Clone, Copy)]
 enum Timing {
     /// Holds as soon as its conditions do.
     Immediate,
-    /// Starts an instance.
     Start(u32),
-    /// Ends an instance.
     End(u32),
-    /// Timed initial literals at this time.
     At(Time),
 }
 
@@ -63,7 +58,6 @@ enum Duration {
     Assigned(Linear<Int>, Int),
 }
 
-/// Computes timed relaxed plans, with scratch buffers for one state at a time.
 pub(super) struct TimedRelaxation<'a> {
     concurrent: &'a TemporalTask,
     relaxed: &'a TemporalRelaxation,
@@ -94,7 +88,6 @@ fn time(time: Int) -> Time {
     Time::try_from(time).unwrap_or(NEVER / 4)
 }
 
-/// Value that the start of an instance assigns to a number.
 fn assigned(concurrent: &TemporalTask, start: OperatorId, number: NumericId) -> Option<Linear<Int>> {
     let effects = &concurrent.task.operators[start.index()].numeric_effects;
     effects.iter().find(|effect| effect.variable == number).map(|effect| effect.value.clone())

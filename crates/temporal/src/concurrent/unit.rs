@@ -50,7 +50,6 @@ impl Unit {
         common.map(Self).ok_or_else(|| Error::overflow("durations and times"))
     }
 
-    /// Converts a time in PDDL time units to internal units.
     pub(super) fn of(self, time: &Rational) -> Result<Int, Error> {
         let units = (time.clone() * &Rational::from_integer(self.0)).to_int();
         units.filter(|units| (-LIMIT..LIMIT).contains(units)).ok_or_else(|| Error::overflow("a time"))
@@ -65,7 +64,6 @@ impl Unit {
         (by / divisor.clone()).to_int().ok_or_else(|| Error::overflow("a duration"))
     }
 
-    /// Constant duration of an operator in internal time units.
     pub(super) fn duration(self, task: &Task, operator: OperatorId) -> Result<Int, Error> {
         let factor = self.0.checked_div(task.time_scale);
         let task_duration = task.operators[operator.index()].duration.constant;

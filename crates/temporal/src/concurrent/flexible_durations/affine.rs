@@ -7,7 +7,6 @@ use task::number::Rational;
 /// Column of a linear program: a variable that must be at least 0.
 pub(super) type Column = u32;
 
-/// An affine expression: a constant plus multiples of columns.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 pub(super) struct Affine {
     pub(super) constant: Rational,
@@ -29,7 +28,6 @@ impl Affine {
         self.terms.is_empty().then_some(&self.constant)
     }
 
-    /// Factor of a column. Returns `None` if the column does not occur.
     pub(super) fn coefficient(&self, column: Column) -> Option<&Rational> {
         let position = self.terms.binary_search_by_key(&column, |(candidate, _)| *candidate).ok()?;
         Some(&self.terms[position].1)
@@ -75,7 +73,6 @@ impl Affine {
         Self::default().plus(self, factor)
     }
 
-    /// Replaces a column by the expression `by`.
     pub(super) fn substitute(&mut self, column: Column, by: &Self) {
         if let Ok(position) = self.terms.binary_search_by_key(&column, |(candidate, _)| *candidate) {
             let (_, factor) = self.terms.remove(position);
@@ -83,7 +80,6 @@ impl Affine {
         }
     }
 
-    /// Approximate memory use in bytes.
     pub(super) fn bytes(&self) -> usize {
         self.terms.len().saturating_mul(size_of::<(Column, Rational)>()).saturating_add(size_of::<Self>())
     }

@@ -12,7 +12,6 @@ use crate::concurrent::flexible_durations::partial_plan_lp::{Course, MAKESPAN, d
 use crate::concurrent::happening::Role;
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// A plan and its metric.
 #[derive(Debug, Clone)]
 pub(super) struct Answer {
     /// Metric value in the integer scale of [`crate::concurrent::measure::Measure`].

@@ -33,12 +33,10 @@ impl Program {
         Self { rows: Vec::new(), objective, slacks: FIRST_SLACK_COLUMN }
     }
 
-    /// Minimum of the current objective.
     pub(super) fn least(&self) -> &Rational {
         &self.objective.constant
     }
 
-    /// Approximate memory use in bytes.
     pub(super) fn bytes(&self) -> usize {
         self.rows.iter().fold(self.objective.bytes(), |sum, (_, row)| sum.saturating_add(row.bytes()))
     }

@@ -45,7 +45,6 @@ impl<'a> Traces<'a> {
         first
     }
 
-    /// Returns `true` if the order of two happenings may matter.
     fn depend(&mut self, first: OperatorId, second: OperatorId) -> bool {
         let pair = (first.min(second), first.max(second));
         let concurrent = self.concurrent;

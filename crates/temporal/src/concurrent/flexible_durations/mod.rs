@@ -85,8 +85,8 @@ pub(super) fn is_exact(concurrent: &TemporalTask) -> bool {
             .all(|instance| instance.joint.is_empty() && is_decided(instance) && takes_time(instance))
 }
 
-/// Finds a plan with the least metric and, among these plans, the least makespan and then the
-/// shortest durations.
+/// Searches for a plan with the least metric, until a limit is reached. Among the plans with the same
+/// sequence of happenings, it has the least makespan and then the shortest durations.
 pub(super) fn optimize(concurrent: &TemporalTask, limits: &Limits, mut record: Record<'_>) -> Solution {
     let span = info_span!("optimize", operators = concurrent.task.operators.len());
     let (is_over, lower, best) = span.in_scope(|| take_turns_choosing(concurrent, limits, &mut record));

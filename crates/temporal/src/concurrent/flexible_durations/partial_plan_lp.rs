@@ -22,7 +22,6 @@ use crate::concurrent::happening::{Instance, Role};
 use crate::concurrent::simple_temporal_network::Key;
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// Column of the makespan.
 pub(super) const MAKESPAN: Column = 0;
 
 /// Column of the time of the happening at a position in the sequence. Ends and timed initial
@@ -38,11 +37,9 @@ pub(super) fn duration_of(position: usize) -> Column {
     2 * dense(position) + 3
 }
 
-/// A running action of a partial plan.
 #[derive(Debug, Clone)]
 pub(super) struct RunningAction {
     pub(super) instance: u32,
-    /// Time of the end of the action.
     end: Affine,
     /// Value of the number that holds the duration of this run, if the instance has such a number.
     /// Other runs of the instance may have other values.
@@ -90,7 +87,6 @@ fn rational(number: Int) -> Rational {
 }
 
 impl Course {
-    /// Empty partial plan, in the initial state.
     pub(super) fn new(concurrent: &TemporalTask) -> Self {
         let State { values, numbers } = concurrent.task.initial.clone();
         Self {
@@ -105,7 +101,6 @@ impl Course {
         }
     }
 
-    /// Approximate memory use in bytes.
     pub(super) fn bytes(&self) -> usize {
         let numbers = self.numbers.iter().map(Affine::bytes);
         // The table of traces stores about the same amount for each happening again.
@@ -128,7 +123,6 @@ impl Course {
         self.opens.iter().map(|open| open.instance)
     }
 
-    /// Number of simultaneous runs of an instance.
     fn runs(&self, instance: u32) -> usize {
         self.instances().filter(|open| *open == instance).count()
     }
@@ -363,7 +357,6 @@ impl Course {
         Some(())
     }
 
-    /// Duration of an instance that starts at a position.
     fn duration(&self, concurrent: &TemporalTask, instance: u32, position: usize) -> Affine {
         let action = &concurrent.instances[instance as usize];
         match action.timer {

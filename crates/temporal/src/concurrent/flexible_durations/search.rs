@@ -35,14 +35,12 @@ const BOOST: i64 = 1_000;
 /// parent node, and the happening with the index of the run that it ends.
 type QueueEntry = Reverse<(u64, Rational, Reverse<u32>, u32, u32, (OperatorId, u32))>;
 
-/// Outcome of one call of [`Search::run`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Outcome {
-    /// Found a plan that is better than the incumbent.
     Found,
     /// The open list is empty: all sequences were expanded.
     Exhausted,
-    /// Stopped at a limit of time, memory or work.
+    /// Stopped by an interrupt, or at a limit of time, memory or work.
     Stopped,
 }
 
@@ -57,7 +55,6 @@ pub(super) struct Search<'a> {
     expansion: &'a Expansion<'a>,
     kind: Kind<'a>,
     nodes: Vec<Course>,
-    /// Queue of all happenings, and queue of preferred happenings.
     queues: [BinaryHeap<QueueEntry>; 2],
     priorities: [i64; 2],
     order: u32,
@@ -79,7 +76,6 @@ impl<'a> Search<'a> {
         Self::new(concurrent, expansion, kind)
     }
 
-    /// Exhaustive search over all Mazurkiewicz traces.
     pub(super) fn exhaustive(concurrent: &'a TemporalTask, expansion: &'a Expansion<'a>) -> Self {
         let kind = Kind::Exhaustive { traces: Traces::new(concurrent), seen: FxHashSet::default() };
         Self::new(concurrent, expansion, kind)
@@ -140,8 +136,9 @@ impl<'a> Search<'a> {
         Outcome::Stopped
     }
 
-    /// Evaluates a sequence and queues its successors. Returns `Found` if the sequence is a plan
-    /// that is better than the incumbent `best`, which is then replaced.
+    /// Evaluates a sequence and queues its successors, unless it is a duplicate, a dead end or no better than
+    /// the incumbent `best`. Returns `Found` if the sequence is a plan that is better than `best`, which is
+    /// then replaced.
     fn take_up(&mut self, course: Course, best: &mut Option<Answer>) -> Option<Outcome> {
         self.figures.evaluated = self.figures.evaluated.saturating_add(1);
         let least = course.least(self.concurrent);
@@ -182,14 +179,14 @@ impl<'a> Search<'a> {
         outcome
     }
 
-    /// Records the metric of a plan before its durations were rounded.
     fn note_reached(&mut self, least: &Rational) {
         if self.reached.as_ref().is_none_or(|reached| least < reached) {
             self.reached = Some(least.clone());
         }
     }
 
-    /// Heuristic value of a sequence. Returns `None` if the sequence is a duplicate or a dead end.
+    /// Heuristic value of a sequence (0 in the exhaustive search). Returns `None` if the sequence is a
+    /// duplicate or a dead end.
     fn judge(&mut self, course: &Course, least: &Rational) -> Option<HeuristicValue> {
         match &mut self.kind {
             Kind::Exhaustive { traces, seen } => {

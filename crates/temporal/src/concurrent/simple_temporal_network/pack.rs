@@ -7,11 +7,9 @@ use task::number::{Int, dense};
 use crate::concurrent::simple_temporal_network::{RunningAction, SimpleTemporalNetwork, Start};
 use crate::concurrent::time::TimeExpression;
 
-/// Writes numbers in variable-length encoding.
 #[derive(Default)]
 struct Writer(Vec<u8>);
 
-/// Reads numbers in the order in which [`Writer`] wrote them.
 struct Reader<'a>(std::slice::Iter<'a, u8>);
 
 impl Writer {
@@ -146,15 +144,12 @@ impl SimpleTemporalNetwork {
     }
 }
 
-/// A packed simple temporal network. At first only its head is unpacked: all parts except the times
-/// of accesses and changes.
 pub(in crate::concurrent) struct PackedStn<'a> {
     pub(in crate::concurrent) clocks: SimpleTemporalNetwork,
     rest: Reader<'a>,
 }
 
 impl PackedStn<'_> {
-    /// Unpacks the times of accesses and changes.
     pub(in crate::concurrent) fn finish(&mut self) {
         let reader = &mut self.rest;
         let mut times = || reader.list(|times| (times.index(), times.time()));
