@@ -30,3 +30,24 @@ pub(crate) fn components(successors: &[Vec<usize>]) -> Vec<usize> {
     }
     numbers
 }
+
+#[cfg(test)]
+mod tests {
+    use super::components;
+
+    #[test]
+    fn edges_lead_to_the_same_or_a_later_component() {
+        assert_eq!(components(&[vec![1], vec![0, 2], vec![], vec![2]])[2], 2);
+        let components = components(&[vec![1], vec![2], vec![1, 3], vec![]]);
+        assert_eq!(components, [0, 1, 1, 2]);
+    }
+
+    #[test]
+    fn long_chains_do_not_overflow_the_stack() {
+        let successors: Vec<Vec<usize>> = (1..=100_000).map(|next| vec![next]).chain([vec![]]).collect();
+        let thread = std::thread::Builder::new().stack_size(256 * 1024);
+        let numbers =
+            thread.spawn(move || components(&successors)).expect("a thread").join().expect("no panic");
+        assert!(numbers.iter().copied().eq(0..=100_000));
+    }
+}

@@ -107,7 +107,8 @@ impl Naming {
             Some((file, Some(place))) => {
                 Message::warning_at(code, file, *place, format!("`[bindings.names]`: {text}"))
             }
-            _ => Message::warning(code, format!("`--name {}={}`: {text}", self.individual, self.object)),
+            Some((file, None)) => Message::warning(code, format!("`[bindings.names]` of {file}: {text}")),
+            None => Message::warning(code, format!("`--name {}={}`: {text}", self.individual, self.object)),
         }
     }
 }

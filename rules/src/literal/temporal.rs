@@ -99,7 +99,7 @@ impl Moment {
         let date = (1..=date).rev().find(fits)?;
         let shift = days_from_civil(year, month, date) - day;
         let seconds = add(&add_seconds(&local, shift.checked_mul(DAY)?), &duration.seconds);
-        let (day, _) = split_day(&seconds);
+        let (day, _) = split_seconds(&seconds)?;
         let seconds = match self.kind {
             MomentKind::DateTime => seconds,
             MomentKind::Date => Decimal::from(day * DAY),
@@ -222,7 +222,7 @@ impl Duration {
         let (hours, time) = take_field(time.unwrap_or(""), 'H')?;
         let (minutes, time) = take_field(time, 'M')?;
         let seconds = match time.strip_suffix('S') {
-            Some(text) if text.starts_with(|c: char| c.is_ascii_digit()) => Decimal::parse(text)?,
+            Some(text) if is_plain_decimal(text) => Decimal::parse(text)?,
             _ if time.is_empty() => Decimal::from(0),
             _ => return None,
         };
@@ -378,6 +378,13 @@ pub(super) fn split_zone(lexical: &str) -> Option<(&str, Option<i64>)> {
     (seconds <= ZONE_LIMIT).then_some((body, Some(sign * seconds)))
 }
 
+/// Returns `true` for digits, optionally with a point and more digits.
+fn is_plain_decimal(text: &str) -> bool {
+    let (whole, fraction) = text.split_once('.').unwrap_or((text, "0"));
+    let is_number = |part: &str| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit());
+    is_number(whole) && is_number(fraction)
+}
+
 fn number(text: &str, width: usize) -> Option<i64> {
     (text.len() == width && text.bytes().all(|b| b.is_ascii_digit())).then(|| text.parse().ok())?
 }
@@ -433,6 +440,11 @@ fn civil_from_days(days: i64) -> (i64, i64, i64) {
 /// Splits a number of seconds into whole days (rounded down) and the remaining clock time
 /// `hh:mm:ss.fff`.
 fn split_day(seconds: &Decimal) -> (i64, String) {
+    split_seconds(seconds).unwrap_or_default()
+}
+
+/// Splits seconds like [`split_day`]. Returns `None` if the whole seconds exceed `i64`, which no moment has.
+fn split_seconds(seconds: &Decimal) -> Option<(i64, String)> {
     let (unscaled, scale) = seconds.parts();
     let unit = ten_to(scale);
     let (mut whole, mut fraction) = (&unscaled / &unit, &unscaled % &unit);
@@ -440,7 +452,7 @@ fn split_day(seconds: &Decimal) -> (i64, String) {
         whole -= 1;
         fraction += &unit;
     }
-    let whole = i64::try_from(whole).unwrap_or(0);
+    let whole = i64::try_from(whole).ok()?;
     let clock = whole.rem_euclid(DAY);
     let tail = if scale == 0 {
         String::new()
@@ -448,5 +460,5 @@ fn split_day(seconds: &Decimal) -> (i64, String) {
         format!(".{:0>width$}", fraction.to_string(), width = scale as usize)
     };
     let text = format!("{:02}:{:02}:{:02}{tail}", clock / 3600, clock / 60 % 60, clock % 60);
-    (whole.div_euclid(DAY), text)
+    Some((whole.div_euclid(DAY), text))
 }

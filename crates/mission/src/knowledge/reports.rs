@@ -119,7 +119,7 @@ impl Knowledge {
 
     /// Sets the limit of inference steps per update; see [`rules::Limits`].
     pub fn limit(&mut self, steps: u64) {
-        let limits = Limits { steps, ..self.sources.limits.clone() };
+        let limits = Limits { steps, ..self.runtime.engine().limits().clone() };
         self.runtime.engine_mut().set_limits(limits);
     }
 }

@@ -24,7 +24,7 @@ pub(super) struct Layout {
     /// Predicates that state availability. Each has one parameter.
     assumed: Vec<Name>,
     objects: FxHashMap<String, ObjectId>,
-    /// Objects, goal and metric of the problem as text. All supported problems have this text.
+    /// Objects, goal, constraints and metric of the problem as text. All supported problems have this text.
     frame: String,
     /// Variable and value of each fact, and whether the fact is reachable in the relaxation.
     facts: FxHashMap<String, (Fact, bool)>,
@@ -232,7 +232,7 @@ struct Reading {
     fixed_values: Vec<bool>,
 }
 
-/// Returns the objects, the goal and the metric of a problem as text.
+/// Returns the objects, the goal, the constraints and the metric of a problem as text.
 fn frame(problem: &Problem) -> String {
     use std::fmt::Write as _;
     let mut text = String::new();
@@ -246,7 +246,7 @@ fn frame(problem: &Problem) -> String {
     }
     // The text includes source positions. A problem with other positions is therefore not supported, which
     // costs time but is correct.
-    let _ = write!(text, "{:?} {:?}", problem.goal, problem.metric);
+    let _ = write!(text, "{:?} {:?} {:?}", problem.goal, problem.constraints, problem.metric);
     text
 }
 

@@ -38,3 +38,24 @@ pub fn components(axioms: &[GroundAxiom]) -> Vec<Vec<AtomId>> {
     };
     kosaraju_scc(&graph).into_iter().map(sorted).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{GroundAxiom, components};
+    use crate::ground::vocabulary::atom::AtomId;
+    use crate::ground::vocabulary::condition::GroundCondition;
+
+    #[test]
+    fn long_chains_do_not_overflow_the_stack() {
+        let axiom = |number: u32| GroundAxiom {
+            head: AtomId(number + 1),
+            body: GroundCondition { literals: vec![(AtomId(number), true)], ..GroundCondition::default() },
+        };
+        let axioms: Vec<GroundAxiom> = (0..100_000).map(axiom).collect();
+        let thread = std::thread::Builder::new().stack_size(256 * 1024);
+        let components =
+            thread.spawn(move || components(&axioms)).expect("a thread").join().expect("no panic");
+        let expected: Vec<Vec<AtomId>> = (1..=100_000).map(|number| vec![AtomId(number)]).collect();
+        assert_eq!(components, expected);
+    }
+}
