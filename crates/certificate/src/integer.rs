@@ -179,7 +179,6 @@ impl Ord for Integer {
     }
 }
 
-/// Formats the integer in decimal.
 impl std::fmt::Display for Integer {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match &self.0 {

@@ -241,7 +241,6 @@ impl Writer<'_> {
     }
 }
 
-/// Encodes a condition, given the terms of its comparisons.
 fn condition_with(condition: &Condition, comparisons: impl Iterator<Item = String>) -> String {
     let facts = condition.facts.iter().copied().map(fact);
     let clauses = condition.clauses.iter().map(|clause| any(clause.iter().map(literal)));

@@ -39,7 +39,6 @@ impl<'t> Table<'t> {
         self.at_row(self.row(values))
     }
 
-    /// Returns the row of a combination of values of the pattern's variables.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "a row is below the size of its table, see `references`"
@@ -48,13 +47,11 @@ impl<'t> Table<'t> {
         self.sizes.iter().zip(values).fold(0, |row, (size, value)| row * size + *value as usize)
     }
 
-    /// Returns the row of a state, which depends on the values of the pattern's variables.
     pub(super) fn row_of(&self, state: &State) -> usize {
         let values: Vec<u32> = self.pattern.iter().map(|variable| state.values[*variable as usize]).collect();
         self.row(&values)
     }
 
-    /// Returns the number of rows, i.e. of combinations of values.
     pub(super) fn rows(&self) -> usize {
         self.values.len()
     }

@@ -19,7 +19,8 @@ const LITERAL_LIMIT: usize = 1 << 26;
 /// number of clauses of the proof.
 ///
 /// # Errors
-/// The first line that is malformed or does not follow, or a missing empty clause.
+/// Reports the first line that cannot be read, is malformed, or does not follow. Also fails if the empty
+/// clause is missing, or if there are more than [`LITERAL_LIMIT`] literals.
 pub(super) fn check<'c>(
     clauses: impl Iterator<Item = &'c [Literal]>,
     variables: usize,
@@ -81,8 +82,6 @@ impl Checker {
         self.settled.push(literal);
     }
 
-    /// Returns `true` if the clauses named by `hints` derive a contradiction from the negation of
-    /// `clause`.
     fn follows(&mut self, clause: &[Literal], hints: &[usize]) -> bool {
         for literal in clause {
             self.settle(-*literal);
@@ -116,7 +115,6 @@ mod tests {
     use crate::clausal::lines;
     use crate::clausal::literal::Literal;
 
-    /// A deterministic pseudo-random number generator.
     struct Random(u64);
 
     impl Random {

@@ -26,7 +26,6 @@ pub(super) struct Sums {
     numbers: Vec<Bits>,
 }
 
-/// The effect of an operator on a numeric variable.
 enum Change<'c> {
     Add(&'c Quantity),
     Assign(&'c Quantity),
@@ -43,7 +42,6 @@ fn change(operator: &Operator, number: u32) -> Result<Option<Change<'_>>, String
     }
 }
 
-/// Iterates over the numeric comparisons in the conditions of all operators and in the goal.
 fn comparisons(model: &Model) -> impl Iterator<Item = &Linear> {
     let conditions = model.operators.iter().map(|operator| &operator.condition).chain([&model.goal]);
     conditions.flat_map(|condition| &condition.comparisons)
@@ -106,7 +104,6 @@ impl Sums {
         Ok(sums)
     }
 
-    /// Returns the number of bits of the widest number.
     pub(super) fn widest(&self) -> usize {
         self.numbers.iter().chain([&self.spent]).map(Vec::len).max().unwrap_or(0)
     }

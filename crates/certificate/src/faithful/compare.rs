@@ -34,7 +34,6 @@ pub(super) struct Comparison<'c> {
     pub(super) task: &'c Translation<'c>,
     objects: FxHashMap<String, u32>,
     operators: Calls,
-    /// The positions of the operators that wait for the next event.
     waits: Vec<usize>,
     /// For each action, the sets of parameters that are slots in an operator (`true` for a slot).
     masks: FxHashMap<String, BTreeSet<Vec<bool>>>,

@@ -13,7 +13,6 @@ use crate::model::Operator;
 /// Upper limit on the number of case splits for one variable.
 const SPLIT_LIMIT: usize = 1_024;
 
-/// An operator with a choice of designs for its slots.
 #[derive(Clone, Copy)]
 pub(super) struct Made<'m> {
     pub(super) operator: &'m Operator,
@@ -90,7 +89,6 @@ struct Variable<'v> {
     conditional: Vec<(Formula, u32)>,
 }
 
-/// The result of comparing the effects on a variable under partial knowledge.
 enum Outcome<'o> {
     Same,
     Other,

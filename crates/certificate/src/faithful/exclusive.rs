@@ -89,8 +89,6 @@ pub(super) struct Move {
 }
 
 impl Move {
-    /// Computes the effect of a case (outcome of an action instance under a condition) on mutex
-    /// groups, given the atoms that the case may add.
     pub(super) fn new(structure: &Structure, case: &Case, adds: BTreeSet<Key>) -> Self {
         let at_end = case
             .effects

@@ -47,7 +47,6 @@ impl Linear {
         Self { factors: BTreeMap::from([(key, BigRational::one())]), constant: BigRational::zero() }
     }
 
-    /// Returns `self + factor * other`.
     pub(super) fn plus(mut self, other: &Self, factor: &BigRational) -> Self {
         self.constant += &other.constant * factor;
         for (key, own) in &other.factors {
@@ -71,7 +70,6 @@ impl Linear {
         self.times(&-BigRational::one())
     }
 
-    /// Returns the value of the expression if it contains no fluent.
     pub(super) fn value(&self) -> Option<&BigRational> {
         self.factors.is_empty().then_some(&self.constant)
     }

@@ -61,13 +61,11 @@ pub(super) struct Reader<'r> {
     /// Whether derived atoms are kept instead of being replaced by their rules.
     pub(super) opaque: bool,
     unfolding: Unfolding,
-    /// The nesting depth of the current condition.
     depth: usize,
     size: usize,
     work: usize,
 }
 
-/// The state of replacing derived atoms by their rules.
 #[derive(Default)]
 struct Unfolding {
     /// The derived atoms whose rules are being evaluated, outermost first.
@@ -171,7 +169,6 @@ impl<'r> Reader<'r> {
         Ok(Formula::junction(formulas, all))
     }
 
-    /// Returns `true` if a condition mentions a derived predicate.
     fn is_derived(&self, condition: &Condition) -> bool {
         match condition {
             Condition::And(parts) | Condition::Or(parts) => parts.iter().any(|part| self.is_derived(part)),

@@ -21,7 +21,6 @@ pub(super) struct Reads<'r> {
     pub(super) durations: Vec<&'r Expression>,
 }
 
-/// A ground atom or numeric fluent, to be searched for in a happening.
 #[derive(Clone, Copy)]
 enum ReadQuery<'w> {
     Atom(&'w Key),
@@ -29,7 +28,6 @@ enum ReadQuery<'w> {
 }
 
 impl Reads<'_> {
-    /// Returns `true` if the happening reads an atom that the event changes.
     pub(super) fn event(&self, event: &Event) -> bool {
         event.truths.keys().any(|key| self.atom(key))
     }

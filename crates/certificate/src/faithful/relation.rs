@@ -4,7 +4,6 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::faithful::key::Key;
 
-/// An indexed set of ground atoms.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Relation {
     atoms: FxHashSet<Key>,
@@ -36,7 +35,6 @@ impl Relation {
         self.atoms.len()
     }
 
-    /// Returns the number of atoms that [`Relation::rows`] yields.
     pub(super) fn count(&self, predicate: u32, place: Option<(usize, u32)>) -> usize {
         match place {
             None => self.rows.get(&predicate).map_or(0, Vec::len),

@@ -36,7 +36,6 @@ pub(super) struct Event {
 /// An end of a time range; the flag is `true` if the end itself is excluded.
 type End = (BigRational, bool);
 
-/// The events in the order of their times.
 #[derive(Debug, Default)]
 pub(super) struct Timeline {
     pub(super) events: Vec<Event>,
@@ -56,7 +55,6 @@ pub(super) struct Passage {
     at_end: bool,
     /// The latest start time; `None` if there is no limit.
     latest: Option<End>,
-    /// The earliest end time.
     pub(super) end: End,
 }
 
@@ -158,7 +156,6 @@ impl Timeline {
     }
 }
 
-/// A range of times.
 struct Range {
     low: End,
     high: Option<End>,
@@ -212,7 +209,6 @@ impl Passage {
         Formula::junction(conditions.into_iter().chain(limit), true)
     }
 
-    /// Returns the event at the start of the action, if there is one.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "phases are counted from 0, and each but the first one begins with an event"
@@ -240,8 +236,8 @@ impl Passage {
         (self.at_end && self.to > self.from).then(|| &timeline.events[self.to - 1])
     }
 
-    /// Returns the effects of an action with this passage (position relative to the events) on the
-    /// atoms of the phases and on the atom `waited`; `None` without events.
+    /// Returns the effects of an action with this passage (position relative to the events) on the atoms of
+    /// the phases and on the atom `waited`. Empty if there are no events.
     pub(super) fn truths(&self, timeline: &Timeline) -> Truths {
         if timeline.is_empty() {
             return Truths::new();

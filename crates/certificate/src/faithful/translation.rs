@@ -145,8 +145,6 @@ pub(super) struct Translation<'t> {
     pub(super) names: &'t Names,
     pub(super) invariant: &'t Invariant,
     pub(super) axioms: &'t Axioms,
-    /// For each variable, its values whose atoms may hold in the witness (the over-approximation of
-    /// the reachable states): value and atom.
     possible: Vec<Vec<(u32, &'t Key)>>,
     /// For each derived variable whose atom is not in `Axioms::linked`: the formula that replaces
     /// the variable.
@@ -220,7 +218,6 @@ impl<'t> Translation<'t> {
         Ok(())
     }
 
-    /// Returns the variables that the rules of a derived variable read.
     fn read_by(&self, variable: u32) -> impl Iterator<Item = u32> {
         self.bodies(variable).flat_map(|body| {
             let clauses = body.clauses.iter().flatten().map(|((variable, _), _)| *variable);
@@ -294,7 +291,6 @@ impl<'t> Translation<'t> {
         Formula::junction(facts.chain(clauses).chain(comparisons), true)
     }
 
-    /// Translates a linear expression over numbers of the task to a linear expression over fluents.
     fn linear(&self, linear: &model::Linear, choice: &[u32], sizes: &[usize]) -> Linear {
         let scale = self.model.number_scale.to_rational();
         let mut sum = Linear::constant(self.model.quantity(&linear.quantity, choice, sizes).to_rational());

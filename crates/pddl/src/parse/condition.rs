@@ -106,7 +106,7 @@ fn is_term_variable(symbol: &str) -> bool {
     symbol.starts_with('?') && !symbol.eq_ignore_ascii_case("?duration")
 }
 
-/// Returns `true` if `=` compares terms: at least one side is a variable, or both are names.
+/// Returns `true` if `=` compares terms: both sides are symbols, and one is a variable or both are names.
 fn is_term_pair(left: Item<'_>, right: Item<'_>) -> bool {
     let (Some(left), Some(right)) = (left.symbol(), right.symbol()) else { return false };
     let is_name =

@@ -14,7 +14,6 @@ const ACTION_KEYS: [&str; 4] = [":parameters", ":vars", ":precondition", ":effec
 const DURATIVE_KEYS: [&str; 4] = [":parameters", ":duration", ":condition", ":effect"];
 
 impl Parser<'_> {
-    /// Parses `(define (domain NAME) SECTION…)`.
     pub(super) fn domain(&mut self, define: Item<'_>) -> Option<Domain> {
         let (name, sections) = self.header(define, "domain")?;
         let mut domain = Domain {

@@ -9,7 +9,6 @@ use crate::sexp::Item;
 
 use super::{Parser, at_start, list_start};
 
-/// Returns the comparison with the given symbol.
 pub(super) fn comparison(symbol: &str) -> Option<Comparison> {
     Some(match symbol {
         "<" => Comparison::Less,
@@ -86,7 +85,6 @@ impl Parser<'_> {
         Some(Atom { predicate, arguments: Vec::new(), span: item.span() })
     }
 
-    /// Parses a numeric expression.
     pub(super) fn expression(&mut self, item: Item<'_>) -> Option<Expression> {
         let Some(symbol) = item.symbol() else { return self.compound_expression(item) };
         if symbol.eq_ignore_ascii_case("?duration") {
@@ -137,8 +135,9 @@ impl Parser<'_> {
         (operands.len() == count).then_some(Expression::Operation(operation, operands, item.span()))
     }
 
-    /// Parses an expression without functions, as required in `:init` and for times of trajectory
-    /// constraints, and returns its value. Reports an error without one.
+    /// Parses a constant expression, as required in `:init` and for times of trajectory constraints, and
+    /// returns its value. Reports an error if there is no value, for example because the expression reads a
+    /// function.
     pub(super) fn constant(&mut self, item: Item<'_>) -> Option<BigRational> {
         let expression = self.expression(item)?;
         let value = evaluate(&expression);

@@ -11,7 +11,6 @@ use crate::types::TypeHierarchy;
 pub(super) struct Objects {
     /// Predicates that represent object fluents, by name. The last parameter is the value.
     pub(super) functions: FxHashMap<Name, Declaration>,
-    /// Declared types.
     pub(super) types: FxHashSet<Name>,
     /// Common prefix of the names of generated variables; `None` before the first is generated.
     pub(super) prefix: Option<String>,
@@ -25,7 +24,6 @@ pub(super) struct Objects {
     pub(super) time: Option<EffectTime>,
     /// Conditions that the effects of the current action impose on the state, each with its time.
     pub(super) needs: Vec<(EffectTime, Condition)>,
-    /// Assignments to object fluents by the current action.
     pub(super) assigned: Vec<Assigned>,
     /// Values of object fluents in `:init`, by function and arguments, with their positions. `None` for
     /// `undefined`.
@@ -47,7 +45,6 @@ pub(super) struct Mark {
 }
 
 impl Objects {
-    /// Collects the object fluents of a domain.
     pub(super) fn of(domain: &Domain) -> Self {
         let names: FxHashSet<&Name> = domain.object_fluents.iter().collect();
         let functions =

@@ -49,7 +49,6 @@ impl Parser<'_> {
         Some(goal)
     }
 
-    /// Parses the precondition of an instantaneous action and separates its preferences.
     pub(super) fn precondition(
         &mut self,
         item: Item<'_>,
@@ -65,7 +64,6 @@ impl Parser<'_> {
         Some(precondition)
     }
 
-    /// Parses the condition of a durative action and separates its preferences.
     pub(super) fn durative_condition(
         &mut self,
         item: Item<'_>,
@@ -127,7 +125,6 @@ impl Parser<'_> {
         self.condition(item)
     }
 
-    /// Parses the mandatory part of a durative action's condition and collects the preferences in `soft`.
     fn hard_timed<'t>(
         &mut self,
         item: Item<'t>,

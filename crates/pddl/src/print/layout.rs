@@ -21,7 +21,6 @@ enum Content {
     List(Vec<Doc>, usize),
 }
 
-/// Creates a word.
 pub(super) fn text(text: impl Into<String>) -> Doc {
     let text = text.into();
     Doc {
@@ -61,7 +60,6 @@ impl Doc {
         self
     }
 
-    /// Returns the text without line breaks.
     pub(super) fn on_one_line(&self) -> String {
         let mut out = String::new();
         self.write_inline(&mut out);
@@ -115,7 +113,6 @@ impl Doc {
     }
 }
 
-/// Formats the whole document, with a final line break.
 pub(super) fn layout(doc: &Doc) -> String {
     let mut out = String::new();
     doc.write(0, &mut out);

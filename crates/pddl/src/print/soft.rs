@@ -22,7 +22,6 @@ pub(super) fn with(hard: &Condition, soft: impl Iterator<Item = Doc>) -> Doc {
     list("and", 1, parts.iter().map(condition).chain(soft))
 }
 
-/// Returns the section `:constraints`; `None` without constraints.
 pub(super) fn constraints(constraints: &[&Constraint]) -> Option<Doc> {
     let conjunction = list("and", 1, constraints.iter().map(|item| constraint(item, false))).broken();
     (!constraints.is_empty()).then(|| list(":constraints", 2, [conjunction]))

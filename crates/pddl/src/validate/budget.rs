@@ -28,7 +28,6 @@ pub(super) struct Budget<'s> {
 }
 
 impl<'s> Budget<'s> {
-    /// Creates a budget that is spent once `stop` has returned `true`.
     pub(super) fn new(stop: &'s dyn Fn() -> bool) -> Self {
         Self { stop, steps_left: Cell::new(STRIDE), is_spent: Cell::new(false) }
     }

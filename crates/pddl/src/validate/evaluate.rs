@@ -15,12 +15,10 @@ use crate::ast::{
 use super::trace::Trace;
 use super::world::{Arguments, State, Symbol, World};
 
-/// Reason why a condition or an expression has no value.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Undefined {
     /// A function without a value, as text.
     Function(String),
-    /// A division by zero.
     Division,
     /// A number whose numerator or denominator has more than [`BITS_LIMIT`] bits.
     Size,
@@ -62,7 +60,6 @@ impl<'p> Bindings<'p> {
 /// otherwise exhaust memory.
 const BITS_LIMIT: u64 = 100_000;
 
-/// Evaluator for one state.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Evaluator<'e, 'p> {
     pub(super) world: &'e World<'p>,

@@ -59,7 +59,6 @@ impl<'e, 'p> Execution<'e, 'p> {
         Evaluator { duration, ..Evaluator::new(self.world, &self.state) }
     }
 
-    /// Time of the next timed initial literal, if any.
     pub(super) fn next_timed(&self) -> Option<&BigRational> {
         self.pending.last().map(|(time, ..)| time)
     }
@@ -250,7 +249,6 @@ impl<'e, 'p> Execution<'e, 'p> {
         Ok(())
     }
 
-    /// Evaluates the effects of an action at its start or its end in the current state.
     pub(super) fn changes(
         &self,
         running: &Running<'e, 'p>,

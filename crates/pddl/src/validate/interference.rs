@@ -22,7 +22,6 @@ struct Pattern {
     arguments: Option<SmallVec<[Slot; 4]>>,
 }
 
-/// Argument of a pattern.
 #[derive(Debug, Clone)]
 enum Slot {
     Object(Symbol),
@@ -51,7 +50,7 @@ impl Pattern {
     }
 }
 
-/// Read and write sets of a happening: the start or the end of an action, or both, or timed initial literals.
+/// Read and write sets of a happening.
 #[derive(Debug, Default)]
 pub(super) struct Footprint {
     facts_read: Vec<Pattern>,
@@ -117,7 +116,6 @@ impl Footprint {
         Self { added: added.collect(), deleted: deleted.collect(), ..Self::default() }
     }
 
-    /// Adds the read and write sets of another happening of the same action.
     pub(super) fn join(&mut self, other: Self) {
         self.facts_read.extend(other.facts_read);
         self.values_read.extend(other.values_read);
@@ -155,7 +153,6 @@ impl Footprint {
     }
 }
 
-/// Fact or function that a condition, effect or expression reads.
 #[derive(Clone, Copy)]
 enum Use<'c> {
     Fact(&'c Atom),

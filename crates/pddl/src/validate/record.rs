@@ -34,8 +34,8 @@ impl Record {
         record
     }
 
-    /// Appends the state after a happening. It replaces the last recorded state if that one results from
-    /// events at the same time. Without constraints nothing is recorded.
+    /// Appends the state after a happening, or replaces the last recorded state if that state results from
+    /// events at the same time.
     pub(super) fn note(&mut self, time: &BigRational, state: &State, is_event: bool) {
         // Without constraints nothing is recorded, to save memory.
         let Some(last) = self.moments.last() else { return };

@@ -28,13 +28,11 @@ struct Branch<'e, 'p> {
     bound: Vec<usize>,
 }
 
-/// Options at a branching point.
 enum Choices<'e, 'p> {
     /// Candidate objects of the variable at a position.
     Objects(usize, Box<dyn Iterator<Item = Symbol> + 'e>),
     /// Facts that may match an atom.
     Facts(&'p Atom, Box<dyn Iterator<Item = &'e Arguments> + 'e>),
-    /// Parts of a disjunction.
     Alternatives(std::slice::Iter<'p, Condition>),
 }
 
@@ -198,7 +196,6 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         Some((conditions, branch.undefined.clone()))
     }
 
-    /// Returns the number of facts that [`Evaluator::rows`] returns for the atom.
     fn row_count(&self, atom: &Atom, bindings: &Bindings<'p>) -> usize {
         let unindexed = || self.state.count(self.world.symbol(&atom.predicate.name));
         self.indexed_rows(atom, bindings).map_or_else(unindexed, <[Arguments]>::len)
@@ -223,7 +220,8 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         rows.min_by_key(|rows| rows.len())
     }
 
-    /// Returns the variable and the object that an equation with one unbound side determines.
+    /// Returns the position of the unbound variable in an equation with one unbound side, and the object that
+    /// it must have.
     fn forced(&self, part: &Condition, bindings: &Bindings<'p>) -> Option<(usize, Symbol)> {
         let Condition::Equal(left, right, _) = part else { return None };
         let unbound = |term: &Term| match term {
@@ -240,7 +238,7 @@ impl<'e, 'p> Evaluator<'e, 'p> {
     }
 
     /// Unifies an atom with a fact. Appends the positions of newly bound variables to `bound`. Returns
-    /// `false` on a mismatch; these variables remain bound even then.
+    /// `false` on a mismatch, without undoing the bindings made before it.
     pub(super) fn unify(
         &self,
         atom: &Atom,

@@ -10,7 +10,6 @@ use super::plan::PlanStep;
 use super::verdict::{Violation, ViolationKind};
 use super::world::{Symbol, World};
 
-/// Step of a plan with its possible instances.
 #[derive(Debug, Clone)]
 pub(super) struct Step<'p> {
     /// Number of the step in the plan's text, from 1.

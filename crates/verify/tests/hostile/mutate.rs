@@ -86,7 +86,6 @@ pub fn mutate(files: &Files, draw: &mut Draw<'_>) -> Files {
     files
 }
 
-/// Updates the sizes and digests in the manifest.
 fn mend(files: &mut Files) {
     let Ok(mut manifest) = serde_json::from_slice::<Value>(&files["manifest.json"]) else { return };
     let listed = manifest.get_mut("files").and_then(Value::as_array_mut);
