@@ -194,7 +194,6 @@ impl std::fmt::Debug for Integer {
     }
 }
 
-/// Serialises the integer as a JSON number with all its digits.
 impl Serialize for Integer {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match &self.0 {
@@ -227,7 +226,6 @@ mod tests {
 
     use super::*;
 
-    /// Integers of all sizes, including the bounds of the small representation.
     fn integer() -> impl Strategy<Value = BigInt> {
         prop_oneof![
             (-20_i128..20).prop_map(BigInt::from),

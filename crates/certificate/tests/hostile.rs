@@ -60,7 +60,6 @@ fn compare(declarations: &str, more: &str, objects: &str, facts: &str) -> Faithf
     }
 }
 
-/// Returns the names `prefix0`, `prefix1` and so on, separated by spaces.
 fn names(prefix: &str, count: usize) -> String {
     (0..count).fold(String::new(), |mut text, number| {
         let _ = write!(text, " {prefix}{number}");
@@ -125,7 +124,6 @@ fn long_lists_of_names_are_rejected_or_compared() {
     assert!(matches!(found, Faithful::Undecided(Cause::TooMany { .. })), "{found:?}");
 }
 
-/// The largest accepted chain of rules is compared quickly.
 #[test]
 fn long_chains_of_derived_predicates_are_compared_quickly() {
     let count = 3_000;

@@ -62,7 +62,6 @@ pub struct Diagnostic {
 }
 
 impl fmt::Display for Diagnostic {
-    /// Writes one line: position, severity, code, message, and suggested correction.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { file, line, column, severity, code, message, .. } = self;
         write!(f, "{file}:{line}:{column}: {severity}[{code}]: {message}")?;
@@ -143,7 +142,6 @@ impl Diagnostic {
 /// very many.
 const MAX_DIAGNOSTICS: usize = 200;
 
-/// Collects the diagnostics of one stage (parsing or checking) about one source.
 #[derive(Debug)]
 pub(crate) struct Sink<'s> {
     source: &'s Source,

@@ -10,7 +10,6 @@ const MAX_DIGITS: usize = 400;
 
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Literal {
-    /// A name: the symbol does not have the form of a number.
     Name,
     Number(BigRational),
     /// A number that has more than [`MAX_DIGITS`] digits if written without exponent.
@@ -80,7 +79,6 @@ fn decimal(whole: &str, fraction: &str, exponent: i32) -> BigRational {
     }
 }
 
-/// Formats a number as a decimal, or as a fraction if its decimal expansion is infinite.
 pub(crate) fn show_number(value: &BigRational) -> String {
     to_decimal(value).unwrap_or_else(|| value.to_string())
 }

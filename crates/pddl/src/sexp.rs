@@ -228,7 +228,6 @@ impl Reader<'_, '_> {
         self.nodes.push(Node { span, next: dense(self.nodes.len()) + 1, is_list: false });
     }
 
-    /// Warns about a variable that follows a word without a space.
     fn glued_variable(&mut self, span: Span, text: &str) {
         self.sink
             .warning("P116", span, format!("`{text}` is read as a word of its own"))

@@ -11,7 +11,6 @@ pub(super) fn sign(number: &Bits) -> Literal {
     *number.last().expect("invariant: a number has a sign")
 }
 
-/// Returns the number of bits that represent every integer from `least` to `most`.
 pub(super) fn width(least: &Integer, most: &Integer) -> usize {
     least.width().max(most.width())
 }

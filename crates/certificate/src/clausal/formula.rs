@@ -29,7 +29,6 @@ impl Formula {
         formula
     }
 
-    /// Records that the encoding contains a number of `bits` bits; see [`Self::widest`].
     pub(super) fn has_number(&mut self, bits: usize) {
         self.widest = self.widest.max(bits);
     }
@@ -145,8 +144,6 @@ impl Formula {
         })
     }
 
-    /// Checks that a written formula and its legend equal this formula and its legend, line by
-    /// line.
     pub(super) fn compare(&self, formula: &mut dyn BufRead, legend: &mut dyn BufRead) -> Result<(), String> {
         let mut legend = LineComparer { what: "legend", text: legend, line: Vec::new(), number: 0 };
         self.legend(&mut |line| legend.compare(line))?;

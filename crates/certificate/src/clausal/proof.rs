@@ -60,11 +60,9 @@ pub(super) fn check<'c>(
 }
 
 struct Checker {
-    /// The literals of all clauses, concatenated.
     literals: Vec<Literal>,
     /// The range of each clause in `literals`.
     places: Vec<Range<usize>>,
-    /// For each literal, whether it is true in the current propagation.
     is_true: Vec<bool>,
     /// The true literals, in order to reset `is_true`.
     settled: Vec<Literal>,
@@ -148,7 +146,6 @@ mod tests {
         text
     }
 
-    /// A clause is a set of literals, so repeated literals have no effect.
     #[test]
     fn a_clause_may_repeat_a_literal() {
         let literal = |number: &i32| Literal::new(*number).expect("a literal");

@@ -15,10 +15,8 @@ use crate::integer::Integer;
 use crate::model::{Linear, Model, Operator, Quantity};
 use crate::table::is_alone;
 
-/// Upper limit on the number of bits of each number.
 const WIDTH_LIMIT: usize = 4_096;
 
-/// The accumulated cost and the numeric variables after the latest step.
 pub(super) struct Sums {
     spent: Bits,
     /// Upper limit on the accumulated cost: the claimed cost minus 1.

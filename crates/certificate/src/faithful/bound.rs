@@ -24,15 +24,12 @@ const ATOM_LIMIT: usize = 50_000;
 /// objects of variables.
 const CONJUNCT_LIMIT: usize = 64;
 
-/// A positive occurrence of a derived atom in the condition of a rule.
 struct Occurrence<'w> {
     rule: &'w Derived,
     atom: &'w Atom,
-    /// The variables of the existential quantifiers around the atom.
     variables: Rc<[&'w TypedName]>,
     /// The conjuncts around the atom, which restrict the candidates of variables.
     others: Rc<[&'w Condition]>,
-    /// Whether all names are unambiguous, i.e. no variable shadows another one.
     has_distinct_names: bool,
 }
 

@@ -429,7 +429,6 @@ fn rank(reason: &Obstacle) -> u8 {
     }
 }
 
-/// Inserts the name of the action instance in a reason that has no name yet.
 fn named(reason: Obstacle, instance: &str) -> Obstacle {
     let instance = instance.to_owned();
     match reason {

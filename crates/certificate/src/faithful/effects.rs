@@ -19,9 +19,7 @@ pub(super) struct Made<'m> {
     pub(super) choice: &'m [u32],
 }
 
-/// The first variable or number for which the effects are not proved equal.
 pub(super) enum Mismatch {
-    /// The values of this variable or number differ.
     Differs(String),
     /// The atoms of this variable are not proved to be mutually exclusive after the case (outcome
     /// of an action instance under a condition), or there are too many case splits.
@@ -84,7 +82,6 @@ struct Variable<'v> {
     /// The atoms of the variable that the case may change. The key is the value that represents the
     /// atom.
     touched: BTreeMap<u32, &'v Key>,
-    /// The value that the operator assigns unconditionally.
     certain: Option<u32>,
     conditional: Vec<(Formula, u32)>,
 }
@@ -94,7 +91,6 @@ enum Outcome<'o> {
     Other,
     /// The atoms of the variable are not proved to be mutually exclusive.
     Unknown,
-    /// The result depends on the truth value of this formula.
     Open(Formula),
     OpenPart(&'o Formula),
 }

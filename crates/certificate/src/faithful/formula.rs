@@ -69,7 +69,6 @@ impl Formula {
         }
     }
 
-    /// Returns the nesting depth of conjunctions and disjunctions; 0 for an atom or comparison.
     pub(super) fn depth(&self) -> usize {
         match self {
             Self::All(parts) | Self::Any(parts) => {

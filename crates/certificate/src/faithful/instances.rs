@@ -10,7 +10,6 @@ use pddl::ast::{Action, ActionBody, Atom, Condition, Name, Term};
 pub(super) const INSTANCE_LIMIT: usize = 400_000;
 /// Upper limit on the total number of arguments of all instances, which then take 256 MB.
 pub(super) const ARGUMENT_LIMIT: usize = 1 << 26;
-/// Number of instances between two calls of the function that reports whether to stop.
 const POLL_INTERVAL: usize = 1 << 10;
 
 type Binding<'b> = FxHashMap<&'b Name, u32>;

@@ -38,7 +38,6 @@ const WIDENING_THRESHOLD: u32 = 8;
 #[serde(deny_unknown_fields)]
 struct WitnessFile {
     format: String,
-    /// All atoms of changing predicates that may hold.
     atoms: Vec<String>,
     /// The least and greatest value of each fluent that actions change; `null` means unbounded.
     /// Fluents that are not listed are unbounded.
@@ -204,7 +203,6 @@ impl Invariant {
         range
     }
 
-    /// Iterates over the atoms that a case (outcome of an action instance) may make true.
     pub(super) fn added<'c>(structure: &'c Structure, case: &'c Case) -> impl Iterator<Item = &'c Key> {
         let at_end = case
             .effects

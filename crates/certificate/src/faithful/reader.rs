@@ -19,12 +19,10 @@ use crate::faithful::verdict::Cause;
 use crate::faithful::world::World;
 use pddl::ast::{Arithmetic, Atom, Comparison, Condition, Expression, Name, Term, TypedName};
 
-/// Upper limit on the number of parts in the conditions of an instance.
 const SIZE_LIMIT: usize = 200_000;
 /// Upper limit on the number of parts that are evaluated for an instance, counting repeated
 /// evaluations (see [`Reader::unfold`]).
 const WORK_LIMIT: usize = 16 * SIZE_LIMIT;
-/// Upper limit on the number of variables of a quantifier or of the head of a rule.
 const VARIABLE_LIMIT: usize = 10_000;
 /// Maximum nesting depth, counted from the outermost derived atom, at which a derived atom is
 /// replaced by its rules recursively. This bounds the call stack. Deeper atoms are evaluated
@@ -75,7 +73,6 @@ struct Unfolding {
     /// An atom nested deeper than [`UNFOLDING_LIMIT`]. Its condition is computed separately, before
     /// the evaluation that found the atom is repeated.
     pending: Option<Key>,
-    /// The computed conditions of atoms that were pending before.
     known: FxHashMap<Key, Formula>,
 }
 
@@ -362,7 +359,6 @@ impl<'r> Reader<'r> {
         ))
     }
 
-    /// Returns the disjunction of the conditions of all rules for a derived atom.
     fn body(&mut self, key: &Key) -> Result<Formula, Cause> {
         self.unfolding.path.push(key.clone());
         let mut bodies = Vec::new();

@@ -11,7 +11,6 @@ use crate::faithful::timeline::Event;
 use crate::faithful::world::World;
 use pddl::ast::{Atom, Condition, Effect, Expression, Name, Term, TypedName};
 
-/// A happening of an action instance: its conditions, effects and duration constraints.
 pub(super) struct Reads<'r> {
     pub(super) world: &'r World<'r>,
     pub(super) axioms: &'r Axioms,
@@ -51,7 +50,6 @@ impl Reads<'_> {
 struct Search<'s> {
     reads: &'s Reads<'s>,
     wanted: ReadQuery<'s>,
-    /// The quantified variables in scope; the innermost comes last.
     scope: Vec<&'s TypedName>,
 }
 

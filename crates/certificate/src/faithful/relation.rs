@@ -14,7 +14,6 @@ pub(super) struct Relation {
 }
 
 impl Relation {
-    /// Adds an atom. Returns `true` if the atom was not in the set.
     pub(super) fn insert(&mut self, key: Key) -> bool {
         if !self.atoms.insert(key.clone()) {
             return false;

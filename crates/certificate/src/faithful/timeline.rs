@@ -23,7 +23,6 @@ use crate::faithful::formula::Formula;
 use crate::faithful::key::{CLOCK, Key, PHASE, WAITED};
 use crate::faithful::linear::Linear;
 
-/// The truth values that an event assigns to atoms.
 pub(super) type Truths = BTreeMap<Key, bool>;
 
 /// All timed initial literals with the same time.
@@ -53,7 +52,6 @@ pub(super) struct Passage {
     /// states this for the end and phase `to`.
     at_start: bool,
     at_end: bool,
-    /// The latest start time; `None` if there is no limit.
     latest: Option<End>,
     pub(super) end: End,
 }

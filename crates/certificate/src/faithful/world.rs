@@ -181,8 +181,6 @@ impl<'w> World<'w> {
         })
     }
 
-    /// Returns the object that a term denotes, or `None` if a variable is unbound or a constant is
-    /// undeclared.
     pub(super) fn bound(&self, term: &Term, binding: &FxHashMap<&Name, u32>) -> Option<u32> {
         match term {
             Term::Variable(identifier) => binding.get(&identifier.name).copied(),

@@ -266,11 +266,9 @@ impl<'a> Checker<'a> {
 #[derive(Debug)]
 pub(super) enum ArgumentType<'a> {
     Variable(&'a TypeExpression),
-    /// Object with the types of all its declarations.
     Object(&'a [&'a TypeExpression]),
 }
 
-/// Returns `true` if a type is `object` or absent.
 fn is_object(r#type: &TypeExpression) -> bool {
     r#type.alternatives.iter().all(|alternative| alternative.name.as_str().eq_ignore_ascii_case("object"))
 }

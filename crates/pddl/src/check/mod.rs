@@ -57,7 +57,6 @@ pub fn check(
     diagnostics
 }
 
-/// Checks an objective that is given separately from the domain and problem files.
 pub(super) fn objective(
     domain: &Domain,
     problem: &Problem,
@@ -140,7 +139,6 @@ impl<'a> Checker<'a> {
     }
 }
 
-/// Maximum number of declared names that are compared with an undeclared name.
 const MAX_CANDIDATES: usize = 5_000;
 
 fn did_you_mean<'n>(written: &str, candidates: impl IntoIterator<Item = &'n Name>) -> Option<String> {

@@ -7,7 +7,6 @@ use crate::types::TypeHierarchy;
 
 #[derive(Debug, Default)]
 pub(super) struct Object<'a> {
-    /// Types from all declarations of the object.
     pub(super) types: Vec<&'a TypeExpression>,
     pub(super) is_constant: bool,
 }

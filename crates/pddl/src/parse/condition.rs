@@ -8,7 +8,6 @@ use super::expression::comparison;
 use super::{Parser, at_start, list_start};
 
 impl Parser<'_> {
-    /// Parses a condition without time specifiers.
     pub(super) fn condition(&mut self, item: Item<'_>) -> Option<Condition> {
         if !item.is_list() {
             let help = item.symbol().map(|symbol| format!("a condition is in parentheses: `({symbol})`"));
@@ -79,7 +78,6 @@ impl Parser<'_> {
         self.atom(item, "a predicate").map(Condition::Atom)
     }
 
-    /// Parses a comparison of numbers, or `=` between terms.
     fn comparison_condition(&mut self, item: Item<'_>, operator: Comparison) -> Option<Condition> {
         let head = item.head().unwrap_or_default();
         let [left, right] = self.operands(item, &format!("({head} a b)"))?;

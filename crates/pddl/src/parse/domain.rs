@@ -107,7 +107,6 @@ impl Parser<'_> {
         }
     }
 
-    /// Reports a section whose keyword is unsupported, unknown or ignored.
     pub(super) fn other_section(&mut self, section: Item<'_>, kind: &str) {
         let keyword = section.head().unwrap_or_default().to_ascii_lowercase();
         let refused = match keyword.as_str() {

@@ -37,7 +37,6 @@ pub(super) fn is_conjunction(item: Item<'_>) -> bool {
     item.is_headed("and") || (item.is_list() && item.items().next().is_none())
 }
 
-/// Appends each conjunct of a condition to `conditions`, with the given time.
 fn spread_condition(time: ConditionTime, condition: Condition, conditions: &mut TimedConditions) {
     match condition {
         Condition::And(parts) => parts.into_iter().for_each(|part| spread_condition(time, part, conditions)),

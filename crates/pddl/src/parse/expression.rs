@@ -30,7 +30,6 @@ fn arithmetic(symbol: &str) -> Option<Arithmetic> {
     })
 }
 
-/// Help text for continuous effects.
 pub(super) const CONTINUOUS: &str = "numbers change at the start and the end of actions only: `(at end (increase (f) (* 2 ?duration)))` for a rate of 2";
 
 impl Parser<'_> {

@@ -14,9 +14,7 @@ pub(super) struct Objects {
     pub(super) types: FxHashSet<Name>,
     /// Common prefix of the names of generated variables; `None` before the first is generated.
     pub(super) prefix: Option<String>,
-    /// Number of generated variables.
     pub(super) count: usize,
-    /// Whether the current context allows terms with object fluents.
     pub(super) is_open: bool,
     /// Object-fluent terms of the condition or effect that is being parsed.
     pub(super) values: Vec<Value>,
@@ -69,7 +67,6 @@ impl Objects {
     }
 }
 
-/// Assignment to an object fluent.
 #[derive(Clone)]
 pub(super) struct Assigned {
     pub(super) time: EffectTime,

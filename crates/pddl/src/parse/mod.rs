@@ -192,7 +192,6 @@ impl Parser<'_> {
         diagnostic
     }
 
-    /// Reports a construct that is recognised but not supported.
     fn refuse(&mut self, item: Item<'_>, construct: &str) -> &mut Diagnostic {
         self.sink.error("P113", at_start(item), format!("{construct} are not supported"))
     }

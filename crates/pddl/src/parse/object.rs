@@ -19,7 +19,6 @@ use crate::sexp::Item;
 use super::fluents::{Assigned, Mark, Value};
 use super::{Parser, at_start};
 
-/// Symbol for the absence of a value.
 const UNDEFINED: &str = "undefined";
 
 impl Parser<'_> {
@@ -98,7 +97,6 @@ impl Parser<'_> {
         self.identifier(&name, span)
     }
 
-    /// Returns a new variable of the function's value type.
     fn value_variable(&mut self, function: &Name, span: Span) -> TypedName {
         let declaration = self.objects.functions.get(function);
         let mut r#type = declaration
@@ -174,7 +172,6 @@ impl Parser<'_> {
         Some((function, arguments))
     }
 
-    /// Parses an object, a variable, or an object-fluent term.
     fn object(&mut self, item: Item<'_>) -> Option<Term> {
         let is_number =
             |symbol: &str| literal(symbol) != Literal::Name || symbol.eq_ignore_ascii_case("?duration");
@@ -274,7 +271,6 @@ impl Parser<'_> {
         Some(Effect::ForAll(variables, Box::new(Effect::When(values_hold, Box::new(effect)))))
     }
 
-    /// Clears the data that is collected over the effects of one action.
     pub(super) fn begin_effects(&mut self) {
         self.objects.time = None;
         self.objects.needs.clear();
@@ -374,7 +370,6 @@ fn conjunction(mut parts: Vec<Condition>) -> Condition {
     if parts.len() == 1 { parts.swap_remove(0) } else { Condition::And(parts) }
 }
 
-/// Conjoins a condition with the conditions that the action's effects impose.
 pub(super) fn with_needs(condition: Condition, needs: Vec<Condition>) -> Condition {
     if needs.is_empty() {
         return condition;

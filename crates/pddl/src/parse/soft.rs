@@ -15,14 +15,12 @@ struct RawPreference<'t> {
     whole: Item<'t>,
 }
 
-/// Context of a preference: enclosing quantifiers and time specifier.
 #[derive(Clone, Default)]
 struct Context {
     variables: Vec<TypedName>,
     time: Option<ConditionTime>,
 }
 
-/// Returns `true` if an item contains a preference.
 fn is_soft(item: Item<'_>) -> bool {
     item.is_headed("preference") || item.items().any(is_soft)
 }

@@ -7,7 +7,6 @@ use super::Parser;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Entries {
-    /// Variables, with question marks.
     Variables,
     /// Names of objects, constants or types.
     Names,

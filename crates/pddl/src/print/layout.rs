@@ -4,7 +4,6 @@
 /// Maximum width of a list that is printed on one line, in characters, including the indentation.
 const WIDTH: usize = 100;
 
-/// A list or a word, with its width.
 #[derive(Debug)]
 pub(super) struct Doc {
     /// Text before the opening parenthesis: the keyword of an action, or empty.

@@ -7,7 +7,6 @@ use crate::ast::{Condition, Constraint, Preference, Trajectory, TypedName};
 use super::layout::{Doc, list, text};
 use super::tree::{condition, number, timed_condition, variables};
 
-/// Returns `true` if a constraint is printed as a preference of the goal.
 pub(super) fn is_of_goal(constraint: &Constraint) -> bool {
     constraint.preference.is_some() && matches!(constraint.trajectory, Trajectory::AtEnd(_))
 }

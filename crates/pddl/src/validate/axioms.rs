@@ -27,7 +27,6 @@ pub(super) struct Axiom<'p> {
 /// quantifiers enclose the atom.
 #[derive(Debug)]
 pub(super) struct Occurrence<'p> {
-    /// Index of the axiom in [`Stratum::axioms`].
     pub(super) axiom: usize,
     pub(super) atom: &'p Atom,
     /// Variables of the enclosing quantifiers, outermost first.

@@ -22,7 +22,6 @@ impl std::error::Error for Interrupted {}
 /// discarded.
 pub(super) struct Budget<'s> {
     stop: &'s dyn Fn() -> bool,
-    /// Loop steps until the next call of `stop`.
     steps_left: Cell<u32>,
     is_spent: Cell<bool>,
 }

@@ -10,7 +10,6 @@ use crate::ast::{Arithmetic, Assignment, Effect};
 use super::evaluate::{Bindings, Evaluator, Undefined, apply};
 use super::world::{Arguments, State, Symbol, World};
 
-/// A fact or a function with its arguments.
 pub(super) type Ground = (Symbol, Arguments);
 
 #[derive(Debug, Default)]
@@ -41,7 +40,6 @@ impl From<Undefined> for EffectError {
 }
 
 impl<'p> Evaluator<'_, 'p> {
-    /// Adds the changes of an effect, evaluated in the current state, to `changes`.
     pub(super) fn collect(
         &self,
         effect: &'p Effect,

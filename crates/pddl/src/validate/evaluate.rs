@@ -17,7 +17,6 @@ use super::world::{Arguments, State, Symbol, World};
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Undefined {
-    /// A function without a value, as text.
     Function(String),
     Division,
     /// A number whose numerator or denominator has more than [`BITS_LIMIT`] bits.
@@ -30,7 +29,6 @@ pub(super) enum Undefined {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Bindings<'p>(pub(super) Vec<Binding<'p>>);
 
-/// A variable with its type, and with its object if it is bound.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Binding<'p> {
     pub(super) variable: &'p Name,
@@ -64,13 +62,11 @@ const BITS_LIMIT: u64 = 100_000;
 pub(super) struct Evaluator<'e, 'p> {
     pub(super) world: &'e World<'p>,
     pub(super) state: &'e State,
-    /// Value of `?duration`.
     pub(super) duration: Option<&'e BigRational>,
     /// Value of `total-time`, in the metric only.
     pub(super) total_time: Option<&'e BigRational>,
     /// Addresses of subconditions that count as true while [`Evaluator::solve`] searches for bindings.
     pub(super) ignored: Option<&'e FxHashSet<*const Condition>>,
-    /// Records the facts that are missing for the result, if present.
     pub(super) trace: Option<&'e Trace<'e, 'p>>,
 }
 

@@ -18,7 +18,6 @@ use super::step::{Instance, Step, unresolved};
 use super::verdict::{Violation, ViolationKind};
 use super::world::{State, World};
 
-/// A partially executed plan: the current state and the pending events.
 #[derive(Debug)]
 pub(super) struct Execution<'e, 'p> {
     pub(super) world: &'e World<'p>,
@@ -163,7 +162,6 @@ impl<'e, 'p> Execution<'e, 'p> {
         Ok(duration)
     }
 
-    /// Checks that the stated or fixed duration satisfies one constraint within the tolerance.
     fn check_duration(
         &self,
         step: &Step<'p>,

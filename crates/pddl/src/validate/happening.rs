@@ -15,7 +15,6 @@ use super::step::Step;
 use super::verdict::{Violation, ViolationKind};
 use crate::number::show_number;
 
-/// Part of an action that takes place in one happening.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Part {
     Start,
@@ -143,7 +142,6 @@ impl<'e, 'p> Execution<'e, 'p> {
         Ok(())
     }
 
-    /// Returns the violation that an action interferes with a timed initial literal.
     pub(super) fn disturbed(
         &self,
         step: &Step<'p>,

@@ -50,7 +50,6 @@ impl Pattern {
     }
 }
 
-/// Read and write sets of a happening.
 #[derive(Debug, Default)]
 pub(super) struct Footprint {
     facts_read: Vec<Pattern>,
@@ -63,7 +62,6 @@ pub(super) struct Footprint {
 }
 
 impl Footprint {
-    /// Computes the read and write sets of the start or the end of an action, given its changes.
     pub(super) fn of<'p>(
         world: &World<'p>,
         running: &Running<'_, 'p>,

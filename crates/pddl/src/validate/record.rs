@@ -16,7 +16,6 @@ pub(super) struct Moment {
     is_event: bool,
 }
 
-/// Trajectory of an execution, and the violated preferences of its actions.
 #[derive(Debug, Default)]
 pub(super) struct Record {
     /// States of the trajectory, in order. Empty if the domain and the problem have no constraints.

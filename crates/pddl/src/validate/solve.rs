@@ -16,7 +16,6 @@ pub(super) type OnSolution<'f, 'p> = &'f mut dyn FnMut(&Bindings<'p>, Option<&Un
 /// Conditions that remain to be solved, and the reason if an evaluated condition was undefined.
 type Goals<'p> = (Vec<&'p Condition>, Option<Undefined>);
 
-/// A branching point of the search, with its untried options.
 struct Branch<'e, 'p> {
     /// Conditions that remain to be solved after any of the options.
     open: Vec<&'p Condition>,
@@ -31,13 +30,11 @@ struct Branch<'e, 'p> {
 enum Choices<'e, 'p> {
     /// Candidate objects of the variable at a position.
     Objects(usize, Box<dyn Iterator<Item = Symbol> + 'e>),
-    /// Facts that may match an atom.
     Facts(&'p Atom, Box<dyn Iterator<Item = &'e Arguments> + 'e>),
     Alternatives(std::slice::Iter<'p, Condition>),
 }
 
 impl Branch<'_, '_> {
-    /// Undoes the bindings of the current option.
     fn undo(&mut self, bindings: &mut Bindings<'_>) {
         for position in self.bound.drain(..) {
             bindings.0[position].object = None;
@@ -268,7 +265,6 @@ impl<'e, 'p> Evaluator<'e, 'p> {
     }
 }
 
-/// Returns `true` if all free variables of a condition are bound.
 fn is_bound(condition: &Condition, bindings: &Bindings<'_>) -> bool {
     fn walk<'c>(condition: &'c Condition, bindings: &Bindings<'_>, inner: &mut Vec<&'c Name>) -> bool {
         match condition {

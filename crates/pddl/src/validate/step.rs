@@ -19,7 +19,6 @@ pub(super) struct Step<'p> {
     pub(super) instances: Vec<Instance<'p>>,
 }
 
-/// Action schema with objects for its parameters.
 #[derive(Debug, Clone)]
 pub(super) struct Instance<'p> {
     pub(super) action: &'p Action,

@@ -39,7 +39,6 @@ pub(super) struct World<'p> {
     position: FxHashMap<Symbol, usize>,
     /// Objects of each declared type, in order and as a set.
     members: FxHashMap<Name, (Vec<Symbol>, FxHashSet<Symbol>)>,
-    /// Axioms, lowest stratum first.
     pub(super) strata: Vec<Stratum<'p>>,
     pub(super) read_by_axioms: FxHashSet<Symbol>,
     /// Predicates that actions, timed initial literals or axioms can change.
@@ -219,7 +218,6 @@ impl<'p> World<'p> {
         objects.next().filter(|_| objects.next().is_none())
     }
 
-    /// Text of a fact or a function in PDDL syntax.
     pub(super) fn show(&self, symbol: Symbol, arguments: &[Symbol]) -> String {
         let words: Vec<_> =
             std::iter::once(&symbol).chain(arguments).map(|symbol| self.name(*symbol)).collect();

@@ -9,7 +9,6 @@ use serde_json::{Value, json};
 /// The files of a certificate: contents by name.
 pub type Files = BTreeMap<String, Vec<u8>>;
 
-/// Upper limit on the number of repetitions of a part of a file.
 const REPETITION_LIMIT: usize = 300;
 
 /// A source of random decisions.
