@@ -29,7 +29,6 @@ fn answer(mission: &Mission) -> Answer {
     (solution.status, plan.as_ref().map(|plan| plan.cost.to_string()), configurations.collect())
 }
 
-/// Reads a shipped mission and changes its state by `situation`.
 fn shipped(name: &str, situation: &dyn Fn(&mut Mission)) -> Mission {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("missions/{name}.toml"));
     let mut mission = Setup::read(&manifest).unwrap_or_else(|messages| panic!("{messages:#?}")).mission;
@@ -215,7 +214,6 @@ fn explicit(functions: usize, bound: i64, reconfiguration: bool) -> String {
     )
 }
 
-/// Returns the plain form of the domain, without designs.
 fn plain(reconfiguration: bool) -> String {
     let (function, effect) = if reconfiguration {
         ("(reconfiguration)", "(increase (total-cost) (reconfiguration))")

@@ -39,7 +39,6 @@ struct Times {
     processor: f64,
 }
 
-/// Locations of Pellet, and of the test data with the files of SUAVE and the generator of large knowledge bases.
 struct Peer {
     class_path: String,
     shared: PathBuf,

@@ -94,7 +94,6 @@ fn pages_in_one_clone() -> Result<(), Failed> {
     if faults.is_empty() { Ok(()) } else { Err(Failed::from(faults.join("\n"))) }
 }
 
-/// Returns `true` if `METAPLAN_BLESS` requests that pages be rewritten.
 fn is_blessing() -> bool {
     std::env::var_os("METAPLAN_BLESS").is_some()
 }
@@ -159,7 +158,6 @@ impl Page {
         if faults.is_empty() { Ok(()) } else { Err(Failed::from(faults.join("\n"))) }
     }
 
-    /// Reports that blocks of this page are not run.
     fn lacks(&self, resource: Resource, name: &str) {
         missing_in(&self.path, resource, &format!("blocks that need {name} are not run"));
     }

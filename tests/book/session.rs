@@ -19,11 +19,9 @@ const SEPARATOR: char = '\u{1e}';
 pub struct Session {
     /// Temporary directory that contains a copy of the project.
     directory: TempDir,
-    /// Value of the environment variable `PATH`.
     path: String,
 }
 
-/// A command with the output that the page shows for it.
 struct Step {
     command: String,
     shown: String,
@@ -97,7 +95,6 @@ impl Session {
         self.directory.path().join("metaplan")
     }
 
-    /// Runs a script and returns its output.
     fn shell(&self, script: &str) -> String {
         let file = self.directory.path().join("script");
         std::fs::write(&file, script).expect("the script is written");

@@ -17,7 +17,6 @@ const SECONDS: [u32; 4] = [5, 15, 60, 180];
 const SIMULATE: [&str; 6] =
     ["simulate", "missions/ugv.toml", "--scenario", "kinect_comes_and_goes", "--strategy", "joint"];
 
-/// Runs a command, interrupts it by SIGINT after some seconds, and waits for its end.
 #[cfg(unix)]
 fn interrupted(directory: &Path, arguments: &[&str], seconds: u32) -> Outcome {
     let child = Command::new(env!("CARGO_BIN_EXE_metaplan"))

@@ -77,7 +77,6 @@ fn mangled(text: &str, number: usize) -> String {
     changed_lines.join("\n") + "\n"
 }
 
-/// Runs the commands with each of `count` errors in each file, on two threads.
 fn check(files: &[&str], template: &str, count: usize, commands: &[&[&str]]) {
     let work: Vec<(&str, usize)> =
         files.iter().flat_map(|file| (0..count).map(move |number| (*file, number))).collect();
@@ -119,7 +118,6 @@ fn messages_about_files_contain_no_internals() {
     check(&["problem.pddl"], "blank", 10, &[&["plan", "m/mission.toml", "--time-limit", "2"]]);
 }
 
-/// Messages about unknown names and invalid values in all kinds of arguments contain no internal names.
 #[test]
 fn messages_about_arguments_contain_no_internals() {
     let directory = tempfile::tempdir().expect("a directory");
@@ -171,7 +169,6 @@ fn messages_about_arguments_contain_no_internals() {
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
-/// Messages have equal texts with and without colours. Without a terminal, the default is no colours.
 #[test]
 fn colours_depend_on_option_and_terminal() {
     let directory = tempfile::tempdir().expect("a directory");

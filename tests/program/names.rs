@@ -154,8 +154,6 @@ fn certificates_depend_on_the_name_map() {
     assert!(outcome.stdout.contains("the knowledge says"), "{outcome:#?}");
 }
 
-/// Runs `metaplan plan` on the renamed mission with these entries of the name map. Asserts that standard
-/// error contains the words.
 fn check(entries: &str, status: i32, words: &[&str]) -> Outcome {
     let copy = renamed(entries);
     let outcome = metaplan_in(copy.path(), &["plan", MANIFEST], "");

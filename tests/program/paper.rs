@@ -166,7 +166,6 @@ fn problem_of_the_paper_needs_a_name_map() {
     }
 }
 
-/// The problem determines the availability of designs and functions that the knowledge base does not have.
 #[test]
 fn functions_unknown_to_the_knowledge_base_are_kept() {
     let Some((files, options)) = paper() else { return };

@@ -140,7 +140,6 @@ fn agree(label: &str, setup: &Setup, risk: Risk) -> bool {
     plan.is_some()
 }
 
-/// Numbers of solvable and unsolvable cases on which the planner and the model checker agree.
 #[derive(Debug, Default)]
 struct Agreement {
     solved: usize,
@@ -175,7 +174,6 @@ fn pairs_of_the_map(count: usize) -> Option<Agreement> {
     Some(agreement)
 }
 
-/// A deterministic pseudorandom number generator (LCG).
 struct Random(u64);
 
 impl Random {
@@ -353,8 +351,6 @@ fn missions_without_places_are_compared() {
     assert_eq!(first["replanned"], first["solved_again"], "{answer:#}");
 }
 
-/// Values that are invalid in a process are rejected, and so are more configurations than a state can
-/// represent.
 #[test]
 fn invalid_processes_are_refused() {
     use pddl::ast::{InitialElement, Name, Problem as Pddl, Term};

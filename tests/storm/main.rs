@@ -168,7 +168,6 @@ fn random_models() {
     assert_eq!(refused, 0);
 }
 
-/// A property of the mission `camara_like`, which is checked with larger numbers of battery levels.
 struct Case {
     property: &'static str,
     reward: Option<&'static str>,
@@ -226,7 +225,6 @@ fn native(mission: &Coadaptation, risk: Risk, case: &Case) -> Run {
     Run { states: explored.mdp.states(), value, build, solve }
 }
 
-/// Checks the process as a text in the PRISM language, like any other model.
 fn as_text(text: &str, case: &Case) -> Run {
     let model = prism::parse(text).expect("a model");
     let bounds = Bounds::default().with_states(100_000_000);

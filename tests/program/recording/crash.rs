@@ -79,7 +79,6 @@ fn recordings_of_killed_runs_can_be_replayed() {
     super::others::assert_readable_by_python(&file, input().lines().count());
 }
 
-/// A truncated file is read up to its last complete chunk, regardless of the point of truncation.
 #[test]
 fn truncated_recordings_are_read_up_to_the_last_chunk() {
     let directory = tempfile::tempdir().expect("a directory");

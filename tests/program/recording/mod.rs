@@ -11,7 +11,6 @@ use serde_json::{Value, json};
 
 use crate::common::{Outcome, metaplan_in, root};
 
-/// Input lines of a run: measurements, a failure, invalid lines, and a ROS 2 diagnostics message.
 const EVENTS: [&str; 9] = [
     r#"{"event":"measured","attribute":"ambient_light","value":0.50,"time":1.5}"#,
     r#"{"event":"action_succeeded","action":1}"#,
@@ -236,7 +235,6 @@ fn channels_declare_their_encoding_and_schema() {
     }
 }
 
-/// The message definitions in recordings equal those of the ROS 2 interfaces.
 #[test]
 fn message_definitions_match_the_ros_interfaces() {
     let directory = tempfile::tempdir().expect("a directory");
