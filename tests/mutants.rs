@@ -117,7 +117,7 @@ fn prune(from: &Path, to: &Path) {
     }
 }
 
-/// Copies a file or folder, except for the files in `faulty_files`.
+/// Copies a file or folder, except build results (`target`) and the files whose copies are in `faulty_files`.
 fn copy(from: &Path, to: &Path, faulty_files: &BTreeMap<PathBuf, String>) {
     if from.is_dir() {
         for entry in std::fs::read_dir(from).expect("a directory") {

@@ -37,7 +37,7 @@ fn shipped(name: &str, situation: &dyn Fn(&mut Mission)) -> Mission {
 }
 
 /// Checks that the explicit and the plain form of a shipped mission have the same optimum, with the same
-/// designs at each step.
+/// designs at each step. `expected` is the optimal cost; `None` if there is no plan.
 fn check(name: &str, situation: &dyn Fn(&mut Mission), expected: Option<&str>) {
     let explicit = answer(&shipped(name, situation));
     let native = answer(&shipped(&format!("{name}_plain"), situation));

@@ -96,7 +96,8 @@ fn median(mut values: Vec<f64>) -> f64 {
 }
 
 /// Returns the times of a call in this process: the median wall time, and the mean processor time. Thread
-/// clocks have a coarse resolution, so the processor time of a single call is not meaningful.
+/// clocks have a coarse resolution, so the processor time of a single call is not meaningful. On systems that
+/// do not report processor times, the wall time replaces them.
 fn measure_call(runs: usize, mut call: impl FnMut()) -> Times {
     let start_time = thread_processor_time();
     let times = (0..runs).map(|_| {

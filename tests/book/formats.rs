@@ -170,8 +170,9 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Returns the name and the schema of the object that contains the fields of a value. References, lists
-    /// and nullable types are followed, and `path` is extended accordingly.
+    /// Returns the schema of the object that contains the fields of a value, with the name of its definition
+    /// (empty without one). References, lists and nullable types are followed, and `path` is extended
+    /// accordingly.
     fn inside(&self, field: &Value, path: &mut String) -> Option<(String, Value)> {
         let (mut name, mut schema) = (String::new(), field.clone());
         loop {

@@ -78,7 +78,8 @@ fn pages() -> Vec<String> {
     pages
 }
 
-/// Runs all pages of the book in order in one copy of the project, as a reader of the whole book would.
+/// Runs the pages that `docs/SUMMARY.md` lists, in order, in one copy of the project, as a reader of the
+/// whole book would.
 fn pages_in_one_clone() -> Result<(), Failed> {
     let summary = std::fs::read_to_string(root().join("docs/SUMMARY.md")).expect("the summary");
     let links = summary.lines().filter_map(|line| line.split_once("](")?.1.split_once(')'));
@@ -162,7 +163,8 @@ impl Page {
         missing_in(&self.path, resource, &format!("blocks that need {name} are not run"));
     }
 
-    /// Runs blocks in order in one session. Returns the differences between their output and the page.
+    /// Runs blocks in order in one session. Returns the differences between their output and the page. If
+    /// pages are to be rewritten (`METAPLAN_BLESS`), writes the actual output into the page.
     fn run(&self, session: &Session, blocks: &[&Block]) -> Vec<String> {
         let mut blessed = self.text.clone();
         let mut faults = Vec::new();

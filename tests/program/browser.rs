@@ -253,7 +253,7 @@ fn headline_shows_whether_there_is_a_plan() {
         "There is no plan: no plan reaches the goal",
     );
     run.send([status("c_lidar", "RECOVERED")], 5);
-    // A component that recovers is used again when it has been healthy for `heal` seconds.
+    // A component that recovers is used again when it has been healthy for `heal_time` seconds.
     let lines_with_plan = until(&|news: &Value| news["said"]["answer"] == "resume_action");
     let (action, cost) = ("Action 1: move wp1 wp2", "Cost 516, proved optimal.");
     check_headline(&run, &lines_with_plan, false, action, cost);

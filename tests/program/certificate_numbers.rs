@@ -4,8 +4,8 @@
 use crate::certificate::change;
 use crate::common::{metaplan_in, verify_in};
 
-/// Products that exceed all machine integers, together with a scaling effect, force the planner to compute
-/// with fractions.
+/// Products that exceed all machine integers force the planner to compute with fractions. Such plans get
+/// certificates, unless numbers are also multiplied by fractions.
 #[test]
 fn plans_found_in_fractions_have_certificates() {
     let directory = tempfile::tempdir().expect("a directory");
@@ -72,8 +72,8 @@ fn duplicate_literals_are_certified() {
     assert_eq!(outcome.status, 0, "{outcome:#?}");
 }
 
-/// A start that is too early by less than the tolerance is moved to the permitted time, and the plan is
-/// validated with the moved start.
+/// A start slightly before the end of the preceding action is moved to this end, and the plan is validated
+/// with the moved start. A start slightly before a window of timed literals is not moved into the window.
 #[test]
 fn tolerance_does_not_move_plans_into_a_window() {
     let directory = tempfile::tempdir().expect("a directory");

@@ -38,8 +38,8 @@ fn interrupted(directory: &Path, arguments: &[&str], seconds: u32) -> Outcome {
     }
 }
 
-/// Ends a command early, once by a time limit and once by a signal. The time is increased until there is a
-/// result. `count_results` counts the results of an answer. Returns the answers.
+/// Ends a command early: once by a time limit, and once by SIGINT unless this signal is ignored. The time is
+/// increased until there is a result. `count_results` counts the results of an answer. Returns the answers.
 fn check(
     directory: &Path,
     arguments: &[&str],

@@ -34,8 +34,9 @@ fn is_debug_text(text: &str) -> bool {
     })
 }
 
-/// Returns the lines of an outcome that contain internal texts. Source lines and positions are excluded,
-/// because they are content of the user's files.
+/// Returns the lines of an outcome that contain internal texts or paths with `..`, and the exit status if it
+/// is not a documented one. Source lines and positions are excluded, because they are content of the user's
+/// files.
 fn faults(outcome: &Outcome) -> Vec<String> {
     let output = format!("{}{}", outcome.stdout, outcome.stderr);
     let message_lines = output.lines().filter(|line| !line.contains(" │"));
@@ -59,7 +60,7 @@ fn faults(outcome: &Outcome) -> Vec<String> {
     faults
 }
 
-/// Returns a copy of a text with one error. `number` determines the line and the kind of error.
+/// Returns a copy of a text with one changed line. `number` determines the line and the kind of change.
 fn mangled(text: &str, number: usize) -> String {
     let lines: Vec<&str> = text.lines().collect();
     let at = number / 5 * 7 % lines.len();

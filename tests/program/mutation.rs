@@ -107,7 +107,7 @@ fn change_line(text: &str, random: &mut Random, is_candidate: &dyn Fn(&str) -> b
     lines.concat()
 }
 
-/// Inverts the sign of a random number after the first line.
+/// Inverts the sign of a random number that is neither in the first line nor the last one of its line.
 fn flip(text: &str, random: &mut Random) -> String {
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     if lines.len() < 2 {

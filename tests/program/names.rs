@@ -23,8 +23,8 @@ fn declared() -> tempfile::TempDir {
     copy
 }
 
-/// Copies the mission `uuv` with other names for functions, designs and actions in the knowledge base, and
-/// with these entries of the name map.
+/// Copies the mission `uuv` like `declared`. Renames functions, designs and actions in the knowledge base,
+/// and adds these entries to the name map.
 fn renamed(entries: &str) -> tempfile::TempDir {
     let copy = declared();
     let mut text = std::fs::read_to_string(copy.path().join(KB)).expect("the knowledge base");

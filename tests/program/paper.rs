@@ -44,8 +44,8 @@ fn by_hand(files: &[String; 2], unavailable: &[&str]) -> Value {
     plan(&[files[0].clone(), problem.display().to_string()], &[]).json()
 }
 
-/// Returns the greatest value of the three actions of the shortest plan, by brute force over the available
-/// designs in the paper's table.
+/// Returns the greatest sum of design values over the three actions of the shortest plan, by brute force over
+/// the available designs in the paper's table.
 fn greatest_value(unavailable: &[&str]) -> f64 {
     let designs = [
         ("search", "fd_search_low", 0.5),

@@ -307,14 +307,15 @@ fn speed_on_coadaptation_models() {
     }
 }
 
-/// Returns the processor time of this thread in seconds, which does not depend on other processes.
+/// Returns the processor time of this thread in seconds, which does not depend on other processes. Returns 0
+/// on systems that do not report it.
 fn processor() -> f64 {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
     let nanoseconds = text.split_whitespace().next().and_then(|word| word.parse::<f64>().ok());
     nanoseconds.unwrap_or(0.0) / 1e9
 }
 
-/// Returns the peak resident memory of this process in megabytes.
+/// Returns the peak resident memory of this process in megabytes; 0 on systems that do not report it.
 fn peak() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).unwrap_or("0");

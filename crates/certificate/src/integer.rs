@@ -62,7 +62,6 @@ impl Integer {
         !self.is_positive() && !self.is_zero()
     }
 
-    /// Returns the quotient by a positive divisor, rounded down.
     pub(crate) fn div_floor(&self, divisor: &Self) -> Self {
         match (&self.0, &divisor.0) {
             (Small(own), Small(other)) => Self(Small(own.div_euclid(*other))),

@@ -149,7 +149,6 @@ impl Model {
                 .all(|linear| !self.linear(linear, state, choice, sizes).is_negative())
     }
 
-    /// Returns the state after an operator, which must be applicable, with a choice of designs.
     pub(super) fn successor(
         &self,
         operator: &Operator,

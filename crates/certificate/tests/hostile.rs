@@ -86,7 +86,6 @@ fn long_chains_of_derived_atoms_are_unfolded() {
     assert!(matches!(found, Faithful::Yes { instances: 3, .. }), "{found:?}");
 }
 
-/// The nesting of unfolded conditions is limited even if each derived atom adds only one level.
 #[test]
 fn conditions_that_nest_too_deeply_are_rejected() {
     let length = 5_000;

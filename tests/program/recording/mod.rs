@@ -28,7 +28,7 @@ fn input() -> String {
     EVENTS.map(|line| line.replace('\n', " ")).join("\n")
 }
 
-/// Returns the answers of a run without times and progress reports.
+/// Returns the answers of a successful run without progress reports and without the field `microseconds`.
 fn decisions(outcome: &Outcome) -> Vec<Value> {
     assert_eq!(outcome.status, 0, "{outcome:#?}");
     outcome.stdout.lines().map(decision).filter(|answer| answer["answer"] != "planning").collect()
@@ -183,7 +183,8 @@ fn replayed_recordings_give_the_same_decisions() {
     }
 }
 
-/// A replay must use the recorded times, because decisions depend on time (a recovered design is used after `settle` seconds).
+/// A replay must use the recorded times, because decisions depend on time. For example, a recovered component
+/// is used only after `heal_time` seconds.
 #[test]
 fn replays_use_the_recorded_times() {
     let directory = tempfile::tempdir().expect("a directory");

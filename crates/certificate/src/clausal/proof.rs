@@ -156,7 +156,6 @@ mod tests {
         assert_eq!(check(borrowed, 2, &mut proof.as_slice(), &mut hints.as_slice()), Ok(1));
     }
 
-    /// No random proof refutes satisfiable clauses; some random proofs refute unsatisfiable ones.
     #[test]
     fn satisfiable_clauses_are_never_refuted() {
         let mut refuted = 0;

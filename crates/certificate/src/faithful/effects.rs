@@ -89,7 +89,6 @@ struct Variable<'v> {
 enum Outcome<'o> {
     Same,
     Other,
-    /// The atoms of the variable are not proved to be mutually exclusive.
     Unknown,
     Open(Formula),
     OpenPart(&'o Formula),

@@ -104,7 +104,6 @@ impl<'s> Search<'s> {
         matches!(self.wanted, ReadQuery::Atom(_)) && self.is_instance(atom, key)
     }
 
-    /// Returns `true` if `key` is an instance of an atom or fluent with quantified variables.
     fn is_instance(&self, atom: &Atom, key: &Key) -> bool {
         let Reads { world, binding, .. } = self.reads;
         let mut chosen: FxHashMap<usize, u32> = FxHashMap::default();

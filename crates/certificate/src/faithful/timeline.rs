@@ -263,7 +263,6 @@ mod tests {
         BigRational::new(count.into(), 4.into())
     }
 
-    /// Every start time lies in exactly one passage, which is the one that the definition requires.
     #[test]
     fn passages_partition_the_start_times() {
         for (events, duration) in [
@@ -305,7 +304,6 @@ mod tests {
         }
     }
 
-    /// A clock past its mark represents only times after the mark.
     #[test]
     fn a_clock_represents_times_from_its_mark_on() {
         let unit = quarters(2);
