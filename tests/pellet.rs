@@ -7,7 +7,8 @@
 //! METAPLAN_PYTHON=$PWD/pellet/bin/python cargo test --release --test pellet -- --ignored --nocapture
 //! ```
 //!
-//! Pellet is started with the command line of owlready2's `sync_reasoner_pellet`, so that the overhead of Python is excluded.
+//! Pellet is started with the command line of owlready2's `sync_reasoner_pellet`, so that the overhead of
+//! Python is excluded.
 //! Processor time includes child processes. Wall time depends on the load of the machine.
 
 #![allow(clippy::print_stdout)] // Measurements are printed.

@@ -1,9 +1,10 @@
-//! Tests of the README and the book: every block of every page is run as a reader would run it, or compared
-//! with the file that it shows.
+//! Tests of the README and the book: the blocks of each page are run as a reader would run them, or compared
+//! with the file that they show.
 //!
-//! Each page is one test. It runs in a shell in a fresh copy of the project, with `metaplan` and `metaplan-verify` in the path. By default
-//! these are the programs that cargo builds for the tests. With `METAPLAN_PROGRAMS=DIR`, `metaplan` is the program in that directory,
-//! where `cargo install` has put it, as in `.ci/newcomer`.
+//! Each page is one test. It runs in a shell in a fresh copy of the project, with `metaplan` and
+//! `metaplan-verify` in the path. By default these are the programs that cargo builds for the tests. With
+//! `METAPLAN_PROGRAMS=DIR`, `metaplan` is the program in that directory, where `cargo install` has put it, as
+//! in `.ci/newcomer`.
 //!
 //! The fence of a block, and the comment before the block, determine the check:
 //!

@@ -1,5 +1,5 @@
-//! Tests of messages: after random changes to the files of a mission or to the arguments, no message contains internal names or debug
-//! output. Also tests when messages are coloured.
+//! Tests of messages: after random changes to the files of a mission or to the arguments, no message contains
+//! internal names or debug output. Also tests when messages are coloured.
 
 use std::path::Path;
 

@@ -1,5 +1,5 @@
-//! Tests of mistakes in scenarios, situations and studies, such as unknown names: all errors are reported with their positions, and
-//! nothing is simulated.
+//! Tests of mistakes in scenarios, situations and studies, such as unknown names: all errors are reported
+//! with their positions, and nothing is simulated.
 
 use std::fs;
 

@@ -273,7 +273,8 @@ fn unmatched_names_are_listed_from_both_sides() {
     ] {
         assert!(outcome.stderr.contains(word), "no `{word}`: {outcome:#?}");
     }
-    // A design that the problem does not declare, although it declares others, is reported at its position in the knowledge base.
+    // A design that the problem does not declare, although it declares others, is reported at its position in
+    // the knowledge base.
     let incomplete = declared();
     edit(incomplete.path(), PROBLEM, "fd_search_low ", "");
     let outcome = metaplan_in(incomplete.path(), &["plan", MANIFEST], "");

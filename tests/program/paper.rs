@@ -1,4 +1,5 @@
-//! Tests of the problem in the Metaplan paper with SUAVE's knowledge base. Their names differ and are mapped.
+//! Tests of the problem in the Metaplan paper with SUAVE's knowledge base. The names of problem and knowledge
+//! base differ and are mapped.
 
 use serde_json::{Value, json};
 

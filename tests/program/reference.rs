@@ -1,8 +1,9 @@
 //! Benchmark with generated instances, whose optima are known from several planners and an exact oracle.
 //!
-//! `cargo test --release --test program reference -- --ignored --nocapture --test-threads 1` prints one line per instance: name, cost,
-//! kind of proof, and processor time of the program; then the time with a certificate, and the time of verification, which must be at
-//! most ten times the time of planning. Needs python3 (standard library only) for generators and measurement.
+//! `cargo test --release --test program reference -- --ignored --nocapture --test-threads 1` prints one line
+//! per instance. It contains name, cost, kind of proof, and processor time of the program. Then it contains
+//! the time with a certificate, and the time of verification, which must be at most ten times the time of
+//! planning. Needs python3 (standard library only) for generators and measurement.
 
 use std::fmt::Write as _;
 use std::path::Path;

@@ -2,8 +2,8 @@
 //! `camara_like`, JANI files, and speed.
 //!
 //! Setup: `python3 -m venv storm && storm/bin/pip install stormpy==2.0.0`. Run:
-//! `STORM_PYTHON=storm/bin/python cargo test --release --test storm -- --ignored --nocapture`. `SEED` and `MODELS` set the seed and the
-//! number of the random models.
+//! `STORM_PYTHON=storm/bin/python cargo test --release --test storm -- --ignored --nocapture`.
+//! `SEED` and `MODELS` set the seed and the number of the random models.
 
 #![allow(clippy::print_stdout)]
 

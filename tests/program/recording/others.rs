@@ -1,4 +1,5 @@
-//! Exchange of recordings with other implementations: `mcap` and `mcap-ros2-support` for Python, installed by `.ci/mcap-peers`.
+//! Exchange of recordings with other implementations: `mcap` and `mcap-ros2-support` for Python, installed by
+//! `.ci/mcap-peers`.
 
 use std::io::Write as _;
 use std::path::Path;
