@@ -98,7 +98,7 @@ fn tolerance_does_not_move_plans_into_a_window() {
             &["6.9995", "7.000", "9.0005", "9.001"][..],
             &["7.001", "8.500"][..],
         ),
-        // Only `prepare` can end before 5, and from 5 on the way is closed.
+        // `prepare` ends at 5, when the way is already closed.
         ("(open) (at 4.9998 (not (open)))", &["4.9995", "4.9998", "5.000"], &[]),
         ("(open) (at 5.5 (not (open)))", &["4.9985", "5.5005"], &["4.9995", "5.000", "5.200"]),
     ];
