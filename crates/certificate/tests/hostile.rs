@@ -67,7 +67,6 @@ fn names(prefix: &str, count: usize) -> String {
     })
 }
 
-/// Returns the facts `(next o0 o1)`, `(next o1 o2)` and so on, and `(end oN)`.
 fn chain(length: usize) -> String {
     let mut facts = format!("(end o{length})");
     for number in 0..length {

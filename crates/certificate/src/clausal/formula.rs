@@ -9,7 +9,6 @@ use crate::clausal::literal::Literal;
 
 /// A CNF formula. Each variable has a description, which is written to a legend.
 pub struct Formula {
-    /// The literals of all clauses, concatenated.
     literals: Vec<Literal>,
     /// The end of each clause in `literals`.
     ends: Vec<usize>,

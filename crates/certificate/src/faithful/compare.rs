@@ -46,7 +46,6 @@ pub(super) struct Comparison<'c> {
     unit: BigRational,
 }
 
-/// The name of an action instance for messages, and the cost that the instance adds to the metric.
 struct Instance<'i> {
     name: &'i dyn Fn() -> String,
     cost: BigRational,

@@ -77,7 +77,6 @@ struct Variable<'v> {
     task: &'v Translation<'v>,
     own: u32,
     case: &'v Case,
-    /// The effects of the case on atoms of the variable at the end of the action.
     effects: Vec<&'v (Formula, Key, bool)>,
     /// The atoms of the variable that the case may change. The key is the value that represents the
     /// atom.

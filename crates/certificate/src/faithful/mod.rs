@@ -132,7 +132,6 @@ fn read(task: &str) -> Result<Model> {
 struct Instance {
     action: usize,
     arguments: Vec<u32>,
-    /// The atoms of changing predicates that the condition requires.
     requires: Vec<Key>,
 }
 

@@ -33,7 +33,6 @@ fn arithmetic(symbol: &str) -> Option<Arithmetic> {
 pub(super) const CONTINUOUS: &str = "numbers change at the start and the end of actions only: `(at end (increase (f) (* 2 ?duration)))` for a rate of 2";
 
 impl Parser<'_> {
-    /// Parses `?x`, `name` or a term with an object fluent.
     pub(super) fn term(&mut self, item: Item<'_>) -> Option<Term> {
         let Some(symbol) = item.symbol() else { return self.value_of(item) };
         match symbol.strip_prefix('?') {
@@ -63,7 +62,6 @@ impl Parser<'_> {
         (self.sink.len() == message_count).then_some(Atom { predicate, arguments, span: item.span() })
     }
 
-    /// Parses a function: `(f ?x)`, or a bare name without arguments.
     pub(super) fn fluent(&mut self, item: Item<'_>) -> Option<Atom> {
         if item.is_list() {
             return self.atom(item, "a function");

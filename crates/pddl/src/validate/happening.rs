@@ -84,7 +84,6 @@ impl<'e, 'p> Execution<'e, 'p> {
         }
     }
 
-    /// Applies all events (timed initial literals) of the next event time.
     pub(super) fn apply_next_timed(&mut self) {
         if let Some((time, event)) = self.take_next_timed() {
             self.apply_events(event.changes);

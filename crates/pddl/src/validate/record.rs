@@ -7,7 +7,6 @@ use crate::ast::{Constraint, Name};
 
 use super::world::{State, World};
 
-/// A state of the trajectory, with the time at which it begins.
 #[derive(Debug)]
 pub(super) struct Moment {
     pub(super) time: BigRational,
@@ -45,7 +44,6 @@ impl Record {
     }
 }
 
-/// Returns all constraints of a domain and a problem, including preferences.
 pub(super) fn constraints<'p>(world: &World<'p>) -> impl Iterator<Item = &'p Constraint> + use<'p> {
     world.domain.constraints.iter().chain(&world.problem.constraints)
 }
