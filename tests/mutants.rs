@@ -45,16 +45,12 @@ const SWITCH: &str = "METAPLAN_MUTANT";
 /// File of a crate to which the function that queries the switch is added.
 const LIBRARY: &str = "src/lib.rs";
 
-/// A test program that can detect faults.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Tests {
-    /// `tests/oracle`.
     Oracle,
-    /// `tests/planta`.
     Planta,
     /// Unit tests of the planner, for code that only large tasks reach.
     Unit,
-    /// `tests/world`.
     World,
 }
 
@@ -96,7 +92,6 @@ struct Mutant {
     file: String,
     before: String,
     after: String,
-    /// Tests that must detect this fault.
     #[serde(skip)]
     oracles: &'static [Oracle],
 }
@@ -122,7 +117,7 @@ fn prune(from: &Path, to: &Path) {
     }
 }
 
-/// Copies a file or folder, except for the files in `faulty_files`.
+/// Copies a file or folder, except build results (`target`) and the files whose copies are in `faulty_files`.
 fn copy(from: &Path, to: &Path, faulty_files: &BTreeMap<PathBuf, String>) {
     if from.is_dir() {
         for entry in std::fs::read_dir(from).expect("a directory") {
@@ -168,7 +163,6 @@ fn original(file: &str) -> String {
     std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(file)).expect("a file")
 }
 
-/// Creates a copy of the workspace with all faults and returns its path.
 fn mutated(mutants: &[Mutant]) -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let home = Path::new(env!("CARGO_TARGET_TMPDIR")).join("mutants");
@@ -196,7 +190,6 @@ fn mutated(mutants: &[Mutant]) -> PathBuf {
     home
 }
 
-/// Compiles a test program and returns its path.
 fn compile_tests(home: &Path, tests: Tests) -> PathBuf {
     let (target, name): (&[&str], _) = match tests {
         Tests::Oracle => (&["--test", "oracle"], "oracle"),

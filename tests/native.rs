@@ -29,7 +29,6 @@ fn answer(mission: &Mission) -> Answer {
     (solution.status, plan.as_ref().map(|plan| plan.cost.to_string()), configurations.collect())
 }
 
-/// Reads a shipped mission and changes its state by `situation`.
 fn shipped(name: &str, situation: &dyn Fn(&mut Mission)) -> Mission {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("missions/{name}.toml"));
     let mut mission = Setup::read(&manifest).unwrap_or_else(|messages| panic!("{messages:#?}")).mission;
@@ -38,7 +37,7 @@ fn shipped(name: &str, situation: &dyn Fn(&mut Mission)) -> Mission {
 }
 
 /// Checks that the explicit and the plain form of a shipped mission have the same optimum, with the same
-/// designs at each step.
+/// designs at each step. `expected` is the optimal cost; `None` if there is no plan.
 fn check(name: &str, situation: &dyn Fn(&mut Mission), expected: Option<&str>) {
     let explicit = answer(&shipped(name, situation));
     let native = answer(&shipped(&format!("{name}_plain"), situation));
@@ -215,7 +214,6 @@ fn explicit(functions: usize, bound: i64, reconfiguration: bool) -> String {
     )
 }
 
-/// Returns the plain form of the domain, without designs.
 fn plain(reconfiguration: bool) -> String {
     let (function, effect) = if reconfiguration {
         ("(reconfiguration)", "(increase (total-cost) (reconfiguration))")

@@ -7,7 +7,8 @@
 //! METAPLAN_PYTHON=$PWD/pellet/bin/python cargo test --release --test pellet -- --ignored --nocapture
 //! ```
 //!
-//! Pellet is started with the command line of owlready2's `sync_reasoner_pellet`, so that the overhead of Python is excluded.
+//! Pellet is started with the command line of owlready2's `sync_reasoner_pellet`, so that the overhead of
+//! Python is excluded.
 //! Processor time includes child processes. Wall time depends on the load of the machine.
 
 #![allow(clippy::print_stdout)] // Measurements are printed.
@@ -39,7 +40,6 @@ struct Times {
     processor: f64,
 }
 
-/// Locations of Pellet, and of the test data with the files of SUAVE and the generator of large knowledge bases.
 struct Peer {
     class_path: String,
     shared: PathBuf,
@@ -97,7 +97,8 @@ fn median(mut values: Vec<f64>) -> f64 {
 }
 
 /// Returns the times of a call in this process: the median wall time, and the mean processor time. Thread
-/// clocks have a coarse resolution, so the processor time of a single call is not meaningful.
+/// clocks have a coarse resolution, so the processor time of a single call is not meaningful. On systems that
+/// do not report processor times, the wall time replaces them.
 fn measure_call(runs: usize, mut call: impl FnMut()) -> Times {
     let start_time = thread_processor_time();
     let times = (0..runs).map(|_| {

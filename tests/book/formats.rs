@@ -74,7 +74,6 @@ struct Table<'a> {
     /// Placeholder for arbitrary field names in paths. Empty if such fields are not listed.
     any: &'a str,
     rows: Vec<Row>,
-    /// Paths of fields that already have a row.
     seen: BTreeSet<String>,
     /// Names of definitions whose fields are already listed, each with its path.
     listed: Vec<(String, String)>,
@@ -89,7 +88,6 @@ impl<'a> Table<'a> {
         table.rows
     }
 
-    /// Adds a row for each field of an object at `path`.
     fn object(&mut self, schema: &Value, path: &str) {
         let required: Vec<&str> =
             schema["required"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
@@ -172,8 +170,9 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Returns the name and the schema of the object that contains the fields of a value. References, lists
-    /// and nullable types are followed, and `path` is extended accordingly.
+    /// Returns the schema of the object that contains the fields of a value, with the name of its definition
+    /// (empty without one). References, lists and nullable types are followed, and `path` is extended
+    /// accordingly.
     fn inside(&self, field: &Value, path: &mut String) -> Option<(String, Value)> {
         let (mut name, mut schema) = (String::new(), field.clone());
         loop {
@@ -197,7 +196,6 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Describes the type of a value in words.
     fn kind(&self, field: &Value) -> String {
         let mut kinds: Vec<String> = Vec::new();
         let mut add = |kind: String| {

@@ -36,7 +36,6 @@ pub fn trials() -> Vec<Trial> {
     trials
 }
 
-/// Compares a part of a page with the generated content.
 fn check(page: &str, name: &str, content: &str) -> Result<(), Failed> {
     // Several tests can rewrite the same page, each as a whole, so they must not run concurrently.
     static WRITING: Mutex<()> = Mutex::new(());
@@ -59,7 +58,6 @@ fn check(page: &str, name: &str, content: &str) -> Result<(), Failed> {
     Err("out of date; METAPLAN_BLESS=1 rewrites it".into())
 }
 
-/// Compares the picture of the tutorial with the output of `metaplan plan --svg`.
 fn check_picture() -> Result<(), Failed> {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("plan.svg").display().to_string();
@@ -76,7 +74,6 @@ fn check_picture() -> Result<(), Failed> {
     Err("out of date; METAPLAN_BLESS=1 redraws it".into())
 }
 
-/// Returns the tables of all message codes, one table per first letter.
 fn codes() -> String {
     let mut text = String::new();
     let mut letter = "";
@@ -144,7 +141,6 @@ fn classes(list: &str) -> String {
     names.collect::<Vec<_>>().join(", ")
 }
 
-/// Formats the range of a property: classes, a datatype, or the values of an enumeration.
 fn range(text: &str) -> String {
     let Some((_, values)) = text.split_once("owl:oneOf (") else { return classes(text) };
     let values = values.split(')').next().expect("a list").split_whitespace();

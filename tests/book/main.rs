@@ -1,9 +1,10 @@
-//! Tests of the README and the book: every block of every page is run as a reader would run it, or compared
-//! with the file that it shows.
+//! Tests of the README and the book: the blocks of each page are run as a reader would run them, or compared
+//! with the file that they show.
 //!
-//! Each page is one test. It runs in a shell in a fresh copy of the project, with `metaplan` and `metaplan-verify` in the path. By default
-//! these are the programs that cargo builds for the tests. With `METAPLAN_PROGRAMS=DIR`, `metaplan` is the program in that directory,
-//! where `cargo install` has put it, as in `.ci/newcomer`.
+//! Each page is one test. It runs in a shell in a fresh copy of the project, with `metaplan` and
+//! `metaplan-verify` in the path. By default these are the programs that cargo builds for the tests. With
+//! `METAPLAN_PROGRAMS=DIR`, `metaplan` is the program in that directory, where `cargo install` has put it, as
+//! in `.ci/newcomer`.
 //!
 //! The fence of a block, and the comment before the block, determine the check:
 //!
@@ -78,7 +79,8 @@ fn pages() -> Vec<String> {
     pages
 }
 
-/// Runs all pages of the book in order in one copy of the project, as a reader of the whole book would.
+/// Runs the pages that `docs/SUMMARY.md` lists, in order, in one copy of the project, as a reader of the
+/// whole book would.
 fn pages_in_one_clone() -> Result<(), Failed> {
     let summary = std::fs::read_to_string(root().join("docs/SUMMARY.md")).expect("the summary");
     let links = summary.lines().filter_map(|line| line.split_once("](")?.1.split_once(')'));
@@ -94,7 +96,6 @@ fn pages_in_one_clone() -> Result<(), Failed> {
     if faults.is_empty() { Ok(()) } else { Err(Failed::from(faults.join("\n"))) }
 }
 
-/// Returns `true` if `METAPLAN_BLESS` requests that pages be rewritten.
 fn is_blessing() -> bool {
     std::env::var_os("METAPLAN_BLESS").is_some()
 }
@@ -159,12 +160,12 @@ impl Page {
         if faults.is_empty() { Ok(()) } else { Err(Failed::from(faults.join("\n"))) }
     }
 
-    /// Reports that blocks of this page are not run.
     fn lacks(&self, resource: Resource, name: &str) {
         missing_in(&self.path, resource, &format!("blocks that need {name} are not run"));
     }
 
-    /// Runs blocks in order in one session. Returns the differences between their output and the page.
+    /// Runs blocks in order in one session. Returns the differences between their output and the page. If
+    /// pages are to be rewritten (`METAPLAN_BLESS`), writes the actual output into the page.
     fn run(&self, session: &Session, blocks: &[&Block]) -> Vec<String> {
         let mut blessed = self.text.clone();
         let mut faults = Vec::new();

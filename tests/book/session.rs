@@ -19,11 +19,9 @@ const SEPARATOR: char = '\u{1e}';
 pub struct Session {
     /// Temporary directory that contains a copy of the project.
     directory: TempDir,
-    /// Value of the environment variable `PATH`.
     path: String,
 }
 
-/// A command with the output that the page shows for it.
 struct Step {
     command: String,
     shown: String,
@@ -45,7 +43,8 @@ impl Session {
     pub fn new() -> Self {
         let directory = tempfile::tempdir().expect("a directory");
         copy_project(&directory);
-        // `metaplan-verify` is always the one built with the tests. Installing it would compile everything again with other features.
+        // `metaplan-verify` is always the one built with the tests. Installing it would compile everything
+        // again with other features.
         let built = verifier().parent().expect("a folder").display().to_string();
         let installed = std::env::var("METAPLAN_PROGRAMS").ok();
         let path = std::env::var("PATH").unwrap_or_default();
@@ -97,7 +96,6 @@ impl Session {
         self.directory.path().join("metaplan")
     }
 
-    /// Runs a script and returns its output.
     fn shell(&self, script: &str) -> String {
         let file = self.directory.path().join("script");
         std::fs::write(&file, script).expect("the script is written");

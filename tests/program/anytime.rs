@@ -22,7 +22,7 @@ fn ward(large: bool) -> Option<tempfile::TempDir> {
     Some(directory)
 }
 
-/// Returns missions with several cheapest plans: directory, and manifest in this directory.
+/// Returns missions, each as a directory and a manifest in this directory.
 fn missions() -> Vec<(PathBuf, &'static str)> {
     let ward = ward(false).map(|directory| (directory.keep(), "mission.toml"));
     let shipped = ["missions/templates/warehouse/mission.toml", "missions/ugv.toml", "missions/uuv.toml"];

@@ -44,7 +44,6 @@ fn open(browser: &Path, page: &Path, profile: &Path) -> (Vec<String>, String) {
     (console, String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
-/// Escapes a text for use in an attribute value.
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('"', "&quot;")
 }
@@ -137,7 +136,6 @@ fn ways_in_both_directions_and_late_steps_are_visible() {
     );
 }
 
-/// Pages of Pareto fronts, comparisons, simulations and journals also work in a browser.
 #[test]
 fn other_pages_work_in_a_browser() {
     let Some(browser) = browser() else { return };
@@ -191,7 +189,6 @@ fn self_contained_page(run: &Run, lines: &[String], has_ended: bool) -> String {
     )
 }
 
-/// The page of a run marks completed steps and the current step, also on narrow screens.
 #[test]
 fn the_page_of_a_run_works_in_a_browser() {
     let Some(browser) = browser() else { return };
@@ -256,7 +253,7 @@ fn headline_shows_whether_there_is_a_plan() {
         "There is no plan: no plan reaches the goal",
     );
     run.send([status("c_lidar", "RECOVERED")], 5);
-    // A component that recovers is used again when it has been healthy for `heal` seconds.
+    // A component that recovers is used again when it has been healthy for `heal_time` seconds.
     let lines_with_plan = until(&|news: &Value| news["said"]["answer"] == "resume_action");
     let (action, cost) = ("Action 1: move wp1 wp2", "Cost 516, proved optimal.");
     check_headline(&run, &lines_with_plan, false, action, cost);
@@ -286,7 +283,6 @@ fn headline_shows_whether_there_is_a_plan() {
     run.end();
 }
 
-/// The function `check` detects each kind of error in a page.
 #[test]
 fn page_errors_are_detected() {
     let Some(browser) = browser() else { return };

@@ -351,7 +351,6 @@ pub const MISSIONS: [&[&str]; 5] = [
     &["plan", "missions/ugv.toml", "--fail", "c_kinect", "--set", "robot_at=wp2"],
 ];
 
-/// A claim about a metric that is not the metric of the files must be rejected.
 #[test]
 fn claims_must_use_the_metric_of_the_files() {
     let directory = tempfile::tempdir().expect("a directory");
@@ -417,7 +416,6 @@ fn verification_of_a_huge_task_terminates() {
     assert!(outcome.stdout.contains("ends at 400000 instances of wait"), "{outcome:#?}");
 }
 
-/// A task with a feature that the checker does not cover gets no certificate, and the message names the feature.
 #[test]
 fn unsupported_features_get_no_certificate() {
     let directory = tempfile::tempdir().expect("a directory");

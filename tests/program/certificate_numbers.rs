@@ -4,8 +4,8 @@
 use crate::certificate::change;
 use crate::common::{metaplan_in, verify_in};
 
-/// Products that exceed all machine integers, together with a scaling effect, force the planner to compute
-/// with fractions.
+/// Products that exceed all machine integers force the planner to compute with fractions. Such plans get
+/// certificates, unless numbers are also multiplied by fractions.
 #[test]
 fn plans_found_in_fractions_have_certificates() {
     let directory = tempfile::tempdir().expect("a directory");
@@ -72,8 +72,8 @@ fn duplicate_literals_are_certified() {
     assert_eq!(outcome.status, 0, "{outcome:#?}");
 }
 
-/// A start that is too early by less than the tolerance is moved to the permitted time, and the plan is
-/// validated with the moved start.
+/// A start slightly before the end of the preceding action is moved to this end, and the plan is validated
+/// with the moved start. A start slightly before a window of timed literals is not moved into the window.
 #[test]
 fn tolerance_does_not_move_plans_into_a_window() {
     let directory = tempfile::tempdir().expect("a directory");
@@ -98,7 +98,7 @@ fn tolerance_does_not_move_plans_into_a_window() {
             &["6.9995", "7.000", "9.0005", "9.001"][..],
             &["7.001", "8.500"][..],
         ),
-        // Only `prepare` can end before 5, and from 5 on the way is closed.
+        // `prepare` ends at 5, when the way is already closed.
         ("(open) (at 4.9998 (not (open)))", &["4.9995", "4.9998", "5.000"], &[]),
         ("(open) (at 5.5 (not (open)))", &["4.9985", "5.5005"], &["4.9995", "5.000", "5.200"]),
     ];

@@ -25,7 +25,6 @@ const PROBLEM: &str = "(define (problem p) (:domain d)
   (:init (at a) (way a b) (way b c))
   (:goal (at c)))";
 
-/// Runs `metaplan plan` with a domain and a problem in a temporary directory.
 fn plan(domain: &str, problem: &str, arguments: &[&str]) -> Outcome {
     let directory = tempfile::tempdir().expect("a temporary directory");
     std::fs::write(directory.path().join("domain.pddl"), domain).expect("a file");

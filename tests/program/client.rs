@@ -15,8 +15,8 @@ const DOMAIN: &str = "(define (domain d) (:requirements :typing) (:types place i
   (:action put :parameters (?i - item ?p - place) :precondition (and (at ?p) (has ?i))
     :effect (and (lies ?i ?p) (not (has ?i)) (free))))";
 
-/// Returns a problem that takes more than a few seconds to solve: parcels on a grid, each with a different
-/// destination.
+/// Returns a problem that takes more than a few seconds to solve: 14 parcels on a grid, carried one at a
+/// time.
 fn parcels() -> String {
     let (side, count) = (9, 14);
     let mut text = "(define (problem p) (:domain d) (:objects".to_owned();
@@ -79,7 +79,7 @@ fn ready_is_followed_by_progress_during_search() {
     assert!(kinds[..end].contains(&"plan_requested"), "{kinds:?}");
 }
 
-/// Domain for which a few objects yield hundreds of thousands of ground operators.
+/// Domain for which 20 objects yield hundreds of thousands of ground operators.
 const WIDE: &str = "(define (domain wide) (:predicates (p ?a ?b) (q ?a ?b ?c ?d) (done))
     (:action a :parameters (?a ?b ?c ?d) :precondition (and (p ?a ?b) (p ?c ?d)) :effect (q ?a ?b ?c ?d))
     (:action b :parameters (?a ?b ?c ?d) :precondition (q ?a ?b ?c ?d) :effect (done)))";

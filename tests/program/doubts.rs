@@ -56,7 +56,6 @@ fn unused_names_are_reported_with_their_position() {
     assert_eq!(outcome.status, 0, "{outcome:#?}");
 }
 
-/// A name in an imported file is reported with its position in that file.
 #[test]
 fn names_in_imported_files_have_a_position() {
     let copy = copy_of_mission("ugv");

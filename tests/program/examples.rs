@@ -24,7 +24,6 @@ fn folder() -> &'static Path {
     })
 }
 
-/// Runs an example and returns its output.
 fn printed(example: &str) -> String {
     let program = folder().join(format!("{example}{}", std::env::consts::EXE_SUFFIX));
     let output = Command::new(program).current_dir(root()).output().expect("the example starts");

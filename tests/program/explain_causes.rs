@@ -9,7 +9,6 @@ use serde_json::{Value, json};
 
 use crate::common::{copy_folder, metaplan_in, root};
 
-/// A deterministic pseudorandom number generator (LCG).
 struct Random(u64);
 
 impl Random {
@@ -56,7 +55,6 @@ impl Design {
     }
 }
 
-/// The designs of one function, with the failed components and the measured values.
 #[derive(Debug)]
 struct World {
     designs: Vec<Design>,
@@ -138,7 +136,6 @@ impl World {
         }
     }
 
-    /// Returns the command-line options that establish a situation: failed components and measured values.
     fn options(failed: &BTreeSet<u64>, measured: &[u64]) -> Vec<String> {
         let fail = failed.iter().flat_map(|component| ["--fail".to_owned(), format!("c_{component}")]);
         let set = measured.iter().zip(0..);

@@ -64,7 +64,6 @@ fn warehouse_template_can_be_planned() {
     check("warehouse", "110.8", &scenarios);
 }
 
-/// Returns the names of the entries of a directory.
 fn names(directory: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(directory).expect("a directory");
     entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect()
@@ -95,7 +94,6 @@ fn nothing_is_overwritten() {
     assert_eq!(names(here).len(), 2, "{:?}", names(here));
 }
 
-/// Every directory name is accepted as the name of a mission, and the answer lists the created files.
 #[test]
 fn directory_names_become_mission_names() {
     let directory = tempfile::tempdir().expect("a directory");

@@ -17,7 +17,6 @@ const SECONDS: [u32; 4] = [5, 15, 60, 180];
 const SIMULATE: [&str; 6] =
     ["simulate", "missions/ugv.toml", "--scenario", "kinect_comes_and_goes", "--strategy", "joint"];
 
-/// Runs a command, interrupts it by SIGINT after some seconds, and waits for its end.
 #[cfg(unix)]
 fn interrupted(directory: &Path, arguments: &[&str], seconds: u32) -> Outcome {
     let child = Command::new(env!("CARGO_BIN_EXE_metaplan"))
@@ -39,8 +38,8 @@ fn interrupted(directory: &Path, arguments: &[&str], seconds: u32) -> Outcome {
     }
 }
 
-/// Ends a command early, once by a time limit and once by a signal. The time is increased until there is a
-/// result. `count_results` counts the results of an answer. Returns the answers.
+/// Ends a command early: once by a time limit, and once by SIGINT unless this signal is ignored. The time is
+/// increased until there is a result. `count_results` counts the results of an answer. Returns the answers.
 fn check(
     directory: &Path,
     arguments: &[&str],

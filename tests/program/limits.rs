@@ -128,7 +128,6 @@ fn time_limit_includes_reading() {
     assert_eq!(status.code(), Some(12));
 }
 
-/// A comparison at its time limit shows the finished results and reports that they are incomplete.
 #[test]
 fn comparisons_at_a_limit_show_finished_results() {
     let outcome = metaplan(&["compare", "missions/camara_like.toml", "--time-limit", "0"]);

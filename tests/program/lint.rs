@@ -77,8 +77,8 @@ fn unused_names_are_warnings() {
     );
 }
 
-/// Missing or negative numbers that make a design or an action unusable: `lint` reports their position, and
-/// `plan` warns as well.
+/// `lint` warns of missing or negative numbers that make a design or an action unusable, and reports their
+/// positions.
 #[test]
 fn missing_and_negative_numbers_are_warnings() {
     let misspelt = (
@@ -159,7 +159,7 @@ fn missing_numbers_are_listed_if_there_is_no_plan() {
     assert!(outcome.stdout.contains(words), "{outcome:#?}");
 }
 
-/// A domain may omit values on purpose: distances between places without a way, and from a place to itself.
+/// A problem may omit values on purpose: distances between places without a way, and from a place to itself.
 #[test]
 fn unneeded_missing_numbers_are_not_reported() {
     let domain = "(define (domain d) (:requirements :typing :numeric-fluents) (:types place)

@@ -70,7 +70,6 @@ impl Run {
         }
     }
 
-    /// Opens a connection to the server and requests a path.
     fn request(&self, path: &str, headers: &str) -> TcpStream {
         let mut stream = TcpStream::connect(&self.address).expect("a connection");
         stream.set_read_timeout(Some(TIMEOUT)).expect("a timeout");
@@ -207,7 +206,6 @@ fn input_and_answers_are_streamed_as_they_come() {
     assert_eq!(remaining_kinds, ["end"]);
 }
 
-/// The page draws the current plan, with escaped names.
 #[test]
 fn current_plan_is_drawn() {
     let mut run = Run::begin(&["--serve=0"]);

@@ -81,7 +81,6 @@ fn maps_of_2017_become_missions() {
     assert_eq!(outcome.status, 2, "an option is there twice: {outcome:#?}");
 }
 
-/// Maps with the key `coord` and with the key `coords` yield the same mission.
 #[test]
 fn both_map_formats_give_the_same_mission() {
     let options = MapOptions { start: "h1".to_owned(), goal: "h4".to_owned(), ..MapOptions::default() };

@@ -1,5 +1,5 @@
-//! Tests of messages: after random changes to the files of a mission or to the arguments, no message contains internal names or debug
-//! output. Also tests when messages are coloured.
+//! Tests of messages: after random changes to the files of a mission or to the arguments, no message contains
+//! internal names or debug output. Also tests when messages are coloured.
 
 use std::path::Path;
 
@@ -34,8 +34,9 @@ fn is_debug_text(text: &str) -> bool {
     })
 }
 
-/// Returns the lines of an outcome that contain internal texts. Source lines and positions are excluded,
-/// because they are content of the user's files.
+/// Returns the lines of an outcome that contain internal texts or paths with `..`, and the exit status if it
+/// is not a documented one. Source lines and positions are excluded, because they are content of the user's
+/// files.
 fn faults(outcome: &Outcome) -> Vec<String> {
     let output = format!("{}{}", outcome.stdout, outcome.stderr);
     let message_lines = output.lines().filter(|line| !line.contains(" │"));
@@ -59,7 +60,7 @@ fn faults(outcome: &Outcome) -> Vec<String> {
     faults
 }
 
-/// Returns a copy of a text with one error. `number` determines the line and the kind of error.
+/// Returns a copy of a text with one changed line. `number` determines the line and the kind of change.
 fn mangled(text: &str, number: usize) -> String {
     let lines: Vec<&str> = text.lines().collect();
     let at = number / 5 * 7 % lines.len();
@@ -77,7 +78,6 @@ fn mangled(text: &str, number: usize) -> String {
     changed_lines.join("\n") + "\n"
 }
 
-/// Runs the commands with each of `count` errors in each file, on two threads.
 fn check(files: &[&str], template: &str, count: usize, commands: &[&[&str]]) {
     let work: Vec<(&str, usize)> =
         files.iter().flat_map(|file| (0..count).map(move |number| (*file, number))).collect();
@@ -119,7 +119,6 @@ fn messages_about_files_contain_no_internals() {
     check(&["problem.pddl"], "blank", 10, &[&["plan", "m/mission.toml", "--time-limit", "2"]]);
 }
 
-/// Messages about unknown names and invalid values in all kinds of arguments contain no internal names.
 #[test]
 fn messages_about_arguments_contain_no_internals() {
     let directory = tempfile::tempdir().expect("a directory");
@@ -171,7 +170,6 @@ fn messages_about_arguments_contain_no_internals() {
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
-/// Messages have equal texts with and without colours. Without a terminal, the default is no colours.
 #[test]
 fn colours_depend_on_option_and_terminal() {
     let directory = tempfile::tempdir().expect("a directory");

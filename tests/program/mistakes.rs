@@ -1,5 +1,5 @@
-//! Tests of mistakes in scenarios, situations and studies, such as unknown names: all errors are reported with their positions, and
-//! nothing is simulated.
+//! Tests of mistakes in scenarios, situations and studies, such as unknown names: all errors are reported
+//! with their positions, and nothing is simulated.
 
 use std::fs;
 
@@ -147,7 +147,6 @@ fn all_errors_of_a_situation_are_reported_together() {
     }
 }
 
-/// A condition can be any PDDL condition; a single atom can be written without parentheses.
 #[test]
 fn parentheses_of_conditions_are_optional() {
     let costs = [
@@ -181,7 +180,6 @@ fn parentheses_of_conditions_are_optional() {
     assert!(costs.iter().all(|cost| (cost - costs[0]).abs() < 1e-9 && *cost > 111.0), "{costs:?}");
 }
 
-/// A study with an invalid command is rejected before anything is run.
 #[test]
 fn unknown_names_in_studies_are_reported() {
     for (study, place, words) in [
@@ -247,7 +245,6 @@ fn nonexistent_rows_are_an_error() {
     );
 }
 
-/// There are three units of time. A misspelt unit gets a suggestion.
 #[test]
 fn unknown_time_units_are_an_error() {
     let directory = tempfile::tempdir().expect("a directory");

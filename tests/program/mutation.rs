@@ -21,8 +21,6 @@ impl Random {
     }
 }
 
-/// Changes a random part of a text: a line is removed, duplicated or swapped, or a word is replaced by a
-/// number or by another word.
 fn mutate(text: &str, random: &mut Random) -> String {
     let mut lines: Vec<&str> = text.split_inclusive('\n').collect();
     let line = random.below(lines.len());
@@ -71,7 +69,6 @@ const KINDS: [&str; 14] = [
     "anything",
 ];
 
-/// An unchanged certificate on disk, with the texts of its files for restoration.
 struct Original {
     directory: tempfile::TempDir,
     target: PathBuf,
@@ -96,7 +93,6 @@ impl Original {
     }
 }
 
-/// Removes or duplicates a random line that satisfies a condition.
 fn change_line(text: &str, random: &mut Random, is_candidate: &dyn Fn(&str) -> bool) -> String {
     let mut lines: Vec<&str> = text.split_inclusive('\n').collect();
     let candidates: Vec<usize> = (0..lines.len()).filter(|at| is_candidate(lines[*at])).collect();
@@ -111,7 +107,7 @@ fn change_line(text: &str, random: &mut Random, is_candidate: &dyn Fn(&str) -> b
     lines.concat()
 }
 
-/// Inverts the sign of a random number after the first line.
+/// Inverts the sign of a random number that is neither in the first line nor the last one of its line.
 fn flip(text: &str, random: &mut Random) -> String {
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     if lines.len() < 2 {

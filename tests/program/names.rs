@@ -23,8 +23,8 @@ fn declared() -> tempfile::TempDir {
     copy
 }
 
-/// Copies the mission `uuv` with other names for functions, designs and actions in the knowledge base, and
-/// with these entries of the name map.
+/// Copies the mission `uuv` like `declared`. Renames functions, designs and actions in the knowledge base,
+/// and adds these entries to the name map.
 fn renamed(entries: &str) -> tempfile::TempDir {
     let copy = declared();
     let mut text = std::fs::read_to_string(copy.path().join(KB)).expect("the knowledge base");
@@ -154,8 +154,6 @@ fn certificates_depend_on_the_name_map() {
     assert!(outcome.stdout.contains("the knowledge says"), "{outcome:#?}");
 }
 
-/// Runs `metaplan plan` on the renamed mission with these entries of the name map. Asserts that standard
-/// error contains the words.
 fn check(entries: &str, status: i32, words: &[&str]) -> Outcome {
     let copy = renamed(entries);
     let outcome = metaplan_in(copy.path(), &["plan", MANIFEST], "");
@@ -275,7 +273,8 @@ fn unmatched_names_are_listed_from_both_sides() {
     ] {
         assert!(outcome.stderr.contains(word), "no `{word}`: {outcome:#?}");
     }
-    // A design that the problem does not declare, although it declares others, is reported at its position in the knowledge base.
+    // A design that the problem does not declare, although it declares others, is reported at its position in
+    // the knowledge base.
     let incomplete = declared();
     edit(incomplete.path(), PROBLEM, "fd_search_low ", "");
     let outcome = metaplan_in(incomplete.path(), &["plan", MANIFEST], "");

@@ -1,4 +1,5 @@
-//! Tests of the problem in the Metaplan paper with SUAVE's knowledge base. Their names differ and are mapped.
+//! Tests of the problem in the Metaplan paper with SUAVE's knowledge base. The names of problem and knowledge
+//! base differ and are mapped.
 
 use serde_json::{Value, json};
 
@@ -44,8 +45,8 @@ fn by_hand(files: &[String; 2], unavailable: &[&str]) -> Value {
     plan(&[files[0].clone(), problem.display().to_string()], &[]).json()
 }
 
-/// Returns the greatest value of the three actions of the shortest plan, by brute force over the available
-/// designs in the paper's table.
+/// Returns the greatest sum of design values over the three actions of the shortest plan, by brute force over
+/// the available designs in the paper's table.
 fn greatest_value(unavailable: &[&str]) -> f64 {
     let designs = [
         ("search", "fd_search_low", 0.5),
@@ -166,7 +167,6 @@ fn problem_of_the_paper_needs_a_name_map() {
     }
 }
 
-/// The problem determines the availability of designs and functions that the knowledge base does not have.
 #[test]
 fn functions_unknown_to_the_knowledge_base_are_kept() {
     let Some((files, options)) = paper() else { return };

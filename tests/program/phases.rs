@@ -14,7 +14,6 @@ use test_resources::python;
 use crate::common::{program, verify_in};
 use crate::limits::round_trip;
 
-/// Outcome of a command, with its processor time and memory usage.
 #[derive(Debug)]
 struct Run {
     status: i64,
@@ -68,12 +67,10 @@ fn limited(directory: &Path, arguments: &[&str], limit: f64) -> Run {
     latest_run
 }
 
-/// Asserts that the command has no result and names a limit as the reason.
 fn assert_nothing_to_show(outcome: &Run) {
     assert!(outcome.status == 12 && outcome.stderr.contains("limit was reached"), "{outcome:#?}");
 }
 
-/// Concatenates the texts for the numbers from 0 to `count - 1`.
 fn repeated(count: usize, text: impl Fn(usize) -> String) -> String {
     (0..count).fold(String::new(), |joined, number| joined + &text(number))
 }
@@ -105,7 +102,6 @@ fn reading_keeps_the_limit() {
     assert_nothing_to_show(&limited(directory.path(), &PLAN, 0.3));
 }
 
-/// Creates a knowledge base with a transitive property along a chain of individuals.
 fn transitive(count: usize) -> tempfile::TempDir {
     let mut text = "@prefix : <http://example.org/> . @prefix owl: <http://www.w3.org/2002/07/owl#> .\n\
         :before a owl:TransitiveProperty , owl:ObjectProperty .\n"
@@ -151,7 +147,6 @@ fn grounding_keeps_the_limit() {
     assert_nothing_to_show(&limited(quantified(40, "x y").path(), &PLAN, 0.5));
 }
 
-/// With one object per variable, there is only one combination.
 #[test]
 fn variables_with_one_object_are_cheap() {
     if python().is_none() {

@@ -106,7 +106,8 @@ fn known_results(map: &str, speeds: bool, configurations: usize) {
     assert_eq!(front, expected.map(|pair| pair.map(str::to_owned)));
 }
 
-/// Returns the exact minimum expected time to the goal; `None` if the goal is not reached with probability 1.
+/// Returns the exact minimum expected time to the goal; `None` if no policy reaches the goal with probability
+/// 1.
 fn least_time(mission: &Coadaptation, risk: Risk) -> Option<BigRational> {
     let process = Process::<BigRational>::new(mission, risk, &["time"]);
     let explored = explore(&process, &Bounds::default()).expect("explored");
@@ -140,7 +141,6 @@ fn agree(label: &str, setup: &Setup, risk: Risk) -> bool {
     plan.is_some()
 }
 
-/// Numbers of solvable and unsolvable cases on which the planner and the model checker agree.
 #[derive(Debug, Default)]
 struct Agreement {
     solved: usize,
@@ -153,8 +153,8 @@ impl Agreement {
     }
 }
 
-/// Compares random pairs of places on the map until `count` pairs have a plan. `None` if the map is not
-/// available.
+/// Compares the planner with the model checker on random pairs of places, until `count` pairs have a plan.
+/// Returns `None` if the map is not available.
 fn pairs_of_the_map(count: usize) -> Option<Agreement> {
     let map = std::fs::read_to_string(data("real/map/map-p2cp3.json")?).expect("readable");
     let (_directory, setup) = mission(&map, &MapOptions { dark: dark(), ..places("l1", "l18") });
@@ -175,7 +175,6 @@ fn pairs_of_the_map(count: usize) -> Option<Agreement> {
     Some(agreement)
 }
 
-/// A deterministic pseudorandom number generator (LCG).
 struct Random(u64);
 
 impl Random {
@@ -215,7 +214,7 @@ fn random_map(random: &mut Random) -> (String, usize) {
     (json!({ "map": nodes, "time": time }).to_string(), n)
 }
 
-/// Compares random missions until `count` of them have a plan.
+/// Compares the planner with the model checker on random missions, until `count` of them have a plan.
 fn generated_missions(count: usize) -> Agreement {
     let mut random = Random(11);
     let mut agreement = Agreement::default();
@@ -317,8 +316,8 @@ fn shipped_mission_is_compared() {
     assert!((answer["price_of_determinism"].as_f64().expect("a number") - 197.94).abs() < 1e-6, "{answer:#}");
 }
 
-/// Every mission has a Markov decision process. Without uncertainty, its minimum time is the planner's
-/// optimum.
+/// Missions without a map of places also have a Markov decision process. Without uncertainty, the minimum of
+/// its reward `time` is the planner's optimum.
 #[test]
 fn processes_of_missions_without_places_have_the_optimum_of_the_planner() {
     let cases = [
@@ -353,8 +352,6 @@ fn missions_without_places_are_compared() {
     assert_eq!(first["replanned"], first["solved_again"], "{answer:#}");
 }
 
-/// Values that are invalid in a process are rejected, and so are more configurations than a state can
-/// represent.
 #[test]
 fn invalid_processes_are_refused() {
     use pddl::ast::{InitialElement, Name, Problem as Pddl, Term};

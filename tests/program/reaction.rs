@@ -9,7 +9,6 @@ use serde_json::Value;
 
 use crate::common::{program, root};
 
-/// A running loop with piped input and output.
 struct Run {
     child: Child,
     input: ChildStdin,

@@ -48,7 +48,6 @@ fn unique_names_are_optional() {
     assert!(!unique.stdout.contains("requiresF"), "{unique:#?}");
 }
 
-/// `-` means standard input for every kind of document.
 #[test]
 fn standard_input_can_replace_any_document() {
     let failure = ":c a t:Component ; t:c_status \"FALSE\" . :fd t:requiresC :c .";
@@ -80,7 +79,6 @@ fn standard_input_can_replace_any_document() {
     }
 }
 
-/// Each axiom outside the supported profile is reported once, with a summary.
 #[test]
 fn axioms_outside_the_profile_are_summarised() {
     let model = format!(
@@ -105,7 +103,6 @@ const ZOO: &str =
 :tom a :Cat .
 ";
 
-/// Tests entailment queries, the class hierarchy, and derivations.
 #[test]
 fn queries_are_answered_with_derivations() {
     let directory = tempfile::tempdir().expect("a temporary directory");
@@ -152,7 +149,6 @@ fn queries_are_answered_with_derivations() {
     }
 }
 
-/// A diverging rule ends with an error that names the rule. Missing imports can be ignored.
 #[test]
 fn step_limit_and_missing_imports_are_options() {
     let counting_rule = "<http://x#n>(?x, ?n) ^ swrlb:add(?m, ?n, 1) -> <http://x#n>(?x, ?m) .\n";
@@ -179,7 +175,6 @@ fn step_limit_and_missing_imports_are_options() {
     check(&run(&["reason", "-", "--ignore-missing-imports"], imports), 0, &["warning[O206]"]);
 }
 
-/// At most ten warnings of one kind are printed.
 #[test]
 fn repeated_warnings_are_summarised() {
     let models: Vec<String> = (0..15).map(|n| format!("<http://x#i{n}> a <http://x#C{n}> .\n")).collect();
@@ -275,7 +270,6 @@ fn hostile_rule_files_are_escaped() {
 const EMPTY: &str = "@prefix : <urn:x#> . @prefix owl: <http://www.w3.org/2002/07/owl#> . \
     @prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .\n";
 
-/// Asserting and retracting documents has the same status and conclusions as reading the combined document.
 #[test]
 fn updates_are_equivalent_to_the_resulting_document() {
     let negative = "[] a owl:NegativePropertyAssertion ; owl:sourceIndividual :a ; owl:assertionProperty :p ; \
@@ -328,7 +322,6 @@ fn updates_are_equivalent_to_the_resulting_document() {
     }
 }
 
-/// Updates without effect are reported, and so are invalid updates.
 #[test]
 fn ineffective_updates_are_reported() {
     let change = |option: &str, text: &str| {
@@ -346,8 +339,8 @@ fn ineffective_updates_are_reported() {
     check(&change("--assert", ":A rdfs:subClassOf [ a owl:Class ; owl:unionOf ( :B :C ) ] ."), 0, &["O301"]);
 }
 
-/// A rule that derives ever larger values ends each command within 2 s, also with default limits. The message
-/// contains the rule and the value.
+/// A rule that derives ever larger values ends each command within 2 s of processor time, also with default
+/// limits. The message contains the rule and the value.
 #[test]
 fn diverging_rules_end_every_command() {
     let directory = tempfile::tempdir().expect("a temporary directory");

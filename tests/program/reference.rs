@@ -1,8 +1,9 @@
 //! Benchmark with generated instances, whose optima are known from several planners and an exact oracle.
 //!
-//! `cargo test --release --test program reference -- --ignored --nocapture --test-threads 1` prints one line per instance: name, cost,
-//! kind of proof, and processor time of the program; then the time with a certificate, and the time of verification, which must be at
-//! most ten times the time of planning. Needs python3 (standard library only) for generators and measurement.
+//! `cargo test --release --test program reference -- --ignored --nocapture --test-threads 1` prints one line
+//! per instance. It contains name, cost, kind of proof, and processor time of the program. Then it contains
+//! the time with a certificate, and the time of verification, which must be at most ten times the time of
+//! planning. Needs python3 (standard library only) for generators and measurement.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -13,7 +14,6 @@ use test_resources::{data, python};
 
 use crate::common::{metaplan_in, processor_time, root};
 
-/// Reads a CSV table. Returns its rows as pairs of column name and value.
 fn table(file: &Path) -> Vec<Vec<(String, String)>> {
     let text = std::fs::read_to_string(file).expect("the table");
     let mut lines = text.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
@@ -30,7 +30,6 @@ fn generate(python: &Path, script: &Path, arguments: &[&str]) {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
-/// Results and measurements for one instance.
 #[derive(Debug)]
 struct Row {
     /// Cost of the plan, or the status if there is no plan.
@@ -42,7 +41,6 @@ struct Row {
     verifying: f64,
 }
 
-/// Plans an instance without and with a certificate, and verifies the certificate.
 fn row(directory: &Path, name: &str, expected: &str) -> Row {
     let files = [format!("{name}.domain.pddl"), format!("{name}.problem.pddl")];
     let arguments = ["plan", &files[0], &files[1], "--quiet"];
@@ -59,7 +57,6 @@ fn row(directory: &Path, name: &str, expected: &str) -> Row {
     row
 }
 
-/// Measures planning, planning with a certificate, and verification.
 fn timed(directory: &Path, name: &str, arguments: &[&str], certificate: &str) -> Row {
     let planning = processor_time(directory, arguments);
     let started = Instant::now();

@@ -11,7 +11,6 @@ use crate::common::{copy_of_mission, edit, metaplan, metaplan_in, root};
 /// Number of drawings of each picture on a page, for columns of different widths. Plans shown side by side
 /// have two drawings.
 const DRAWINGS: usize = 3;
-/// Maximum size of a page in bytes.
 const MAX_PAGE_BYTES: usize = 500_000;
 
 fn page(arguments: &[&str]) -> String {
@@ -21,7 +20,6 @@ fn page(arguments: &[&str]) -> String {
     outcome.stdout
 }
 
-/// Returns the number of occurrences of an attribute with the given value in a page.
 fn count(page: &str, attribute: &str, value: &str) -> usize {
     page.matches(&format!("{attribute}=\"{value}\"")).count()
 }
@@ -82,7 +80,6 @@ fn plans_before_and_after_are_compared_with_reasons() {
     }
 }
 
-/// If there is no plan, the comparison states this and nothing about the steps of a plan.
 #[test]
 fn missing_plan_is_stated_plainly() {
     let outcome = metaplan(&["report", "missions/ugv.toml", "--set", "battery=1"]);
@@ -93,8 +90,6 @@ fn missing_plan_is_stated_plainly() {
     }
 }
 
-/// If several causes make a design unavailable, all are listed, with the note that removing one cause is not
-/// sufficient.
 #[test]
 fn all_causes_of_an_unavailable_design_are_listed() {
     let sentence = "2 causes rule it out, and all of them have to go before it is available:";
@@ -132,7 +127,6 @@ fn values(picture: &str) -> Vec<(f64, f64)> {
     points.map(value).collect()
 }
 
-/// Pages about simulations: they report failed missions, and figures have at most two decimals.
 #[test]
 fn failed_simulations_are_reported_and_figures_are_rounded() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -161,14 +155,12 @@ fn failed_simulations_are_reported_and_figures_are_rounded() {
     }
 }
 
-/// A function that was not used before has no previous design.
 #[test]
 fn first_uses_of_functions_are_reported() {
     let page = page(&["missions/uuv.toml", "--scenario", "battery_drop"]);
     assert!(page.contains("Designs of f_recharge: none before, fd_recharge now."));
 }
 
-/// Curves show the bounds of conditions, such as the battery required for the next move.
 #[test]
 fn curves_show_the_bounds_of_conditions() {
     let page = page(&["missions/uuv.toml"]);
@@ -256,7 +248,6 @@ fn places_are_drawn_at_positions_of_the_manifest() {
     assert!(outcome.stderr.contains("places.csv:4:1"), "{}", outcome.stderr);
 }
 
-/// Pages of plans with a thousand steps, along a corridor of 1,001 places, are drawn within the time limit.
 #[test]
 fn pages_of_thousand_steps_are_fast() {
     let mission = copy_of_mission("ugv");
@@ -350,7 +341,6 @@ fn reports_have_no_json_format() {
     assert_eq!(error["messages"][0]["code"], "M107");
 }
 
-/// Overlapping actions are drawn in separate rows. Curves show the effects of both actions.
 #[test]
 fn overlapping_actions_are_drawn() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -380,7 +370,6 @@ fn overlapping_actions_are_drawn() {
     );
 }
 
-/// All answers with pictures can write them to files.
 #[test]
 fn all_answers_write_their_pictures_to_files() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -416,7 +405,6 @@ fn all_answers_write_their_pictures_to_files() {
     }
 }
 
-/// The pictures in README and book are up to date.
 #[test]
 fn pictures_of_the_book_are_up_to_date() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -1,4 +1,5 @@
-//! Comparison of joint optimisation with a fixed shortest route, for all pairs of places on the map of Cámara et al.
+//! Comparison of joint optimisation with a fixed shortest route, for all pairs of places with measured ways
+//! on the map of Cámara et al.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};

@@ -4,8 +4,9 @@ use serde_json::Value;
 
 use crate::common::{edit, metaplan, metaplan_in, root};
 
-/// Simulates a scenario. Returns for each strategy: name, number of accomplished missions, and numbers of
-/// runs that are better and worse than the run of the loop.
+/// Simulates a scenario and asserts that no strategy is better than the loop. Returns for each strategy:
+/// name, number of accomplished missions, and numbers of runs that are better and worse than the run of the
+/// loop.
 fn check(mission: &str, scenario: &str, runs: usize) -> Vec<(String, u64, u64, u64)> {
     let (file, count) = (format!("missions/{mission}.toml"), runs.to_string());
     let arguments =
@@ -28,7 +29,6 @@ fn worse_runs(rows: &[(String, u64, u64, u64)], strategy: &str) -> u64 {
     rows.iter().find(|row| row.0 == strategy).expect("the strategy").3
 }
 
-/// Compares the strategies in several scenarios over the given number of seeds.
 fn compare(runs: usize) {
     let run_count = runs as u64;
     for (mission, scenario) in [("ugv", "kinect_at_wp2"), ("uuv", "battery_under_way")] {
@@ -210,7 +210,6 @@ fn clock_of_the_loop_is_in_seconds() {
     }
 }
 
-/// Times are printed with their unit. SUAVE's columns are in seconds.
 #[test]
 fn units_are_shown() {
     let arguments =
@@ -334,7 +333,6 @@ fn greedy_control_observes_requirements_in_a_ward() {
     assert!(requests > 0, "{log}");
 }
 
-/// Failed missions are reported with the reason.
 #[test]
 fn failed_missions_are_reported_with_the_reason() {
     let arguments =

@@ -139,8 +139,8 @@ fn runs_end_at_their_time_limit_and_files_are_generated() {
     assert_eq!((outcome.status, &outcome.json()["timed_out"]), (1, &1.into()), "{outcome:#?}");
 }
 
-/// A study can vary all ordered pairs of places of the invented map. Its results equal those of the
-/// comparison of the map.
+/// A study can vary pairs of places of the invented map. Its results equal those of the comparison of the
+/// map.
 #[test]
 fn pairs_of_a_map_can_be_varied() {
     let folder = tempfile::tempdir().expect("a directory");

@@ -11,7 +11,6 @@ fn texts(folder: &Path) -> Vec<std::path::PathBuf> {
     entries.flat_map(|path| if path.is_dir() { texts(&path) } else { vec![path] }).collect()
 }
 
-/// Copies the tutorial's mission and replaces a name in all files.
 fn warehouse_with(old: &str, new: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     copy_folder(&root().join("missions/templates/warehouse"), folder.path());

@@ -1,5 +1,5 @@
-//! Tests of the UGV mission of the paper: both plans, their uniqueness by brute force, the three
-//! modifications, availability of designs, and identical answers of repeated runs.
+//! Tests of the UGV mission of the paper: both plans, their uniqueness by brute force, modified problems,
+//! domains and knowledge bases, availability of designs, and identical answers of repeated runs.
 
 use crate::common::{copy_of_mission, edit, metaplan, metaplan_in, steps};
 

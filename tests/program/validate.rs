@@ -31,7 +31,6 @@ fn validate(domain: &str, problem: &str, plan: &str, arguments: &[&str]) -> Outc
     metaplan_in(directory.path(), &command.copied().collect::<Vec<_>>(), "")
 }
 
-/// Validates a plan for the survey domain. Checks the exit status and the complete JSON answer.
 fn check(plan: &str, status: i32, expected: &Value) {
     let outcome = validate(DOMAIN, PROBLEM, plan, &["--format", "json"]);
     assert_eq!((outcome.status, &outcome.json()), (status, expected), "{plan}");
@@ -81,7 +80,6 @@ fn messages_have_a_position_and_a_suggestion() {
     assert!(message["help"].as_str().is_some_and(|help| help.contains("`at`")), "{message}");
 }
 
-/// Plans that `metaplan plan` writes are valid in each format, for plain and explicit domains.
 #[test]
 fn plans_are_valid_in_each_format() {
     for mission in ["ugv", "ugv_plain", "uuv", "uuv_plain"] {

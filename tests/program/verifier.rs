@@ -8,7 +8,6 @@ use serde_json::{Value, json};
 use crate::certificate::{certificate, change};
 use crate::common::{metaplan, root, verify_in};
 
-/// Missing certificates, unwritable outputs, and time limits are reported alike by both programs.
 #[test]
 fn both_programs_give_the_same_refusals() {
     let directory = tempfile::tempdir().expect("a directory");

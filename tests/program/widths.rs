@@ -20,14 +20,12 @@ fn width(text: &str) -> usize {
     text.lines().map(|line| line.chars().count()).max().unwrap_or(0)
 }
 
-/// Returns the words of a text, sorted.
 fn words(text: &str) -> Vec<&str> {
     let mut words: Vec<&str> = text.split_whitespace().collect();
     words.sort_unstable();
     words
 }
 
-/// Returns the non-blank characters of a text, sorted.
 fn characters(text: &str) -> Vec<char> {
     let mut characters: Vec<char> = text.chars().filter(|character| !character.is_whitespace()).collect();
     characters.sort_unstable();

@@ -2,8 +2,8 @@
 //! `camara_like`, JANI files, and speed.
 //!
 //! Setup: `python3 -m venv storm && storm/bin/pip install stormpy==2.0.0`. Run:
-//! `STORM_PYTHON=storm/bin/python cargo test --release --test storm -- --ignored --nocapture`. `SEED` and `MODELS` set the seed and the
-//! number of the random models.
+//! `STORM_PYTHON=storm/bin/python cargo test --release --test storm -- --ignored --nocapture`.
+//! `SEED` and `MODELS` set the seed and the number of the random models.
 
 #![allow(clippy::print_stdout)]
 
@@ -168,7 +168,6 @@ fn random_models() {
     assert_eq!(refused, 0);
 }
 
-/// A property of the mission `camara_like`, which is checked with larger numbers of battery levels.
 struct Case {
     property: &'static str,
     reward: Option<&'static str>,
@@ -226,7 +225,6 @@ fn native(mission: &Coadaptation, risk: Risk, case: &Case) -> Run {
     Run { states: explored.mdp.states(), value, build, solve }
 }
 
-/// Checks the process as a text in the PRISM language, like any other model.
 fn as_text(text: &str, case: &Case) -> Run {
     let model = prism::parse(text).expect("a model");
     let bounds = Bounds::default().with_states(100_000_000);
@@ -309,14 +307,15 @@ fn speed_on_coadaptation_models() {
     }
 }
 
-/// Returns the processor time of this thread in seconds, which does not depend on other processes.
+/// Returns the processor time of this thread in seconds, which does not depend on other processes. Returns 0
+/// on systems that do not report it.
 fn processor() -> f64 {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
     let nanoseconds = text.split_whitespace().next().and_then(|word| word.parse::<f64>().ok());
     nanoseconds.unwrap_or(0.0) / 1e9
 }
 
-/// Returns the peak resident memory of this process in megabytes.
+/// Returns the peak resident memory of this process in megabytes; 0 on systems that do not report it.
 fn peak() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).unwrap_or("0");

@@ -177,7 +177,6 @@ struct Checker<'c> {
     needs: Vec<(usize, Table<'c>)>,
     labels: FxHashMap<&'c [u32], Vec<(&'c [Integer], &'c Integer)>>,
     monotone: bool,
-    /// For each operator, the non-dominated combinations of designs.
     choices: Vec<Rc<[Choice]>>,
 }
 
@@ -220,8 +219,9 @@ impl Checker<'_> {
         })
     }
 
-    /// Returns `true` if a label (state of the proof) or a lower bound proves that every plan
-    /// through a state, reached at cost `paid`, costs at least the claim.
+    /// Returns `true` if a label (state of the proof) or a lower bound proves that every plan through a
+    /// state, reached at cost `paid`, costs at least the claim. Without a claim, proves that there is no such
+    /// plan.
     fn is_covered(&self, state: &State, paid: &Integer) -> bool {
         let too_expensive = self.potentials.iter().any(|potential| match (potential.at(state), &self.cost) {
             (None, _) => true,
@@ -312,8 +312,6 @@ fn front(
     Ok(front.into_iter().map(|(choice, _)| choice).collect())
 }
 
-/// Returns the design-dependent quantities in the conditions and the numeric changes of an
-/// operator.
 fn quantities(operator: &Operator) -> impl Iterator<Item = &Quantity> {
     let changes = operator.changes.iter().map(|(_, value)| value);
     operator.condition.comparisons.iter().chain(changes).map(|linear| &linear.quantity)

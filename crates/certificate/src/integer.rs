@@ -62,7 +62,6 @@ impl Integer {
         !self.is_positive() && !self.is_zero()
     }
 
-    /// Returns the quotient by a positive divisor, rounded down.
     pub(crate) fn div_floor(&self, divisor: &Self) -> Self {
         match (&self.0, &divisor.0) {
             (Small(own), Small(other)) => Self(Small(own.div_euclid(*other))),
@@ -179,7 +178,6 @@ impl Ord for Integer {
     }
 }
 
-/// Formats the integer in decimal.
 impl std::fmt::Display for Integer {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match &self.0 {
@@ -195,7 +193,6 @@ impl std::fmt::Debug for Integer {
     }
 }
 
-/// Serialises the integer as a JSON number with all its digits.
 impl Serialize for Integer {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match &self.0 {
@@ -228,7 +225,6 @@ mod tests {
 
     use super::*;
 
-    /// Integers of all sizes, including the bounds of the small representation.
     fn integer() -> impl Strategy<Value = BigInt> {
         prop_oneof![
             (-20_i128..20).prop_map(BigInt::from),

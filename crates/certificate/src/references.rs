@@ -61,7 +61,6 @@ pub(super) fn task(model: &Model) -> Found {
     model.check_condition(&model.goal, &[])
 }
 
-/// Checks all indices and sizes in an argument that refer to its task.
 pub(super) fn argument(model: &Model, argument: &Argument) -> Found {
     let potentials = argument.potentials.iter().map(|potential| (&potential.pattern, &potential.values));
     let needs = argument.needs.iter().map(|need| (&need.pattern, &need.values));

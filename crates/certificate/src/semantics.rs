@@ -6,7 +6,6 @@ use std::ops::Range;
 use crate::integer::Integer;
 use crate::model::{Condition, Fact, Linear, Literal, Model, Operator, Quantity};
 
-/// A state: the values of all variables and of all numbers.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) struct State {
     pub(super) values: Vec<u32>,
@@ -14,13 +13,11 @@ pub(super) struct State {
 }
 
 impl Model {
-    /// Returns the indices of the basic (not derived) variables.
     #[expect(clippy::cast_possible_truncation, reason = "fewer than 2^32 of each kind, see `references`")]
     pub(super) fn basic_variables(&self) -> Range<u32> {
         0..self.basic as u32
     }
 
-    /// Returns the indices of the derived variables.
     #[expect(clippy::cast_possible_truncation, reason = "fewer than 2^32 of each kind, see `references`")]
     pub(super) fn derived_variables(&self) -> Range<u32> {
         self.basic as u32..self.variables.len() as u32
@@ -124,7 +121,6 @@ impl Model {
         tables.chain([&quantity.constant]).sum()
     }
 
-    /// Returns an upper bound on a quantity over all combinations of designs.
     pub(super) fn most(&self, quantity: &Quantity) -> Integer {
         let tables =
             quantity.tables.iter().filter_map(|(_, table)| self.tables[*table as usize].iter().max());
@@ -153,7 +149,6 @@ impl Model {
                 .all(|linear| !self.linear(linear, state, choice, sizes).is_negative())
     }
 
-    /// Returns the state after an operator, which must be applicable, with a choice of designs.
     pub(super) fn successor(
         &self,
         operator: &Operator,

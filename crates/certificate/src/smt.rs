@@ -116,8 +116,6 @@ impl Writer<'_> {
         format!("(invariant {})", self.names().join(" "))
     }
 
-    /// Returns the definition of the invariant as a function of all variables, numbers and the
-    /// accumulated cost.
     fn invariant(&self) -> String {
         let parameters: Vec<String> = self.names().iter().map(|name| format!("({name} Int)")).collect();
         let potentials = self.argument.potentials.iter().map(|potential| self.cut_off(potential));
@@ -241,7 +239,6 @@ impl Writer<'_> {
     }
 }
 
-/// Encodes a condition, given the terms of its comparisons.
 fn condition_with(condition: &Condition, comparisons: impl Iterator<Item = String>) -> String {
     let facts = condition.facts.iter().copied().map(fact);
     let clauses = condition.clauses.iter().map(|clause| any(clause.iter().map(literal)));

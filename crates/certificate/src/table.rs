@@ -18,7 +18,6 @@ use crate::semantics::State;
 /// A lower bound; `None` is infinity.
 type Bound<'b> = Option<&'b Integer>;
 
-/// A table with a lower bound for each combination of values of the variables in the pattern.
 pub(super) struct Table<'t> {
     pattern: &'t [u32],
     sizes: Vec<usize>,
@@ -39,7 +38,6 @@ impl<'t> Table<'t> {
         self.at_row(self.row(values))
     }
 
-    /// Returns the row of a combination of values of the pattern's variables.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "a row is below the size of its table, see `references`"
@@ -48,13 +46,11 @@ impl<'t> Table<'t> {
         self.sizes.iter().zip(values).fold(0, |row, (size, value)| row * size + *value as usize)
     }
 
-    /// Returns the row of a state, which depends on the values of the pattern's variables.
     pub(super) fn row_of(&self, state: &State) -> usize {
         let values: Vec<u32> = self.pattern.iter().map(|variable| state.values[*variable as usize]).collect();
         self.row(&values)
     }
 
-    /// Returns the number of rows, i.e. of combinations of values.
     pub(super) fn rows(&self) -> usize {
         self.values.len()
     }
@@ -153,7 +149,6 @@ fn at_most(left: Bound<'_>, right: Bound<'_>, step: &Integer) -> bool {
     right.is_none_or(|right| left.is_some_and(|left| *left <= right + step))
 }
 
-/// Checks that a table is a lower bound on the remaining cost of every state.
 pub(super) fn check_potential(model: &Model, table: &Table<'_>) -> Result<(), String> {
     for values in table.matching(&model.goal.facts) {
         if !at_most(table.value(&values), Some(&Integer::ZERO), &Integer::ZERO) {
@@ -171,7 +166,6 @@ enum Use {
     /// Decreases the number by at least this amount (≥ 0). If the amount can be positive, requires
     /// that the result is at least 0.
     Lowers(Integer),
-    /// Any other effect.
     Other,
 }
 
@@ -197,8 +191,6 @@ fn implies(model: &Model, guard: &Linear, wanted: &Linear) -> bool {
         && (same_designs || model.most(&guard.quantity) <= model.least(&wanted.quantity))
 }
 
-/// Checks that a table is a lower bound on the value of a number that is required to reach the
-/// goal.
 pub(super) fn check_need(model: &Model, number: u32, table: &Table<'_>) -> Result<(), String> {
     if table.values.iter().flatten().any(Integer::is_negative) {
         return Err("it is negative".into());

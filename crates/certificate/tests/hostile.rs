@@ -60,7 +60,6 @@ fn compare(declarations: &str, more: &str, objects: &str, facts: &str) -> Faithf
     }
 }
 
-/// Returns the names `prefix0`, `prefix1` and so on, separated by spaces.
 fn names(prefix: &str, count: usize) -> String {
     (0..count).fold(String::new(), |mut text, number| {
         let _ = write!(text, " {prefix}{number}");
@@ -68,7 +67,6 @@ fn names(prefix: &str, count: usize) -> String {
     })
 }
 
-/// Returns the facts `(next o0 o1)`, `(next o1 o2)` and so on, and `(end oN)`.
 fn chain(length: usize) -> String {
     let mut facts = format!("(end o{length})");
     for number in 0..length {
@@ -87,7 +85,6 @@ fn long_chains_of_derived_atoms_are_unfolded() {
     assert!(matches!(found, Faithful::Yes { instances: 3, .. }), "{found:?}");
 }
 
-/// The nesting of unfolded conditions is limited even if each derived atom adds only one level.
 #[test]
 fn conditions_that_nest_too_deeply_are_rejected() {
     let length = 5_000;
@@ -125,7 +122,6 @@ fn long_lists_of_names_are_rejected_or_compared() {
     assert!(matches!(found, Faithful::Undecided(Cause::TooMany { .. })), "{found:?}");
 }
 
-/// The largest accepted chain of rules is compared quickly.
 #[test]
 fn long_chains_of_derived_predicates_are_compared_quickly() {
     let count = 3_000;

@@ -62,7 +62,6 @@ pub struct Diagnostic {
 }
 
 impl fmt::Display for Diagnostic {
-    /// Writes one line: position, severity, code, message, and suggested correction.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { file, line, column, severity, code, message, .. } = self;
         write!(f, "{file}:{line}:{column}: {severity}[{code}]: {message}")?;
@@ -124,13 +123,11 @@ impl Diagnostic {
         primary.into_iter().chain(related).collect()
     }
 
-    /// Sets the suggested correction.
     pub(crate) fn help(&mut self, help: impl Into<String>) -> &mut Self {
         self.help = Some(help.into());
         self
     }
 
-    /// Sets the related position.
     pub(crate) fn related(&mut self, source: &Source, span: Span, message: impl Into<String>) -> &mut Self {
         let place = source.position(span.start);
         let file = source.name().to_owned();
@@ -140,11 +137,11 @@ impl Diagnostic {
     }
 }
 
-/// Maximum number of diagnostics that a [`Sink`] stores, apart from the final message P119, which counts the
-/// omitted ones. A file in another language would produce very many.
+/// Number of diagnostics after which a [`Sink`] only counts. One more is stored; if others follow, the
+/// message P119 with the number of omitted diagnostics replaces it. A file in another language would produce
+/// very many.
 const MAX_DIAGNOSTICS: usize = 200;
 
-/// Collects the diagnostics of one stage (parsing or checking) about one source.
 #[derive(Debug)]
 pub(crate) struct Sink<'s> {
     source: &'s Source,

@@ -8,19 +8,16 @@ use num_traits::{One, Pow, Signed, Zero};
 /// and prevents a short text from requesting a number that fills the memory.
 const MAX_DIGITS: usize = 400;
 
-/// Result of reading a symbol as a number.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Literal {
-    /// A name: the symbol does not have the form of a number.
     Name,
-    /// A number.
     Number(BigRational),
     /// A number that has more than [`MAX_DIGITS`] digits if written without exponent.
     TooLong,
 }
 
-/// Parses a symbol as a number: `5`, `-0.5`, `100.`, `.5`, `1e-3`. A number that has more than [`MAX_DIGITS`]
-/// digits without exponent is too long. Any other symbol is a name, for example `0.8_decimal`.
+/// Parses a symbol such as `5`, `-0.5`, `100.`, `.5` or `1e-3`. Symbols of any other form are names, for
+/// example `0.8_decimal`.
 pub(crate) fn literal(text: &str) -> Literal {
     let unsigned = text.strip_prefix(['-', '+']).unwrap_or(text);
     let (mantissa, exponent) = match unsigned.split_once(['e', 'E']) {
@@ -82,7 +79,6 @@ fn decimal(whole: &str, fraction: &str, exponent: i32) -> BigRational {
     }
 }
 
-/// Formats a number as a decimal, or as a fraction if its decimal expansion is infinite.
 pub(crate) fn show_number(value: &BigRational) -> String {
     to_decimal(value).unwrap_or_else(|| value.to_string())
 }

@@ -51,7 +51,6 @@ fn declare_types(domain: &mut Domain) {
     }
 }
 
-/// Declares `total-cost` if it is used but not declared.
 fn declare_total_cost(domain: &mut Domain, problem: &Problem) {
     let name = Name::new("total-cost");
     let is_declared = domain.functions.iter().any(|function| function.identifier.name == name);

@@ -7,8 +7,8 @@ use super::ast::Span;
 use super::diagnostic::Sink;
 use crate::number::dense;
 
-/// Maximum nesting depth. Later stages may recurse to this depth, also without optimisation in a thread with
-/// a stack of 2 MB. Real files stay below 30.
+/// Maximum nesting depth of lists. At this depth, recursion in later stages fits into a stack of 2 MB even in
+/// a debug build. Real files stay below 30.
 const DEPTH_LIMIT: usize = 200;
 
 /// Keywords of sections. A list inside a section that begins with such a keyword shows that the section was
@@ -44,7 +44,6 @@ struct Node {
     is_list: bool,
 }
 
-/// Tree of the lists and symbols of a text.
 #[derive(Debug)]
 pub(super) struct Tree<'s> {
     text: &'s str,
@@ -72,7 +71,6 @@ impl<'t> Item<'t> {
         self.node().is_list
     }
 
-    /// Text of a symbol; `None` for a list.
     pub(super) fn symbol(self) -> Option<&'t str> {
         let Node { span, is_list, .. } = self.node();
         (!is_list).then(|| &self.tree.text[span.start as usize..span.end as usize])
@@ -94,7 +92,6 @@ impl<'t> Item<'t> {
         self.head().is_some_and(|head| head.eq_ignore_ascii_case(keyword))
     }
 
-    /// Items of a list after the first one.
     pub(super) fn rest(self) -> Items<'t> {
         let mut items = self.items();
         items.next();
@@ -102,7 +99,6 @@ impl<'t> Item<'t> {
     }
 }
 
-/// Iterator over the items of a list.
 #[derive(Debug, Clone)]
 pub(super) struct Items<'t> {
     tree: &'t Tree<'t>,
@@ -124,7 +120,6 @@ impl<'t> Iterator for Items<'t> {
 }
 
 impl<'s> Tree<'s> {
-    /// Top-level lists and symbols.
     pub(super) fn top(&'s self) -> Items<'s> {
         Items { tree: self, next: 0, end: dense(self.nodes.len()) }
     }
@@ -187,7 +182,6 @@ fn next_token(text: &str, mut at: usize) -> Option<(usize, usize)> {
     Some((at, at + length))
 }
 
-/// Returns `true` if a character can be part of a word.
 fn in_a_word(character: char) -> bool {
     !matches!(character, '(' | ')' | ';') && !is_space(character)
 }
@@ -198,7 +192,6 @@ fn is_space(character: char) -> bool {
     character.is_whitespace() || character == '\u{feff}'
 }
 
-/// The state of [`read`].
 struct Reader<'r, 's> {
     nodes: Vec<Node>,
     /// Indices of the open lists, outermost first.
@@ -235,7 +228,6 @@ impl Reader<'_, '_> {
         self.nodes.push(Node { span, next: dense(self.nodes.len()) + 1, is_list: false });
     }
 
-    /// Warns about a variable that follows a word without a space.
     fn glued_variable(&mut self, span: Span, text: &str) {
         self.sink
             .warning("P116", span, format!("`{text}` is read as a word of its own"))

@@ -16,11 +16,8 @@ pub(crate) struct Strata<'d> {
 pub(crate) struct NegativeCycle<'d>(pub(crate) &'d Name);
 
 impl<'d> Strata<'d> {
-    /// Computes the stratum of each derived predicate of a domain.
-    ///
-    /// # Errors
-    ///
-    /// Returns a derived predicate that depends on its own negation, if there is one.
+    /// Computes the stratum of each derived predicate. The error is a derived predicate that depends on its
+    /// own negation.
     #[expect(clippy::arithmetic_side_effects, reason = "levels are at most the number of predicates")]
     pub(crate) fn of(domain: &'d Domain) -> Result<Self, NegativeCycle<'d>> {
         let mut level: FxHashMap<&Name, usize> = FxHashMap::default();

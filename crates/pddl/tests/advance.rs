@@ -10,13 +10,12 @@ use metaplan_pddl::ast::{Domain, Problem};
 use metaplan_pddl::validate::{PlanStep, PlanText, advance, advance_each};
 use metaplan_pddl::{Source, read};
 
-/// Maximum number of ground steps that are compared for each action schema.
+/// Number of random ground steps that are compared for each action schema in each state.
 const STEPS: u64 = 150;
 
-/// Number of steps of a random walk from the initial state, so that other states are compared as well.
+/// Maximum number of states of a random walk from the initial state, in which steps are compared.
 const WALK: usize = 6;
 
-/// Pseudo-random number generator (Knuth's MMIX generator).
 struct Sequence(u64);
 
 impl Sequence {
@@ -26,7 +25,8 @@ impl Sequence {
     }
 }
 
-/// Returns the paths of all folders of the repository with a `domain.pddl` and a `problem.pddl`, sorted.
+/// Returns the sorted paths of the folders with a `domain.pddl` and a `problem.pddl` that lie directly in one of the
+/// listed folders of the repository.
 fn tasks() -> Vec<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let mut folders: Vec<PathBuf> = [

@@ -17,7 +17,6 @@ const PROBLEM: &str = "(define (problem p) (:domain d) (:objects a b - robot)
     (:init (= (battery a) 50) (= (battery b) 60) (= (speed) 2) (= (reserve) 10))
     (:goal (and (there a) (>= (battery a) 20))))";
 
-/// Formats the numeric trace of a plan, one line per moment: step, time, changed values, and bounds.
 fn trace(plan: &str) -> Vec<String> {
     let (domain, problem) = (Source::new("d", DOMAIN), Source::new("p", PROBLEM));
     let (domain, problem) =

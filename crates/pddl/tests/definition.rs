@@ -16,7 +16,6 @@ struct Task {
     goal: String,
 }
 
-/// Returns a durative action in PDDL.
 fn durative(name: &str, duration: &str, condition: &str, effect: &str) -> String {
     format!(
         "(:durative-action {name} :parameters () :duration (= ?duration {duration})
@@ -67,7 +66,6 @@ impl Task {
         }
     }
 
-    /// Checks the cases, each a plan and its verdict, in sequential and in concurrent execution.
     fn check_both(&self, cases: &[(&str, &str)]) {
         self.check(IN_SEQUENCE, cases);
         self.check(CONCURRENTLY, cases);

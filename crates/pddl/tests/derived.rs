@@ -170,7 +170,6 @@ fn condition() -> impl Strategy<Value = Condition> {
     })
 }
 
-/// Returns the variables that are the parameters of a derived predicate's head.
 fn head(predicate: usize) -> Vec<usize> {
     (0..DERIVED[predicate].1).collect()
 }

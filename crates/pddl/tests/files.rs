@@ -11,7 +11,6 @@ use metaplan_pddl::{
 };
 use test_resources::{data, data_directory};
 
-/// Directory of the files below the directory of test data.
 const REAL: &str = "real/pddl";
 
 /// Expected diagnostics of domains: `CODE:line`, with a tilde before warnings. All other domains have no
@@ -103,7 +102,6 @@ const PROBLEMS: [(&str, &str, &str); 35] = [
     ("suave_planta/suave_problem_extended", "suave_planta/suave_domain_extended", ""),
 ];
 
-/// Expands the abbreviated path of a problem or domain in `PROBLEMS`.
 fn path_of(short: &str) -> String {
     match short.split_once(':') {
         Some((package, file)) => {

@@ -42,8 +42,6 @@ fn texts(place: &str, what: &str) -> (Source, Source) {
     (Source::new("domain", DOMAIN.replace("SECTIONS", &sections)), Source::new("problem", problem))
 }
 
-/// Reads a domain and a problem with the construct `what` in the section `place`. Returns the codes of the
-/// errors.
 fn errors(place: &str, what: &str) -> Vec<&'static str> {
     let (domain, problem) = texts(place, what);
     let diagnostics =

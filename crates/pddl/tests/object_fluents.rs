@@ -14,7 +14,6 @@ const DOMAIN: &str = "(define (domain d) (:requirements :adl :object-fluents :fl
 const PROBLEM: &str = "(define (problem p) (:domain d) (:objects a b - place v w - van t - tool)
  (:init (= (fuel v) 1) INIT) (:goal GOAL) METRIC)";
 
-/// Returns a domain and a problem with the construct `what` in the section `place`.
 fn texts(place: &str, what: &str) -> (Source, Source) {
     let (mut section, mut init, mut goal, mut metric) = (String::new(), "", "(and )", "");
     let parameters = "(?p ?q - place ?v ?w - van ?t - tool)";

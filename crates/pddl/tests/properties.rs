@@ -6,7 +6,6 @@ use metaplan_pddl::{
     Errors, Source, has_errors, parse_domain, parse_problem, print_domain, print_problem, read, render,
 };
 
-/// Random name in one of the forms that occur in real files.
 fn name() -> impl Strategy<Value = String> {
     prop_oneof![
         "[a-z][a-z0-9_]{0,5}",
@@ -239,7 +238,6 @@ fn parse_and_print_problem(text: &str) -> String {
     print_problem(&problem.expect("a problem without errors is read"))
 }
 
-/// Modification of a valid PDDL text.
 #[derive(Debug, Clone)]
 enum Mutation {
     Delete(usize, usize),

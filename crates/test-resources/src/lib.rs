@@ -215,11 +215,9 @@ fn from_root(path: PathBuf) -> PathBuf {
     }
 }
 
-/// Values of the environment variables.
 struct Settings {
     /// Names of required resources, separated by commas.
     required: String,
-    /// File for records.
     record: Option<PathBuf>,
 }
 

@@ -6,7 +6,6 @@ use std::process::{Command, Output};
 
 use test_resources::{Resource, data, data_directory, missing_in, program, python_with};
 
-/// A file that no directory of test data contains.
 const ABSENT: &str = "no/such/file";
 
 /// Returns a path of this test's own in the temporary directory of the target.

@@ -83,7 +83,6 @@ fn text(report: &Verification) -> String {
     visible(&text).into_owned()
 }
 
-/// Describes in words what a verification covers.
 fn extent(subject: &Subject) -> String {
     let checked = match (&subject.mission, subject.kind) {
         (Some(name), _) => format!("the mission `{name}` with digest {:.12}", subject.digest),

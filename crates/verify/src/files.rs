@@ -112,7 +112,6 @@ fn plain_file(directory: &Path, name: &str, limit: u64) -> Result<PathBuf, Strin
     Ok(path)
 }
 
-/// Reads a regular file of at most `limit` bytes as text.
 fn read_file(directory: &Path, name: &str, limit: u64) -> Result<String, String> {
     let path = plain_file(directory, name, limit)?;
     let wrong = |what: String| format!("{name}: {what}");

@@ -43,7 +43,6 @@ pub struct Origin {
     pub changes: Statements,
 }
 
-/// The texts of the three knowledge files of a certificate.
 pub(crate) struct KnowledgeFiles<'w> {
     pub(crate) document: &'w str,
     pub(crate) origin: &'w str,
@@ -70,8 +69,8 @@ pub fn is_shipped(name: &str, text: &str) -> bool {
     [(COADAPTATION, rules::COADAPTATION_RULES), (TOMASYS, rules::TOMASYS_RULES)].contains(&(name, text))
 }
 
-/// Describes each rule file, e.g. as a shipped one. Returns an error if a recorded digest differs
-/// from the digest of the text.
+/// Describes each rule file: shipped, changed or own. Returns an error if the recorded digest of a shipped
+/// rule file differs from the digest of its text, or if this file is missing.
 fn provenance(origin: &Origin) -> Result<String, String> {
     let mut descriptions = Vec::new();
     for (name, text) in &origin.rules {

@@ -17,7 +17,6 @@ pub(crate) fn raise(py: Python<'_>, messages: &[Message]) -> PyErr {
     }
 }
 
-/// Creates the exception for a single message.
 pub(crate) fn raise_one(py: Python<'_>, message: Message) -> PyErr {
     raise(py, &[message])
 }

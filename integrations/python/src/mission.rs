@@ -67,7 +67,6 @@ struct Numbers {
     alternatives: Vec<Vec<[String; 3]>>,
 }
 
-/// Exact numbers of the plans of a Pareto front.
 #[derive(Serialize)]
 struct FrontNumbers {
     points: Vec<Numbers>,
@@ -86,7 +85,6 @@ impl Numbers {
         }
     }
 
-    /// Returns start, duration and cost of each step as texts.
     fn steps(plan: &Plan) -> Vec<[String; 3]> {
         let numbers = |step: &Step| [&step.start, &step.duration, &step.cost].map(Exact::to_string);
         plan.steps.iter().map(numbers).collect()
@@ -125,12 +123,10 @@ fn number(name: &str, text: &str) -> PyResult<Exact> {
     text.parse().map_err(|error| PyValueError::new_err(format!("{name}: {error}")))
 }
 
-/// Parses a choice, such as a strategy, in the keyword argument `name`.
 fn word<T: std::str::FromStr<Err: std::fmt::Display>>(name: &str, text: &str) -> PyResult<T> {
     text.parse().map_err(|error| PyValueError::new_err(format!("{name}: {error}")))
 }
 
-/// Converts a number of seconds in the keyword argument `name` to a duration.
 pub(crate) fn seconds(name: &str, value: f64) -> PyResult<Duration> {
     Duration::try_from_secs_f64(value)
         .map_err(|_| PyValueError::new_err(format!("{name} must be a number of seconds, not {value}")))

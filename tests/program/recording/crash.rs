@@ -24,7 +24,7 @@ pub(super) fn count_readable_messages(file: &Path, topic: &str) -> usize {
 }
 
 /// Starts a recorded run and sends each line once the previous line is answered, as in a replay. Returns the
-/// process and the answers once all answers are in the file.
+/// process and the answers, once all answers of the topic `/metaplan/loop` are in the file.
 fn start_recorded_run(file: &Path) -> (Child, Vec<Value>) {
     let mut child = Command::new(env!("CARGO_BIN_EXE_metaplan"))
         .args(["run", "missions/ugv.toml", "--mcap"])
@@ -79,7 +79,6 @@ fn recordings_of_killed_runs_can_be_replayed() {
     super::others::assert_readable_by_python(&file, input().lines().count());
 }
 
-/// A truncated file is read up to its last complete chunk, regardless of the point of truncation.
 #[test]
 fn truncated_recordings_are_read_up_to_the_last_chunk() {
     let directory = tempfile::tempdir().expect("a directory");

@@ -11,7 +11,6 @@ use serde_json::{Value, json};
 
 use crate::common::{Outcome, metaplan_in, root};
 
-/// Input lines of a run: measurements, a failure, invalid lines, and a ROS 2 diagnostics message.
 const EVENTS: [&str; 9] = [
     r#"{"event":"measured","attribute":"ambient_light","value":0.50,"time":1.5}"#,
     r#"{"event":"action_succeeded","action":1}"#,
@@ -29,7 +28,7 @@ fn input() -> String {
     EVENTS.map(|line| line.replace('\n', " ")).join("\n")
 }
 
-/// Returns the answers of a run without times and progress reports.
+/// Returns the answers of a successful run without progress reports and without the field `microseconds`.
 fn decisions(outcome: &Outcome) -> Vec<Value> {
     assert_eq!(outcome.status, 0, "{outcome:#?}");
     outcome.stdout.lines().map(decision).filter(|answer| answer["answer"] != "planning").collect()
@@ -184,7 +183,8 @@ fn replayed_recordings_give_the_same_decisions() {
     }
 }
 
-/// A replay must use the recorded times, because decisions depend on time (a recovered design is used after `settle` seconds).
+/// A replay must use the recorded times, because decisions depend on time. For example, a recovered component
+/// is used only after `heal_time` seconds.
 #[test]
 fn replays_use_the_recorded_times() {
     let directory = tempfile::tempdir().expect("a directory");
@@ -236,7 +236,6 @@ fn channels_declare_their_encoding_and_schema() {
     }
 }
 
-/// The message definitions in recordings equal those of the ROS 2 interfaces.
 #[test]
 fn message_definitions_match_the_ros_interfaces() {
     let directory = tempfile::tempdir().expect("a directory");

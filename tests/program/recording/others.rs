@@ -1,4 +1,5 @@
-//! Exchange of recordings with other implementations: `mcap` and `mcap-ros2-support` for Python, installed by `.ci/mcap-peers`.
+//! Exchange of recordings with other implementations: `mcap` and `mcap-ros2-support` for Python, installed by
+//! `.ci/mcap-peers`.
 
 use std::io::Write as _;
 use std::path::Path;
@@ -15,7 +16,6 @@ fn python() -> Option<String> {
     python_with(Resource::Mcap, "METAPLAN_PYTHON", "mcap.reader, mcap_ros2.decoder")
 }
 
-/// Runs the peer script and returns its output, one JSON value per line.
 fn peer(python: &str, arguments: &[&str], input: &str) -> Vec<Value> {
     let mut child = Command::new(python)
         .arg(root().join("tests/recording/peer.py"))
@@ -32,7 +32,6 @@ fn peer(python: &str, arguments: &[&str], input: &str) -> Vec<Value> {
     text.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect()
 }
 
-/// Asserts that `mcap` for Python reads this number of events from a truncated file.
 pub(super) fn assert_readable_by_python(file: &Path, events: usize) {
     let Some(python) = python() else { return };
     let counts = peer(&python, &["salvage", &file.display().to_string()], "");
@@ -81,7 +80,6 @@ fn python_reads_recordings() {
     }
 }
 
-/// Replays recordings with ROS 2 diagnostics, for each compression method.
 #[test]
 fn recordings_of_other_tools_are_replayed() {
     let Some(python) = python() else { return };

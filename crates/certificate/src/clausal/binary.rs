@@ -7,24 +7,19 @@ use crate::integer::Integer;
 /// The bits of a number, from the lowest to the highest; the last bit is the sign.
 pub(super) type Bits = Vec<Literal>;
 
-/// Returns the sign bit of a number, which is true for negative numbers.
 pub(super) fn sign(number: &Bits) -> Literal {
     *number.last().expect("invariant: a number has a sign")
 }
 
-/// Returns the number of bits that represent every integer from `least` to `most`.
 pub(super) fn width(least: &Integer, most: &Integer) -> usize {
     least.width().max(most.width())
 }
 
 impl Formula {
-    /// Creates a number with `width` new variables as its bits. `name` describes the number in the
-    /// legend.
     pub(super) fn bits(&mut self, width: usize, name: &str) -> Bits {
         (0..width).map(|position| self.variable(|| format!("bit {position} of {name}"))).collect()
     }
 
-    /// Returns the bits of a constant, in `width` bits.
     pub(super) fn constant(&self, number: &Integer, width: usize) -> Bits {
         (0..width).map(|position| if number.bit(position) { self.truth() } else { -self.truth() }).collect()
     }
@@ -72,7 +67,6 @@ impl Formula {
         }
     }
 
-    /// Encodes that `number` is at most `most` if all literals of `condition` hold.
     #[expect(clippy::arithmetic_side_effects, reason = "positions in a number whose bits are held in memory")]
     pub(super) fn at_most(&mut self, condition: &[Literal], number: &Bits, most: &Integer) {
         let ordered = ordered(number, most);

@@ -9,13 +9,11 @@ use crate::clausal::literal::Literal;
 
 /// A CNF formula. Each variable has a description, which is written to a legend.
 pub struct Formula {
-    /// The literals of all clauses, concatenated.
     literals: Vec<Literal>,
     /// The end of each clause in `literals`.
     ends: Vec<usize>,
     names: Vec<String>,
     limit: usize,
-    /// Number of bits of the widest number in the encoding.
     widest: usize,
 }
 
@@ -30,12 +28,10 @@ impl Formula {
         formula
     }
 
-    /// Records that the encoding contains a number of `bits` bits; see [`Self::widest`].
     pub(super) fn has_number(&mut self, bits: usize) {
         self.widest = self.widest.max(bits);
     }
 
-    /// Returns an error if the formula exceeds its limit on literals or variables.
     pub(super) fn within_limit(&self) -> Result<(), String> {
         if self.literals.len() > self.limit || self.names.len() >= self.limit {
             return Err(format!("the formula has more than {} literals", self.limit));
@@ -43,7 +39,6 @@ impl Formula {
         Ok(())
     }
 
-    /// Adds a variable with a description, and returns its positive literal.
     pub(super) fn variable(&mut self, name: impl FnOnce() -> String) -> Literal {
         // Variables beyond the limit need no description, because `within_limit` rejects the
         // formula.
@@ -53,7 +48,6 @@ impl Formula {
         Literal::of_variable(self.names.len()).unwrap_or(Literal::FIRST)
     }
 
-    /// Returns the literal that is always true.
     #[allow(clippy::unused_self, reason = "part of the formula")]
     pub(super) fn truth(&self) -> Literal {
         Literal::FIRST
@@ -131,7 +125,6 @@ impl Formula {
         output.flush()
     }
 
-    /// Calls `visit` with each line of the formula in the DIMACS format.
     fn dimacs<E>(&self, visit: &mut dyn FnMut(&[u8]) -> Result<(), E>) -> Result<(), E> {
         visit(format!("p cnf {} {}\n", self.variables(), self.count()).as_bytes())?;
         let mut line = Vec::new();
@@ -141,7 +134,6 @@ impl Formula {
         })
     }
 
-    /// Calls `visit` with each line of the legend (variable number and description).
     fn legend<E>(&self, visit: &mut dyn FnMut(&[u8]) -> Result<(), E>) -> Result<(), E> {
         let mut line = String::new();
         (1..).zip(&self.names).try_for_each(|(number, name): (usize, _)| {
@@ -151,8 +143,6 @@ impl Formula {
         })
     }
 
-    /// Checks that a written formula and its legend equal this formula and its legend, line by
-    /// line.
     pub(super) fn compare(&self, formula: &mut dyn BufRead, legend: &mut dyn BufRead) -> Result<(), String> {
         let mut legend = LineComparer { what: "legend", text: legend, line: Vec::new(), number: 0 };
         self.legend(&mut |line| legend.compare(line))?;
@@ -163,12 +153,10 @@ impl Formula {
     }
 }
 
-/// Compares a text line by line with expected lines.
 struct LineComparer<'w> {
     what: &'static str,
     text: &'w mut dyn BufRead,
     line: Vec<u8>,
-    /// Number of lines that were read.
     number: usize,
 }
 

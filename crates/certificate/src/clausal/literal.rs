@@ -8,10 +8,8 @@ use std::ops::Neg;
 pub struct Literal(i32);
 
 impl Literal {
-    /// The positive literal of variable 1.
     pub(crate) const FIRST: Self = Self(1);
 
-    /// Creates a literal from a DIMACS number. Returns `None` if the number is 0 or `i32::MIN`.
     pub(crate) fn new(number: i32) -> Option<Self> {
         (number != 0 && number != i32::MIN).then_some(Self(number))
     }

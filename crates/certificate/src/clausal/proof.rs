@@ -19,7 +19,8 @@ const LITERAL_LIMIT: usize = 1 << 26;
 /// number of clauses of the proof.
 ///
 /// # Errors
-/// The first line that is malformed or does not follow, or a missing empty clause.
+/// Reports the first line that cannot be read, is malformed, or does not follow. Also fails if the empty
+/// clause is missing, or if there are more than [`LITERAL_LIMIT`] literals.
 pub(super) fn check<'c>(
     clauses: impl Iterator<Item = &'c [Literal]>,
     variables: usize,
@@ -59,11 +60,9 @@ pub(super) fn check<'c>(
 }
 
 struct Checker {
-    /// The literals of all clauses, concatenated.
     literals: Vec<Literal>,
     /// The range of each clause in `literals`.
     places: Vec<Range<usize>>,
-    /// For each literal, whether it is true in the current propagation.
     is_true: Vec<bool>,
     /// The true literals, in order to reset `is_true`.
     settled: Vec<Literal>,
@@ -81,8 +80,6 @@ impl Checker {
         self.settled.push(literal);
     }
 
-    /// Returns `true` if the clauses named by `hints` derive a contradiction from the negation of
-    /// `clause`.
     fn follows(&mut self, clause: &[Literal], hints: &[usize]) -> bool {
         for literal in clause {
             self.settle(-*literal);
@@ -116,7 +113,6 @@ mod tests {
     use crate::clausal::lines;
     use crate::clausal::literal::Literal;
 
-    /// A deterministic pseudo-random number generator.
     struct Random(u64);
 
     impl Random {
@@ -150,7 +146,6 @@ mod tests {
         text
     }
 
-    /// A clause is a set of literals, so repeated literals have no effect.
     #[test]
     fn a_clause_may_repeat_a_literal() {
         let literal = |number: &i32| Literal::new(*number).expect("a literal");
@@ -161,7 +156,6 @@ mod tests {
         assert_eq!(check(borrowed, 2, &mut proof.as_slice(), &mut hints.as_slice()), Ok(1));
     }
 
-    /// No random proof refutes satisfiable clauses; some random proofs refute unsatisfiable ones.
     #[test]
     fn satisfiable_clauses_are_never_refuted() {
         let mut refuted = 0;

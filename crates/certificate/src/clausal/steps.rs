@@ -22,7 +22,6 @@ pub enum StepBound {
     Potential,
 }
 
-/// Upper limit on the number of steps that a formula encodes.
 const STEP_LIMIT: usize = 64;
 /// Upper limit on the number of transitions between the rows of a potential (table of lower bounds
 /// on the remaining cost). Potentials with more are not used.

@@ -15,10 +15,8 @@ use crate::integer::Integer;
 use crate::model::{Linear, Model, Operator, Quantity};
 use crate::table::is_alone;
 
-/// Upper limit on the number of bits of each number.
 const WIDTH_LIMIT: usize = 4_096;
 
-/// The accumulated cost and the numeric variables after the latest step.
 pub(super) struct Sums {
     spent: Bits,
     /// Upper limit on the accumulated cost: the claimed cost minus 1.
@@ -26,7 +24,6 @@ pub(super) struct Sums {
     numbers: Vec<Bits>,
 }
 
-/// The effect of an operator on a numeric variable.
 enum Change<'c> {
     Add(&'c Quantity),
     Assign(&'c Quantity),
@@ -43,7 +40,6 @@ fn change(operator: &Operator, number: u32) -> Result<Option<Change<'_>>, String
     }
 }
 
-/// Iterates over the numeric comparisons in the conditions of all operators and in the goal.
 fn comparisons(model: &Model) -> impl Iterator<Item = &Linear> {
     let conditions = model.operators.iter().map(|operator| &operator.condition).chain([&model.goal]);
     conditions.flat_map(|condition| &condition.comparisons)
@@ -106,7 +102,6 @@ impl Sums {
         Ok(sums)
     }
 
-    /// Returns the number of bits of the widest number.
     pub(super) fn widest(&self) -> usize {
         self.numbers.iter().chain([&self.spent]).map(Vec::len).max().unwrap_or(0)
     }

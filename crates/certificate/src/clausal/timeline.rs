@@ -11,12 +11,10 @@ use crate::clausal::formula::Formula;
 use crate::clausal::literal::Literal;
 use crate::model::{self, Argument, Fact, Model, Operator};
 
-/// The literals of the state after the latest step, and of the operators and designs of this step.
 pub(super) struct Timeline {
     /// For each variable and value, the literal that the variable has this value after the latest
     /// step.
     values: Vec<Vec<Literal>>,
-    /// For each operator, the literal that it is the operator of the latest step.
     pub(super) operators: Vec<Literal>,
     pub(super) idle: Option<Literal>,
     /// For each slot (parameter that is a design) and each of its designs, the literal that this

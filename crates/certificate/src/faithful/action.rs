@@ -51,7 +51,6 @@ pub(super) fn waits(timeline: &Timeline, structure: &Structure) -> Result<Vec<Ca
     Ok(cases)
 }
 
-/// The new values of numeric fluents.
 type Changes = BTreeMap<Key, Linear>;
 
 /// Returns the cases of an action instance: conditions on the state before it, each with the
@@ -124,7 +123,6 @@ impl<'r> Durative<'r> {
         self.effects.iter().filter(move |(time, _)| *time == wanted).map(|(_, effect)| effect)
     }
 
-    /// Returns the atoms and fluents that the start (or the end) of the action reads.
     fn reads(&self, reader: &Reader<'r>, wanted: EffectTime) -> Reads<'r> {
         let time = match wanted {
             EffectTime::AtStart => ConditionTime::AtStart,
@@ -252,8 +250,6 @@ impl<'r> Durative<'r> {
 }
 
 impl<'r> Reader<'r> {
-    /// Describes the atoms and fluents that a happening with these conditions, effects and duration
-    /// expressions reads.
     fn reads(
         &self,
         conditions: Vec<&'r Condition>,

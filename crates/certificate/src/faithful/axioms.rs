@@ -19,7 +19,6 @@ pub(super) struct Axioms {
     /// The derived atoms on dependency cycles or between cycles that are variables of the task.
     /// Every other derived atom is replaced by its rules.
     pub(super) linked: FxHashSet<Key>,
-    /// For each derived predicate, the predicates and functions in its rules.
     pub(super) reads: FxHashMap<u32, FxHashSet<u32>>,
 }
 

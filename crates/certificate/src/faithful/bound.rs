@@ -17,22 +17,19 @@ use crate::faithful::verdict::Cause;
 use crate::faithful::world::World;
 use pddl::ast::{Atom, Condition, Derived, Name, Term, TypedName};
 
-/// Upper limit on the number of derived atoms.
+/// Upper limit on the number of derived atoms, and on the number of partial bindings of one rule.
 const ATOM_LIMIT: usize = 50_000;
 
 /// Upper limit on the number of conjuncts around an atom that are used to restrict the candidate
 /// objects of variables.
 const CONJUNCT_LIMIT: usize = 64;
 
-/// A positive occurrence of a derived atom in the condition of a rule.
 struct Occurrence<'w> {
     rule: &'w Derived,
     atom: &'w Atom,
-    /// The variables of the existential quantifiers around the atom.
     variables: Rc<[&'w TypedName]>,
     /// The conjuncts around the atom, which restrict the candidates of variables.
     others: Rc<[&'w Condition]>,
-    /// Whether all names are unambiguous, i.e. no variable shadows another one.
     has_distinct_names: bool,
 }
 
@@ -119,7 +116,6 @@ fn collect<'w>(
     }
 }
 
-/// Returns `true` if no quantified variable shadows another one or a parameter of the rule.
 fn has_distinct_names(rule: &Derived, variables: &[&TypedName]) -> bool {
     let variables_in_scope = rule.head.parameters.iter().chain(variables.iter().copied());
     let mut names = FxHashSet::default();
@@ -223,10 +219,10 @@ impl Occurrence<'_> {
 }
 
 impl<'r> Reader<'r> {
-    /// Returns `false` only if a condition holds in no state of the witness (the over-approximation
-    /// of the reachable states) in which at most the derived atoms of `axioms.bound` hold.
-    /// Implications, universal conditions, comparisons and negated compound conditions are assumed
-    /// to be possible.
+    /// Returns `false` only if a condition holds in no state of the witness (the over-approximation of the
+    /// reachable states) in which at most the derived atoms of `axioms.bound` hold. Implications, universal
+    /// conditions and comparisons are assumed to be possible. So are negations, except those of equalities
+    /// and of basic atoms.
     fn is_possible(&mut self, condition: &'r Condition) -> Result<bool, Cause> {
         self.count()?;
         match condition {

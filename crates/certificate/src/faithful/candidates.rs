@@ -27,8 +27,6 @@ impl Reader<'_> {
         }
     }
 
-    /// Returns the candidate objects of a variable in a conjunction. Returns all objects of its
-    /// type if no conjunct restricts the variable.
     pub(super) fn candidates_where(&self, variable: &TypedName, conditions: &[&Condition]) -> Vec<u32> {
         match self.restricted_by_all(&variable.identifier.name, conditions.iter().copied(), &[]) {
             Some(objects) => {

@@ -13,7 +13,6 @@ use pddl::ast::Assignment;
 /// together they cover all executions of the instance.
 #[derive(Debug)]
 pub(super) struct Case {
-    /// Facts and comparisons that hold in the state before the instance.
     pub(super) known: Known,
     /// The truth values of the atoms that start effects or events change, and of the timeline's own
     /// atoms (phase and `waited`).
@@ -21,7 +20,6 @@ pub(super) struct Case {
     /// Conditional effects on atoms at the end: (condition, atom, `true` if added). An atom that is
     /// both added and deleted holds.
     pub(super) effects: Vec<(Formula, Key, bool)>,
-    /// The values of the changed numeric fluents after the instance.
     pub(super) changes: BTreeMap<Key, Linear>,
     /// The range of durations; `None` for instantaneous actions and waits.
     pub(super) length: Option<Length>,

@@ -34,7 +34,6 @@ pub(super) struct Comparison<'c> {
     pub(super) task: &'c Translation<'c>,
     objects: FxHashMap<String, u32>,
     operators: Calls,
-    /// The positions of the operators that wait for the next event.
     waits: Vec<usize>,
     /// For each action, the sets of parameters that are slots in an operator (`true` for a slot).
     masks: FxHashMap<String, BTreeSet<Vec<bool>>>,
@@ -47,7 +46,6 @@ pub(super) struct Comparison<'c> {
     unit: BigRational,
 }
 
-/// The name of an action instance for messages, and the cost that the instance adds to the metric.
 struct Instance<'i> {
     name: &'i dyn Fn() -> String,
     cost: BigRational,
@@ -430,7 +428,6 @@ fn rank(reason: &Obstacle) -> u8 {
     }
 }
 
-/// Inserts the name of the action instance in a reason that has no name yet.
 fn named(reason: Obstacle, instance: &str) -> Obstacle {
     let instance = instance.to_owned();
     match reason {

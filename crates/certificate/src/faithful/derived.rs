@@ -47,8 +47,8 @@ pub(super) fn axioms(
     Ok(axioms)
 }
 
-/// Returns the derived atoms on dependency cycles and on paths between cycles. Atoms without a
-/// remaining predecessor or successor are removed until a fixpoint is reached.
+/// Returns the derived atoms on dependency cycles and on paths between cycles, except atoms with a known
+/// truth value. Atoms without a remaining predecessor or successor are removed until a fixpoint is reached.
 fn circular<'b>(axioms: &Axioms, bodies: &'b [(Key, Formula)]) -> FxHashSet<&'b Key> {
     let mut below: FxHashMap<&Key, FxHashSet<&Key>> = FxHashMap::default();
     for (key, body) in bodies.iter().filter(|(key, _)| axioms.known(key).is_none()) {
@@ -111,7 +111,6 @@ fn bodies(world: &World<'_>, invariant: &Invariant, axioms: &Axioms) -> Result<V
     heads.into_iter().map(body).collect()
 }
 
-/// Collects all atoms of a formula in `keys`.
 fn atoms<'f>(formula: &'f Formula, keys: &mut FxHashSet<&'f Key>) {
     match formula {
         Formula::All(parts) | Formula::Any(parts) => parts.iter().for_each(|part| atoms(part, keys)),
@@ -170,7 +169,6 @@ fn certain(world: &World<'_>, formula: &Formula, must: &FxHashSet<Key>, may: &Fx
     }
 }
 
-/// Maps each derived predicate to the predicates and functions in its rules.
 fn reads(world: &World<'_>) -> Result<FxHashMap<u32, FxHashSet<u32>>, Cause> {
     let mut reads: FxHashMap<u32, FxHashSet<u32>> = FxHashMap::default();
     for (symbol, rules) in world.derived() {

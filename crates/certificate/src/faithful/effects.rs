@@ -13,16 +13,13 @@ use crate::model::Operator;
 /// Upper limit on the number of case splits for one variable.
 const SPLIT_LIMIT: usize = 1_024;
 
-/// An operator with a choice of designs for its slots.
 #[derive(Clone, Copy)]
 pub(super) struct Made<'m> {
     pub(super) operator: &'m Operator,
     pub(super) choice: &'m [u32],
 }
 
-/// The first variable or number for which the effects are not proved equal.
 pub(super) enum Mismatch {
-    /// The values of this variable or number differ.
     Differs(String),
     /// The atoms of this variable are not proved to be mutually exclusive after the case (outcome
     /// of an action instance under a condition), or there are too many case splits.
@@ -80,23 +77,18 @@ struct Variable<'v> {
     task: &'v Translation<'v>,
     own: u32,
     case: &'v Case,
-    /// The effects of the case on atoms of the variable at the end of the action.
     effects: Vec<&'v (Formula, Key, bool)>,
     /// The atoms of the variable that the case may change. The key is the value that represents the
     /// atom.
     touched: BTreeMap<u32, &'v Key>,
-    /// The value that the operator assigns unconditionally.
     certain: Option<u32>,
     conditional: Vec<(Formula, u32)>,
 }
 
-/// The result of comparing the effects on a variable under partial knowledge.
 enum Outcome<'o> {
     Same,
     Other,
-    /// The atoms of the variable are not proved to be mutually exclusive.
     Unknown,
-    /// The result depends on the truth value of this formula.
     Open(Formula),
     OpenPart(&'o Formula),
 }

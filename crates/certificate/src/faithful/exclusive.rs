@@ -81,7 +81,6 @@ pub(super) struct Move {
     /// The atoms that certainly hold before the case (outcome of an action instance under a
     /// condition).
     holding: Vec<Key>,
-    /// The atoms that the case (outcome of an action instance under a condition) may add.
     pub(super) adds: BTreeSet<Key>,
     /// The atoms that certainly do not hold after the case (outcome of an action instance under a
     /// condition).
@@ -89,8 +88,6 @@ pub(super) struct Move {
 }
 
 impl Move {
-    /// Computes the effect of a case (outcome of an action instance under a condition) on mutex
-    /// groups, given the atoms that the case may add.
     pub(super) fn new(structure: &Structure, case: &Case, adds: BTreeSet<Key>) -> Self {
         let at_end = case
             .effects
@@ -190,7 +187,6 @@ pub(super) fn numbered(variables: usize, groups: &[Group]) -> impl Iterator<Item
     (u32::try_from(variables).unwrap_or(u32::MAX)..).zip(groups)
 }
 
-/// Returns the mutex groups to which a case (outcome of an action instance) may add an atom.
 pub(super) fn concerned<'g>(case: &Case, groups: &'g [Group]) -> impl Iterator<Item = &'g Group> {
     let at_end = case.effects.iter().filter(|(_, _, holds)| *holds).map(|(_, key, _)| key);
     let added: FxHashSet<&Key> =

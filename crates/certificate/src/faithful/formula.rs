@@ -62,7 +62,6 @@ impl Formula {
         }
     }
 
-    /// Returns the number of atoms and comparisons.
     pub(super) fn size(&self) -> usize {
         match self {
             Self::All(parts) | Self::Any(parts) => parts.iter().map(Self::size).sum(),
@@ -70,7 +69,6 @@ impl Formula {
         }
     }
 
-    /// Returns the nesting depth of conjunctions and disjunctions; 0 for an atom or comparison.
     pub(super) fn depth(&self) -> usize {
         match self {
             Self::All(parts) | Self::Any(parts) => {
@@ -108,12 +106,10 @@ pub(super) struct Known {
 }
 
 impl Known {
-    /// Returns the atom of a mutex group that is known to hold.
     pub(super) fn holding(&self, group: u32) -> Option<&Key> {
         self.holding.get(&group)
     }
 
-    /// Iterates over the atoms that are known to hold.
     pub(super) fn holding_atoms(&self) -> impl Iterator<Item = &Key> {
         self.atoms.iter().filter(|(_, holds)| **holds).map(|(key, _)| key)
     }

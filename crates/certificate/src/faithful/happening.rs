@@ -11,7 +11,6 @@ use pddl::ast::Assignment;
 /// The start or the end of an action: the atoms and fluents that it reads, and its effects.
 type Half<'h> = (&'h Reads<'h>, &'h Moment);
 
-/// Returns the condition under which the start and the end of an action do not interfere.
 pub(super) fn apart(left: Half<'_>, right: Half<'_>) -> Formula {
     let mut clashes = Vec::new();
     one_way(left.1, right, &mut clashes);

@@ -7,17 +7,15 @@ use crate::faithful::verdict::Cause;
 use crate::faithful::world::World;
 use pddl::ast::{Action, ActionBody, Atom, Condition, Name, Term};
 
-/// Upper limit on the number of action instances.
 pub(super) const INSTANCE_LIMIT: usize = 400_000;
 /// Upper limit on the total number of arguments of all instances, which then take 256 MB.
 pub(super) const ARGUMENT_LIMIT: usize = 1 << 26;
-/// Number of instances between two calls of the function that reports whether to stop.
 const POLL_INTERVAL: usize = 1 << 10;
 
-/// A partial binding of the parameters of an action to objects.
 type Binding<'b> = FxHashMap<&'b Name, u32>;
 
-/// Returns the argument lists of all instances of an action whose static conditions hold.
+/// Returns the argument lists of all instances of an action whose static positive conjuncts hold. Fails if
+/// there are too many instances, or if `stop` returns `true`.
 pub(super) fn of(
     world: &World<'_>,
     action: &Action,
@@ -93,7 +91,6 @@ pub(super) fn conjuncts<'c>(condition: &'c Condition, atoms: &mut Vec<&'c Atom>)
     }
 }
 
-/// Creates the error that an action has too many instances.
 pub(super) fn too_many(name: &str) -> Cause {
     Cause::TooMany { what: format!("instances of {name}"), limit: INSTANCE_LIMIT }
 }
@@ -165,7 +162,6 @@ fn complete(
     }
 }
 
-/// Returns `true` if this number of instances of an action exceeds the limits.
 fn are_too_many(instances: usize, action: &Action) -> bool {
     instances > INSTANCE_LIMIT || instances.saturating_mul(action.parameters.len()) > ARGUMENT_LIMIT
 }

@@ -38,7 +38,6 @@ const WIDENING_THRESHOLD: u32 = 8;
 #[serde(deny_unknown_fields)]
 struct WitnessFile {
     format: String,
-    /// All atoms of changing predicates that may hold.
     atoms: Vec<String>,
     /// The least and greatest value of each fluent that actions change; `null` means unbounded.
     /// Fluents that are not listed are unbounded.
@@ -54,7 +53,6 @@ pub(super) struct Invariant {
     /// The interval of each numeric fluent; a single value for a static fluent. A fluent without an
     /// entry is unbounded.
     numbers: FxHashMap<Key, Interval>,
-    /// Mutex groups: atoms of which at most one holds.
     pub(super) exclusive: Vec<Group>,
 }
 
@@ -63,7 +61,6 @@ impl Invariant {
     /// initial state. The clock is unbounded.
     pub(super) fn initial(world: &World<'_>) -> Self {
         let atoms = world.initial_atoms().filter(|key| world.changes(key.0)).collect();
-        // The clock is unbounded.
         let values = world.initial_values().filter(|(key, _)| key.0 != CLOCK);
         let numbers = values.map(|(key, value)| (key.clone(), Interval::point(value))).collect();
         Self { atoms, numbers, exclusive: Vec::new() }
@@ -152,7 +149,6 @@ impl Invariant {
         self.atoms.rows(predicate, place)
     }
 
-    /// Returns the number of atoms that [`Invariant::rows`] yields.
     pub(super) fn count(&self, predicate: u32, place: Option<(usize, u32)>) -> usize {
         self.atoms.count(predicate, place)
     }
@@ -165,7 +161,7 @@ impl Invariant {
         }
     }
 
-    /// Replaces the fluents of an expression whose intervals are single values.
+    /// Replaces each fluent of an expression whose interval is a single value by this value.
     pub(super) fn settled(&self, linear: &Linear) -> Linear {
         let mut sum = Linear::constant(linear.constant.clone());
         for (key, factor) in &linear.factors {
@@ -207,7 +203,6 @@ impl Invariant {
         range
     }
 
-    /// Iterates over the atoms that a case (outcome of an action instance) may make true.
     pub(super) fn added<'c>(structure: &'c Structure, case: &'c Case) -> impl Iterator<Item = &'c Key> {
         let at_end = case
             .effects
@@ -294,8 +289,6 @@ impl Widening {
     }
 }
 
-/// Creates the error that the computation of a witness (the over-approximation of the reachable
-/// states) needs more than `limit` rounds.
 pub(super) fn too_many_rounds(limit: usize) -> Cause {
     Cause::TooMany { what: "rounds in search of a witness".into(), limit }
 }

@@ -14,7 +14,6 @@ pub(super) struct Length {
 }
 
 impl Length {
-    /// Returns the duration if the interval contains a single one.
     pub(super) fn fixed(&self) -> Option<&BigRational> {
         self.most.as_ref().filter(|most| **most == self.least)
     }

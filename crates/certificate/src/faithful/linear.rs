@@ -26,7 +26,6 @@ impl Interval {
         Self { low: Some(value.clone()), high: Some(value.clone()) }
     }
 
-    /// Returns the number if the interval contains a single one.
     pub(super) fn value(&self) -> Option<&BigRational> {
         self.low.as_ref().filter(|low| Some(*low) == self.high.as_ref())
     }
@@ -47,7 +46,6 @@ impl Linear {
         Self { factors: BTreeMap::from([(key, BigRational::one())]), constant: BigRational::zero() }
     }
 
-    /// Returns `self + factor * other`.
     pub(super) fn plus(mut self, other: &Self, factor: &BigRational) -> Self {
         self.constant += &other.constant * factor;
         for (key, own) in &other.factors {
@@ -71,7 +69,6 @@ impl Linear {
         self.times(&-BigRational::one())
     }
 
-    /// Returns the value of the expression if it contains no fluent.
     pub(super) fn value(&self) -> Option<&BigRational> {
         self.factors.is_empty().then_some(&self.constant)
     }
@@ -90,7 +87,6 @@ impl Linear {
         is_multiple.then_some(ratio)
     }
 
-    /// Returns the interval of the expression if each fluent lies in its interval.
     pub(super) fn range<'i>(&self, interval: impl Fn(&Key) -> Option<&'i Interval>) -> Interval {
         let mut range = Interval::point(&self.constant);
         for (key, factor) in &self.factors {

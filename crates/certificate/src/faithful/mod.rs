@@ -129,15 +129,12 @@ fn read(task: &str) -> Result<Model> {
     Ok(model)
 }
 
-/// A ground action: an action schema with the objects of its arguments.
 struct Instance {
     action: usize,
     arguments: Vec<u32>,
-    /// The atoms of changing predicates that the condition requires.
     requires: Vec<Key>,
 }
 
-/// The PDDL files, with the correspondence of their atoms and fluents to the task.
 struct Files<'f> {
     domain: &'f Domain,
     world: World<'f>,

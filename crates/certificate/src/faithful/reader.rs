@@ -19,12 +19,10 @@ use crate::faithful::verdict::Cause;
 use crate::faithful::world::World;
 use pddl::ast::{Arithmetic, Atom, Comparison, Condition, Expression, Name, Term, TypedName};
 
-/// Upper limit on the number of parts in the conditions of an instance.
 const SIZE_LIMIT: usize = 200_000;
 /// Upper limit on the number of parts that are evaluated for an instance, counting repeated
 /// evaluations (see [`Reader::unfold`]).
 const WORK_LIMIT: usize = 16 * SIZE_LIMIT;
-/// Upper limit on the number of variables of a quantifier or of the head of a rule.
 const VARIABLE_LIMIT: usize = 10_000;
 /// Maximum nesting depth, counted from the outermost derived atom, at which a derived atom is
 /// replaced by its rules recursively. This bounds the call stack. Deeper atoms are evaluated
@@ -61,13 +59,11 @@ pub(super) struct Reader<'r> {
     /// Whether derived atoms are kept instead of being replaced by their rules.
     pub(super) opaque: bool,
     unfolding: Unfolding,
-    /// The nesting depth of the current condition.
     depth: usize,
     size: usize,
     work: usize,
 }
 
-/// The state of replacing derived atoms by their rules.
 #[derive(Default)]
 struct Unfolding {
     /// The derived atoms whose rules are being evaluated, outermost first.
@@ -77,7 +73,6 @@ struct Unfolding {
     /// An atom nested deeper than [`UNFOLDING_LIMIT`]. Its condition is computed separately, before
     /// the evaluation that found the atom is repeated.
     pending: Option<Key>,
-    /// The computed conditions of atoms that were pending before.
     known: FxHashMap<Key, Formula>,
 }
 
@@ -171,7 +166,6 @@ impl<'r> Reader<'r> {
         Ok(Formula::junction(formulas, all))
     }
 
-    /// Returns `true` if a condition mentions a derived predicate.
     fn is_derived(&self, condition: &Condition) -> bool {
         match condition {
             Condition::And(parts) | Condition::Or(parts) => parts.iter().any(|part| self.is_derived(part)),
@@ -365,7 +359,6 @@ impl<'r> Reader<'r> {
         ))
     }
 
-    /// Returns the disjunction of the conditions of all rules for a derived atom.
     fn body(&mut self, key: &Key) -> Result<Formula, Cause> {
         self.unfolding.path.push(key.clone());
         let mut bodies = Vec::new();

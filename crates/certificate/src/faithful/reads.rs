@@ -11,7 +11,6 @@ use crate::faithful::timeline::Event;
 use crate::faithful::world::World;
 use pddl::ast::{Atom, Condition, Effect, Expression, Name, Term, TypedName};
 
-/// A happening of an action instance: its conditions, effects and duration constraints.
 pub(super) struct Reads<'r> {
     pub(super) world: &'r World<'r>,
     pub(super) axioms: &'r Axioms,
@@ -21,7 +20,6 @@ pub(super) struct Reads<'r> {
     pub(super) durations: Vec<&'r Expression>,
 }
 
-/// A ground atom or numeric fluent, to be searched for in a happening.
 #[derive(Clone, Copy)]
 enum ReadQuery<'w> {
     Atom(&'w Key),
@@ -29,7 +27,6 @@ enum ReadQuery<'w> {
 }
 
 impl Reads<'_> {
-    /// Returns `true` if the happening reads an atom that the event changes.
     pub(super) fn event(&self, event: &Event) -> bool {
         event.truths.keys().any(|key| self.atom(key))
     }
@@ -53,7 +50,6 @@ impl Reads<'_> {
 struct Search<'s> {
     reads: &'s Reads<'s>,
     wanted: ReadQuery<'s>,
-    /// The quantified variables in scope; the innermost comes last.
     scope: Vec<&'s TypedName>,
 }
 
@@ -108,7 +104,6 @@ impl<'s> Search<'s> {
         matches!(self.wanted, ReadQuery::Atom(_)) && self.is_instance(atom, key)
     }
 
-    /// Returns `true` if `key` is an instance of an atom or fluent with quantified variables.
     fn is_instance(&self, atom: &Atom, key: &Key) -> bool {
         let Reads { world, binding, .. } = self.reads;
         let mut chosen: FxHashMap<usize, u32> = FxHashMap::default();

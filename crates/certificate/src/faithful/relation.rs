@@ -4,7 +4,6 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::faithful::key::Key;
 
-/// An indexed set of ground atoms.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Relation {
     atoms: FxHashSet<Key>,
@@ -15,7 +14,6 @@ pub(super) struct Relation {
 }
 
 impl Relation {
-    /// Adds an atom. Returns `true` if the atom was not in the set.
     pub(super) fn insert(&mut self, key: Key) -> bool {
         if !self.atoms.insert(key.clone()) {
             return false;
@@ -36,7 +34,6 @@ impl Relation {
         self.atoms.len()
     }
 
-    /// Returns the number of atoms that [`Relation::rows`] yields.
     pub(super) fn count(&self, predicate: u32, place: Option<(usize, u32)>) -> usize {
         match place {
             None => self.rows.get(&predicate).map_or(0, Vec::len),

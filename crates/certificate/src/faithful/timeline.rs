@@ -23,7 +23,6 @@ use crate::faithful::formula::Formula;
 use crate::faithful::key::{CLOCK, Key, PHASE, WAITED};
 use crate::faithful::linear::Linear;
 
-/// The truth values that an event assigns to atoms.
 pub(super) type Truths = BTreeMap<Key, bool>;
 
 /// All timed initial literals with the same time.
@@ -36,7 +35,6 @@ pub(super) struct Event {
 /// An end of a time range; the flag is `true` if the end itself is excluded.
 type End = (BigRational, bool);
 
-/// The events in the order of their times.
 #[derive(Debug, Default)]
 pub(super) struct Timeline {
     pub(super) events: Vec<Event>,
@@ -54,9 +52,7 @@ pub(super) struct Passage {
     /// states this for the end and phase `to`.
     at_start: bool,
     at_end: bool,
-    /// The latest start time; `None` if there is no limit.
     latest: Option<End>,
-    /// The earliest end time.
     pub(super) end: End,
 }
 
@@ -158,7 +154,6 @@ impl Timeline {
     }
 }
 
-/// A range of times.
 struct Range {
     low: End,
     high: Option<End>,
@@ -212,7 +207,6 @@ impl Passage {
         Formula::junction(conditions.into_iter().chain(limit), true)
     }
 
-    /// Returns the event at the start of the action, if there is one.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "phases are counted from 0, and each but the first one begins with an event"
@@ -240,8 +234,8 @@ impl Passage {
         (self.at_end && self.to > self.from).then(|| &timeline.events[self.to - 1])
     }
 
-    /// Returns the effects of an action with this passage (position relative to the events) on the
-    /// atoms of the phases and on the atom `waited`; `None` without events.
+    /// Returns the effects of an action with this passage (position relative to the events) on the atoms of
+    /// the phases and on the atom `waited`. Empty if there are no events.
     pub(super) fn truths(&self, timeline: &Timeline) -> Truths {
         if timeline.is_empty() {
             return Truths::new();
@@ -269,7 +263,6 @@ mod tests {
         BigRational::new(count.into(), 4.into())
     }
 
-    /// Every start time lies in exactly one passage, which is the one that the definition requires.
     #[test]
     fn passages_partition_the_start_times() {
         for (events, duration) in [
@@ -311,7 +304,6 @@ mod tests {
         }
     }
 
-    /// A clock past its mark represents only times after the mark.
     #[test]
     fn a_clock_represents_times_from_its_mark_on() {
         let unit = quarters(2);

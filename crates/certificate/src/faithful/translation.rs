@@ -15,7 +15,6 @@ use crate::faithful::verdict::{Cause, Difference, Obstacle};
 use crate::faithful::world::World;
 use crate::model::{self, Condition, Fact, Literal, Model};
 
-/// Upper limit on the number of parts of a condition of the task after translation.
 const SIZE_LIMIT: usize = 200_000;
 
 /// Upper limit on the total number of parts of all translated conditions.
@@ -30,11 +29,9 @@ pub(super) struct Names {
     /// that the PDDL files do not contain.
     keys: Vec<Vec<Option<Key>>>,
     facts: FxHashMap<Key, Fact>,
-    /// For each number of the task, the fluent.
     pub(super) fluents: Vec<Key>,
     pub(super) numbers: FxHashMap<Key, u32>,
     pub(super) structure: Structure,
-    /// The derived atoms that are variables of the task.
     pub(super) linked: FxHashSet<Key>,
     /// For each derived variable, the axiom layer that computes its value.
     layers: FxHashMap<u32, usize>,
@@ -138,20 +135,16 @@ impl Names {
     }
 }
 
-/// The task, with its conditions expressed as formulas over atoms and fluents of the PDDL files.
 pub(super) struct Translation<'t> {
     pub(super) world: &'t World<'t>,
     pub(super) model: &'t Model,
     pub(super) names: &'t Names,
     pub(super) invariant: &'t Invariant,
     pub(super) axioms: &'t Axioms,
-    /// For each variable, its values whose atoms may hold in the witness (the over-approximation of
-    /// the reachable states): value and atom.
     possible: Vec<Vec<(u32, &'t Key)>>,
     /// For each derived variable whose atom is not in `Axioms::linked`: the formula that replaces
     /// the variable.
     unfolded: BTreeMap<u32, Formula>,
-    /// For each derived variable, the bodies of its rules.
     bodies: FxHashMap<u32, Vec<&'t Condition>>,
 }
 
@@ -220,7 +213,6 @@ impl<'t> Translation<'t> {
         Ok(())
     }
 
-    /// Returns the variables that the rules of a derived variable read.
     fn read_by(&self, variable: u32) -> impl Iterator<Item = u32> {
         self.bodies(variable).flat_map(|body| {
             let clauses = body.clauses.iter().flatten().map(|((variable, _), _)| *variable);
@@ -294,7 +286,6 @@ impl<'t> Translation<'t> {
         Formula::junction(facts.chain(clauses).chain(comparisons), true)
     }
 
-    /// Translates a linear expression over numbers of the task to a linear expression over fluents.
     fn linear(&self, linear: &model::Linear, choice: &[u32], sizes: &[usize]) -> Linear {
         let scale = self.model.number_scale.to_rational();
         let mut sum = Linear::constant(self.model.quantity(&linear.quantity, choice, sizes).to_rational());

@@ -22,15 +22,14 @@ pub(super) struct World<'w> {
     objects: Vec<(u32, Vec<&'w TypeExpression>)>,
     by_name: FxHashMap<u32, usize>,
     facts: FxHashSet<Key>,
-    /// The arguments of the initial facts of each predicate. For each predicate, argument position
-    /// and object, `rows_with` contains the indices of the matching rows.
+    /// The arguments of the initial facts of each predicate, without the changes by events at time 0. For
+    /// each predicate, argument position and object, `rows_with` contains the indices of the matching rows.
     rows: FxHashMap<u32, Vec<Vec<u32>>>,
     rows_with: FxHashMap<(u32, usize, u32), Vec<usize>>,
     values: FxHashMap<Key, BigRational>,
     /// The predicates and functions that an action or a timed event changes.
     changing: FxHashSet<u32>,
     pub(super) timeline: Timeline,
-    /// For each derived predicate, its rules.
     rules: FxHashMap<u32, Vec<&'w Derived>>,
 }
 
@@ -182,8 +181,6 @@ impl<'w> World<'w> {
         })
     }
 
-    /// Returns the object that a term denotes, or `None` if a variable is unbound or a constant is
-    /// undeclared.
     pub(super) fn bound(&self, term: &Term, binding: &FxHashMap<&Name, u32>) -> Option<u32> {
         match term {
             Term::Variable(identifier) => binding.get(&identifier.name).copied(),
@@ -236,7 +233,6 @@ impl<'w> World<'w> {
         self.changing.contains(&symbol)
     }
 
-    /// Returns the rules of a derived predicate, or `None` if the predicate is not derived.
     pub(super) fn rules(&self, symbol: u32) -> Option<&[&'w Derived]> {
         self.rules.get(&symbol).map(Vec::as_slice)
     }
@@ -276,7 +272,6 @@ impl<'w> World<'w> {
         objects.filter(|object| self.is_of(*object, wanted)).collect()
     }
 
-    /// Returns the number of facts that [`World::rows`] returns.
     pub(super) fn count(&self, predicate: u32, place: Option<(usize, u32)>) -> usize {
         match place {
             None => self.rows.get(&predicate).map_or(0, Vec::len),
@@ -284,8 +279,8 @@ impl<'w> World<'w> {
         }
     }
 
-    /// Returns the arguments of the initial facts of a predicate. `place` optionally restricts the
-    /// argument at a position to an object.
+    /// Returns the arguments of the initial facts of a predicate, without the changes by events at time 0.
+    /// `place` optionally restricts the argument at a position to an object.
     pub(super) fn rows(&self, predicate: u32, place: Option<(usize, u32)>) -> Vec<&Vec<u32>> {
         let Some(rows) = self.rows.get(&predicate) else { return Vec::new() };
         match place {

@@ -28,8 +28,6 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Checks that the predicate in the head of an axiom is declared with the same number of parameters and
-    /// compatible types.
     fn axiom_head(&mut self, axiom: &'a crate::ast::Derived) {
         let Identifier { name, span } = &axiom.head.identifier;
         let symbols = self.symbols;

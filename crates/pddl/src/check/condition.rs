@@ -7,7 +7,6 @@ use crate::print::{signature, type_text};
 use super::soft::is_violation;
 use super::{Checker, Scope, did_you_mean};
 
-/// Namespace of the symbol of an atom.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     Predicate,
@@ -264,21 +263,16 @@ impl<'a> Checker<'a> {
     }
 }
 
-/// Type information about an argument.
 #[derive(Debug)]
 pub(super) enum ArgumentType<'a> {
-    /// Variable with its declared type.
     Variable(&'a TypeExpression),
-    /// Object with the types of all its declarations.
     Object(&'a [&'a TypeExpression]),
 }
 
-/// Returns `true` if a type is `object` or absent.
 fn is_object(r#type: &TypeExpression) -> bool {
     r#type.alternatives.iter().all(|alternative| alternative.name.as_str().eq_ignore_ascii_case("object"))
 }
 
-/// Formats a type for messages.
 fn describe(r#type: &TypeExpression) -> String {
     format!("of type `{}`", type_text(r#type))
 }

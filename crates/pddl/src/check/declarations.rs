@@ -81,7 +81,6 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Warns about a redundant second declaration.
     fn repeated(&mut self, span: Span, noun: &str, earlier: Span) {
         let source = self.sink.source();
         self.sink.warning("P127", span, format!("{noun} is declared twice")).related(
@@ -146,7 +145,6 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Reports undeclared types in a type expression.
     pub(super) fn check_type(&mut self, r#type: &TypeExpression) {
         for alternative in &r#type.alternatives {
             if !self.symbols.types.contains(&alternative.name) {

@@ -11,7 +11,6 @@ use super::condition::Kind;
 use super::soft::is_violation;
 use super::{Checker, Scope};
 
-/// Predicate or function with its arguments, without source positions.
 type Key<'a> = (&'a Name, SmallVec<[&'a Name; 4]>);
 
 fn key(atom: &Atom) -> Key<'_> {

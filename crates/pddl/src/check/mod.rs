@@ -15,7 +15,6 @@ use super::diagnostic::{Diagnostic, Severity, Sink};
 use super::source::Source;
 use symbols::Symbols;
 
-/// Codes of messages about undeclared names.
 const UNDECLARED_CODES: [&str; 5] = ["P120", "P121", "P122", "P123", "P136"];
 
 /// Minimum number of undeclared `inferred-…` predicates for a domain to count as a template of PLANTA's
@@ -58,8 +57,6 @@ pub fn check(
     diagnostics
 }
 
-/// Checks an objective that is given separately from the domain and problem files. Returns its errors and
-/// warnings.
 pub(super) fn objective(
     domain: &Domain,
     problem: &Problem,
@@ -104,7 +101,6 @@ fn template_message(domain: &Domain, source: &Source, inferred_count: usize) -> 
     diagnostic
 }
 
-/// State of the checks of one file.
 struct Checker<'a> {
     symbols: &'a Symbols<'a>,
     sink: Sink<'a>,
@@ -113,7 +109,6 @@ struct Checker<'a> {
     /// Whether the checked file is the domain. A domain should use only its own constants, not objects of a
     /// problem.
     in_domain: bool,
-    /// Whether `?duration` is defined in the current context.
     in_durative_action: bool,
 }
 
@@ -144,7 +139,6 @@ impl<'a> Checker<'a> {
     }
 }
 
-/// Maximum number of declared names that are compared with an undeclared name.
 const MAX_CANDIDATES: usize = 5_000;
 
 fn did_you_mean<'n>(written: &str, candidates: impl IntoIterator<Item = &'n Name>) -> Option<String> {

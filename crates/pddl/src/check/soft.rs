@@ -4,10 +4,8 @@ use crate::ast::{Atom, Constraint, Preference, Term, Trajectory};
 
 use super::{Checker, Scope};
 
-/// Name of the function that counts the violations of a preference.
 const IS_VIOLATED: &str = "is-violated";
 
-/// Returns `true` if an atom is `(is-violated …)`.
 pub(super) fn is_violation(atom: &Atom) -> bool {
     atom.predicate.name.as_str().eq_ignore_ascii_case(IS_VIOLATED)
 }
@@ -56,7 +54,6 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Checks `(is-violated NAME)` in a metric.
     pub(super) fn violation(&mut self, atom: &'a Atom) {
         let [Term::Constant(name)] = &atom.arguments[..] else {
             self.sink

@@ -5,12 +5,9 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use crate::ast::{Declaration, Domain, Name, Problem, TypeExpression, TypedName};
 use crate::types::TypeHierarchy;
 
-/// Object or constant.
 #[derive(Debug, Default)]
 pub(super) struct Object<'a> {
-    /// Types from all declarations of the object.
     pub(super) types: Vec<&'a TypeExpression>,
-    /// Whether the domain declares the object as a constant.
     pub(super) is_constant: bool,
 }
 

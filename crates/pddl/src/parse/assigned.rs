@@ -7,7 +7,6 @@ use crate::ast::{Atom, Condition, EffectTime, Expression, Identifier, Name, Term
 use super::Parser;
 use super::fluents::Assigned;
 
-/// Maps each renamed variable to its replacement.
 type Renaming = FxHashMap<Name, Identifier>;
 
 impl Parser<'_> {
@@ -32,7 +31,6 @@ impl Parser<'_> {
         needs
     }
 
-    /// Returns a copy of an assignment with fresh variables.
     fn copy(&mut self, assigned: &Assigned) -> Assigned {
         let mut renaming = Renaming::default();
         let mut renamed = |variables: &[TypedName]| -> Vec<TypedName> {

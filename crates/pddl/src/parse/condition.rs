@@ -8,7 +8,6 @@ use super::expression::comparison;
 use super::{Parser, at_start, list_start};
 
 impl Parser<'_> {
-    /// Parses a condition without time specifiers.
     pub(super) fn condition(&mut self, item: Item<'_>) -> Option<Condition> {
         if !item.is_list() {
             let help = item.symbol().map(|symbol| format!("a condition is in parentheses: `({symbol})`"));
@@ -79,7 +78,6 @@ impl Parser<'_> {
         self.atom(item, "a predicate").map(Condition::Atom)
     }
 
-    /// Parses a comparison of numbers, or `=` between terms.
     fn comparison_condition(&mut self, item: Item<'_>, operator: Comparison) -> Option<Condition> {
         let head = item.head().unwrap_or_default();
         let [left, right] = self.operands(item, &format!("({head} a b)"))?;
@@ -106,7 +104,7 @@ fn is_term_variable(symbol: &str) -> bool {
     symbol.starts_with('?') && !symbol.eq_ignore_ascii_case("?duration")
 }
 
-/// Returns `true` if `=` compares terms: at least one side is a variable, or both are names.
+/// Returns `true` if `=` compares terms: both sides are symbols, and one is a variable or both are names.
 fn is_term_pair(left: Item<'_>, right: Item<'_>) -> bool {
     let (Some(left), Some(right)) = (left.symbol(), right.symbol()) else { return false };
     let is_name =

@@ -14,7 +14,6 @@ const ACTION_KEYS: [&str; 4] = [":parameters", ":vars", ":precondition", ":effec
 const DURATIVE_KEYS: [&str; 4] = [":parameters", ":duration", ":condition", ":effect"];
 
 impl Parser<'_> {
-    /// Parses `(define (domain NAME) SECTION…)`.
     pub(super) fn domain(&mut self, define: Item<'_>) -> Option<Domain> {
         let (name, sections) = self.header(define, "domain")?;
         let mut domain = Domain {
@@ -108,7 +107,6 @@ impl Parser<'_> {
         }
     }
 
-    /// Reports a section whose keyword is unsupported, unknown or ignored.
     pub(super) fn other_section(&mut self, section: Item<'_>, kind: &str) {
         let keyword = section.head().unwrap_or_default().to_ascii_lowercase();
         let refused = match keyword.as_str() {

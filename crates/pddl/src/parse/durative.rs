@@ -37,7 +37,6 @@ pub(super) fn is_conjunction(item: Item<'_>) -> bool {
     item.is_headed("and") || (item.is_list() && item.items().next().is_none())
 }
 
-/// Appends each conjunct of a condition to `conditions`, with the given time.
 fn spread_condition(time: ConditionTime, condition: Condition, conditions: &mut TimedConditions) {
     match condition {
         Condition::And(parts) => parts.into_iter().for_each(|part| spread_condition(time, part, conditions)),
@@ -45,7 +44,6 @@ fn spread_condition(time: ConditionTime, condition: Condition, conditions: &mut 
     }
 }
 
-/// Appends each conjunct of an effect to `effects`, with the given time.
 fn spread_effect(time: EffectTime, effect: Effect, effects: &mut TimedEffects) {
     match effect {
         Effect::And(parts) => parts.into_iter().for_each(|part| spread_effect(time, part, effects)),
@@ -54,7 +52,6 @@ fn spread_effect(time: EffectTime, effect: Effect, effects: &mut TimedEffects) {
 }
 
 impl Parser<'_> {
-    /// Parses `:condition` of a durative action and appends its conjuncts to `conditions`.
     pub(super) fn timed_conditions(&mut self, item: Item<'_>, conditions: &mut TimedConditions) {
         if is_conjunction(item) {
             for item in item.rest() {
@@ -96,7 +93,6 @@ impl Parser<'_> {
             .help(format!("write {forms}"));
     }
 
-    /// Parses `:effect` of a durative action and appends its conjuncts to `effects`.
     pub(super) fn timed_effects(&mut self, item: Item<'_>, effects: &mut TimedEffects) {
         if is_conjunction(item) {
             for item in item.rest() {
@@ -166,7 +162,6 @@ impl Parser<'_> {
         }
     }
 
-    /// Parses `:duration`.
     pub(super) fn duration(&mut self, item: Item<'_>, constraints: &mut Vec<DurationConstraint>) {
         if is_conjunction(item) {
             for item in item.rest() {
@@ -198,7 +193,6 @@ impl Parser<'_> {
     }
 }
 
-/// Returns `true` if `#t` occurs in an item.
 fn mentions_continuous_time(item: Item<'_>) -> bool {
     item.symbol().is_some_and(|symbol| symbol.eq_ignore_ascii_case("#t"))
         || item.items().any(mentions_continuous_time)

@@ -7,7 +7,6 @@ use super::condition::is_timed;
 use super::expression::comparison;
 use super::{Parser, list_start};
 
-/// Returns the assignment operator with the given name.
 fn assignment(symbol: &str) -> Option<Assignment> {
     Some(match symbol {
         "assign" => Assignment::Assign,
@@ -20,7 +19,6 @@ fn assignment(symbol: &str) -> Option<Assignment> {
 }
 
 impl Parser<'_> {
-    /// Parses an effect without time specifiers.
     pub(super) fn effect(&mut self, item: Item<'_>) -> Option<Effect> {
         if !item.is_list() {
             self.expected(item, "an effect");

@@ -9,7 +9,6 @@ use crate::sexp::Item;
 
 use super::{Parser, at_start, list_start};
 
-/// Returns the comparison with the given symbol.
 pub(super) fn comparison(symbol: &str) -> Option<Comparison> {
     Some(match symbol {
         "<" => Comparison::Less,
@@ -31,11 +30,9 @@ fn arithmetic(symbol: &str) -> Option<Arithmetic> {
     })
 }
 
-/// Help text for continuous effects.
 pub(super) const CONTINUOUS: &str = "numbers change at the start and the end of actions only: `(at end (increase (f) (* 2 ?duration)))` for a rate of 2";
 
 impl Parser<'_> {
-    /// Parses `?x`, `name` or a term with an object fluent.
     pub(super) fn term(&mut self, item: Item<'_>) -> Option<Term> {
         let Some(symbol) = item.symbol() else { return self.value_of(item) };
         match symbol.strip_prefix('?') {
@@ -65,7 +62,6 @@ impl Parser<'_> {
         (self.sink.len() == message_count).then_some(Atom { predicate, arguments, span: item.span() })
     }
 
-    /// Parses a function: `(f ?x)`, or a bare name without arguments.
     pub(super) fn fluent(&mut self, item: Item<'_>) -> Option<Atom> {
         if item.is_list() {
             return self.atom(item, "a function");
@@ -86,7 +82,6 @@ impl Parser<'_> {
         Some(Atom { predicate, arguments: Vec::new(), span: item.span() })
     }
 
-    /// Parses a numeric expression.
     pub(super) fn expression(&mut self, item: Item<'_>) -> Option<Expression> {
         let Some(symbol) = item.symbol() else { return self.compound_expression(item) };
         if symbol.eq_ignore_ascii_case("?duration") {
@@ -137,8 +132,9 @@ impl Parser<'_> {
         (operands.len() == count).then_some(Expression::Operation(operation, operands, item.span()))
     }
 
-    /// Parses an expression without functions, as required in `:init` and for times of trajectory
-    /// constraints, and returns its value. Reports an error without one.
+    /// Parses a constant expression, as required in `:init` and for times of trajectory constraints, and
+    /// returns its value. Reports an error if there is no value, for example because the expression reads a
+    /// function.
     pub(super) fn constant(&mut self, item: Item<'_>) -> Option<BigRational> {
         let expression = self.expression(item)?;
         let value = evaluate(&expression);

@@ -11,13 +11,10 @@ use crate::types::TypeHierarchy;
 pub(super) struct Objects {
     /// Predicates that represent object fluents, by name. The last parameter is the value.
     pub(super) functions: FxHashMap<Name, Declaration>,
-    /// Declared types.
     pub(super) types: FxHashSet<Name>,
     /// Common prefix of the names of generated variables; `None` before the first is generated.
     pub(super) prefix: Option<String>,
-    /// Number of generated variables.
     pub(super) count: usize,
-    /// Whether the current context allows terms with object fluents.
     pub(super) is_open: bool,
     /// Object-fluent terms of the condition or effect that is being parsed.
     pub(super) values: Vec<Value>,
@@ -25,7 +22,6 @@ pub(super) struct Objects {
     pub(super) time: Option<EffectTime>,
     /// Conditions that the effects of the current action impose on the state, each with its time.
     pub(super) needs: Vec<(EffectTime, Condition)>,
-    /// Assignments to object fluents by the current action.
     pub(super) assigned: Vec<Assigned>,
     /// Values of object fluents in `:init`, by function and arguments, with their positions. `None` for
     /// `undefined`.
@@ -47,7 +43,6 @@ pub(super) struct Mark {
 }
 
 impl Objects {
-    /// Collects the object fluents of a domain.
     pub(super) fn of(domain: &Domain) -> Self {
         let names: FxHashSet<&Name> = domain.object_fluents.iter().collect();
         let functions =
@@ -72,7 +67,6 @@ impl Objects {
     }
 }
 
-/// Assignment to an object fluent.
 #[derive(Clone)]
 pub(super) struct Assigned {
     pub(super) time: EffectTime,

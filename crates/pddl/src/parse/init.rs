@@ -64,7 +64,6 @@ impl Parser<'_> {
         Some(InitialElement::Value(function?, value?, item.span()))
     }
 
-    /// Parses `(at 5 (p))` and `(at 5 (not (p)))`.
     fn timed_literal(&mut self, item: Item<'_>) -> Option<InitialElement> {
         let [time, literal] = self.operands(item, "(at 5 (predicate object))")?;
         let time = self.number(time)?;
@@ -83,7 +82,6 @@ impl Parser<'_> {
         Some(InitialElement::Timed(time, atom, holds, item.span()))
     }
 
-    /// Parses `(:metric minimize (f))`.
     pub(super) fn metric(&mut self, section: Item<'_>) -> Option<Metric> {
         let [direction, expression] = self.operands(section, "(:metric minimize (total-cost))")?;
         let word = direction.symbol().unwrap_or_default();

@@ -27,14 +27,14 @@ use super::source::Source;
 use fluents::Objects;
 
 /// Parses a domain. In case of errors the tree lacks the unreadable parts. The tree is absent if the text has
-/// no `(define (domain …) …)`.
+/// no `(define (domain …) …)`, is too large, or is nested too deeply.
 pub fn parse_domain(source: &Source) -> (Option<Domain>, Vec<Diagnostic>) {
     let parsed = domain(source);
     (parsed.tree, parsed.diagnostics)
 }
 
 /// Parses a problem. In case of errors the tree lacks the unreadable parts. The tree is absent if the text
-/// has no `(define (problem …) …)`.
+/// has no `(define (problem …) …)`, is too large, or is nested too deeply.
 pub fn parse_problem(source: &Source) -> (Option<Problem>, Vec<Diagnostic>) {
     let parsed = problem(source);
     (parsed.tree, parsed.diagnostics)
@@ -62,12 +62,11 @@ pub(super) fn expression(source: &Source) -> Parsed<Expression> {
     })
 }
 
-/// Result of parsing a text.
 #[derive(Debug)]
 pub(super) struct Parsed<T> {
     pub(super) tree: Option<T>,
     pub(super) diagnostics: Vec<Diagnostic>,
-    /// Whether all declarations were parsed. Otherwise a name may be undeclared because of a syntax error.
+    /// `false` if declarations may be missing because of a syntax error. A name may then seem undeclared.
     pub(super) declarations_intact: bool,
 }
 
@@ -111,7 +110,6 @@ fn parse_top<'s, T>(
     Parsed { tree, declarations_intact: parser.declarations_intact, diagnostics: parser.sink.finish() }
 }
 
-/// Parser state.
 struct Parser<'s> {
     sink: Sink<'s>,
     /// Interned names: one allocation per spelling.
@@ -194,7 +192,6 @@ impl Parser<'_> {
         diagnostic
     }
 
-    /// Reports a construct that is recognised but not supported.
     fn refuse(&mut self, item: Item<'_>, construct: &str) -> &mut Diagnostic {
         self.sink.error("P113", at_start(item), format!("{construct} are not supported"))
     }
@@ -215,7 +212,6 @@ impl Parser<'_> {
         operands
     }
 
-    /// Parses a number. Reports anything else, and a number that is too long.
     fn number(&mut self, item: Item<'_>) -> Option<num_rational::BigRational> {
         match item.symbol().map(literal) {
             Some(Literal::Number(value)) => Some(value),

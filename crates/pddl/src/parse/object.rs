@@ -19,7 +19,6 @@ use crate::sexp::Item;
 use super::fluents::{Assigned, Mark, Value};
 use super::{Parser, at_start};
 
-/// Symbol for the absence of a value.
 const UNDEFINED: &str = "undefined";
 
 impl Parser<'_> {
@@ -98,7 +97,6 @@ impl Parser<'_> {
         self.identifier(&name, span)
     }
 
-    /// Returns a new variable of the function's value type.
     fn value_variable(&mut self, function: &Name, span: Span) -> TypedName {
         let declaration = self.objects.functions.get(function);
         let mut r#type = declaration
@@ -110,7 +108,6 @@ impl Parser<'_> {
         TypedName { identifier: self.new_variable(span), r#type }
     }
 
-    /// Returns `true` if an item is an object fluent applied to terms.
     pub(super) fn is_object_fluent(&self, item: Item<'_>) -> bool {
         item.head().is_some_and(|head| self.objects.contains(&Name::new(head)))
     }
@@ -126,7 +123,7 @@ impl Parser<'_> {
     }
 
     /// Replaces an object-fluent term by a new variable for its value and records the atom that binds the
-    /// variable.
+    /// variable. Reports any other item, and a context that does not allow object fluents.
     pub(super) fn value_of(&mut self, item: Item<'_>) -> Option<Term> {
         if !self.is_object_fluent(item) {
             self.expected(item, "a variable or an object").help(
@@ -175,7 +172,6 @@ impl Parser<'_> {
         Some((function, arguments))
     }
 
-    /// Parses an object, a variable, or an object-fluent term.
     fn object(&mut self, item: Item<'_>) -> Option<Term> {
         let is_number =
             |symbol: &str| literal(symbol) != Literal::Name || symbol.eq_ignore_ascii_case("?duration");
@@ -224,7 +220,8 @@ impl Parser<'_> {
         Some(Condition::Atom(Atom { predicate, arguments, span: term.span() }))
     }
 
-    /// Reads `(assign (place-of ?x) ?y)`.
+    /// Parses `(assign (place-of ?x) ?y)` and records the assignment in
+    /// [`Objects::assigned`](super::fluents::Objects::assigned).
     pub(super) fn object_assignment(&mut self, target: Item<'_>, value: Item<'_>) -> Option<Effect> {
         let (function, arguments) = self.object_term(target)?;
         let value = if is_undefined(value) { None } else { Some(self.object(value)?) };
@@ -274,7 +271,6 @@ impl Parser<'_> {
         Some(Effect::ForAll(variables, Box::new(Effect::When(values_hold, Box::new(effect)))))
     }
 
-    /// Clears the data that is collected over the effects of one action.
     pub(super) fn begin_effects(&mut self) {
         self.objects.time = None;
         self.objects.needs.clear();
@@ -286,7 +282,8 @@ impl Parser<'_> {
     }
 
     /// Quantifies universally over `variables` the needs of all effects parsed since `mark`. Needs are
-    /// conditions that effects impose on the state.
+    /// conditions that effects impose on the state. Also adds the variables to the assignments recorded since
+    /// `mark`.
     pub(super) fn effects_below(&mut self, mark: Mark, variables: &[TypedName]) {
         for (_, need) in &mut self.objects.needs[mark.needs..] {
             let inner = std::mem::replace(need, Condition::And(Vec::new()));
@@ -298,7 +295,7 @@ impl Parser<'_> {
     }
 
     /// Makes the needs of all effects parsed since `mark` depend on `condition`. Needs are conditions that
-    /// effects impose on the state.
+    /// effects impose on the state. Also adds the condition to the assignments recorded since `mark`.
     pub(super) fn effects_when(&mut self, mark: Mark, condition: &Condition) {
         for (_, need) in &mut self.objects.needs[mark.needs..] {
             let inner = std::mem::replace(need, Condition::And(Vec::new()));
@@ -359,7 +356,6 @@ fn is_undefined(item: Item<'_>) -> bool {
     item.symbol().is_some_and(|symbol| symbol.eq_ignore_ascii_case(UNDEFINED))
 }
 
-/// Splits values into their variables and the atoms that bind the variables.
 fn variables_and_atoms(values: Vec<Value>) -> (Vec<TypedName>, Vec<Condition>) {
     values.into_iter().map(|value| (value.variable, Condition::Atom(value.atom))).unzip()
 }
@@ -374,7 +370,6 @@ fn conjunction(mut parts: Vec<Condition>) -> Condition {
     if parts.len() == 1 { parts.swap_remove(0) } else { Condition::And(parts) }
 }
 
-/// Conjoins a condition with the conditions that the action's effects impose.
 pub(super) fn with_needs(condition: Condition, needs: Vec<Condition>) -> Condition {
     if needs.is_empty() {
         return condition;

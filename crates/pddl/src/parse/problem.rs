@@ -19,7 +19,6 @@ struct UniqueSections {
 }
 
 impl Parser<'_> {
-    /// Parses `(define (problem NAME) SECTION…)`.
     pub(super) fn problem(&mut self, define: Item<'_>) -> Option<Problem> {
         let (name, sections) = self.header(define, "problem")?;
         let unnamed = self.identifier("unnamed", name.span);

@@ -15,14 +15,12 @@ struct RawPreference<'t> {
     whole: Item<'t>,
 }
 
-/// Context of a preference: enclosing quantifiers and time specifier.
 #[derive(Clone, Default)]
 struct Context {
     variables: Vec<TypedName>,
     time: Option<ConditionTime>,
 }
 
-/// Returns `true` if an item contains a preference.
 fn is_soft(item: Item<'_>) -> bool {
     item.is_headed("preference") || item.items().any(is_soft)
 }
@@ -49,7 +47,6 @@ impl Parser<'_> {
         Some(goal)
     }
 
-    /// Parses the precondition of an instantaneous action and separates its preferences.
     pub(super) fn precondition(
         &mut self,
         item: Item<'_>,
@@ -65,7 +62,6 @@ impl Parser<'_> {
         Some(precondition)
     }
 
-    /// Parses the condition of a durative action and separates its preferences.
     pub(super) fn durative_condition(
         &mut self,
         item: Item<'_>,
@@ -127,7 +123,6 @@ impl Parser<'_> {
         self.condition(item)
     }
 
-    /// Parses the mandatory part of a durative action's condition and collects the preferences in `soft`.
     fn hard_timed<'t>(
         &mut self,
         item: Item<'t>,

@@ -97,7 +97,6 @@ impl Parser<'_> {
         })
     }
 
-    /// Parses the condition of a modal operator with one operand.
     fn single_condition(&mut self, item: Item<'_>, form: &str) -> Option<crate::ast::Condition> {
         let [body] = self.operands(item, form)?;
         self.condition(body)

@@ -5,10 +5,8 @@ use crate::sexp::{Item, Items};
 
 use super::Parser;
 
-/// Kind of the entries of a typed list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Entries {
-    /// Variables, with question marks.
     Variables,
     /// Names of objects, constants or types.
     Names,
@@ -65,7 +63,6 @@ impl Parser<'_> {
         self.type_expression(item)
     }
 
-    /// Parses one type or `(either …)`.
     fn type_expression(&mut self, item: Item<'_>) -> TypeExpression {
         if !item.is_headed("either") {
             let name = self.name_item(item, "a type");
@@ -96,7 +93,6 @@ impl Parser<'_> {
         self.variable(item, symbol)
     }
 
-    /// Parses a variable. The question mark is not part of the name.
     fn variable(&mut self, item: Item<'_>, symbol: &str) -> Option<Identifier> {
         match symbol.strip_prefix('?') {
             Some(name) if !name.is_empty() => Some(self.identifier(name, item.span())),
@@ -109,7 +105,6 @@ impl Parser<'_> {
         }
     }
 
-    /// Parses the parenthesised parameters of an action or a quantifier.
     pub(super) fn parameters(&mut self, item: Item<'_>) -> Vec<TypedName> {
         if !item.is_list() {
             self.expected(item, "a list of variables").help("write `(?x ?y - type)`");
@@ -118,7 +113,6 @@ impl Parser<'_> {
         self.typed_list(item.items(), Entries::Variables)
     }
 
-    /// Parses `(name ?x ?y - type)`.
     pub(super) fn declaration(&mut self, item: Item<'_>, description: &str) -> Option<Declaration> {
         let Some(first) = item.items().next() else {
             self.expected(item, description).help("write `(name ?x ?y - type)`");

@@ -4,7 +4,6 @@
 /// Maximum width of a list that is printed on one line, in characters, including the indentation.
 const WIDTH: usize = 100;
 
-/// A list or a word, with its width.
 #[derive(Debug)]
 pub(super) struct Doc {
     /// Text before the opening parenthesis: the keyword of an action, or empty.
@@ -21,7 +20,6 @@ enum Content {
     List(Vec<Doc>, usize),
 }
 
-/// Creates a word.
 pub(super) fn text(text: impl Into<String>) -> Doc {
     let text = text.into();
     Doc {
@@ -61,7 +59,6 @@ impl Doc {
         self
     }
 
-    /// Returns the text without line breaks.
     pub(super) fn on_one_line(&self) -> String {
         let mut out = String::new();
         self.write_inline(&mut out);
@@ -115,7 +112,6 @@ impl Doc {
     }
 }
 
-/// Formats the whole document, with a final line break.
 pub(super) fn layout(doc: &Doc) -> String {
     let mut out = String::new();
     doc.write(0, &mut out);

@@ -64,12 +64,10 @@ pub fn print_problem(problem: &Problem) -> String {
     layout(&list("define", 2, sections).broken())
 }
 
-/// Prints a condition on one line, for messages.
 pub(crate) fn condition_text(condition: &Condition) -> String {
     tree::condition(condition).on_one_line()
 }
 
-/// Prints a constraint on one line, for messages.
 pub(crate) fn constraint_text(constraint: &crate::ast::Constraint) -> String {
     soft::constraint(constraint, false).on_one_line()
 }

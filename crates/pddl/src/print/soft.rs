@@ -7,7 +7,6 @@ use crate::ast::{Condition, Constraint, Preference, Trajectory, TypedName};
 use super::layout::{Doc, list, text};
 use super::tree::{condition, number, timed_condition, variables};
 
-/// Returns `true` if a constraint is printed as a preference of the goal.
 pub(super) fn is_of_goal(constraint: &Constraint) -> bool {
     constraint.preference.is_some() && matches!(constraint.trajectory, Trajectory::AtEnd(_))
 }
@@ -22,7 +21,6 @@ pub(super) fn with(hard: &Condition, soft: impl Iterator<Item = Doc>) -> Doc {
     list("and", 1, parts.iter().map(condition).chain(soft))
 }
 
-/// Returns the section `:constraints`; `None` without constraints.
 pub(super) fn constraints(constraints: &[&Constraint]) -> Option<Doc> {
     let conjunction = list("and", 1, constraints.iter().map(|item| constraint(item, false))).broken();
     (!constraints.is_empty()).then(|| list(":constraints", 2, [conjunction]))

@@ -148,7 +148,6 @@ pub(super) fn typed(prefix: &str, entries: &[TypedName]) -> Vec<String> {
     lines
 }
 
-/// Text of a type, without its dash.
 pub(crate) fn type_text(r#type: &TypeExpression) -> String {
     let names: Vec<_> = r#type.alternatives.iter().map(|name| name.name.as_str()).collect();
     match names.as_slice() {

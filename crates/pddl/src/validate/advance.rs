@@ -183,7 +183,6 @@ fn note(changes: &Changes, assigned: &mut FxHashMap<Ground, bool>) {
     }
 }
 
-/// Returns the facts that hold in `state` but not in `other`, sorted by their text.
 fn facts_only_in(world: &World<'_>, state: &State, other: &State) -> Vec<Atom> {
     let is_new = |predicate: Symbol, arguments: &Arguments| {
         !other.facts.get(&predicate).is_some_and(|tuples| tuples.contains(arguments))

@@ -9,7 +9,6 @@ use crate::strata::Strata;
 /// Axioms of one stratum. Their predicates may depend on each other, but not through a negation.
 #[derive(Debug, Default)]
 pub(super) struct Stratum<'p> {
-    /// Derived predicates of the stratum.
     pub(super) predicates: FxHashSet<&'p Name>,
     pub(super) axioms: Vec<Axiom<'p>>,
     /// Body atoms of each predicate of the stratum that new facts can be joined with.
@@ -28,7 +27,6 @@ pub(super) struct Axiom<'p> {
 /// quantifiers enclose the atom.
 #[derive(Debug)]
 pub(super) struct Occurrence<'p> {
-    /// Index of the axiom in [`Stratum::axioms`].
     pub(super) axiom: usize,
     pub(super) atom: &'p Atom,
     /// Variables of the enclosing quantifiers, outermost first.
@@ -71,7 +69,6 @@ pub(super) fn strata(domain: &Domain) -> Vec<Stratum<'_>> {
     strata
 }
 
-/// Returns all predicates and functions that occur in the conditions of axioms.
 pub(super) fn read_by_axioms(domain: &Domain) -> FxHashSet<&Name> {
     let mut names = FxHashSet::default();
     for axiom in &domain.derived {
@@ -82,7 +79,6 @@ pub(super) fn read_by_axioms(domain: &Domain) -> FxHashSet<&Name> {
     names
 }
 
-/// Visitor for the condition of one axiom.
 struct Walk<'w, 'p> {
     axiom: usize,
     derived: &'p Derived,
@@ -139,7 +135,6 @@ impl<'p> Walk<'_, 'p> {
     }
 }
 
-/// Calls `visit` with each predicate and each function of a condition.
 fn names_in<'p>(condition: &'p Condition, visit: &mut dyn FnMut(&'p Name)) {
     condition.walk(&mut |node| {
         if let Some(atom) = node.atom().or_else(|| node.fluent()) {

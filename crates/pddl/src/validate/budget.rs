@@ -22,13 +22,11 @@ impl std::error::Error for Interrupted {}
 /// discarded.
 pub(super) struct Budget<'s> {
     stop: &'s dyn Fn() -> bool,
-    /// Loop steps until the next call of `stop`.
     steps_left: Cell<u32>,
     is_spent: Cell<bool>,
 }
 
 impl<'s> Budget<'s> {
-    /// Creates a budget that is spent once `stop` has returned `true`.
     pub(super) fn new(stop: &'s dyn Fn() -> bool) -> Self {
         Self { stop, steps_left: Cell::new(STRIDE), is_spent: Cell::new(false) }
     }

@@ -4,7 +4,6 @@ use rustc_hash::FxHashSet;
 
 use crate::ast::{Action, ActionBody, Domain, Effect, InitialElement, Name, Problem};
 
-/// Functions that some action can change.
 pub(super) fn changeable_functions(domain: &Domain) -> FxHashSet<&Name> {
     let mut functions = FxHashSet::default();
     for action in &domain.actions {
@@ -34,7 +33,6 @@ pub(super) fn changeable_predicates<'p>(domain: &'p Domain, problem: &'p Problem
     predicates
 }
 
-/// Calls `visit` with each atomic effect of an action.
 fn action_effects<'p>(action: &'p Action, visit: &mut dyn FnMut(&'p Effect)) {
     match &action.body {
         ActionBody::Instantaneous { effect, .. } => simple_effects(effect, visit),

@@ -23,8 +23,9 @@ struct Recent<'e, 'p> {
     footprint: Footprint,
 }
 
-/// Executes the steps at their start times until the first violation. Sets `total_time` to the end of the
-/// last executed action and applies all events (timed initial literals) up to this time.
+/// Executes the steps at their start times until the first violation or until the budget is spent. Sets
+/// `total_time` to the time of the last executed start or end, and applies all events (timed initial
+/// literals) up to this time.
 pub(super) fn run<'e, 'p>(
     execution: &mut Execution<'e, 'p>,
     steps: &'e [Step<'p>],
@@ -160,8 +161,6 @@ impl<'e, 'p> Simultaneous<'e, 'p> {
     }
 }
 
-/// Checks that a happening does not interfere with a recent happening. Two events, and two happenings of the
-/// same step, are not compared.
 fn check_pair<'p>(
     execution: &Execution<'_, 'p>,
     (step, time, footprint): (Option<&Step<'p>>, &BigRational, &Footprint),

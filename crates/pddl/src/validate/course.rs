@@ -150,7 +150,6 @@ impl<'e, 'p> Follower<'e, 'p> {
         Ok(())
     }
 
-    /// Appends a moment to the course, with the metric value of the current state.
     fn note(&mut self, moment: CourseMoment) {
         let metric = metric(self.execution.world, &self.execution.state, &moment.time);
         self.course.moments.push(CourseMoment { metric, ..moment });

@@ -48,7 +48,6 @@ struct Waiting {
     predicates: FxHashMap<Symbol, Vec<(usize, u32)>>,
 }
 
-/// State of the semi-naive evaluation of one stratum.
 struct Closure<'c, 'p> {
     world: &'c World<'p>,
     stratum: &'c Stratum<'p>,

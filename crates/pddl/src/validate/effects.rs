@@ -10,10 +10,8 @@ use crate::ast::{Arithmetic, Assignment, Effect};
 use super::evaluate::{Bindings, Evaluator, Undefined, apply};
 use super::world::{Arguments, State, Symbol, World};
 
-/// A fact or a function with its arguments.
 pub(super) type Ground = (Symbol, Arguments);
 
-/// Changes of a happening: added facts, deleted facts, and numeric changes.
 #[derive(Debug, Default)]
 pub(super) struct Changes {
     pub(super) added: FxHashSet<Ground>,
@@ -21,21 +19,15 @@ pub(super) struct Changes {
     pub(super) numeric: FxHashMap<Ground, Change>,
 }
 
-/// Change of one numeric function.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Change {
-    /// Assigns the value.
     Assign(BigRational),
-    /// Adds the value.
     Add(BigRational),
-    /// Multiplies by the value.
     Scale(BigRational),
 }
 
-/// Reason why effects cannot be applied.
 #[derive(Debug)]
 pub(super) enum EffectError {
-    /// A required value is undefined.
     Undefined(Undefined),
     /// One function is changed in two ways that do not commute.
     Conflict(Ground),
@@ -48,7 +40,6 @@ impl From<Undefined> for EffectError {
 }
 
 impl<'p> Evaluator<'_, 'p> {
-    /// Adds the changes of an effect, evaluated in the current state, to `changes`.
     pub(super) fn collect(
         &self,
         effect: &'p Effect,
@@ -123,7 +114,7 @@ impl Changes {
     }
 
     /// Adds the changes of another part of the same happening, for example of a simultaneous action. Returns
-    /// an error if numeric changes do not commute.
+    /// an error if numeric changes do not commute, or if their combination is too large.
     pub(super) fn merge(&mut self, other: Self) -> Result<(), EffectError> {
         self.added.extend(other.added);
         self.deleted.extend(other.deleted);
@@ -151,13 +142,11 @@ impl Changes {
         Ok(())
     }
 
-    /// Returns `true` if the changes concern a fact or value of one of the given predicates and functions.
     pub(super) fn concern(&self, symbols: &FxHashSet<Symbol>) -> bool {
         let facts = self.added.iter().chain(&self.deleted);
         facts.chain(self.numeric.keys()).any(|(symbol, _)| symbols.contains(symbol))
     }
 
-    /// Applies only the changes of facts, not those of numbers.
     pub(super) fn apply_facts(self, state: &mut State) {
         change_facts(self.added, self.deleted, state);
     }

@@ -15,12 +15,9 @@ use crate::ast::{
 use super::trace::Trace;
 use super::world::{Arguments, State, Symbol, World};
 
-/// Reason why a condition or an expression has no value.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Undefined {
-    /// A function without a value, as text.
     Function(String),
-    /// A division by zero.
     Division,
     /// A number whose numerator or denominator has more than [`BITS_LIMIT`] bits.
     Size,
@@ -32,7 +29,6 @@ pub(super) enum Undefined {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Bindings<'p>(pub(super) Vec<Binding<'p>>);
 
-/// A variable with its type, and with its object if it is bound.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Binding<'p> {
     pub(super) variable: &'p Name,
@@ -62,18 +58,15 @@ impl<'p> Bindings<'p> {
 /// otherwise exhaust memory.
 const BITS_LIMIT: u64 = 100_000;
 
-/// Evaluator for one state.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Evaluator<'e, 'p> {
     pub(super) world: &'e World<'p>,
     pub(super) state: &'e State,
-    /// Value of `?duration`.
     pub(super) duration: Option<&'e BigRational>,
     /// Value of `total-time`, in the metric only.
     pub(super) total_time: Option<&'e BigRational>,
     /// Addresses of subconditions that count as true while [`Evaluator::solve`] searches for bindings.
     pub(super) ignored: Option<&'e FxHashSet<*const Condition>>,
-    /// Records the facts that are missing for the result, if present.
     pub(super) trace: Option<&'e Trace<'e, 'p>>,
 }
 

@@ -18,7 +18,6 @@ use super::step::{Instance, Step, unresolved};
 use super::verdict::{Violation, ViolationKind};
 use super::world::{State, World};
 
-/// A partially executed plan: the current state and the pending events.
 #[derive(Debug)]
 pub(super) struct Execution<'e, 'p> {
     pub(super) world: &'e World<'p>,
@@ -59,7 +58,6 @@ impl<'e, 'p> Execution<'e, 'p> {
         Evaluator { duration, ..Evaluator::new(self.world, &self.state) }
     }
 
-    /// Time of the next timed initial literal, if any.
     pub(super) fn next_timed(&self) -> Option<&BigRational> {
         self.pending.last().map(|(time, ..)| time)
     }
@@ -164,7 +162,6 @@ impl<'e, 'p> Execution<'e, 'p> {
         Ok(duration)
     }
 
-    /// Checks that the stated or fixed duration satisfies one constraint within the tolerance.
     fn check_duration(
         &self,
         step: &Step<'p>,
@@ -250,7 +247,6 @@ impl<'e, 'p> Execution<'e, 'p> {
         Ok(())
     }
 
-    /// Evaluates the effects of an action at its start or its end in the current state.
     pub(super) fn changes(
         &self,
         running: &Running<'e, 'p>,

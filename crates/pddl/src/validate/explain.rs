@@ -40,7 +40,6 @@ pub(super) fn unmet<'p>(
     vec![Unmet { condition: condition_text(&ground), values }]
 }
 
-/// Describes why a value is undefined.
 pub(super) fn undefined_text(undefined: &Undefined) -> String {
     match undefined {
         Undefined::Function(function) => format!("the value of {function} is needed, but it was never set"),

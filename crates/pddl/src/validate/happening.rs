@@ -15,7 +15,6 @@ use super::step::Step;
 use super::verdict::{Violation, ViolationKind};
 use crate::number::show_number;
 
-/// Part of an action that takes place in one happening.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Part {
     Start,
@@ -85,7 +84,6 @@ impl<'e, 'p> Execution<'e, 'p> {
         }
     }
 
-    /// Applies all events (timed initial literals) of the next event time.
     pub(super) fn apply_next_timed(&mut self) {
         if let Some((time, event)) = self.take_next_timed() {
             self.apply_events(event.changes);
@@ -123,8 +121,9 @@ impl<'e, 'p> Execution<'e, 'p> {
         Some((time, Happening { changes, footprint }))
     }
 
-    /// Executes a part of an action in sequential execution. Applies all pending events up to `time` first;
-    /// those at `time` must not interfere with the part.
+    /// Executes a part of an action in sequential execution: evaluates the part in the current state, applies
+    /// the pending events up to `time`, and then the changes of the part. Events at `time` must not interfere
+    /// with the part.
     pub(super) fn execute(
         &mut self,
         running: &Running<'e, 'p>,
@@ -142,7 +141,6 @@ impl<'e, 'p> Execution<'e, 'p> {
         Ok(())
     }
 
-    /// Returns the violation that an action interferes with a timed initial literal.
     pub(super) fn disturbed(
         &self,
         step: &Step<'p>,

@@ -22,7 +22,6 @@ struct Pattern {
     arguments: Option<SmallVec<[Slot; 4]>>,
 }
 
-/// Argument of a pattern.
 #[derive(Debug, Clone)]
 enum Slot {
     Object(Symbol),
@@ -51,7 +50,6 @@ impl Pattern {
     }
 }
 
-/// Read and write sets of a happening: the start or the end of an action, or both, or timed initial literals.
 #[derive(Debug, Default)]
 pub(super) struct Footprint {
     facts_read: Vec<Pattern>,
@@ -64,7 +62,6 @@ pub(super) struct Footprint {
 }
 
 impl Footprint {
-    /// Computes the read and write sets of the start or the end of an action, given its changes.
     pub(super) fn of<'p>(
         world: &World<'p>,
         running: &Running<'_, 'p>,
@@ -117,7 +114,6 @@ impl Footprint {
         Self { added: added.collect(), deleted: deleted.collect(), ..Self::default() }
     }
 
-    /// Adds the read and write sets of another happening of the same action.
     pub(super) fn join(&mut self, other: Self) {
         self.facts_read.extend(other.facts_read);
         self.values_read.extend(other.values_read);
@@ -155,7 +151,6 @@ impl Footprint {
     }
 }
 
-/// Fact or function that a condition, effect or expression reads.
 #[derive(Clone, Copy)]
 enum Use<'c> {
     Fact(&'c Atom),

@@ -7,7 +7,6 @@ use crate::ast::{Constraint, Name};
 
 use super::world::{State, World};
 
-/// A state of the trajectory, with the time at which it begins.
 #[derive(Debug)]
 pub(super) struct Moment {
     pub(super) time: BigRational,
@@ -16,7 +15,6 @@ pub(super) struct Moment {
     is_event: bool,
 }
 
-/// Trajectory of an execution, and the violated preferences of its actions.
 #[derive(Debug, Default)]
 pub(super) struct Record {
     /// States of the trajectory, in order. Empty if the domain and the problem have no constraints.
@@ -34,8 +32,8 @@ impl Record {
         record
     }
 
-    /// Appends the state after a happening. It replaces the last recorded state if that one results from
-    /// events at the same time. Without constraints nothing is recorded.
+    /// Appends the state after a happening, or replaces the last recorded state if that state results from
+    /// events at the same time.
     pub(super) fn note(&mut self, time: &BigRational, state: &State, is_event: bool) {
         // Without constraints nothing is recorded, to save memory.
         let Some(last) = self.moments.last() else { return };
@@ -46,7 +44,6 @@ impl Record {
     }
 }
 
-/// Returns all constraints of a domain and a problem, including preferences.
 pub(super) fn constraints<'p>(world: &World<'p>) -> impl Iterator<Item = &'p Constraint> + use<'p> {
     world.domain.constraints.iter().chain(&world.problem.constraints)
 }

@@ -79,7 +79,6 @@ fn reads_all_objects(action: &Action) -> bool {
     is_quantified || !action.preferences.is_empty()
 }
 
-/// Appends the numeric functions that an action reads or changes.
 fn fluents_of<'a>(action: &'a Action, fluents: &mut Vec<&'a Atom>) {
     action.body.walk(&mut |node| match node {
         Node::Effect(Effect::Assign(_, target, ..)) => fluents.push(target),

@@ -6,7 +6,6 @@ use crate::ast::{ActionBody, Condition, ConditionTime, Effect, EffectTime};
 
 use super::step::{Instance, Step};
 
-/// A started action.
 #[derive(Debug)]
 pub(super) struct Running<'e, 'p> {
     pub(super) step: &'e Step<'p>,

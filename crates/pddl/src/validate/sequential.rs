@@ -13,8 +13,8 @@ use super::step::Step;
 use super::verdict::{Violation, ViolationKind};
 use crate::number::show_number;
 
-/// Executes the steps one after another until the first violation and sums their durations in `total_time`.
-/// Applies all events (timed initial literals) up to the end of the last step.
+/// Executes the steps one after another until the first violation or until the budget is spent. Sums their
+/// durations in `total_time`. Applies all events (timed initial literals) up to the end of the last step.
 pub(super) fn run<'e, 'p>(
     execution: &mut Execution<'e, 'p>,
     steps: &'e [Step<'p>],

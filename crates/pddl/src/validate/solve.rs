@@ -16,7 +16,6 @@ pub(super) type OnSolution<'f, 'p> = &'f mut dyn FnMut(&Bindings<'p>, Option<&Un
 /// Conditions that remain to be solved, and the reason if an evaluated condition was undefined.
 type Goals<'p> = (Vec<&'p Condition>, Option<Undefined>);
 
-/// A branching point of the search, with its untried options.
 struct Branch<'e, 'p> {
     /// Conditions that remain to be solved after any of the options.
     open: Vec<&'p Condition>,
@@ -28,18 +27,14 @@ struct Branch<'e, 'p> {
     bound: Vec<usize>,
 }
 
-/// Options at a branching point.
 enum Choices<'e, 'p> {
     /// Candidate objects of the variable at a position.
     Objects(usize, Box<dyn Iterator<Item = Symbol> + 'e>),
-    /// Facts that may match an atom.
     Facts(&'p Atom, Box<dyn Iterator<Item = &'e Arguments> + 'e>),
-    /// Parts of a disjunction.
     Alternatives(std::slice::Iter<'p, Condition>),
 }
 
 impl Branch<'_, '_> {
-    /// Undoes the bindings of the current option.
     fn undo(&mut self, bindings: &mut Bindings<'_>) {
         for position in self.bound.drain(..) {
             bindings.0[position].object = None;
@@ -198,7 +193,6 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         Some((conditions, branch.undefined.clone()))
     }
 
-    /// Returns the number of facts that [`Evaluator::rows`] returns for the atom.
     fn row_count(&self, atom: &Atom, bindings: &Bindings<'p>) -> usize {
         let unindexed = || self.state.count(self.world.symbol(&atom.predicate.name));
         self.indexed_rows(atom, bindings).map_or_else(unindexed, <[Arguments]>::len)
@@ -223,7 +217,8 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         rows.min_by_key(|rows| rows.len())
     }
 
-    /// Returns the variable and the object that an equation with one unbound side determines.
+    /// Returns the position of the unbound variable in an equation with one unbound side, and the object that
+    /// it must have.
     fn forced(&self, part: &Condition, bindings: &Bindings<'p>) -> Option<(usize, Symbol)> {
         let Condition::Equal(left, right, _) = part else { return None };
         let unbound = |term: &Term| match term {
@@ -240,7 +235,7 @@ impl<'e, 'p> Evaluator<'e, 'p> {
     }
 
     /// Unifies an atom with a fact. Appends the positions of newly bound variables to `bound`. Returns
-    /// `false` on a mismatch; these variables remain bound even then.
+    /// `false` on a mismatch, without undoing the bindings made before it.
     pub(super) fn unify(
         &self,
         atom: &Atom,
@@ -270,7 +265,6 @@ impl<'e, 'p> Evaluator<'e, 'p> {
     }
 }
 
-/// Returns `true` if all free variables of a condition are bound.
 fn is_bound(condition: &Condition, bindings: &Bindings<'_>) -> bool {
     fn walk<'c>(condition: &'c Condition, bindings: &Bindings<'_>, inner: &mut Vec<&'c Name>) -> bool {
         match condition {

@@ -10,7 +10,6 @@ use super::plan::PlanStep;
 use super::verdict::{Violation, ViolationKind};
 use super::world::{Symbol, World};
 
-/// Step of a plan with its possible instances.
 #[derive(Debug, Clone)]
 pub(super) struct Step<'p> {
     /// Number of the step in the plan's text, from 1.
@@ -20,7 +19,6 @@ pub(super) struct Step<'p> {
     pub(super) instances: Vec<Instance<'p>>,
 }
 
-/// Action schema with objects for its parameters.
 #[derive(Debug, Clone)]
 pub(super) struct Instance<'p> {
     pub(super) action: &'p Action,

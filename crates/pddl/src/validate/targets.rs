@@ -6,7 +6,6 @@ use rustc_hash::FxHashSet;
 use super::changeable::changeable_functions;
 use super::world::{State, Symbol, World};
 
-/// Returns the functions that some action can change.
 pub(super) fn changeable(world: &World<'_>) -> FxHashSet<Symbol> {
     changeable_functions(world.domain).into_iter().map(|name| world.symbol(name)).collect()
 }

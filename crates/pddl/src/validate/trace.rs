@@ -1,5 +1,4 @@
-//! Records which new facts could change the result of an evaluation: the missing facts, and the predicates of
-//! which all facts were read.
+//! Records on which missing facts the result of an evaluation depends.
 
 use std::cell::RefCell;
 
@@ -15,17 +14,14 @@ use super::world::{Arguments, Symbol};
 pub(super) struct Trace<'e, 'p> {
     stratum: &'e FxHashSet<&'p Name>,
     facts: RefCell<Vec<(Symbol, Arguments)>>,
-    /// Predicates of which all facts were read.
     predicates: RefCell<Vec<Symbol>>,
 }
 
 impl<'e, 'p> Trace<'e, 'p> {
-    /// Creates a trace for the predicates of a stratum.
     pub(super) fn new(stratum: &'e FxHashSet<&'p Name>) -> Self {
         Self { stratum, facts: RefCell::default(), predicates: RefCell::default() }
     }
 
-    /// Returns the missing facts and the predicates of which all facts were read.
     pub(super) fn into_parts(self) -> (Vec<(Symbol, Arguments)>, Vec<Symbol>) {
         (self.facts.into_inner(), self.predicates.into_inner())
     }

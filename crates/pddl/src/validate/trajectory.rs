@@ -79,7 +79,6 @@ impl<'e, 'p> Execution<'e, 'p> {
     }
 }
 
-/// Returns the number of violated instances of a preference, or an error if an instance is undefined.
 fn count_violated<'p>(
     evaluator: &Evaluator<'_, 'p>,
     preference: &'p Preference,
@@ -97,7 +96,6 @@ fn count_violated<'p>(
     undefined.map_or(Ok(count), Err)
 }
 
-/// Evaluator for formulas over a trajectory.
 struct TrajectoryEvaluator<'j, 'p> {
     world: &'j World<'p>,
     moments: &'j [Moment],

@@ -15,20 +15,17 @@ use super::axioms::{Stratum, read_by_axioms, strata};
 use super::budget::Budget;
 use super::changeable::changeable_predicates;
 
-/// Function that counts the violations of a preference.
 const IS_VIOLATED: &str = "is-violated";
 
 /// Interned name: equal names have equal numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) struct Symbol(u32);
 
-/// Arguments of a predicate or function.
 pub(super) type Arguments = SmallVec<[Symbol; 4]>;
 
 /// Predicate, argument position (column), and object at this position.
 type ColumnKey = (Symbol, usize, Symbol);
 
-/// A domain with a problem, with interned names.
 #[derive(Debug)]
 pub(super) struct World<'p> {
     pub(super) budget: Budget<'p>,
@@ -39,13 +36,10 @@ pub(super) struct World<'p> {
     names: Vec<Name>,
     /// All objects with their declared types, constants first.
     objects: Vec<(Symbol, Vec<&'p TypeExpression>)>,
-    /// Index of each object in `objects`.
     position: FxHashMap<Symbol, usize>,
     /// Objects of each declared type, in order and as a set.
     members: FxHashMap<Name, (Vec<Symbol>, FxHashSet<Symbol>)>,
-    /// Axioms, lowest stratum first.
     pub(super) strata: Vec<Stratum<'p>>,
-    /// Predicates and functions that occur in conditions of axioms.
     pub(super) read_by_axioms: FxHashSet<Symbol>,
     /// Predicates that actions, timed initial literals or axioms can change.
     changeable: FxHashSet<Symbol>,
@@ -53,11 +47,9 @@ pub(super) struct World<'p> {
     fixed: FxHashMap<ColumnKey, Vec<Arguments>>,
 }
 
-/// Facts and numeric values at one time.
 #[derive(Debug, Clone, Default)]
 pub(super) struct State {
     pub(super) facts: FxHashMap<Symbol, FxHashSet<Arguments>>,
-    /// Facts derived by the axioms.
     pub(super) derived: FxHashMap<Symbol, FxHashSet<Arguments>>,
     pub(super) values: FxHashMap<(Symbol, Arguments), BigRational>,
 }
@@ -110,7 +102,6 @@ impl<'p> World<'p> {
         world
     }
 
-    /// Indexes the initial facts of fixed predicates, which no plan changes, by argument position and object.
     fn index_fixed(&mut self) {
         let mut fixed: FxHashMap<ColumnKey, Vec<Arguments>> = FxHashMap::default();
         let mut indexed = FxHashSet::default();
@@ -187,7 +178,6 @@ impl<'p> World<'p> {
         self.symbols.get(name).copied().unwrap_or(Symbol(u32::MAX))
     }
 
-    /// Name of a symbol, if the name is declared.
     pub(super) fn name_of(&self, symbol: Symbol) -> Option<&Name> {
         self.names.get(symbol.0 as usize)
     }
@@ -196,12 +186,10 @@ impl<'p> World<'p> {
         self.names.get(symbol.0 as usize).map_or("?", Name::as_str)
     }
 
-    /// Returns the object with the given name, if there is one.
     pub(super) fn object(&self, name: &Name) -> Option<Symbol> {
         self.symbols.get(name).copied().filter(|symbol| self.position.contains_key(symbol))
     }
 
-    /// Returns `true` if an object is of a type.
     pub(super) fn is_a(&self, object: Symbol, target: &TypeExpression) -> bool {
         if let [alternative] = &target.alternatives[..]
             && let Some((_, members)) = self.members.get(&alternative.name)
@@ -212,7 +200,6 @@ impl<'p> World<'p> {
         types.is_some_and(|types| types.iter().any(|declared| self.types.fits(declared, target)))
     }
 
-    /// Returns all objects of a type.
     pub(super) fn objects_of<'w>(
         &'w self,
         target: &'w TypeExpression,
@@ -231,14 +218,12 @@ impl<'p> World<'p> {
         objects.next().filter(|_| objects.next().is_none())
     }
 
-    /// Text of a fact or a function in PDDL syntax.
     pub(super) fn show(&self, symbol: Symbol, arguments: &[Symbol]) -> String {
         let words: Vec<_> =
             std::iter::once(&symbol).chain(arguments).map(|symbol| self.name(*symbol)).collect();
         format!("({})", words.join(" "))
     }
 
-    /// Converts an atom without variables to its symbols.
     pub(super) fn ground(&self, atom: &Atom) -> (Symbol, Arguments) {
         let arguments = atom.arguments.iter().map(|term| match term {
             Term::Variable(identifier) | Term::Constant(identifier) => self.symbol(&identifier.name),
@@ -274,13 +259,11 @@ impl State {
             .any(|facts| facts.get(&predicate).is_some_and(|tuples| tuples.contains(arguments)))
     }
 
-    /// All argument tuples for which a predicate holds.
     pub(super) fn tuples(&self, predicate: Symbol) -> impl Iterator<Item = &Arguments> {
         let derived = self.derived.get(&predicate).into_iter().flatten();
         self.facts.get(&predicate).into_iter().flatten().chain(derived)
     }
 
-    /// Number of argument tuples for which a predicate holds.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(super) fn count(&self, predicate: Symbol) -> usize {
         let count =

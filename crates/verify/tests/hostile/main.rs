@@ -15,7 +15,6 @@ use mutate::{Draw, Files, certificates, mutate, write};
 /// are not optimised.
 const STACK: usize = 2 << 20;
 
-/// Upper limit on the time for verifying one certificate on a busy machine.
 const TIME_LIMIT: Duration = Duration::from_secs(20);
 
 fn originals() -> Vec<Files> {

@@ -9,7 +9,6 @@ use serde_json::{Value, json};
 /// The files of a certificate: contents by name.
 pub type Files = BTreeMap<String, Vec<u8>>;
 
-/// Upper limit on the number of repetitions of a part of a file.
 const REPETITION_LIMIT: usize = 300;
 
 /// A source of random decisions.
@@ -86,7 +85,6 @@ pub fn mutate(files: &Files, draw: &mut Draw<'_>) -> Files {
     files
 }
 
-/// Updates the sizes and digests in the manifest.
 fn mend(files: &mut Files) {
     let Ok(mut manifest) = serde_json::from_slice::<Value>(&files["manifest.json"]) else { return };
     let listed = manifest.get_mut("files").and_then(Value::as_array_mut);
