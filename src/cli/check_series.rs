@@ -2,7 +2,6 @@
 
 use crate::message::Message;
 use num_bigint::BigInt;
-use num_rational::BigRational;
 use num_traits::Signed;
 use probabilistic::Error;
 use probabilistic::check::{Answer, Outcome, Report};
