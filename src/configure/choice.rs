@@ -349,13 +349,11 @@ impl Whole<'_> {
     }
 }
 
-/// Formats a missed requirement.
 fn requirement_text(missed: &Missed) -> String {
     let Missed { attribute, estimation, bound, status } = missed;
     format!("{attribute}: estimated {}, required {}: {status}", decimal(estimation), decimal(bound))
 }
 
-/// Returns the reasons why an objective needs a design; see [`Choice::need`].
 fn need(objective: &Objective) -> Vec<String> {
     let mut need = objective.statuses.clone();
     if objective.updatable {

@@ -31,7 +31,6 @@ pub(super) struct Segment {
     pub(super) end: End,
 }
 
-/// State of the end of a segment file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum End {
     /// The segment ends with a complete record and its line break.
@@ -241,7 +240,6 @@ fn check_opening(record: &Record, number: u64) -> Result<(), String> {
     }
 }
 
-/// Fault of a segment that has an older file format.
 pub(super) const OLD_FORMAT: &str = "is of the format `metaplan-journal/2` or older, which this version does not read; let the version that \
                                      wrote it bring its mission to an end, or begin the mission anew with a journal in another \
                                      directory";
@@ -289,7 +287,8 @@ pub(super) fn require_file(path: &Path) -> io::Result<()> {
     }
 }
 
-/// Opens a file that only its user can access, and creates it if it does not exist.
+/// Opens a regular file as specified by `options`, which may create it. On Unix, only its user can access it
+/// afterwards.
 pub(super) fn open_private(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
     require_file(path)?;
     #[cfg(unix)]
@@ -303,7 +302,7 @@ pub(super) fn open_private(path: &Path, options: &mut OpenOptions) -> io::Result
     options.open(path)
 }
 
-/// Creates a directory that only its user can access, if it does not exist.
+/// Creates a directory and its missing parents. On Unix, only their user can access them.
 pub(super) fn make_directory(path: &Path) -> io::Result<()> {
     let mut builder = std::fs::DirBuilder::new();
     builder.recursive(true);

@@ -13,7 +13,6 @@ use crate::message::Message;
 
 /// Number of attempts to lock; a killed process may still hold the lock for a short time.
 const LOCK_RETRIES: u32 = 10;
-/// Time between two attempts to lock the journal.
 const RETRY_INTERVAL: Duration = Duration::from_millis(20);
 /// Width in characters of the process number, which is in the first line of the lock file.
 const OWNER_CHARACTERS: usize = 10;

@@ -87,7 +87,6 @@ pub struct Journal {
     segment: u64,
     file: File,
     link: Link,
-    /// Lock of the journal while it is open.
     lock: Lock,
     /// Number of observations in the current segment, i.e. since its snapshot.
     observations: u64,
@@ -95,7 +94,6 @@ pub struct Journal {
     /// it.
     unfinished: Option<Unfinished>,
     digest: String,
-    /// Reaction of the loop to a failed write: stop, or continue without the journal.
     unrecorded: Unrecorded,
     /// `true` after a failed write with which the loop continues; nothing more is written.
     is_incomplete: bool,

@@ -23,9 +23,9 @@ pub(super) enum Unfinished {
     Observation(String, u64),
 }
 
-/// Returns the segments to replay, and the number of the first of them. Replay starts at the newest
-/// sound snapshot whose later segments are also sound. Faults in older files are added to
-/// `warnings`.
+/// Returns the number of the first segment to replay, and the segments from this number on. Replay starts at the newest
+/// sound snapshot, or at the beginning of the journal, such that all later segments are sound. Faults in files that are
+/// not needed are added to `warnings`.
 ///
 /// # Errors
 /// Descriptions of all faults, if no snapshot can be used together with all later segments.
@@ -77,7 +77,6 @@ pub(super) struct Replay<'a, C> {
 }
 
 impl<C: Recoverable> Replay<'_, C> {
-    /// Replays all records of one segment.
     pub(super) fn segment(&mut self, segment: &Segment) -> Result<(), Message> {
         self.observations = 0;
         // The end record only links segments.

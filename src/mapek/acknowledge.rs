@@ -19,7 +19,6 @@ use crate::mapek::receipts::{Acknowledged, Before};
 pub(super) enum Receipt {
     /// No effect has this number.
     Unknown,
-    /// The effect is acknowledged.
     Recorded,
     /// The effect is acknowledged, but the design of the given function is uncertain.
     Doubtful(String),
@@ -32,7 +31,6 @@ pub(super) enum Failure {
     Design(String),
     /// No consequence: the report is old or a duplicate.
     Stale,
-    /// The number does not belong to a reconfiguration.
     NotReconfiguration,
 }
 
@@ -81,7 +79,6 @@ impl Beliefs {
         }
     }
 
-    /// Records the failure of a reconfiguration, before or after its acknowledgement.
     pub(super) fn reconfiguration_failed(&mut self, effect: u64) -> Failure {
         if effect == 0 || effect > self.effects {
             return Failure::NotReconfiguration;
@@ -137,9 +134,9 @@ impl Beliefs {
         Failure::Design(design)
     }
 
-    /// Records that a reconfiguration has arrived, unless a later one of the function is acknowledged. If the function
-    /// was observed with another design while the reconfiguration was pending, the order of observation and
-    /// reconfiguration is unknown, and so is the design.
+    /// Records that a reconfiguration has arrived, unless its arrival or that of a later one of the function is already
+    /// recorded. If the function was observed with another design while the reconfiguration was pending, the order of
+    /// observation and reconfiguration is unknown, and so is the design.
     fn configured(&mut self, effect: u64, function: String, design: String) -> Receipt {
         let history = self.receipts.functions.entry(function.clone()).or_default();
         // A superseded reconfiguration without an answer may have been carried out in between.

@@ -43,7 +43,7 @@ const FACTS: &str = "facts";
 pub(super) enum Need {
     /// The action under way could not continue unchanged, and a safe effect was requested.
     Interrupted,
-    /// The current plan cannot be kept.
+    /// A new plan is needed, for example because the current plan is invalid or missing.
     Must,
     /// A better plan may exist.
     Better,
@@ -193,7 +193,6 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Returns `true` if the scheduled repetition of an unfinished search is due.
     fn is_retry_due(&self) -> bool {
         self.beliefs.retry.is_some_and(|scheduled| scheduled.at <= self.beliefs.now)
     }
@@ -337,7 +336,8 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Returns `true` if `steps` are the action under way followed by the current plan.
+    /// Returns `true` if `steps` are the action under way followed by the current plan. Only actions and their
+    /// arguments are compared.
     fn is_current(&self, steps: &[PlannedStep]) -> bool {
         let key = |step: &PlannedStep| (step.action.clone(), step.arguments.clone());
         let Some(plan) = &self.beliefs.plan else { return false };
@@ -377,7 +377,7 @@ impl Adaptation<'_> {
         self.beliefs.plan = Some(steps);
     }
 
-    /// Reports that no plan was found. If a new plan `is_necessary`, drops the current plan.
+    /// Reports that no plan was found. If `is_necessary`, also drops the current plan.
     fn report_no_plan(&mut self, is_necessary: bool, outcome: Outcome, answers: &mut Vec<Answer>) {
         let status = if outcome.proved { "unsolvable" } else { "unknown" };
         answers.push(Answer::PlanNone { status, because: outcome.because, blocking: outcome.blocking });

@@ -13,16 +13,13 @@ use crate::mapek::monitor::Base;
 /// Changes of available designs and of objectives in error, found by the analysis.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Findings {
-    /// Designs that are no longer available.
     pub(super) lost: BTreeSet<String>,
-    /// Designs that have become available.
     pub(super) gained: BTreeSet<String>,
     /// Objectives that are newly in error, with their statuses, as sentences.
     pub(super) errors: Vec<String>,
 }
 
 impl Findings {
-    /// Returns `true` if nothing was found.
     pub(super) fn is_empty(&self) -> bool {
         self.lost.is_empty() && self.gained.is_empty() && self.errors.is_empty()
     }
@@ -155,7 +152,6 @@ pub(super) fn missing_conclusions(fault: &Fault) -> String {
     format!("it is not known what follows: {}", fault.message)
 }
 
-/// Returns the objectives in error, with their statuses.
 fn statuses(knowledge: &Knowledge) -> BTreeMap<String, Vec<String>> {
     let objectives = knowledge.runtime().objectives().into_iter();
     let in_error = objectives.filter(ontology::runtime::Objective::is_in_error);

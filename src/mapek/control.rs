@@ -90,7 +90,6 @@ pub struct Loop {
     pub(super) beliefs: Beliefs,
     monitor: Monitor,
     pub(super) planner: Planner,
-    /// Changes since the last deliberation, if any.
     agenda: Option<Agenda>,
     /// Number of changes of the planning problem since the start, which identifies the current problem.
     pub(super) question: u64,
@@ -308,7 +307,6 @@ impl Loop {
         self.planner.computed.clear();
     }
 
-    /// Returns the planning stage, which borrows the beliefs, the planner and the settings of the loop.
     fn adaptation(&mut self) -> Adaptation<'_> {
         Adaptation { beliefs: &mut self.beliefs, planner: &mut self.planner, settings: &self.settings }
     }
@@ -351,7 +349,6 @@ impl Loop {
     }
 }
 
-/// Converts a refusal to an answer.
 fn refused(Refusal { code, message }: Refusal) -> Answer {
     Answer::Error { code: code.to_owned(), message }
 }

@@ -171,7 +171,6 @@ mod tests {
     use crate::mapek::step::PlannedStep;
     use crate::setup::Setup;
 
-    /// Short text of each effect.
     fn words(answers: &[Answer]) -> Vec<String> {
         let word = |command: &Command| match command {
             Command::Reconfigure { function, from, to } => format!("{function} {from:?} {to}"),

@@ -15,11 +15,8 @@ use crate::number;
 /// Decision about the action under way.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Interruption {
-    /// The action continues.
     None,
-    /// The action is cancelled.
     Cancel {
-        /// Reason, as a sentence.
         because: String,
     },
     /// The action is suspended, because no plan exists.
@@ -72,7 +69,6 @@ mod tests {
     use super::{Interruption, weigh};
     use crate::mapek::ask::Outcome;
 
-    /// An outcome with an empty plan, or without a plan.
     fn outcome(is_plan: bool) -> Outcome {
         Outcome {
             steps: is_plan.then(Vec::new),

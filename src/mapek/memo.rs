@@ -12,7 +12,6 @@ use crate::mapek::ask::{Outcome, Question};
 use crate::mapek::beliefs::Running;
 use crate::mapek::step::PlannedStep;
 
-/// Upper limit on the number of cached plans.
 const CAPACITY: usize = 16;
 
 /// Planning problems with their outcomes, most recently used first.
@@ -47,14 +46,12 @@ impl Memo {
         }
     }
 
-    /// Clears the cache, for a new goal.
     pub(super) fn clear(&mut self) {
         self.0.clear();
     }
 }
 
 impl StoredQuestion {
-    /// Copies a planning problem. The current plan is copied only if the choice between optimal plans depends on it.
     pub(super) fn new(question: &Question<'_>) -> Self {
         let old = question.old.filter(|_| question.stay_close).map(<[_]>::to_vec);
         Self { problem: question.problem.clone(), running: question.running.cloned(), old }

@@ -55,7 +55,6 @@ pub(super) struct Monitor {
 }
 
 impl Monitor {
-    /// Creates the monitor of a mission.
     pub(super) fn new(mission: &Mission, settings: &Settings) -> Self {
         let kinds =
             mission.knowledge().map(|knowledge| knowledge.view().attribute_types()).unwrap_or_default();
@@ -64,7 +63,6 @@ impl Monitor {
         Self { attributes, checked: HashSet::new(), filters, components: HashMap::new() }
     }
 
-    /// Filters for measurements and component reports.
     pub(super) fn filters(&self) -> &Filters {
         &self.filters
     }
@@ -156,7 +154,6 @@ impl BeliefUpdate<'_> {
         Ok(())
     }
 
-    /// Records the acknowledgement of an effect by the managed system.
     fn acknowledged(&mut self, effect: u64) -> Result<(), Refusal> {
         match self.beliefs.acknowledge(effect) {
             Receipt::Unknown => Err(Refusal::new("M305", format!("there was no effect {effect}"))),
@@ -171,8 +168,9 @@ impl BeliefUpdate<'_> {
         }
     }
 
-    /// Records that a reconfiguration has failed: the function has the previously acknowledged design, and the
-    /// requested design is marked as unrealisable until the next report about the design.
+    /// Handles a report that a reconfiguration has failed: corrects the believed design of the function, and marks the
+    /// requested design as unrealisable until the next report about the design. An old or repeated report has no
+    /// effect.
     fn failed_reconfiguration(&mut self, effect: u64) -> Result<(), Refusal> {
         if self.beliefs.mission.knowledge().is_none() {
             return Err(Refusal::new("M306", "there is no knowledge base that has designs"));

@@ -12,7 +12,7 @@ const MAX_SUPERSEDED: usize = 16;
 /// request replaces it before the robot has acknowledged it.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct Receipts {
-    /// Whether any reconfiguration was acknowledged explicitly, by its effect number.
+    /// Whether any effect was acknowledged explicitly, by its number.
     pub(super) by_number: bool,
     pub(super) functions: BTreeMap<String, Received>,
 }
@@ -52,7 +52,7 @@ pub(super) struct Before {
 }
 
 impl Receipts {
-    /// Returns `true` if the robot has acknowledged any reconfiguration explicitly, by its effect number.
+    /// Returns `true` if the robot has acknowledged any effect explicitly, by its number.
     pub(super) fn are_sent(&self) -> bool {
         self.by_number
     }
@@ -104,7 +104,6 @@ impl Receipts {
         self.functions.iter().find_map(design)
     }
 
-    /// Serialises the history for a snapshot.
     pub(super) fn to_record(&self) -> Value {
         let function = |(name, history): (&String, &Received)| {
             let last = history.last.as_ref().map(|last| {

@@ -60,7 +60,6 @@ impl BeliefUpdate<'_> {
         Ok(())
     }
 
-    /// Applies a value or status that a filter has accepted.
     pub(super) fn accept(&mut self, accepted: Accepted) -> Result<(), Refusal> {
         match accepted {
             Accepted::Value(attribute, value) => self.measured(&attribute, &value),

@@ -10,7 +10,6 @@ use serde_json::{Value, json};
 
 use crate::mapek::answer::Answer;
 
-/// Upper limit on the number of stored ranges of seen sequence numbers.
 const MAX_RANGES: usize = 256;
 
 /// Upper limit on the distance from the greatest seen number to a new number. Numbers further ahead are refused as
@@ -20,12 +19,10 @@ const MAX_AHEAD: u64 = 1_000_000;
 /// Upper limit on the first sequence number.
 const MAX_FIRST: u64 = 1 << 62;
 
-/// Classification of a sequence number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Classification {
     /// The number is within the upper limit and was not seen before.
     New,
-    /// The number was seen before.
     Seen,
     /// The number is at most the given mark, the end of the dropped ranges: it is unknown whether the number was seen.
     Stale(u64),
@@ -91,7 +88,6 @@ impl Numbers {
         }
     }
 
-    /// Greatest seen number.
     pub(crate) fn greatest(&self) -> Option<u64> {
         self.ranges.last_key_value().map(|(_, last)| *last)
     }
@@ -103,7 +99,6 @@ impl Numbers {
         ends.zip(starts).map(|(from, to)| [from, to]).collect()
     }
 
-    /// Serialises the set for a snapshot.
     pub(crate) fn to_record(&self) -> Value {
         json!([self.mark, self.ranges.iter().collect::<Vec<_>>()])
     }

@@ -139,7 +139,6 @@ fn config(mission: &Mission, objectives: &[Metric], limits: &Limits) -> GroundCo
         .with_limits(limits.clone())
 }
 
-/// Converts errors of grounding and encoding to messages with their source lines.
 fn messages(mission: &Mission, errors: &[planner::Error]) -> Errors {
     let (domain, problem) = (mission.domain_source(), mission.problem_source());
     let message = |error: &planner::Error| match error.place() {

@@ -26,7 +26,6 @@ pub(super) enum Literal {
     Equal(bool, Operand, Operand),
 }
 
-/// An argument of an atom: a variable or an object.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Operand {
     Variable(Name),
@@ -61,9 +60,9 @@ pub(super) fn of_type(r#type: &Name) -> Name {
     Name::new(&format!("type {type}"))
 }
 
-/// Converts a derived predicate to clauses without equalities. Returns `None` unless its condition
-/// consists of conjunctions, disjunctions and existential quantifiers over atoms, equalities and
-/// negated equalities, with distinct variable names.
+/// Converts a derived predicate to clauses without equalities. Returns `None` unless its condition consists of
+/// conjunctions, disjunctions and existential quantifiers over atoms, equalities and negated equalities, with distinct
+/// variable names and at most one type per variable.
 pub(super) fn clauses(derived: &Derived) -> Option<Vec<Clause>> {
     let head = &derived.head;
     let mut variables: BTreeSet<Name> = BTreeSet::new();

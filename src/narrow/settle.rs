@@ -188,7 +188,6 @@ fn first_open(clause: &Clause, open: &BTreeSet<Name>) -> Option<usize> {
     clause.body.iter().position(|part| matches!(part, Literal::Holds(name, _) if open.contains(name)))
 }
 
-/// Unfolds the clauses of the predicate `head`.
 struct Unfold<'a> {
     clauses_by_head: &'a BTreeMap<Name, Option<Vec<Clause>>>,
     open: &'a BTreeSet<Name>,

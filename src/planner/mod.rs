@@ -389,7 +389,6 @@ fn valued(solution: Solution, objectives: &Objectives) -> Point {
     Point { values: cost.into_iter().filter(|_| !objectives.metrics.is_empty()).collect(), solution }
 }
 
-/// Creates the error M107 for options that exclude each other.
 fn apart(text: &str) -> Errors {
     Message::error("M107", text).into()
 }

@@ -12,7 +12,6 @@ use crate::mission::{Mission, Reading, Unconfirmed, confirm};
 pub(super) struct Objectives {
     /// The objectives as the user wrote them.
     pub(super) texts: Vec<String>,
-    /// The parsed objectives, in the order of `texts`.
     pub(super) metrics: Vec<Metric>,
 }
 
@@ -34,8 +33,8 @@ impl Objectives {
         Ok(Self { texts: texts.to_vec(), metrics })
     }
 
-    /// Executes the plan of `point` with the validator, and compares the value of each objective
-    /// with the planner's value.
+    /// Executes the plan of `point`, if there is one, with the validator, and compares the value of each objective with
+    /// the planner's value.
     ///
     /// # Errors
     /// M170 if the validator rejects the plan or computes another value; M130 if the time limit is
@@ -62,7 +61,6 @@ impl Objectives {
     }
 }
 
-/// Creates the error for a plan that the validator rejected or could not execute within the limits.
 pub(super) fn unconfirmed(reason: Unconfirmed) -> Message {
     match reason {
         Unconfirmed::Refused(reason) => fault(&reason),

@@ -68,8 +68,8 @@ impl Strategy {
     }
 }
 
-/// A running strategy. All strategies use a [`Loop`] for their knowledge about the robot; only
-/// `joint` lets the loop plan.
+/// A running strategy. All strategies use a [`Loop`] for their knowledge about the robot and for its planner; only
+/// `joint` lets the loop decide.
 #[derive(Debug)]
 pub(super) struct Controller {
     strategy: Strategy,
@@ -79,7 +79,6 @@ pub(super) struct Controller {
     gave_up: bool,
     /// Local names of the designs that were available at the last planning.
     planned_with: BTreeSet<String>,
-    /// Number of plans that were computed until now.
     pub(super) plans: usize,
 }
 
@@ -97,7 +96,6 @@ impl Controller {
         }
     }
 
-    /// Returns `true` if the strategy has given up, so that it will make no further request.
     pub(super) fn is_done(&self) -> bool {
         self.gave_up
     }

@@ -21,7 +21,6 @@ pub(super) struct Watched {
     pub(super) length: Option<String>,
 }
 
-/// Collects the mistakes in a section `simulation`.
 struct Checker<'m> {
     mission: &'m Mission,
     mistakes: Vec<Mistake>,
@@ -90,7 +89,6 @@ impl Checker<'_> {
         }
     }
 
-    /// Checks that a number is above 0.
     fn positive(&mut self, path: Vec<Key>, value: f64) {
         if !(value.is_finite() && value > 0.0) {
             let text = format!("{} is {value}, but should be positive", last(&path));
@@ -98,7 +96,6 @@ impl Checker<'_> {
         }
     }
 
-    /// Checks that a number is at least 0.
     fn not_negative(&mut self, path: Vec<Key>, value: f64) {
         if !(value.is_finite() && value >= 0.0) {
             let text = format!("{} is {value}, but should be at least 0", last(&path));

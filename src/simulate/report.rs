@@ -131,8 +131,8 @@ impl Run {
         short(time * self.time_unit.seconds())
     }
 
-    /// Returns `true` if this run is better than `other`: it alone reached the goal, or both did
-    /// and its metric is better.
+    /// Returns `true` if this run is better than `other`: it alone reached the goal, or both did and its metric is
+    /// better by more than 10⁻⁶.
     pub fn is_better_than(&self, other: &Self) -> bool {
         match (self.accomplished, other.accomplished) {
             (true, true) if self.maximize => self.cost > other.cost + 1e-6,

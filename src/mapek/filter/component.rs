@@ -76,7 +76,6 @@ impl ComponentState {
         Self { has_failed, ..Self::default() }
     }
 
-    /// Serialises the state for a snapshot.
     pub(crate) fn to_record(&self) -> Value {
         json!([self.has_failed, self.change.map(|(since, status)| json!([since, word(status)])), self.held])
     }

@@ -264,7 +264,6 @@ impl Accepted {
 }
 
 impl FilterStates {
-    /// Serialises the states for a snapshot.
     pub(crate) fn to_record(&self) -> Value {
         let measured = self.measured.iter().map(|(name, state)| (name.clone(), state.to_record()));
         let components = self.components.iter().map(|(name, state)| (name.clone(), state.to_record()));

@@ -10,7 +10,6 @@ use ontology::tomasys::change::Status;
 use super::attribute::{AttributeFilter, AttributeState, Bound, Elapsed, Side, Stale, Verdict};
 use super::component::{ComponentFilter, ComponentState};
 
-/// Converts thousandths to a number.
 fn value(thousandths: i64) -> BigRational {
     BigRational::new(thousandths.into(), 1000.into())
 }
@@ -34,7 +33,6 @@ fn random_bounds(random: &mut Rng, sides: &[Side]) -> Vec<Bound> {
         .collect()
 }
 
-/// A random sample, often near a bound.
 fn random_sample(random: &mut Rng, bounds: &[Bound]) -> BigRational {
     if random.bool() {
         return value(random.i64(0..1200));

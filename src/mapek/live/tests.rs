@@ -127,7 +127,6 @@ fn map(width: usize, height: usize, seed: u64) -> World {
     ugv(&format!("map of {count} places"), mission, count)
 }
 
-/// Counts of comparison results.
 #[derive(Default)]
 struct Tally {
     compared: usize,

@@ -28,8 +28,6 @@ pub(super) fn object<'a>(term: &'a Term, binding: &'a Binding<'_>) -> Option<&'a
     }
 }
 
-/// Returns the arguments of an atom under a binding, or `None` if a variable of the atom is not
-/// bound.
 pub(super) fn bound_arguments(atom: &Atom, binding: &Binding<'_>) -> Option<Vec<Name>> {
     atom.arguments.iter().map(|term| object(term, binding).cloned()).collect()
 }
