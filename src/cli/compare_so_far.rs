@@ -130,7 +130,8 @@ impl SoFar {
         Message::error("M130", text)
     }
 
-    /// Writes the answer, with a message if it is incomplete.
+    /// Writes the answer and the requested files, with a message if the answer is incomplete. Files are not written if
+    /// nothing was evaluated.
     fn show(mut self, common: &Common, message: Option<Message>) -> Result<(), Failure> {
         let done = self.done.iter().flat_map(|(pair, comparison)| rows(pair.as_ref(), comparison));
         let begun = self

@@ -87,7 +87,7 @@ impl Drawing {
     }
 
     /// Writes the timeline of a plan to an SVG file, if requested, and returns the timeline as text for a terminal. The
-    /// text is empty if it is not requested, or if the terminal is too small.
+    /// text is empty without a plan, if it is not requested, or if the terminal is too small.
     pub(super) fn draw(
         &self,
         mission: &Mission,

@@ -197,7 +197,7 @@ impl Arguments {
         }
     }
 
-    /// Returns the number of columns for tables, or `None` for files, which have no width.
+    /// Returns the number of columns for tables. `None` for files, which have no width, or if the width is unknown.
     fn columns(&self) -> Option<u16> {
         if self.file().is_some() { None } else { output::columns() }
     }

@@ -316,8 +316,8 @@ impl<'a> Session<'a> {
         Ok(Flow::GoesOn)
     }
 
-    /// Deliberates with the result of another thread. A result for an outdated problem is
-    /// discarded, and the search is repeated.
+    /// Deliberates with the result of another thread. A result for an outdated problem is discarded and the search is
+    /// repeated, except after [`MAX_STOPPED`] cancelled searches in a row.
     fn conclude(&mut self, thoughts: Thoughts) -> Result<Flow, Failure> {
         let was_stopped = self.thinking.take().is_some_and(|search| search.is_stopped);
         let is_late = self.stopped >= MAX_STOPPED;

@@ -2,7 +2,7 @@
 //! demand.
 //!
 //! The process corrects the published procedure: it has every route, reconfigurations at every place, a permanent
-//! collision flag, and only actions after which the battery is not below the reserve.
+//! collision flag, and only actions that need no energy or keep the battery at the reserve or above.
 
 use fixedbitset::FixedBitSet;
 use num_rational::BigRational;

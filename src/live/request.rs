@@ -22,8 +22,8 @@ pub(super) struct Request {
 pub(super) type Refused = (u16, &'static str);
 
 impl Request {
-    /// Reads a request from a connection. Returns a status code for a request that is malformed, too large, not a GET
-    /// request, or not complete within `patience` (408).
+    /// Reads a request from a connection. Returns a status code for a request that is malformed, too large, or not a
+    /// GET request. A request that is not complete within `patience` gives status 408 or a timeout error.
     pub(super) fn read(stream: &mut TcpStream, patience: Duration) -> io::Result<Result<Self, Refused>> {
         let begun = Instant::now();
         let mut bytes = Vec::new();

@@ -1,9 +1,9 @@
 //! Infers the places of a mission, their neighbours, and the route of a plan.
 //!
-//! PDDL does not mark places. This module assumes that something moves if an action deletes `(p …
-//! a)` and adds `(p … b)` with parameters `a` and `b` of one type. The objects of this type are
-//! places. Two places are neighbours if a fact or value of the problem has exactly these two places
-//! among its arguments.
+//! PDDL does not mark places. This module assumes that something moves if an action deletes `(p … a)` and adds `(p …
+//! b)` with parameters `a` and `b` of one type. Of these types, the objects of the type that the plan uses most are
+//! places. Two places are neighbours if a fact of the problem, or a value if there is no such fact, has exactly these
+//! two places among its arguments.
 
 use std::collections::{BTreeMap, BTreeSet};
 
