@@ -218,7 +218,6 @@ impl Setup {
         self.report.positions(&self.origin)
     }
 
-    /// Converts a mistake in a scenario to a message with a position in the manifest.
     fn in_scenario(&self, name: &str, Mistake { path, part, message }: Mistake) -> Message {
         let path: Vec<Key> = ["scenarios".into(), name.into()].into_iter().chain(path).collect();
         let text = format!("scenario `{name}`: {}", message.message);

@@ -86,7 +86,6 @@ fn width(text: &str) -> Result<f64, String> {
     text.parse::<f64>().ok().filter(|width| *width > 0.0 && width.is_finite()).ok_or_else(wrong)
 }
 
-/// The queried properties, and the file that they come from.
 struct Queries {
     listed: Vec<Listed>,
     declarations: Declarations,
@@ -94,7 +93,6 @@ struct Queries {
     text: String,
 }
 
-/// Results of all properties for one combination of constant values.
 struct CombinationResult<'a> {
     combination: &'a Combination,
     reports: Vec<Result<Report, Error>>,
@@ -194,7 +192,6 @@ fn asked(arguments: &Arguments) -> Result<Queries, Failure> {
     Ok(Queries { listed, declarations, file: name, text })
 }
 
-/// Data shared by all combinations of constants.
 struct CheckContext<'a> {
     arguments: &'a Arguments,
     model: &'a Model,
@@ -302,7 +299,6 @@ fn write_all(
     Ok(())
 }
 
-/// Returns the messages of an error.
 fn said(error: &Error) -> Vec<String> {
     match error.diagnostics() {
         [] => vec![error.to_string()],

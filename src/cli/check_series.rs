@@ -103,7 +103,6 @@ fn decimal(value: &BigRational) -> String {
     if fraction.is_empty() { format!("{sign}{whole}") } else { format!("{sign}{whole}.{fraction}") }
 }
 
-/// Formats the result of a property for a table cell.
 fn cell(report: &Result<Report, Error>, text: impl Fn(&Answer) -> String) -> String {
     match report {
         Err(_) => "no answer".to_owned(),

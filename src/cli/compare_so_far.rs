@@ -40,7 +40,6 @@ pub(super) struct SoFar {
     pub pages: Pages,
 }
 
-/// An unfinished comparison.
 #[derive(Debug, Clone)]
 pub(super) struct Begun {
     pub pair: Option<Pair>,
@@ -113,7 +112,6 @@ impl Shared {
 }
 
 impl SoFar {
-    /// Returns the message about the reached time limit and the number of available results.
     fn message(&self) -> Message {
         let Some(of) = self.of else {
             return Message::error(

@@ -56,7 +56,6 @@ impl Pages {
         self.report.is_some() || self.svg.is_some()
     }
 
-    /// Writes the requested HTML page and SVG files of a sheet of pictures.
     pub(super) fn write(&self, sheet: &Sheet) -> Result<(), Failure> {
         if let Some(directory) = &self.svg {
             write_pictures(directory, &sheet.pictures())?;
@@ -75,12 +74,10 @@ pub(super) fn write_pictures(directory: &Path, pictures: &[(String, String)]) ->
 }
 
 impl Drawing {
-    /// Returns `true` if an SVG file is requested.
     pub(super) fn is_file_wanted(&self) -> bool {
         self.svg.is_some()
     }
 
-    /// Writes the picture of a Pareto front to an SVG file, if requested.
     pub(super) fn draw_front(&self, sheet: &Sheet) -> Result<(), Failure> {
         let (Some(file), [(_, picture)]) = (&self.svg, &sheet.pictures()[..]) else { return Ok(()) };
         output::write_file(file, &visible(picture))

@@ -17,7 +17,6 @@ use serde::Serialize;
 
 use crate::cli::common::{Common, Failure, Format};
 
-/// Set if an answer could not be written.
 static ANSWER_LOST: AtomicBool = AtomicBool::new(false);
 
 /// Set once an answer, or a part of one, is being written.

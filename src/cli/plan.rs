@@ -152,7 +152,6 @@ impl From<Encoding> for StepSemantics {
     }
 }
 
-/// Returns the optimizer's configuration for the options of the command line.
 fn configuration(arguments: &Arguments, limits: Limits) -> Config {
     Config::default()
         .with_horizon(arguments.horizon)
@@ -186,7 +185,6 @@ impl Arguments {
         output::file_named(self.output.as_ref())
     }
 
-    /// Returns the format in which the plan is written.
     fn form(&self, common: &Common) -> PlanFormat {
         match (self.plan_format, common.format) {
             (Some(format), _) => format,
@@ -392,7 +390,6 @@ fn missing_text(missing: &[MissingValue]) -> String {
     }
 }
 
-/// Shows a Pareto front or writes it to files, and returns the exit status.
 fn show_front(
     front: &PlannedFront<'_>,
     name: &str,
@@ -417,7 +414,6 @@ fn show_front(
     Ok(exit(front.front.status))
 }
 
-/// Returns the exit status for a solution status.
 pub(super) fn exit(status: Status) -> Exit {
     match status {
         Status::Optimal => Exit::Done,

@@ -18,7 +18,6 @@ const INITIAL_DELAY: Duration = Duration::from_secs(3);
 /// Time between two progress lines.
 const INTERVAL: Duration = Duration::from_secs(5);
 
-/// A progress display that ends when it is finished or dropped.
 pub(super) struct Progress {
     bar: ProgressBar,
     message: Arc<Mutex<String>>,
@@ -26,7 +25,6 @@ pub(super) struct Progress {
 }
 
 impl Progress {
-    /// Starts the progress display for the activity `what`.
     pub(super) fn new(what: &'static str, common: &Common) -> Self {
         let is_terminal = std::io::stderr().is_terminal();
         let is_shown = is_terminal && !common.quiet;
@@ -44,13 +42,11 @@ impl Progress {
         Self { bar, message, teller }
     }
 
-    /// Sets the text of the current progress.
     pub(super) fn set_message(&self, text: String) {
         text.clone_into(&mut self.message.lock().unwrap_or_else(PoisonError::into_inner));
         self.bar.set_message(text);
     }
 
-    /// Ends the display.
     pub(super) fn finish(self) {
         drop(self);
     }

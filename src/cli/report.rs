@@ -98,7 +98,6 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     Ok(exit(status))
 }
 
-/// Writes the report of a journal as an HTML page.
 fn journal(arguments: &Arguments, directory: &Path, report: &JournalReport) -> Result<Exit, Failure> {
     let log = log_picture(&directory.display().to_string(), report);
     if let Some(directory) = &arguments.svg {

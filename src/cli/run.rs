@@ -156,7 +156,6 @@ fn keep(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     ended(keep_going(common, keeper, journal, &ready, events, &outlet), &outlet)
 }
 
-/// Reads the section `[adaptation]` of a file, or returns the default settings.
 fn adaptation(file: Option<&Path>, knowledge: &Knowledge) -> Result<Settings, Failure> {
     let Some(file) = file else { return Ok(Settings::default()) };
     Ok(Settings::read(file, Some(knowledge))?)

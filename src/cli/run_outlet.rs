@@ -90,7 +90,6 @@ impl Outlet {
         }
     }
 
-    /// Publishes the initial state of the loop: the designs, and the plan if there is one.
     pub(super) fn begin(&self, control: &Loop) {
         if let Some(live) = &self.live {
             live.known(control.designs());
@@ -150,7 +149,6 @@ impl Outlet {
         self.say(&text)
     }
 
-    /// Closes the opened destinations.
     pub(super) fn close(&self) -> Result<(), Message> {
         if let Some(live) = &self.live {
             live.end();

@@ -39,14 +39,12 @@ pub(super) enum Input {
     Failed(Message),
 }
 
-/// A search for plans on another thread.
 struct PlanSearch {
     question: u64,
     stop: Arc<AtomicBool>,
     is_stopped: bool,
 }
 
-/// Control flow after an input.
 #[derive(PartialEq, Eq)]
 pub(super) enum Flow {
     GoesOn,
@@ -54,7 +52,6 @@ pub(super) enum Flow {
     Over,
 }
 
-/// An adaptation loop with its inputs and outputs.
 pub(super) struct Session<'a> {
     common: &'a Common,
     control: Loop,
@@ -352,7 +349,6 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// Writes answers to the last line; more may follow.
     fn say(&self, answers: &[Answer]) -> Result<Flow, Failure> {
         warn_if_unrecorded(self.common, answers);
         let number = self.control.beliefs().lines();
@@ -361,7 +357,6 @@ impl<'a> Session<'a> {
         Ok(flow)
     }
 
-    /// Writes the last answers to a line, and the acknowledgement of the line.
     fn answer(&self, number: u64, answers: &[Answer], read: Instant) -> Result<Flow, Failure> {
         warn_if_unrecorded(self.common, answers);
         let flow = flow(self.outlet.answer(number, answers, read))?;

@@ -232,7 +232,6 @@ fn text(strategies: &[Strategy], runs: &[Run], unit: TimeUnit) -> String {
     output::table(&header, rows) + &failures_text(strategies, runs)
 }
 
-/// Lists the reasons of failed missions, one line per strategy that has such missions.
 fn failures_text(strategies: &[Strategy], runs: &[Run]) -> String {
     let mut text = String::new();
     for &strategy in strategies {

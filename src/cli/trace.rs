@@ -8,7 +8,6 @@ use crate::message::Message;
 use tracing_chrome::{ChromeLayerBuilder, FlushGuard};
 use tracing_subscriber::layer::SubscriberExt as _;
 
-/// A profile that is being recorded to a file.
 pub(super) struct Trace {
     flush: FlushGuard,
     pending: Pending,

@@ -14,7 +14,6 @@ use crate::comparison::process::{Process, State};
 /// action ends the mission.
 pub type Decide<'a> = dyn FnMut(State, u32) -> Option<u32> + 'a;
 
-/// The process with a fixed decision rule, which is a Markov chain.
 struct FixedProcess<'a, 'b, N> {
     process: &'a Process<N>,
     decide: RefCell<&'a mut Decide<'b>>,

@@ -121,9 +121,7 @@ pub struct Process<N> {
     goal: usize,
     initial: State,
     reserve: u32,
-    /// Possible moves, by place and configuration.
     moves: Vec<Vec<Vec<Move<N>>>>,
-    /// Possible reconfigurations, by configuration.
     changes: Vec<Vec<Reconfiguration<N>>>,
     /// For each configuration, `true` if it needs the component that may be lost.
     lost: Vec<bool>,

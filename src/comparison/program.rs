@@ -29,7 +29,6 @@ pub fn program(mission: &Coadaptation, risk: Risk) -> Model {
     )
 }
 
-/// Creates a PRISM model with one module.
 pub(super) fn model(
     remark: String,
     constants: Vec<Constant>,

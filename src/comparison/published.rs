@@ -15,7 +15,6 @@ use crate::comparison::coadaptation::{Coadaptation, Traversal};
 use crate::comparison::process::Action;
 use probabilistic::Number;
 
-/// Number of shortest routes that the procedure compares.
 pub(super) const ROUTES: usize = 5;
 /// Weight of the priority property, and weight of each other property.
 const WEIGHTS: [f64; 2] = [0.6, 0.2];

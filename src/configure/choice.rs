@@ -96,7 +96,6 @@ pub enum Verdict {
     Together(String),
 }
 
-/// An objective and its designs, in the order of preference.
 struct Group {
     objective: Objective,
     candidates: Vec<Offer>,
@@ -191,7 +190,6 @@ pub(super) fn choose(
     Ok(Configuration { choices, utility: chosen.utility, optimal: chosen.optimal })
 }
 
-/// Computes demands and utilities of the candidate designs of objectives.
 struct Offers<'a> {
     knowledge: &'a Knowledge,
     wishes: &'a Wishes,

@@ -279,7 +279,6 @@ impl Keeper {
         Ok(())
     }
 
-    /// Asserts the reported status of a component, unless the component's filter holds the report back.
     fn component(
         &mut self,
         component: &str,

@@ -84,7 +84,6 @@ enum Outcome {
     AtLimit,
 }
 
-/// A mission with one value to vary, and its current best plan for comparison.
 struct VariedMission<'a> {
     mission: &'a Mission,
     base: BestPlan,

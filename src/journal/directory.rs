@@ -15,7 +15,6 @@ use crate::message::Message;
 /// the loop continued. Both words have the same length, so that renaming needs no disk space.
 pub(super) const INCOMPLETE: &str = "partial";
 
-/// Content of a segment file, up to its first fault.
 #[derive(Debug)]
 pub(super) struct Segment {
     pub(super) number: u64,
@@ -51,7 +50,6 @@ impl Segment {
     }
 }
 
-/// Content of a snapshot file: a stored state of the loop.
 #[derive(Debug)]
 pub(super) struct SnapshotFile {
     /// Link at which the snapshot was taken; the segment with the same number begins at this link.
@@ -59,7 +57,6 @@ pub(super) struct SnapshotFile {
     pub(super) data: Value,
 }
 
-/// Segments and snapshots of a journal's directory.
 #[derive(Debug, Default)]
 pub(super) struct JournalFiles {
     /// Segments by number; for an unreadable segment, a description of its fault.
@@ -97,7 +94,6 @@ impl JournalFiles {
         Ok(contents)
     }
 
-    /// Returns the file name of the segment with this number.
     pub(super) fn name(&self, number: u64) -> String {
         name(if self.incomplete == Some(number) { INCOMPLETE } else { "journal" }, number)
     }

@@ -472,8 +472,6 @@ fn create_segment(directory: &Path, after: &Link, digest: &str, number: u64) -> 
     Ok((file, link))
 }
 
-/// Atomically writes a snapshot. An existing snapshot with this number is damaged, and is kept
-/// under another name.
 fn write_snapshot(directory: &Path, number: u64, line: &str) -> io::Result<()> {
     let name = path(directory, "snapshot", number);
     let mut file = tempfile::NamedTempFile::new_in(directory)?;

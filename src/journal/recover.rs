@@ -71,7 +71,6 @@ pub(super) struct Replay<'a, C> {
     pub(super) directory: &'a Path,
     pub(super) control: &'a mut C,
     pub(super) recovery: &'a mut Recovery,
-    /// Number of observations in the segment that was replayed last.
     pub(super) observations: u64,
     pub(super) unfinished: Option<Unfinished>,
 }

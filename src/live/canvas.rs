@@ -6,7 +6,6 @@ use crate::mapek::Outlook;
 use crate::report::Painter;
 use crate::visible::visible;
 
-/// The current plan, and its picture after the first request.
 #[derive(Debug, Default)]
 pub(super) struct Canvas {
     painter: Option<Painter>,

@@ -7,10 +7,8 @@ use std::time::{Duration, Instant};
 /// Maximum number of bytes of a request before its body.
 const MAX_HEAD_BYTES: usize = 16 << 10;
 
-/// Maximum number of headers of a request.
 const MAX_HEADERS: usize = 64;
 
-/// The needed parts of a GET request.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Request {
     pub(super) path: String,

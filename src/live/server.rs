@@ -21,7 +21,6 @@ const CLIENT_TIMEOUT: Duration = Duration::from_secs(5);
 /// Interval between keep-alive comments on an idle event stream.
 const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(10);
 
-/// Maximum number of concurrent connections.
 const MAX_CONNECTIONS: usize = 16;
 
 /// Maximum time that the program waits at the end of a run, so that clients receive the last lines.
@@ -40,7 +39,6 @@ pub struct Live {
     shared: Arc<SharedState>,
 }
 
-/// State shared by all connections.
 #[derive(Debug)]
 struct SharedState {
     hub: Arc<Hub>,
@@ -153,7 +151,6 @@ fn receive(shared: &Arc<SharedState>, mut stream: TcpStream) {
     drop(answered);
 }
 
-/// Reads the request of a connection and answers it.
 fn answer(shared: &SharedState, stream: &mut TcpStream) -> io::Result<()> {
     stream.set_nodelay(true)?;
     let request = match Request::read(stream, CLIENT_TIMEOUT)? {

@@ -14,7 +14,6 @@ use crate::mapek::answer::Command;
 use crate::mapek::beliefs::Beliefs;
 use crate::mapek::receipts::{Acknowledged, Before};
 
-/// Outcome of recording the acknowledgement of an effect.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Receipt {
     /// No effect has this number.

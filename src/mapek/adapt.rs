@@ -45,7 +45,6 @@ pub(super) enum Need {
     Interrupted,
     /// A new plan is needed, for example because the current plan is invalid or missing.
     Must,
-    /// A better plan may exist.
     Better,
 }
 

@@ -8,7 +8,6 @@ use crate::mapek::beliefs::Running;
 use crate::mapek::step::PlannedStep;
 use crate::mission::Mission;
 
-/// Outcome of planning: a plan, or the reason for its absence.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Outcome {
     pub steps: Option<Vec<PlannedStep>>,

@@ -73,7 +73,6 @@ pub struct Beliefs {
 #[derive(Debug, Clone, PartialEq)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub(super) struct Running {
-    /// Number of the action.
     pub(super) action: u64,
     /// The action with its current designs.
     pub(super) step: PlannedStep,
@@ -97,7 +96,6 @@ pub(super) struct Running {
     pub(super) sent_configuration: Vec<(String, String)>,
 }
 
-/// A scheduled repetition of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Retry {
     /// Time at which the search is due, since the start of the mission.

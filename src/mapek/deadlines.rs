@@ -185,7 +185,6 @@ fn passed_deadline(running: &mut Running, now: Duration, settings: &Settings) ->
     Some(time_since_report.as_secs())
 }
 
-/// Returns the time from the last report of an action to the next deadline of the action.
 fn next_deadline_after(running: &Running, settings: &Settings) -> Duration {
     allowed_silence(running, settings).saturating_mul(running.overdue.saturating_add(1))
 }

@@ -148,7 +148,6 @@ pub(super) fn suspend(beliefs: &mut Beliefs, running: Running, reason: &str, ans
     beliefs.running = Some(Running { suspended: true, provisional: false, ..running });
 }
 
-/// Requests that the action under way is resumed, if it is suspended.
 pub(super) fn resume_suspended(beliefs: &mut Beliefs, running: &mut Running, answers: &mut Vec<Answer>) {
     running.provisional = false;
     if std::mem::take(&mut running.suspended) {

@@ -12,7 +12,6 @@ use num_rational::BigRational;
 use crate::mapek::ask::Outcome;
 use crate::number;
 
-/// Decision about the action under way.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Interruption {
     None,
@@ -23,7 +22,6 @@ pub(super) enum Interruption {
     Suspend {
         /// `unsolvable` if the absence of a plan is proved, and `unknown` otherwise.
         status: &'static str,
-        /// Reason for the absence of a plan.
         because: String,
         /// Minimal set of unavailable designs that blocks every plan.
         blocking: Vec<String>,

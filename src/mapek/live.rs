@@ -17,7 +17,6 @@ use crate::mission::replanner;
 /// Upper limit on the number of configurations for which the action under way is simulated.
 const MAX_CONFIGURATIONS: usize = 256;
 
-/// State of the incremental planner, kept between queries.
 #[derive(Debug, Clone, Default)]
 pub(super) enum Live {
     /// State before the first query: no planner has been built.

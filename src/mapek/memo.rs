@@ -57,7 +57,6 @@ impl StoredQuestion {
         Self { problem: question.problem.clone(), running: question.running.cloned(), old }
     }
 
-    /// Returns `true` if both planning problems have the same action under way, or no action.
     pub(super) fn has_same_action(&self, question: &Question<'_>) -> bool {
         self.running.as_ref().map(|running| running.action) == question.running.map(|running| running.action)
     }

@@ -47,7 +47,6 @@ const VALUES: [&str; 2] = ["hasValue", "qa_has_value"];
 pub(super) struct Monitor {
     /// IRIs and local names of the quality attributes of the knowledge base.
     pub(super) attributes: BTreeSet<String>,
-    /// Cache of facts and functions, as text, that are known to fit the domain.
     checked: HashSet<String>,
     pub(super) filters: Filters,
     /// Cache of local names of components, by the reported name.
@@ -371,7 +370,6 @@ impl BeliefUpdate<'_> {
         Ok(())
     }
 
-    /// Returns the argument lists of the facts of a predicate in the believed state.
     fn facts(&self, predicate: &str) -> BTreeSet<Vec<String>> {
         let predicate = Name::new(predicate);
         let word = |term: &Term| match term {

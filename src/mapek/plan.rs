@@ -21,7 +21,6 @@ use crate::number;
 /// Upper limit on the number of doublings of the time limit.
 const MAX_DOUBLINGS: u32 = 3;
 
-/// Planner of the adaptation loop, with its caches.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Planner {
     /// Time limit of one search for a plan; `None` for no limit.

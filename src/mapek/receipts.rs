@@ -17,7 +17,6 @@ pub(super) struct Receipts {
     pub(super) functions: BTreeMap<String, Received>,
 }
 
-/// History of the reconfigurations of one function.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct Received {
     pub(super) last: Option<Acknowledged>,

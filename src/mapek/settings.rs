@@ -77,7 +77,6 @@ pub struct AdaptationSection {
     unrecorded: Unrecorded,
 }
 
-/// A file that contains only the section `adaptation`.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Section {

@@ -180,7 +180,6 @@ impl PlannedStep {
     }
 }
 
-/// Converts pairs of function and design to a JSON object with the functions as keys.
 pub(super) fn configuration_to_json(configuration: &[(String, String)]) -> Map<String, Value> {
     configuration.iter().map(|(function, design)| (function.clone(), json!(design))).collect()
 }

@@ -185,7 +185,6 @@ impl Clause {
         Some(self)
     }
 
-    /// Replaces the variables that are keys of `map`.
     fn with(self, map: &BTreeMap<Name, Operand>) -> Self {
         let substitute = |operand: Operand| match &operand {
             Operand::Variable(name) => map.get(name).cloned().unwrap_or(operand),

@@ -16,7 +16,6 @@ use pddl::ast::{
 use super::clause::{Clause, Fact, Literal};
 use super::settle::{Additions, additions, are_equal};
 
-/// A schema of facts that an action may add.
 #[derive(Debug, Clone)]
 struct Addition {
     predicate: Name,

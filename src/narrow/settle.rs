@@ -19,7 +19,6 @@ use pddl::ast::{Action, ActionBody, Atom, Condition, Domain, Effect, Name, Term}
 
 use super::clause::{Clause, Fact, Literal, Operand};
 
-/// Maximum depth of unfolding a clause.
 const MAX_DEPTH: usize = 8;
 /// Maximum number of clauses that are examined while one predicate is unfolded.
 const MAX_CLAUSES: usize = 1000;

@@ -10,7 +10,6 @@ use crate::mission::{Mission, Reading, Unconfirmed, confirm};
 /// metric is kept.
 #[derive(Debug, Clone)]
 pub(super) struct Objectives {
-    /// The objectives as the user wrote them.
     pub(super) texts: Vec<String>,
     pub(super) metrics: Vec<Metric>,
 }

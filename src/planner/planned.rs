@@ -21,7 +21,6 @@ pub(super) enum Ground {
     Integers(Task),
     /// Sequential steps, with costs and values that are rationals of any size.
     Exact(ExactTask),
-    /// Overlapping actions; the task is not retained.
     Concurrent,
 }
 

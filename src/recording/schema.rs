@@ -3,16 +3,13 @@
 use schemars::Schema;
 use serde_json::{Value, json};
 
-/// Topic of the diagnostics messages.
 pub(super) const DIAGNOSTICS: &str = "/diagnostics";
 
 /// Topic of the loop's input lines.
 pub(super) const EVENTS: &str = "/metaplan/events";
 
-/// Name of the schema of the topic [`EVENTS`].
 pub(super) const EVENT: &str = "metaplan.Event";
 
-/// Name of the schema of the topics in [`ANSWERS`].
 pub(super) const ANSWER: &str = "metaplan.Answer";
 
 /// Topics of answers, each with the kinds of its answers. Kinds that are not listed belong to the
@@ -69,7 +66,6 @@ pub fn answer_schema() -> Schema {
     Schema::try_from(answer()).unwrap_or_default()
 }
 
-/// Returns the JSON Schema of the loop's answers, in their recorded form.
 pub(super) fn answer() -> Value {
     let texts = json!({"type": "array", "items": {"type": "string"}});
     let step = json!({

@@ -169,7 +169,6 @@ fn ends<'p>(atoms: impl Iterator<Item = &'p Atom>, predicates: &BTreeSet<&Name>)
     matching.filter_map(|atom| atom.arguments.last()).map(|term| name_of(term).clone()).collect()
 }
 
-/// Returns the atoms among the conjuncts of a goal.
 fn goals(goal: &Condition) -> impl Iterator<Item = &Atom> {
     let mut parts = vec![goal];
     std::iter::from_fn(move || {

@@ -103,7 +103,6 @@ impl Checker<'_> {
         }
     }
 
-    /// Checks an event of the simulation. Returns its parsed condition, if it has a valid one.
     fn event(&mut self, index: usize, event: &Disturbance, simulation: &Simulation) -> Option<Condition> {
         let path = |rest: &[&str]| -> Vec<Key> {
             let begin = ["events".into(), index.into()];

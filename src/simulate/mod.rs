@@ -120,7 +120,6 @@ impl Experiment {
     }
 }
 
-/// State of one simulated run: the world, its controller, and the results up to now.
 struct Stage {
     world: World,
     controller: Controller,

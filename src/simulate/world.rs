@@ -23,7 +23,6 @@ use crate::simulate::settings::{Disturbance, Simulation};
 /// Times and shares are rounded to multiples of 1 / `GRAIN`.
 const GRAIN: f64 = 1e6;
 
-/// The running action of the simulated robot.
 #[derive(Debug, Clone)]
 struct Job {
     action: u64,

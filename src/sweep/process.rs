@@ -12,7 +12,6 @@ use super::results::Line;
 use super::study::{Planned, Study};
 use crate::message::Message;
 
-/// Time between two checks whether a process has ended.
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
 
 /// Maximum number of characters of a run's standard error output that are stored.

@@ -24,7 +24,6 @@ struct Header {
     format: String,
     /// Checksum of the study, by which files of other studies are rejected.
     study: String,
-    /// Number of runs of the study.
     runs: usize,
     shard: String,
 }

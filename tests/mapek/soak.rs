@@ -104,10 +104,8 @@ fn reaction_times() {
     }
 }
 
-/// A benchmark of the loop with two alternating reports.
 struct Rate {
     subject: &'static str,
-    /// Alternating reports.
     reports: [&'static str; 2],
     /// Lines that are delivered before the measurement.
     before: &'static [&'static str],

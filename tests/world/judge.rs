@@ -18,9 +18,7 @@ pub struct Judge {
     failed: BTreeSet<String>,
     /// Designs whose reconfiguration the robot has refused or the loop has abandoned.
     refused: BTreeSet<String>,
-    /// All effects that the loop has requested, by number.
     requested: BTreeMap<u64, Effect>,
-    /// Effects that a later effect has superseded.
     superseded: BTreeSet<u64>,
     /// Effects that the loop has abandoned with a report.
     given_up: BTreeSet<u64>,
@@ -34,13 +32,10 @@ pub struct Judge {
     observed_failures: BTreeSet<u64>,
     /// Whether an outdated observation determined the design before the last reconfiguration.
     was_misled: bool,
-    /// Actions whose start was delivered to the loop.
     started: BTreeSet<u64>,
-    /// Actions whose progress was delivered to the loop.
     progressed: BTreeSet<u64>,
     /// Action that the loop still waits for after its deadline, according to its own report.
     awaited: Option<u64>,
-    /// Actions whose end was delivered to the loop.
     ended: BTreeSet<u64>,
     /// Last decision of the loop about plans, including that the goal is reached.
     plan: Plan,
@@ -147,7 +142,6 @@ impl Judge {
         }
     }
 
-    /// Returns a component that the design requires and that has failed, if there is one.
     fn forbids(&self, design: &str) -> Option<&'static str> {
         let components =
             DESIGNS.iter().find(|entry| entry.0 == design).map(|entry| entry.1).unwrap_or_default();
@@ -405,11 +399,9 @@ struct Belief {
     design: Option<String>,
     /// Whether any reconfiguration was acknowledged by its number.
     has_receipts: bool,
-    /// The last requested reconfiguration, if unanswered: number and design.
     pending: BTreeMap<u64, String>,
     /// Earlier unanswered reconfigurations, which were superseded or abandoned.
     superseded: BTreeMap<u64, String>,
-    /// The acknowledged reconfiguration with the greatest number, if it has not failed since.
     last: Option<Last>,
     greatest: u64,
     /// Reconfigurations up to this number may have been carried out before or after an observation of the
@@ -418,7 +410,6 @@ struct Belief {
     /// Reconfigurations that count as carried out because a later report implies them, before the first
     /// acknowledgement by number.
     implied: BTreeSet<u64>,
-    /// Reconfigurations that have failed according to the delivered messages.
     failed: BTreeSet<u64>,
     /// Superseded reconfigurations up to this number precede an observation of the design, so they leave no
     /// uncertainty.

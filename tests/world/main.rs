@@ -61,7 +61,6 @@ const PROBLEM: &str = "(define (problem p) (:domain m) (:objects p0 p1 p2 - plac
   (:init (robot_at p0) (way p0 p1) (way p1 p0) (way p1 p2) (way p2 p1))
   (:goal (robot_at p2)) (:metric minimize (total-time)))";
 
-/// Returns a knowledge base with the designs. According to its estimates, later designs are faster.
 fn knowledge() -> String {
     let mut text = "@prefix : <http://example.org/m#> .\n@prefix owl: <http://www.w3.org/2002/07/owl#> .\n\
         @prefix t: <http://metacontrol.org/tomasys#> .\n\
@@ -85,7 +84,6 @@ fn knowledge() -> String {
     text
 }
 
-/// Creates a loop that has not received any event.
 fn pristine(settings: Settings) -> Loop {
     let directory = tempfile::tempdir().expect("a directory");
     let manifest = "name = \"m\"\n[knowledge]\nfiles = [\"kb.ttl\"]\n[planning]\ndomain = \"domain.pddl\"\n\

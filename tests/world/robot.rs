@@ -7,7 +7,6 @@ use serde_json::{Value, json};
 
 use crate::{COMPONENTS, FUNCTION, START};
 
-/// Number of work steps per action.
 const WORK: u32 = 4;
 
 /// The action that the robot is executing.
@@ -48,7 +47,6 @@ pub struct Robot {
     refused_before: BTreeSet<u64>,
     /// Answers to effects and reports of ended actions, kept for repetition.
     pub past_reports: Vec<Value>,
-    /// Greatest number of an action that has started.
     last_started: u64,
     has_restarted: bool,
     /// Whether the function lost its design in a restart and has not got a new design since.
@@ -278,7 +276,6 @@ impl Robot {
     }
 }
 
-/// Returns the design of the robot's function in a configuration.
 fn design_in(configuration: &[(String, String)]) -> Option<&String> {
     configuration.iter().find(|(function, _)| function == FUNCTION).map(|pair| &pair.1)
 }

@@ -11,19 +11,16 @@ use crate::judge::Judge;
 use crate::robot::Robot;
 use crate::{COMPONENTS, DESIGNS, FUNCTION};
 
-/// Simulated time of one step.
 const STEP: Duration = Duration::from_millis(500);
 
 /// Number of steps with faults, and number of steps in the subsequent fair phase, which has no faults.
 const STEPS: (u64, u64) = (60, 300);
 
-/// Maximum number of logged messages in the report of a violation.
 const MAX_LOG: usize = 400;
 
 /// Range of the additional delay of a belated message, in steps: longer than two deadlines of the loop.
 const BELATED: (u64, u64) = (45, 90);
 
-/// Number of loop steps after which a new snapshot is taken.
 const SNAPSHOT_EVERY: usize = 23;
 
 /// Maximum number of reactions of the loop before the next deliberation (planning).
@@ -135,14 +132,10 @@ pub struct Schedule<'a> {
     messages: BTreeMap<(u64, u64), Message>,
     /// Result of planning in parallel to the events that is not adopted yet.
     thoughts: Option<Thoughts>,
-    /// Number of reactions since the last deliberation.
     undeliberated: u32,
-    /// Last snapshot of the loop, if any.
     snapshot: Option<Snapshot>,
-    /// Loop steps since the last snapshot.
     steps: Vec<Step>,
     judge: Judge,
-    /// Log of all messages, if enabled.
     log: Option<Vec<String>>,
 }
 
@@ -268,7 +261,6 @@ impl<'a> Schedule<'a> {
         self.judge.motion(&self.robot, bound)
     }
 
-    /// Sends the reports of a robot in the fair phase.
     fn fair_reports(&mut self) {
         if self.now == STEPS.0 + 1 && self.random.bool() {
             self.robot.failed.clear();
@@ -305,7 +297,6 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    /// Simulated time since the start of the mission.
     fn time(&self) -> Duration {
         STEP * u32::try_from(self.now).unwrap_or(u32::MAX)
     }
@@ -446,7 +437,6 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    /// Replaces the loop by a loop that is restored from the snapshot and the later steps.
     fn crash(&mut self) -> Result<(), String> {
         self.log(|| "crash".to_owned());
         let mut restored = self.pristine.clone();
@@ -476,7 +466,6 @@ impl<'a> Schedule<'a> {
     }
 }
 
-/// Formats an effect briefly: number, kind, action and design.
 fn brief(effect: &Effect) -> String {
     let json = Answer::Effect(effect.clone()).to_json();
     format!("{} {} {} {}", json["effect"], json["answer"], json["action"], json["to"])

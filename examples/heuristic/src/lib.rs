@@ -59,13 +59,11 @@ mod tests {
 
     use super::GoalCount;
 
-    /// Random tasks: robots with designs, batteries, conditional effects and derived predicates.
     fn tasks() -> impl Iterator<Item = Task> {
         let tasks = (0..40).flat_map(|seed| [ground_text(fleet(seed)), ground_text(depot(seed))]);
         tasks.filter(|task| task.unreachable.is_none())
     }
 
-    /// Optimal cost of a task, `None` if there is no plan.
     fn optimal_cost(outcome: SearchOutcome) -> Option<Int> {
         match outcome {
             SearchOutcome::Optimal(plan) => Some(plan.cost),

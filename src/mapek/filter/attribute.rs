@@ -85,7 +85,6 @@ pub(crate) struct AttributeFilter {
     pub stale: Stale,
 }
 
-/// State of the filter of one attribute.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct AttributeState {
     believed: Option<BigRational>,
@@ -128,7 +127,6 @@ impl Hold {
     }
 }
 
-/// Result of filtering a sample.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Verdict {
     /// Newly believed value. The value differs from the sample if the sample satisfies some violated bounds by less

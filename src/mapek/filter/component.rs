@@ -14,7 +14,6 @@ pub(crate) struct ComponentFilter {
     pub heal: Micros,
 }
 
-/// State of the filter of one component.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct ComponentState {
     /// Whether the component is believed to have failed; `None` if unknown.
@@ -94,7 +93,6 @@ impl ComponentState {
     }
 }
 
-/// Spelling of a status in events.
 pub(super) fn word(status: Status) -> &'static str {
     match status {
         Status::Failed => "FALSE",

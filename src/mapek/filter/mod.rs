@@ -73,7 +73,6 @@ pub(crate) struct FilterStates {
     components: BTreeMap<String, ComponentState>,
 }
 
-/// A newly believed report.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Accepted {
     /// Value of an attribute, by local name.

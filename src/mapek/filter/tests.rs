@@ -25,7 +25,6 @@ fn is_kept(bound: &Bound, samples: &[BigRational]) -> bool {
     bound.keeps(decisive.unwrap_or(&samples[0]))
 }
 
-/// Random bounds of the given sides, farther from each other than their bands.
 fn random_bounds(random: &mut Rng, sides: &[Side]) -> Vec<Bound> {
     let count = random.i64(1..=4);
     (0..count)

@@ -130,7 +130,6 @@ fn map(width: usize, height: usize, seed: u64) -> World {
 #[derive(Default)]
 struct Tally {
     compared: usize,
-    /// Number of planning problems that the incremental planner did not support.
     unanswered: usize,
     live: Duration,
     scratch: Duration,

@@ -81,9 +81,7 @@ pub(super) struct Numbers<'m> {
     /// Predicates that are not static: actions, derived predicates, timed literals or the
     /// availability of designs change them.
     dynamic: HashSet<Name>,
-    /// Functions that actions change.
     changed: HashSet<Name>,
-    /// Functions to which actions assign a value.
     assigned: HashSet<Name>,
     facts: HashMap<Name, HashSet<Vec<Name>>>,
     values: HashMap<Name, HashMap<Vec<Name>, BigRational>>,
@@ -385,7 +383,6 @@ impl<'m> Numbers<'m> {
         designs.iter().find(|design| design.individual.name == name)
     }
 
-    /// Creates a warning about a design, with its position in the knowledge base.
     pub(super) fn about(&self, design: &str, code: &str, text: String) -> Message {
         match (self.mission.knowledge(), self.design(design)) {
             (Some(knowledge), Some(design)) => doubt_about(knowledge, code, &design.individual.iri, text),
@@ -393,7 +390,6 @@ impl<'m> Numbers<'m> {
         }
     }
 
-    /// Returns the name of the knowledge base's file that contains a design.
     fn file_of(&self, design: &str) -> String {
         self.about(design, "M230", String::new()).file.clone().unwrap_or_default()
     }

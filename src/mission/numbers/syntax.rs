@@ -122,7 +122,6 @@ pub(super) fn in_condition<'a>(condition: &'a Condition, needed: &mut Vec<&'a At
     }
 }
 
-/// Collects the functions that the unconditional parts of an effect read.
 pub(super) fn in_effect<'a>(effect: &'a Effect, needed: &mut Vec<&'a Atom>) {
     match effect {
         Effect::And(parts) => parts.iter().for_each(|part| in_effect(part, needed)),
