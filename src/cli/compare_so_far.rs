@@ -23,7 +23,6 @@ use crate::cli::output;
 /// Polling interval of the clock.
 const INTERVAL: Duration = Duration::from_millis(10);
 
-/// Intermediate results: the finished comparisons, and the current one.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SoFar {
     /// Total number of comparisons. `None` while files are read.

@@ -51,7 +51,6 @@ pub(super) struct Pages {
 }
 
 impl Pages {
-    /// Returns `true` if an HTML page or SVG files are requested.
     pub(super) fn are_wanted(&self) -> bool {
         self.report.is_some() || self.svg.is_some()
     }

@@ -21,7 +21,6 @@ use crate::cli::common::{Common, Exit, Failure};
 use crate::cli::output;
 use crate::cli::values::seconds;
 
-/// Polling interval of the clock.
 const INTERVAL: Duration = Duration::from_millis(10);
 
 /// Additional time, after 1.1 times the time limit, until a command without an answer is ended.

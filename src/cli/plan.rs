@@ -279,7 +279,6 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     })
 }
 
-/// Splits the value of `--pareto` at the comma into two objectives.
 fn two(pair: &str) -> Result<[&str; 2], Failure> {
     let parts: Vec<_> = pair.split(',').map(str::trim).collect();
     <[&str; 2]>::try_from(parts).map_err(|parts| {
@@ -362,7 +361,6 @@ fn show(
     }
 }
 
-/// Maximum number of listed missing values; further ones are only counted.
 const MISSING_SHOWN: usize = 10;
 
 /// Lists values of numeric functions that are missing in the mission, one per line and at most [`MISSING_SHOWN`].

@@ -15,7 +15,6 @@ use crate::cli::output;
 /// Delay before the first progress line, so that short commands show none.
 const INITIAL_DELAY: Duration = Duration::from_secs(3);
 
-/// Time between two progress lines.
 const INTERVAL: Duration = Duration::from_secs(5);
 
 pub(super) struct Progress {

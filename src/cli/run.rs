@@ -94,7 +94,6 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     ended(drive(common, control, journal, &ready, events, &outlet), &outlet)
 }
 
-/// Opens the journal, if requested, and restores the loop from it.
 fn journal(
     arguments: &Arguments,
     common: &Common,

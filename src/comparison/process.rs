@@ -101,7 +101,6 @@ struct Move<N> {
     /// first array is for moves at which the component is not lost, the second for moves at which
     /// it is lost.
     outcomes: [[N; 3]; 2],
-    /// Values of the selected rewards for this move.
     rewards: Vec<N>,
 }
 

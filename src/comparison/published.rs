@@ -18,7 +18,6 @@ use probabilistic::Number;
 pub(super) const ROUTES: usize = 5;
 /// Weight of the priority property, and weight of each other property.
 const WEIGHTS: [f64; 2] = [0.6, 0.2];
-/// Maximum number of partial routes that are examined in the search for routes.
 const MAX_PARTIAL_ROUTES: usize = 2_000_000;
 
 /// Decision of the published procedure, with its predicted values.

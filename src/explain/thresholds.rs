@@ -77,7 +77,6 @@ pub(super) fn measured(knowledge: &Knowledge) -> Vec<(String, BigRational)> {
     measurements.filter_map(|measurement| Some((measurement.attribute, measurement.value?))).collect()
 }
 
-/// Result of the search for a change of one value in one direction.
 enum Outcome {
     Found(Box<Change>),
     None,

@@ -410,7 +410,6 @@ impl Journal {
     }
 }
 
-/// Result of [`resume`]: position of a restored loop in its journal.
 struct Resumed<'c> {
     /// Number of the snapshot from which the loop was restored, or 0 without a snapshot.
     from: u64,

@@ -133,7 +133,6 @@ impl<C: Recoverable> Replay<'_, C> {
         self.compare(next, &answers)
     }
 
-    /// Returns an error if the answers of the replay differ from the recorded ones.
     fn compare(&mut self, written: &Record, answers: &[C::Answer]) -> Result<(), Message> {
         if self.control.decision(answers).agrees(&written.list(0)) {
             return Ok(());

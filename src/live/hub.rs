@@ -48,11 +48,9 @@ struct RetainedLines {
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum News {
     Lines(Vec<Arc<str>>),
-    /// No new lines within the waiting time.
     Nothing,
     /// Lines that the client has not read were dropped.
     Missed,
-    /// The run has ended and all lines were read.
     Ended,
 }
 

@@ -27,7 +27,6 @@ const MAX_CONNECTIONS: usize = 16;
 const SHUTDOWN_GRACE: Duration = Duration::from_millis(500);
 
 const PAGE: &str = include_str!("page/index.html");
-/// Style sheet of this page, in addition to [`picture::STYLE`].
 const STYLE: &str = include_str!("page/live.css");
 const SCRIPT: &str = include_str!("page/live.js");
 

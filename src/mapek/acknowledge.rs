@@ -16,17 +16,14 @@ use crate::mapek::receipts::{Acknowledged, Before};
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Receipt {
-    /// No effect has this number.
     Unknown,
     Recorded,
     /// The effect is acknowledged, but the design of the given function is uncertain.
     Doubtful(String),
 }
 
-/// Outcome of a report that a reconfiguration has failed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Failure {
-    /// The given design could not be realised.
     Design(String),
     /// No consequence: the report is old or a duplicate.
     Stale,

@@ -10,7 +10,6 @@ use crate::mapek::answer::{Answer, DesignChange, ObjectiveChange};
 use crate::mapek::beliefs::Beliefs;
 use crate::mapek::monitor::Base;
 
-/// Changes of available designs and of objectives in error, found by the analysis.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Findings {
     pub(super) lost: BTreeSet<String>,
@@ -136,7 +135,6 @@ pub(crate) fn changes(
     (changed_designs, changed_objectives)
 }
 
-/// Returns the availability of a design, with the reasons if it is unavailable.
 pub(super) fn availability(knowledge: &Knowledge, design: &str, available: bool) -> DesignChange {
     let because = match knowledge.fault() {
         _ if available => Vec::new(),

@@ -74,7 +74,6 @@ pub struct Beliefs {
 #[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub(super) struct Running {
     pub(super) action: u64,
-    /// The action with its current designs.
     pub(super) step: PlannedStep,
     /// Completed share of the action, from 0 to 1.
     pub(super) progress: BigRational,

@@ -18,7 +18,6 @@ pub(super) enum Interruption {
     Cancel {
         because: String,
     },
-    /// The action is suspended, because no plan exists.
     Suspend {
         /// `unsolvable` if the absence of a plan is proved, and `unknown` otherwise.
         status: &'static str,

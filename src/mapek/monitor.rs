@@ -88,7 +88,6 @@ impl Monitor {
     }
 }
 
-/// Context for applying one event to the beliefs, with a record of the changes.
 pub(super) struct BeliefUpdate<'a> {
     pub(super) monitor: &'a mut Monitor,
     pub(super) beliefs: &'a mut Beliefs,
@@ -248,7 +247,6 @@ impl BeliefUpdate<'_> {
         self.changes.facts |= delta.insert.iter().any(is_concluded) || delta.delete.iter().any(is_lost);
     }
 
-    /// Returns the action under way, or a refusal if no action with the number `action` is under way.
     fn running(&mut self, action: u64) -> Result<&mut Running, Refusal> {
         let running = self.beliefs.running.as_mut().filter(|running| running.action == action);
         running.ok_or_else(|| Refusal::new("M305", format!("no action {action} is under way")))

@@ -35,13 +35,11 @@ pub(super) struct Received {
 pub(super) struct Acknowledged {
     pub(super) effect: u64,
     pub(super) design: String,
-    /// Design before the reconfiguration, if known.
     pub(super) before: Option<Before>,
     /// Whether the reconfiguration was reported as failed after its acknowledgement.
     pub(super) failed: bool,
 }
 
-/// Design of a function before a reconfiguration.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Before {
     pub(super) design: String,
@@ -115,7 +113,6 @@ impl Receipts {
         json!([self.by_number, self.functions.iter().map(function).collect::<Vec<_>>()])
     }
 
-    /// Inverse of [`Receipts::to_record`]. Returns `None` if the record is malformed.
     pub(super) fn from_record(record: &Value) -> Option<Self> {
         let text = |value: &Value| value.as_str().map(ToOwned::to_owned);
         let superseded = |pair: &Value| Some((pair.get(0)?.as_u64()?, text(pair.get(1)?)?));

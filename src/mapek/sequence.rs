@@ -103,7 +103,6 @@ impl Numbers {
         json!([self.mark, self.ranges.iter().collect::<Vec<_>>()])
     }
 
-    /// Inverse of [`Numbers::to_record`]. Returns `None` if the record is malformed.
     pub(crate) fn from_record(record: &Value) -> Option<Self> {
         let range = |pair: &Value| Some((pair.get(0)?.as_u64()?, pair.get(1)?.as_u64()?));
         let ranges = record.get(1)?.as_array()?.iter().map(range).collect::<Option<_>>()?;

@@ -162,7 +162,6 @@ impl PlannedStep {
         ])
     }
 
-    /// Inverse of [`PlannedStep::to_record`]. Returns `None` if the record is malformed.
     pub(crate) fn from_record(record: &Value) -> Option<Self> {
         let text = |value: &Value| value.as_str().map(ToOwned::to_owned);
         let [action, arguments, written, configuration, duration, cost] = record.as_array()?.as_slice()

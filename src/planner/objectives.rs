@@ -70,7 +70,6 @@ pub(super) fn unconfirmed(reason: Unconfirmed) -> Message {
     }
 }
 
-/// Creates the error M170 for an internal fault of the planner.
 pub(super) fn fault(reason: &str) -> Message {
     let text = format!("this is a fault of metaplan, not of your input; please report it: {reason}");
     Message::error("M170", text)

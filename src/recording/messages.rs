@@ -43,7 +43,6 @@ string key
 string value
 ";
 
-/// The ROS 2 message `std_msgs/msg/String`.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Text {
     pub(super) data: String,

@@ -49,7 +49,6 @@ impl<R> std::fmt::Debug for Replay<R> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
     Reading,
-    /// The file was read to its end.
     Finished,
     /// The file is truncated and was read up to its end.
     Unfinished,

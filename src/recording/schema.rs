@@ -5,7 +5,6 @@ use serde_json::{Value, json};
 
 pub(super) const DIAGNOSTICS: &str = "/diagnostics";
 
-/// Topic of the loop's input lines.
 pub(super) const EVENTS: &str = "/metaplan/events";
 
 pub(super) const EVENT: &str = "metaplan.Event";
@@ -36,7 +35,6 @@ pub(super) fn topic(kind: &str) -> usize {
     ANSWERS.iter().position(|(_, kinds)| kinds.contains(&kind)).unwrap_or(ANSWERS.len() - 1)
 }
 
-/// Returns the JSON Schema of recorded input lines.
 pub(super) fn event() -> Value {
     json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",

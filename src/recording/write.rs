@@ -15,7 +15,6 @@ use crate::mapek::Observation;
 use crate::recording::messages::{self, DiagnosticArray, Text, to_cdr};
 use crate::recording::schema;
 
-/// Name and version of the recording format, in the file's metadata.
 const FORMAT: &str = "metaplan-recording/1";
 
 /// Encoding of event lines and answers in a recording.

@@ -57,7 +57,6 @@ pub(super) fn map(scene: Scene<'_>, plan: &Plan, steps: &mut [Step]) -> Option<M
     Some(Map { places: places.iter().map(place).collect(), ways: ways(scene.problem, &number, &predicates) })
 }
 
-/// The movements of a plan, and the places between which they lead.
 struct Moving<'d> {
     movements: Vec<&'d Movement<'d>>,
     places: Vec<Name>,

@@ -15,7 +15,6 @@ pub(super) struct Watched {
     pub(super) events: Vec<Option<Condition>>,
     /// Numeric function that ends the mission when it reaches 0, in the validator's notation.
     pub(super) lifeline: Option<String>,
-    /// Condition that holds once the pipeline is found.
     pub(super) found: Option<Condition>,
     /// Numeric function with the length of the pipeline, without parentheses.
     pub(super) length: Option<String>,

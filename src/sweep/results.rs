@@ -12,10 +12,8 @@ use serde_json::{Map, Value};
 use super::study::{Shard, Study};
 use crate::message::{Errors, Message};
 
-/// Name and version of the format of result files.
 pub(super) const FORMAT: &str = "metaplan-sweep/1";
 
-/// Message about a file that belongs to another study.
 const OTHER_STUDY: &str = "it belongs to another study, or the study or its files have changed";
 
 /// The first line of a shard's file. It identifies the study.

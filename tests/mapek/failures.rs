@@ -11,7 +11,6 @@ use metaplan::simulate::{Disturbance, Experiment, RandomFailure, Run, Simulation
 
 struct Robot {
     mission: &'static str,
-    /// Sets of components that fail together.
     failing: &'static [&'static [&'static str]],
     /// Number of leading entries of `failing` whose permanent failure the mission tolerates.
     spare: usize,
@@ -122,7 +121,6 @@ struct Comparison {
     strategy: Strategy,
     /// Mean cost and number of accomplished missions of the other strategy, as text.
     mean_cost_and_count: String,
-    /// Number of missions in which the loop is better.
     better: usize,
     worse: Vec<u64>,
 }

@@ -80,7 +80,6 @@ struct Robot {
     effects: BTreeMap<u64, Value>,
     /// Numbers of effects in the order of their first arrival.
     order: Vec<u64>,
-    /// Numbers of acknowledged effects, in the order of acknowledgement.
     acknowledged: Vec<u64>,
     state: Value,
 }

@@ -107,7 +107,6 @@ fn reaction_times() {
 struct Rate {
     subject: &'static str,
     reports: [&'static str; 2],
-    /// Lines that are delivered before the measurement.
     before: &'static [&'static str],
     /// Minimum number of lines per second of processor time, without and with a journal.
     least: [u64; 2],

@@ -20,7 +20,6 @@ pub struct Judge {
     refused: BTreeSet<String>,
     requested: BTreeMap<u64, Effect>,
     superseded: BTreeSet<u64>,
-    /// Effects that the loop has abandoned with a report.
     given_up: BTreeSet<u64>,
     /// Design that the loop must believe, derived from the messages by the table of
     /// `docs/reference/events.md`.

@@ -55,7 +55,6 @@ pub struct Robot {
     before: Option<(u64, String)>,
     /// Action number and effect number of the last reconfiguration that was carried out.
     pub configured: (u64, u64),
-    /// Future actions that were suspended before their request arrived.
     suspended_early: BTreeSet<u64>,
     /// Future actions that were suspended and resumed before their request arrived, with the effect number
     /// and the design of the resumption.

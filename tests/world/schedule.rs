@@ -23,7 +23,6 @@ const BELATED: (u64, u64) = (45, 90);
 
 const SNAPSHOT_EVERY: usize = 23;
 
-/// Maximum number of reactions of the loop before the next deliberation (planning).
 const MAX_UNDELIBERATED: u32 = 4;
 
 /// Fault rates of a schedule. Unless stated otherwise, each number is a percentage.

@@ -104,7 +104,6 @@ pub(crate) struct AttributeState {
     pub held: u64,
 }
 
-/// Reason why a sample is held back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Hold {
     Range,
@@ -368,7 +367,6 @@ impl AttributeState {
         ])
     }
 
-    /// Inverse of [`AttributeState::to_record`]. Returns `None` if the record is malformed.
     pub(crate) fn from_record(record: &Value) -> Option<Self> {
         let [believed, plausible, suspect, recent, crossing, last_sample_time, silent, held] =
             record.as_array()?.as_slice()

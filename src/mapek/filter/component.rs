@@ -79,7 +79,6 @@ impl ComponentState {
         json!([self.has_failed, self.change.map(|(since, status)| json!([since, word(status)])), self.held])
     }
 
-    /// Inverse of [`ComponentState::to_record`]. Returns `None` if the record is malformed.
     pub(crate) fn from_record(record: &Value) -> Option<Self> {
         let [has_failed, change, held] = record.as_array()?.as_slice() else { return None };
         Some(Self {

@@ -269,7 +269,6 @@ impl FilterStates {
         json!([Value::Object(measured.collect()), Value::Object(components.collect())])
     }
 
-    /// Inverse of [`FilterStates::to_record`]. Returns `None` if the record is malformed.
     pub(crate) fn from_record(record: &Value) -> Option<Self> {
         let [measured, components] = record.as_array()?.as_slice() else { return None };
         let measured = measured.as_object()?.iter();

@@ -62,7 +62,6 @@ pub struct MissingValue {
 /// and to the actions that need the value.
 type Needed = BTreeMap<(Name, Vec<Name>), (bool, BTreeSet<String>)>;
 
-/// A duration of an action that is negative for some arguments.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct NegativeDuration {
     pub(super) action: String,
