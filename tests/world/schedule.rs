@@ -38,7 +38,7 @@ pub struct Faults {
     pub fails: u32,
     pub crashes: u32,
     pub restarts: u32,
-    /// Percentage of reconfigurations that fail after their acknowledgement.
+    /// Percentage of steps at which the last reconfiguration fails after its acknowledgement.
     pub late: u32,
     /// Percentage of steps with an observation of the function's design.
     pub observes: u32,
@@ -57,7 +57,7 @@ pub struct Faults {
 }
 
 impl Faults {
-    /// Returns the fault rates of a seed. Each kind of fault is absent from some schedules.
+    /// Returns the fault rates of a seed. Each kind of fault except `breaks` is absent from some schedules.
     pub fn of(seed: u64) -> Self {
         let mut random = Rng::with_seed(seed ^ 0x5eed);
         let mut share = |maximum: u32| if random.bool() { 0 } else { random.u32(0..=maximum) };
@@ -125,9 +125,9 @@ pub struct Schedule<'a> {
     random: Rng,
     faults: Faults,
     now: u64,
-    /// Number of the last event line.
+    /// Sequence number of the last report; 0 if reports have none.
     line: u64,
-    /// Messages in transit, by step of arrival and a random number that orders the messages of one step.
+    /// Messages in transit, by step of arrival and a number that orders the messages of one step.
     messages: BTreeMap<(u64, u64), Message>,
     /// Result of planning in parallel to the events that is not adopted yet.
     thoughts: Option<Thoughts>,
@@ -172,7 +172,7 @@ impl<'a> Schedule<'a> {
 
     /// Runs the schedule to its end.
     ///
-    /// Returns the first violation, with the last messages.
+    /// Returns the first violation. With the log, the fault rates and the last messages follow.
     pub fn run(mut self) -> Result<(), String> {
         self.deliberate();
         for now in 1..=STEPS.0 + STEPS.1 {
@@ -277,8 +277,8 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    /// Returns the maximum number of steps for which the robot may move with a design that the delivered
-    /// reports forbid. `None` if the last message about the design may have been lost or refused.
+    /// Returns the maximum number of steps for which the robot may move with a design that the delivered reports
+    /// forbid. `None` while messages about designs may be lost, refused or late.
     fn bound(&self) -> Option<u64> {
         // Two deadlines and one step each way: the effect is repeated once, and then abandoned.
         let deadlines = 2 * 20 + 6;
@@ -316,7 +316,8 @@ impl<'a> Schedule<'a> {
         self.faults.lost = lost;
     }
 
-    /// Puts a message in transit. It can be lost, duplicated, and overtaken by later messages.
+    /// Puts a message in transit. In the phase with faults, the message can be lost, duplicated, and overtaken by later
+    /// messages.
     fn post(&mut self, message: &Message) {
         // Before the first acknowledgement, the loop cannot detect whether this robot sends acknowledgements.
         let is_safe = self.now == 0 && !self.faults.start;
@@ -343,7 +344,7 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    /// Delivers a line or a timer to the loop, and checks the reaction.
+    /// Delivers a line or a timer to the loop, checks the reaction, and continues the deliberation.
     fn deliver(&mut self, line: &str) -> Result<(), String> {
         if line != Observation::TIMER {
             self.log(|| format!("loop hears {line}"));
@@ -373,7 +374,7 @@ impl<'a> Schedule<'a> {
         self.judge.configuration(&self.robot, &self.control, self.messages.values())
     }
 
-    /// Deliberates, starts planning in parallel to the events, or adopts the resulting plans.
+    /// Deliberates, starts planning in parallel to the events, adopts the resulting plans, or does nothing.
     fn continue_deliberation(&mut self) -> Result<(), String> {
         if !self.faults.beside || self.undeliberated >= MAX_UNDELIBERATED {
             return self.finish_deliberation();
