@@ -20,7 +20,6 @@ use crate::cli::compare_table::{as_text, costs_text, csv};
 use crate::cli::drawn::Pages;
 use crate::cli::output;
 
-/// Polling interval of the clock.
 const INTERVAL: Duration = Duration::from_millis(10);
 
 #[derive(Debug, Clone, Default)]

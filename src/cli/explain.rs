@@ -93,7 +93,6 @@ fn explain_plan(mission: &Mission, limits: &Limits, common: &Common) -> Result<b
     Ok(changes.complete)
 }
 
-/// Runs `plan`, which computes plans, and shows its progress.
 fn planning<T>(
     common: &Common,
     limits: &Limits,
@@ -105,7 +104,6 @@ fn planning<T>(
     outcome.map_err(|messages| Failure::planning(messages, limits))
 }
 
-/// Prints meaning, cause and remedy of a message code.
 fn code(name: &str, common: &Common) -> Result<Exit, Failure> {
     let Some(found) = codes::find(name) else {
         let catalogue = codes::all();

@@ -288,7 +288,6 @@ fn two(pair: &str) -> Result<[&str; 2], Failure> {
     })
 }
 
-/// Prints the answer, or writes it to a file, and draws the requested pictures.
 fn finish(
     planned: &Planned<'_>,
     mission: &Mission,

@@ -51,7 +51,6 @@ impl Progress {
     }
 }
 
-/// Runs `work`, and shows the progress of the activity `what` until `work` returns.
 pub(super) fn during<T>(what: &'static str, common: &Common, work: impl FnOnce() -> T) -> T {
     let _progress = Progress::new(what, common);
     work()

@@ -120,7 +120,6 @@ fn write(arguments: &Arguments, page: &str, said: &str) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The solution of a mission, and its plan in the form for pictures.
 struct Answer {
     solution: Solution,
     plan: Plan,

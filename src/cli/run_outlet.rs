@@ -176,7 +176,6 @@ pub(super) fn unwritten(error: &io::Error) -> Message {
     Message::error("M321", format!("the journal cannot be written: {error}"))
 }
 
-/// Prints a warning if an answer reports that the loop continues without its journal.
 pub(super) fn warn_if_unrecorded<'a>(common: &Common, answers: impl IntoIterator<Item = &'a Answer>) {
     for answer in answers {
         if let Answer::Unrecorded { message } = answer {

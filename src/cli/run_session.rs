@@ -168,7 +168,6 @@ impl<'a> Session<'a> {
         self.answer(number, &answers, read)
     }
 
-    /// Handles a line completely: reacts, deliberates, and writes all answers.
     fn answer_line(&mut self, line: &Line, read: Instant) -> Result<Flow, Failure> {
         let now = self.heard(line);
         let answers = match &mut self.journal {
@@ -235,7 +234,6 @@ impl<'a> Session<'a> {
         Some(due.saturating_sub(self.begun + self.clock.now()).max(MIN_PAUSE))
     }
 
-    /// Reacts to the passing of time if something has become due.
     fn elapse(&mut self) -> Result<Flow, Failure> {
         let now = self.begun + self.clock.now();
         if self.control.due().is_none_or(|due| due > now) {

@@ -126,7 +126,6 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     Ok(if incomplete.is_some() { Exit::NothingFound } else { Exit::Done })
 }
 
-/// Reads a mission and a scenario for simulation, and reports all mistakes in the scenario.
 fn experiment(mission: &Path, scenario: &str, common: &Common) -> Result<Experiment, Failure> {
     let read = || Setup::read(mission)?.experiment(scenario);
     during("reading", common, read).map_err(scenario_failure)

@@ -69,7 +69,6 @@ impl Imports {
 }
 
 impl Situation {
-    /// Returns the options for a mission with a manifest: a scenario, values to set, and failed components.
     pub(super) fn of_mission(
         scenario: Option<String>,
         set: Vec<(String, String)>,
@@ -187,7 +186,6 @@ pub(super) fn scenario_failure(messages: Errors) -> Failure {
     Failure { exit: if is_usage { Exit::Usage } else { Exit::BadInput }, messages }
 }
 
-/// Reads a knowledge base, marks the components in `fail` as failed, and sets the measured attributes in `set`.
 pub(super) fn knowledge(
     documents: &[PathBuf],
     rules: &[String],

@@ -116,7 +116,6 @@ pub struct Arc {
     pub by: Vec<Option<Traversal>>,
 }
 
-/// Maximum number of places that the encoding of a state supports.
 const MAX_PLACES: usize = 1 << 16;
 const MAX_CONFIGURATIONS: usize = 1 << 12;
 

@@ -80,10 +80,6 @@ impl<'de: 't, 't> Deserialize<'de> for Measured<'t> {
 }
 
 impl<'t> Map<'t> {
-    /// Reads a map.
-    ///
-    /// # Errors
-    /// The text is not JSON of this form, or places, coordinates, arcs or measurements are faulty.
     pub(super) fn read(file: &str, text: &'t str) -> Result<Self, Errors> {
         let map: Self = serde_json::from_str(text).map_err(|error| {
             let older = if error.to_string().contains("missing field `coords`") {

@@ -350,7 +350,6 @@ impl Journal {
         sync_directory(&self.directory)
     }
 
-    /// Inserts the message about a failed write at the front of the answers, once.
     fn give_notice<C: Recoverable>(&mut self, answers: &mut Vec<C::Answer>) {
         if let Some(message) = self.notice.take() {
             answers.insert(0, Answer::Unrecorded { message }.into());

@@ -66,7 +66,6 @@ pub(super) fn usable<'a>(
     Err(format!("{}; {way_out}", problems.join(", ")))
 }
 
-/// Replays recorded observations on a loop, and compares the answers with the recorded ones.
 pub(super) struct Replay<'a, C> {
     pub(super) directory: &'a Path,
     pub(super) control: &'a mut C,

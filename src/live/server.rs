@@ -169,7 +169,6 @@ fn answer(shared: &SharedState, stream: &mut TcpStream) -> io::Result<()> {
     }
 }
 
-/// Checks the token of a request or, without a token, the `Host` header.
 fn authorize(shared: &SharedState, request: &Request) -> Result<(), Refused> {
     if let Some(token) = &shared.token {
         let fits = request.authorization.as_deref().is_some_and(|given| token.fits(given));

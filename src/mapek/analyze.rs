@@ -88,7 +88,6 @@ pub(super) fn analyze_change(beliefs: &mut Beliefs, base: Base, answers: &mut Ve
     if base == Base::Watched { analyze(beliefs, answers) } else { Findings::default() }
 }
 
-/// Compares the current availability and statuses with the previous ones, and reports the differences.
 pub(super) fn analyze(beliefs: &mut Beliefs, answers: &mut Vec<Answer>) -> Findings {
     let mut findings = Findings::default();
     let Some(knowledge) = beliefs.mission.knowledge() else { return findings };
@@ -219,7 +218,6 @@ pub(crate) fn fact_text(fact: &Fact, symbols: &Symbols) -> String {
     text
 }
 
-/// Replaces each `<IRI>` in a text by its local name.
 pub(crate) fn with_local_names(text: &str) -> String {
     let mut parts = text.split('<');
     let mut short = parts.next().unwrap_or_default().to_owned();

@@ -337,7 +337,6 @@ impl Loop {
         self.digest.clone()
     }
 
-    /// Rebuilds the knowledge base if unused names take up memory.
     fn compact_knowledge(&mut self) {
         let Some(base) = self.beliefs.mission.knowledge_mut().filter(|base| base.growth() > MAX_GROWTH)
         else {

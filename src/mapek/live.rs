@@ -22,7 +22,6 @@ pub(super) enum Live {
     /// State before the first query: no planner has been built.
     #[default]
     Untried,
-    /// The incremental planner does not support the mission.
     Unsuited,
     /// Planner built for one problem. Also accepts problems that differ only in initial values and available designs.
     Ready(Replanner),

@@ -343,7 +343,6 @@ impl BeliefUpdate<'_> {
         advance(mission.domain(), &self.beliefs.filled(), &step.to_plan_step(), true).ok()
     }
 
-    /// Applies a reported fact, or a reported value of a numeric function.
     fn fact(&mut self, name: &str, value: &str) -> Result<(), Refusal> {
         let mut words = name.split_whitespace();
         let name = words.by_ref().collect::<Vec<_>>().join(" ");

@@ -60,7 +60,6 @@ impl Receipts {
         self.functions.get(function).is_some_and(|history| !history.superseded.is_empty())
     }
 
-    /// Records that the reconfiguration `effect` of `function` to `design` was superseded before it was answered.
     pub(super) fn supersede(&mut self, effect: u64, function: String, design: String) {
         let superseded = &mut self.functions.entry(function).or_default().superseded;
         superseded.insert(effect, design);
@@ -82,7 +81,6 @@ impl Receipts {
         }
     }
 
-    /// Returns the effect numbers of a function's reconfigurations that were superseded before they were acknowledged.
     pub(super) fn unanswered_superseded(&self, function: &str) -> impl Iterator<Item = &u64> {
         self.functions.get(function).into_iter().flat_map(|history| history.superseded.keys())
     }

@@ -17,7 +17,6 @@ pub(super) struct Clause {
     pub body: Vec<Literal>,
 }
 
-/// A conjunct in the body of a clause.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Literal {
     /// An atom: predicate and arguments. Type tests are unary atoms, see [`of_type`].

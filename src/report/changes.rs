@@ -143,8 +143,6 @@ fn plans(before: &Plan, after: &Plan, costs: &[Cost; 2]) -> Vec<String> {
     vec![text]
 }
 
-/// Returns sentences about the differences between the costs, the used designs and the actions of
-/// two plans.
 fn cost_and_design_differences(before: &Plan, after: &Plan, [old_cost, new_cost]: [&str; 2]) -> Vec<String> {
     let mut texts = Vec::new();
     if old_cost == new_cost {

@@ -216,8 +216,6 @@ impl Controller {
         if !whole.admits(&chosen) && whole.admits(step) { step.clone() } else { chosen }
     }
 
-    /// Chooses a new design for each function of the running action whose design is no longer
-    /// available.
     fn replace_lost(&mut self, answers: &mut Vec<Answer>) {
         let beliefs = self.control.beliefs();
         let Some((_, step)) = beliefs.running() else { return };

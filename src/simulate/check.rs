@@ -8,7 +8,6 @@ use crate::message::{Message, did_you_mean};
 use crate::mission::conditions::{self, Fault, written};
 use crate::mission::{Mission, Mistake, setting};
 
-/// Parsed conditions and numeric functions of a simulation's settings.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Watched {
     /// Condition of each event, in the order of the events. `None` for an event with a time.

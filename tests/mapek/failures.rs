@@ -119,7 +119,6 @@ fn simulation(robot: &Robot, events: Vec<Disturbance>, failures: Vec<RandomFailu
 
 struct Comparison {
     strategy: Strategy,
-    /// Mean cost and number of accomplished missions of the other strategy, as text.
     mean_cost_and_count: String,
     better: usize,
     worse: Vec<u64>,

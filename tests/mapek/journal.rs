@@ -151,7 +151,6 @@ fn a_journal_cut_at_five_hundred_places_restores_the_loop() {
     check(500);
 }
 
-/// Cuts the journal `cuts` times at random positions and checks that the loop is restored each time.
 fn check(cuts: usize) {
     let pristine = control("ugv");
     let (state, effects, _directory) = undisturbed(&pristine);

@@ -53,7 +53,6 @@ fn a_report_in_transit_acknowledges_nothing() {
     assert_eq!(words(&answers)[0], "fd_amcl_kinect to fd_mrpt_lidar", "the next design is asked for");
 }
 
-/// A robot can report a failure after it has acknowledged the arrival of a reconfiguration.
 #[test]
 fn a_reconfiguration_may_fail_after_it_was_acknowledged() {
     let mut ugv = control("ugv");

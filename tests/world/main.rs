@@ -128,7 +128,6 @@ fn faults(seed: u64) -> Faults {
     if seed.is_multiple_of(2) { faults.with_lost_start() } else { faults }
 }
 
-/// Formats the seeds of each kind of violation, with the messages of the first violation of this kind.
 fn summary(violations_found: &[(u64, String)]) -> String {
     let kind = |violation: &str| violation.get(..3).unwrap_or_default().to_owned();
     let mut kinds: BTreeMap<String, Vec<&(u64, String)>> = BTreeMap::new();

@@ -309,7 +309,6 @@ impl<'a> Schedule<'a> {
         self.post(&Message::Event(event));
     }
 
-    /// Sends a report that cannot be lost.
     fn report_safely(&mut self, event: Value) {
         let lost = std::mem::take(&mut self.faults.lost);
         self.report(event);
@@ -427,7 +426,6 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    /// Sends the effects among the answers to the robot and logs all answers.
     fn send(&mut self, answers: Vec<Answer>) {
         for answer in answers {
             self.log(|| answer.to_json().to_string());

@@ -70,7 +70,6 @@ impl ComponentFilter {
 }
 
 impl ComponentState {
-    /// Returns the initial state of a filter, with the belief whether the component has failed.
     pub(crate) fn believing(has_failed: Option<bool>) -> Self {
         Self { has_failed, ..Self::default() }
     }

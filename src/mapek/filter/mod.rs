@@ -84,7 +84,6 @@ pub(crate) enum Accepted {
 }
 
 impl Filters {
-    /// Creates the filters from the settings and the bounds stated by the designs of `knowledge`.
     pub(crate) fn new(settings: &FilterSettings, knowledge: Option<&Knowledge>) -> Self {
         let mut bounds = knowledge.map(stated_bounds).unwrap_or_default();
         for name in settings.measured.keys() {
