@@ -33,7 +33,8 @@ pub(crate) fn rounded(value: &BigRational) -> BigRational {
     (value * &scale).round() / scale
 }
 
-/// Parses a JSON number, or a string that contains a number.
+/// Parses a JSON number, or a string that contains a number. Returns `None` for other values, and in the cases of
+/// [`exact`].
 pub(crate) fn from_json(value: &Value) -> Option<BigRational> {
     match value {
         Value::Number(number) => exact(&number.to_string()),

@@ -12,7 +12,7 @@ use task::task::{Fact, Operator, State, Task};
 pub struct GoalCount {
     /// Goal facts of basic variables. Rules derive the other variables, so that one step can change any number of them.
     goal_facts: Vec<Fact>,
-    /// Maximum number of goal facts that one operator makes true; at least 1.
+    /// Upper bound on the number of goal facts that one operator makes true; at least 1.
     facts_per_step: usize,
     /// Cost of the cheapest operator with its cheapest designs.
     cheapest: Int,
