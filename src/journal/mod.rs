@@ -103,7 +103,7 @@ pub struct Journal {
 
 impl Journal {
     /// Opens the journal in a directory and restores `control`, a loop that has not begun, to its
-    /// state after the last recorded decision. Creates the directory and the journal if they do not
+    /// state after the last recorded reaction or decision. Creates the directory and the journal if they do not
     /// exist. [`Journal::begin`] or [`Journal::begin_reacting`] has to be called next.
     ///
     /// # Errors
@@ -179,8 +179,8 @@ impl Journal {
         Ok(recovery)
     }
 
-    /// Completes the work that the previous process left unfinished, which may require planning.
-    /// Returns the answers that may not have left the program: first the answers to the unfinished
+    /// Completes the work that the previous process left unfinished, or makes the first decision in a new journal. Both
+    /// may require planning. Returns the answers that may not have left the program: first the answers to the unfinished
     /// work, then effects that were not acknowledged.
     ///
     /// # Errors
@@ -219,8 +219,8 @@ impl Journal {
         self.again(control, answers)
     }
 
-    /// Returns `answers` and all earlier effects that were not acknowledged, which have to be
-    /// output again.
+    /// Flushes the journal. Returns `answers`, followed by all earlier effects that were not acknowledged, which have to
+    /// be output again. A message about a failed write comes first.
     fn again<C: Recoverable>(
         &mut self,
         control: &C,
@@ -470,6 +470,7 @@ fn create_segment(directory: &Path, after: &Link, digest: &str, number: u64) -> 
     Ok((file, link))
 }
 
+/// Writes a snapshot atomically. An existing snapshot with this number is damaged, and is kept under another name.
 fn write_snapshot(directory: &Path, number: u64, line: &str) -> io::Result<()> {
     let name = path(directory, "snapshot", number);
     let mut file = tempfile::NamedTempFile::new_in(directory)?;

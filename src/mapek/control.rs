@@ -36,13 +36,13 @@ const MAX_REASONING_STEPS: u64 = 100_000_000;
 /// Number of unused interned names and values above which the knowledge base is rebuilt without them.
 const MAX_GROWTH: usize = 1024;
 
-/// Upper limit on the time between two lines; a line with a later time is refused. The number of seconds equals the
-/// limit on gaps between sequence numbers.
+/// Upper limit on the lead of a line's own time over the later of the previous line's time and the clock. A line with a
+/// greater lead is refused. The number of seconds equals the limit on gaps between sequence numbers.
 const MAX_TIME_STEP: Duration = Duration::from_secs(1_000_000);
 
 /// Returns the time at which a line is handled, and an error if the line's own time skips too much. Such a time is
-/// ignored. `previous` is the time of the previous line. `now` is used for a line without a time of its own. Time never
-/// decreases.
+/// ignored. `previous` is the time of the previous line. `now` is used if the line has no time of its own, or if this
+/// time is ignored. Time never decreases.
 pub(crate) fn time_of_line(
     previous: Duration,
     now: Duration,

@@ -107,7 +107,8 @@ pub(crate) struct AttributeState {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Hold {
     Range,
-    /// The sample is implausibly far from the previous sample.
+    /// The sample is implausibly far from the last plausible sample, and from the last sample that was held for this
+    /// reason.
     Jump,
     /// The sample satisfies a violated bound, but by less than the hysteresis.
     Hysteresis,
