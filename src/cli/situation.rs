@@ -110,7 +110,6 @@ impl Situation {
         self.setup(inputs, common).map(|setup| setup.mission)
     }
 
-    /// Reads the mission as [`Situation::mission`] does. Returns it with the settings of the manifest.
     pub(super) fn setup(&self, inputs: &[PathBuf], common: &Common) -> Result<Setup, Failure> {
         during("reading", common, || self.read(inputs))
     }

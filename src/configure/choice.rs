@@ -101,7 +101,6 @@ struct Group {
     candidates: Vec<Offer>,
 }
 
-/// A candidate design for an objective, with its demands on budgets, its utility, and the reasons that exclude it.
 struct Offer {
     design: String,
     utility: BigRational,

@@ -19,9 +19,7 @@ pub(super) const INCOMPLETE: &str = "partial";
 pub(super) struct Segment {
     pub(super) number: u64,
     pub(super) digest: String,
-    /// Link before the segment's first record.
     pub(super) before: Link,
-    /// Link after the segment's last sound record.
     pub(super) after: Link,
     /// Sound records of the segment, without its header.
     pub(super) records: Vec<Record>,

@@ -135,7 +135,6 @@ pub(super) struct HubSender {
     start: Instant,
 }
 
-/// Size of the queue in bytes, and number of lines that were dropped.
 #[derive(Debug, Default)]
 struct Backlog {
     dropped: AtomicU64,

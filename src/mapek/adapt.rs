@@ -209,8 +209,8 @@ impl Adaptation<'_> {
     }
 
     /// Searches for a plan for the reasons `because`, and adopts it unless it is the current plan. With
-    /// [`Need::Better`], the plan is adopted only if its benefit is sufficient. Otherwise, the action under way may be
-    /// cancelled or suspended instead. Decides nothing if a search is forbidden.
+    /// [`Need::Better`], the plan is adopted only if its benefit is sufficient. With the other needs, the action under
+    /// way may be cancelled or suspended instead. Decides nothing if a search is forbidden.
     pub(super) fn replan(&mut self, because: Vec<String>, need: Need, answers: &mut Vec<Answer>) {
         let is_necessary = need != Need::Better;
         let reason = because.first().cloned().unwrap_or_default();

@@ -91,7 +91,6 @@ pub(super) struct Running {
     pub(super) started: bool,
     pub(super) progressed: bool,
     pub(super) resumed: bool,
-    /// Functions with the designs that were last requested for the action.
     pub(super) sent_configuration: Vec<(String, String)>,
 }
 
@@ -306,7 +305,6 @@ impl Beliefs {
         }
     }
 
-    /// Validates the action under way and the remaining plan against the believed situation.
     pub(super) fn verdict(&self) -> Verdict {
         let running = self.running.iter().map(|running| &running.step);
         let steps = running.chain(self.plan.iter().flatten());

@@ -21,7 +21,6 @@ const MAX_FIRST: u64 = 1 << 62;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Classification {
-    /// The number is within the upper limit and was not seen before.
     New,
     Seen,
     /// The number is at most the given mark, the end of the dropped ranges: it is unknown whether the number was seen.
@@ -30,7 +29,6 @@ enum Classification {
     Ahead(u64),
 }
 
-/// Set of seen sequence numbers, stored as ranges.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct Numbers {
     /// Ranges of seen numbers: maps the first number of each range to the last.

@@ -57,7 +57,6 @@ impl FilterSettings {
     }
 }
 
-/// Configured filters of measured attributes and components, by local name.
 #[derive(Debug, Clone)]
 pub(crate) struct Filters {
     measured: BTreeMap<String, AttributeFilter>,
@@ -66,7 +65,6 @@ pub(crate) struct Filters {
     has_components: bool,
 }
 
-/// States of all filters, by local name of the attribute or component.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct FilterStates {
     measured: BTreeMap<String, AttributeState>,
