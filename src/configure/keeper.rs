@@ -175,12 +175,13 @@ impl Keeper {
         self.lines
     }
 
-    /// Returns the greatest sequence number of the received lines; `None` if no line has one.
+    /// Returns the greatest sequence number of the accepted lines; `None` if no line has one.
     pub fn sequence(&self) -> Option<u64> {
         self.numbers.greatest()
     }
 
-    /// Returns the gaps between received sequence numbers, as inclusive ranges `[first, last]`.
+    /// Returns the gaps between sequence numbers of accepted lines, as inclusive ranges `[first, last]`. The missing lines
+    /// have not arrived yet, or were refused.
     pub fn missing(&self) -> Vec<[u64; 2]> {
         self.numbers.missing()
     }
@@ -206,7 +207,7 @@ impl Keeper {
 
     /// Handles a line and returns the answers. `now`, the time since the start, is used if the line
     /// has no time of its own. Time never decreases: an earlier time is replaced by the time of the
-    /// previous line.
+    /// previous line. A line is refused if its own time skips too much.
     pub fn handle_at(&mut self, observation: &Observation, now: Duration) -> Vec<KeeperAnswer> {
         let mut answers = Vec::new();
         self.lines += u64::from(!observation.is_timer);

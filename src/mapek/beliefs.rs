@@ -198,7 +198,7 @@ impl Beliefs {
     }
 
     /// Returns the requested design of a function if a reconfiguration is pending, and the believed design otherwise;
-    /// `None` if the design is uncertain.
+    /// `None` if the design is unknown or uncertain.
     pub(super) fn expected(&self, function: &str) -> Option<&str> {
         if let Some((_, design)) = self.pending().find(|(name, _)| *name == function) {
             return Some(design);
