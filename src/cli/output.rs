@@ -100,7 +100,7 @@ pub fn warnings<'a>(common: &Common, messages: impl IntoIterator<Item = &'a Mess
 }
 
 /// Reports errors: text on standard error, or a JSON object as the answer. As text, at most [`MESSAGE_LIMIT`] messages
-/// are written; further ones are counted.
+/// are written; further ones are counted. `--quiet` suppresses warnings in the text.
 pub fn failure(common: &Common, messages: &[Message]) {
     if common.format == Format::Json {
         json_answer(&ErrorAnswer::new(messages));

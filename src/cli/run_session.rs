@@ -31,7 +31,8 @@ const MAX_STOPPED: u32 = 3;
 /// Minimum pause before the loop reacts to the passing of time.
 pub(super) const MIN_PAUSE: Duration = Duration::from_millis(1);
 
-/// Input of a session: a line with the time at which it was read, plans from another thread, or the end of the lines.
+/// Input of a session: a line with the time at which it was read, plans from another thread, the end of the lines, or an
+/// error in reading them.
 pub(super) enum Input {
     Line(Line, Instant),
     Thoughts(Thoughts),
@@ -260,7 +261,8 @@ impl<'a> Session<'a> {
         is_idle && self.control.is_ahead(&Observation::parse(&line.text))
     }
 
-    /// Advances the pending deliberation before the next line is handled: starts a search, or waits for its result.
+    /// Advances the pending deliberation before the next line is handled: deliberates at once, starts a search, or waits
+    /// for one further input, such as the result of the search.
     fn catch_up(
         &mut self,
         sender: &SyncSender<Input>,
@@ -282,7 +284,8 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Cancels the search for plans if the planning problem has changed.
+    /// Cancels the search for plans if the planning problem has changed, unless [`MAX_STOPPED`] searches in a row were
+    /// cancelled.
     fn stop_thinking(&mut self) {
         let Some(thinking) = &mut self.thinking else { return };
         // A search for an unchanged problem stays useful.

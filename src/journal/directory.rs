@@ -130,7 +130,8 @@ impl JournalFiles {
     }
 
     /// Returns the segments from the given number to the last one, or a description of the first
-    /// fault. Each segment has to continue the record chain of its predecessor.
+    /// fault. Each segment has to continue the record chain of its predecessor, and the last one must not end with an
+    /// `end` record.
     pub(super) fn chain(&self, from: u64) -> Result<Vec<&Segment>, String> {
         let last = self.segments.keys().chain(self.snapshots.keys()).max().copied().unwrap_or(from);
         let mut chain: Vec<&Segment> = Vec::new();

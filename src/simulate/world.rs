@@ -1,10 +1,10 @@
 //! The simulated robot: its true state, which changes with time, by disturbances and by the running
 //! action.
 //!
-//! Conditions, durations and effects of actions follow the mission's own domain, with a seeded
-//! deviation of the duration. An action stalls if its designs are not available, or if its
-//! conditions do not hold for the remaining part, and fails when it has stalled for its `patience`.
-//! The seed alone determines everything random, so all strategies face the same world.
+//! Conditions, durations and effects of actions follow the mission's own domain, with a seeded deviation of the
+//! duration. An action stalls while it is suspended, if its designs are not available, or if its conditions do not hold
+//! for the remaining part. It fails when it has stalled for the simulation's `patience`. The seed alone determines
+//! everything random, so all strategies face the same world.
 
 use std::cell::OnceCell;
 
