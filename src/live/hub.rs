@@ -181,7 +181,7 @@ impl HubSender {
         self.enqueue(Entry::Designs(designs));
     }
 
-    /// Sends whether a plan exists, and the request number of its running action, if there is one.
+    /// Sends whether a plan exists, and the number of the action under way, if there is one.
     pub(super) fn send_plan(&self, exists: bool, under_way: Option<u64>) {
         self.enqueue(Entry::Planned { exists, under_way });
     }

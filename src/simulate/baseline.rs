@@ -13,6 +13,9 @@
 //!   the requirements \[2\]. The task is planned again when an action has failed;
 //! - *random* works as *greedy*, but chooses a random admissible design.
 //!
+//! All baselines except *none* also plan again if no step is left, the goal is not reached, and other designs are
+//! available than at the last planning.
+//!
 //! [`Admission`] defines which designs are admissible. If a function has no admissible design, the
 //! action keeps the planned design if that is available, and otherwise gets an available one; the
 //! action may become possible later. If the action is impossible with the chosen designs but
@@ -77,6 +80,7 @@ pub(super) struct Controller {
     plan: VecDeque<PlannedStep>,
     random: fastrand::Rng,
     gave_up: bool,
+    /// Designs that were available at the last planning.
     planned_with: BTreeSet<String>,
     pub(super) plans: usize,
 }

@@ -18,7 +18,8 @@ const POLL_INTERVAL: Duration = Duration::from_millis(5);
 const MAX_MESSAGE_CHARACTERS: usize = 2000;
 
 /// Executes a run of a study with `program`, and waits for its end. Returns `None` if a limit is reached first; the run
-/// is killed in this case. The generator of the run's files is not subject to the limits.
+/// is killed in this case. The generator of the run's files is not subject to the limits, but its duration counts
+/// towards the time limit of the run.
 ///
 /// # Errors
 /// The program, or the generator of its files, cannot be executed.

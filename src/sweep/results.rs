@@ -37,7 +37,7 @@ pub struct Line {
     pub status: Option<i32>,
     /// `true` if the time limit ended the run.
     pub timed_out: bool,
-    /// Duration of the run, in seconds.
+    /// Duration of the run and of the generator of its files, in seconds.
     pub seconds: f64,
     /// JSON answer of the run; null if the output is not JSON.
     pub answer: Value,

@@ -180,8 +180,8 @@ impl Study {
     /// Reads the file of a study.
     ///
     /// # Errors
-    /// The file cannot be read or is not a study, a key has invalid values, or its mission has no
-    /// places for `pairs`.
+    /// The file cannot be read or parsed; otherwise all mistakes in it, such as invalid values of a key, or `pairs` with
+    /// a mission without places.
     pub fn read(file: &Path) -> Result<Self, Errors> {
         let (sections, place): (Sections, ManifestPath) = manifest::read(file)?;
         let wrong_at = |path: &[Key], part: Part, text: String| {
@@ -275,8 +275,8 @@ impl Study {
 
     /// Returns a sample of the runs for checking the study. The sample contains the first run and,
     /// for each value of each key, a run that differs from the first run only in this value. Number
-    /// ranges and pairs contribute only their last value. Each run has the path of keys to its
-    /// value in the file.
+    /// ranges and pairs contribute only their last value. Each run has the path of keys to its value in the file. The
+    /// sample of a study without runs is empty.
     pub fn samples(&self) -> Vec<(Vec<Key>, Planned)> {
         if self.is_empty() {
             return Vec::new();
@@ -346,8 +346,8 @@ impl Study {
         self.sections.time_limit
     }
 
-    /// Returns the arguments of a run's command, without the program's name. `directory` replaces
-    /// `{dir}`.
+    /// Returns the arguments of a run's command, without the program's name. `directory` replaces `{dir}`. The last
+    /// arguments request an answer in JSON without warnings.
     pub fn words(&self, run: &Planned, directory: &Path) -> Vec<String> {
         let mut words: Vec<String> =
             self.sections.command.iter().map(|word| filled(word, &run.vary, directory)).collect();
