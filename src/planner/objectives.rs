@@ -36,7 +36,7 @@ impl Objectives {
     /// the planner's value.
     ///
     /// # Errors
-    /// M170 if the validator rejects the plan or computes another value; M130 if the time limit is
+    /// M170 if the validator rejects the plan or computes another value; M130 if a limit is
     /// reached.
     pub(super) fn confirm(
         &self,

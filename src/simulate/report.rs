@@ -63,7 +63,7 @@ pub struct Run {
     pub cancelled: usize,
     /// Number of plans that were requested or computed.
     pub plans: usize,
-    /// Number of changes of a function's design.
+    /// Number of requested changes of a function from one design to another.
     pub reconfigurations: usize,
     /// Number of distinct configurations with which actions were requested.
     pub distinct: usize,
