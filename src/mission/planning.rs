@@ -42,7 +42,7 @@ pub trait Planning {
     /// (starts and ends of actions) are at least `separation` apart, in the domain's time unit.
     ///
     /// # Errors
-    /// All constructs that the planner does not support, with their places.
+    /// All constructs that the planner does not support, with their places; or a limit that was reached.
     fn ground_concurrent(
         &self,
         problem: &Problem,
