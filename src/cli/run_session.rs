@@ -31,8 +31,8 @@ const MAX_STOPPED: u32 = 3;
 /// Minimum pause before the loop reacts to the passing of time.
 pub(super) const MIN_PAUSE: Duration = Duration::from_millis(1);
 
-/// Input of a session: a line with the time at which it was read, plans from another thread, the end of the lines, or an
-/// error in reading them.
+/// Input of a session: a line with the time at which it was read, plans from another thread, the end of the lines, or
+/// an error in reading them.
 pub(super) enum Input {
     Line(Line, Instant),
     Thoughts(Thoughts),
@@ -261,8 +261,8 @@ impl<'a> Session<'a> {
         is_idle && self.control.is_ahead(&Observation::parse(&line.text))
     }
 
-    /// Advances the pending deliberation before the next line is handled: deliberates at once, starts a search, or waits
-    /// for one further input, such as the result of the search.
+    /// Advances the pending deliberation before the next line is handled: deliberates at once, starts a search, or
+    /// waits for one further input, such as the result of the search.
     fn catch_up(
         &mut self,
         sender: &SyncSender<Input>,

@@ -180,8 +180,8 @@ impl Journal {
     }
 
     /// Completes the work that the previous process left unfinished, or makes the first decision in a new journal. Both
-    /// may require planning. Returns the answers that may not have left the program: first the answers to the unfinished
-    /// work, then effects that were not acknowledged.
+    /// may require planning. Returns the answers that may not have left the program: first the answers to the
+    /// unfinished work, then effects that were not acknowledged.
     ///
     /// # Errors
     /// The journal cannot be written; the answers must not leave the program.
@@ -219,8 +219,8 @@ impl Journal {
         self.again(control, answers)
     }
 
-    /// Flushes the journal. Returns `answers`, followed by all earlier effects that were not acknowledged, which have to
-    /// be output again. A message about a failed write comes first.
+    /// Flushes the journal. Returns `answers`, followed by all earlier effects that were not acknowledged, which have
+    /// to be output again. A message about a failed write comes first.
     fn again<C: Recoverable>(
         &mut self,
         control: &C,

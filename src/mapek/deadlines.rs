@@ -88,8 +88,8 @@ fn check_effects(beliefs: &mut Beliefs, deadline: Duration, answers: &mut Vec<An
         if waited < deadline || is_request(effect) && request_of_suspended != Some(*number) {
             continue;
         }
-        // Other effects than reconfigurations are repeated without end. Otherwise, for example, a cancelled action might
-        // go on.
+        // Other effects than reconfigurations are repeated without end. Otherwise, for example, a cancelled action
+        // might go on.
         let is_expired = wait.repeats > 0 && matches!(effect.command, Command::Reconfigure { .. });
         let outcome = if is_expired { OverdueOutcome::Failed } else { OverdueOutcome::Repeated };
         answers.push(Answer::Overdue {

@@ -71,8 +71,8 @@ pub(super) fn must_be_sent(beliefs: &Beliefs, running: &Running, pair: &(String,
 }
 
 /// Creates the effect (request to the robot) with `command` and adds it to the answers. Removes the outstanding effects
-/// that it supersedes. The new effect lists their numbers and those of earlier superseded effects that may still arrive,
-/// at most [`MAX_SUPERSEDED`].
+/// that it supersedes. The new effect lists their numbers and those of earlier superseded effects that may still
+/// arrive, at most [`MAX_SUPERSEDED`].
 pub(super) fn effect(beliefs: &mut Beliefs, action: u64, command: Command, answers: &mut Vec<Answer>) {
     beliefs.effects += 1;
     let number = beliefs.effects;

@@ -30,7 +30,8 @@ pub(super) struct Received {
     pub(super) implied: Option<u64>,
 }
 
-/// The reconfiguration with the greatest number among those that were acknowledged, or implied by a report of an action.
+/// The reconfiguration with the greatest number among those that were acknowledged, or implied by a report of an
+/// action.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Acknowledged {
     pub(super) effect: u64,

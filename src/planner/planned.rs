@@ -37,8 +37,8 @@ pub struct Planned<'m> {
     pub values: Vec<Exact>,
     /// Further optimal plans, if requested and if the plan is proved optimal.
     pub alternatives: Option<Alternatives>,
-    /// If the mission is proved unsolvable: unavailable designs that prevent a plan, or the information that designs are
-    /// not the reason. Always `None` for overlapping actions, and for costs that are too large for integers.
+    /// If the mission is proved unsolvable: unavailable designs that prevent a plan, or the information that designs
+    /// are not the reason. Always `None` for overlapping actions, and for costs that are too large for integers.
     pub blocking: Option<Blocking>,
     /// If the mission is proved unsolvable: numeric functions that actions need and that have no value. Empty in the
     /// same cases as [`Planned::blocking`].

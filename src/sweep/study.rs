@@ -180,8 +180,8 @@ impl Study {
     /// Reads the file of a study.
     ///
     /// # Errors
-    /// The file cannot be read or parsed; otherwise all mistakes in it, such as invalid values of a key, or `pairs` with
-    /// a mission without places.
+    /// The file cannot be read or parsed; otherwise all mistakes in it, such as invalid values of a key, or `pairs`
+    /// with a mission without places.
     pub fn read(file: &Path) -> Result<Self, Errors> {
         let (sections, place): (Sections, ManifestPath) = manifest::read(file)?;
         let wrong_at = |path: &[Key], part: Part, text: String| {
