@@ -1,6 +1,7 @@
-//! A robot that loses its camera: a plan, the loop that keeps it, and a certificate that somebody else can check.
+//! Example of the library: plans for a mission, verifies the certificate of the plan, and runs the adaptation loop when
+//! a component fails.
 //!
-//! `cargo run --example adapt -- MANIFEST COMPONENT`
+//! `cargo run --example adapt -- MANIFEST COMPONENT`; by default the ground vehicle and its Kinect.
 #![expect(clippy::print_stdout, reason = "an example prints")]
 
 use std::error::Error;
@@ -19,7 +20,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let component = words.get(1).map_or("c_kinect", String::as_str);
     let setup = Setup::read(Path::new(manifest))?;
 
-    // One plan, with all that is needed to check that there is no better one.
+    // The certificate contains all data with which the optimality of the plan can be checked.
     let planned = Planner::new(&setup.mission)?.time_limit(Duration::from_secs(60)).plan()?;
     println!("{}", planned.solution.verdict());
     let directory = std::env::temp_dir().join(format!("metaplan-adapt-{}", std::process::id()));
@@ -28,7 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("the certificate is {}", if verification.verified() { "verified" } else { "wrong" });
     std::fs::remove_dir_all(&directory)?;
 
-    // The loop hears what happens, and says what is to be done.
+    // The loop receives reports of the robot, and returns requests for the robot.
     let mut control = Loop::new(setup.mission, setup.settings)?;
     for answer in control.start() {
         println!("{}", answer.to_json());

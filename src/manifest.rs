@@ -156,7 +156,7 @@ impl ManifestPath {
     /// Converts a value to an exact number. `key` is the name of the value for messages.
     ///
     /// # Errors
-    /// The value is not a non-negative decimal.
+    /// The value is not a non-negative decimal, or it has too many digits.
     pub fn number(&self, key: &str, value: &Spanned<toml::Value>) -> Result<BigRational, Message> {
         let text = match value.get_ref() {
             toml::Value::String(text) => text.clone(),

@@ -28,13 +28,13 @@ pub(crate) fn exact(text: &str) -> Option<BigRational> {
     Some(if exponent < 0 { value / power } else { value * power })
 }
 
-/// Rounds a number to [`DECIMALS`] decimals.
 pub(crate) fn rounded(value: &BigRational) -> BigRational {
     let scale = BigRational::from_integer(10_i64.pow(DECIMALS).into());
     (value * &scale).round() / scale
 }
 
-/// Parses a JSON number, or a string that contains a number.
+/// Parses a JSON number, or a string that contains a number. Returns `None` for other values, and in the cases of
+/// [`exact`].
 pub(crate) fn from_json(value: &Value) -> Option<BigRational> {
     match value {
         Value::Number(number) => exact(&number.to_string()),
@@ -59,12 +59,10 @@ pub(crate) fn exact_to_json(value: &planner::Exact) -> Value {
     value.to_string().parse::<serde_json::Number>().map_or_else(|_| value.to_f64().into(), Value::Number)
 }
 
-/// Converts a rational to the nearest double.
 pub(crate) fn to_f64(value: &BigRational) -> f64 {
     if value.is_zero() { 0.0 } else { value.to_f64().unwrap_or(f64::MAX) }
 }
 
-/// Converts a number of the planner to a rational.
 pub(crate) fn of_plan(value: &planner::Exact) -> BigRational {
     value.to_rational()
 }

@@ -87,7 +87,9 @@ impl Setup {
     /// ```
     ///
     /// # Errors
-    /// All faults of the manifest and of the files that it names.
+    /// The faults of the manifest's text; otherwise those of its settings and of the files that it names; otherwise
+    /// names in the settings of filters that the knowledge base does not have. Faulty settings hide faults that only
+    /// the whole mission shows. Scenarios are not checked; see [`Setup::mistakes`].
     pub fn read(manifest: &Path) -> Result<Self, Errors> {
         let (sections, origin) = manifest::read(manifest)?;
         Self::of(sections, origin)
@@ -97,7 +99,7 @@ impl Setup {
     /// `directory`. Messages use `name` as the file name of the manifest.
     ///
     /// # Errors
-    /// All faults of the manifest and of the files that it names.
+    /// Those of [`Setup::read`].
     pub fn parse(name: &str, text: &str, directory: &Path) -> Result<Self, Errors> {
         let (sections, origin) = manifest::parse(name, text, directory)?;
         Self::of(sections, origin)
@@ -135,11 +137,11 @@ impl Setup {
         Ok(Self { mission, description, settings, time_unit, roles, scenarios, report, origin })
     }
 
-    /// Applies a scenario of the manifest to the mission of this setup.
+    /// Applies a scenario of the manifest to the mission of this setup. Settings that fit the mission are applied even
+    /// if others do not fit.
     ///
     /// # Errors
-    /// M108 if the scenario does not exist; otherwise all settings of the scenario that do not fit
-    /// the mission.
+    /// M108 if the scenario does not exist; otherwise all settings of the scenario that do not fit the mission.
     pub fn apply(&mut self, scenario: &str) -> Result<(), Errors> {
         let Some(found) = self.scenarios.get(scenario) else { return Err(self.no_scenario(scenario).into()) };
         let mistakes = found.mistakes(&mut self.mission);
@@ -218,7 +220,6 @@ impl Setup {
         self.report.positions(&self.origin)
     }
 
-    /// Converts a mistake in a scenario to a message with a position in the manifest.
     fn in_scenario(&self, name: &str, Mistake { path, part, message }: Mistake) -> Message {
         let path: Vec<Key> = ["scenarios".into(), name.into()].into_iter().chain(path).collect();
         let text = format!("scenario `{name}`: {}", message.message);

@@ -31,7 +31,6 @@ use crate::file::create_directory;
 use crate::message::Message;
 use crate::mission::Mission;
 
-/// File name of the clausal proof (DRAT) as the SAT solver writes it, before it is trimmed.
 const DRAFT: &str = "draft.drat";
 
 /// Reference to a ground task, with integers or with rationals.

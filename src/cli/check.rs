@@ -86,7 +86,6 @@ fn width(text: &str) -> Result<f64, String> {
     text.parse::<f64>().ok().filter(|width| *width > 0.0 && width.is_finite()).ok_or_else(wrong)
 }
 
-/// The queried properties, and the file that they come from.
 struct Queries {
     listed: Vec<Listed>,
     declarations: Declarations,
@@ -94,7 +93,6 @@ struct Queries {
     text: String,
 }
 
-/// Results of all properties for one combination of constant values.
 struct CombinationResult<'a> {
     combination: &'a Combination,
     reports: Vec<Result<Report, Error>>,
@@ -194,7 +192,6 @@ fn asked(arguments: &Arguments) -> Result<Queries, Failure> {
     Ok(Queries { listed, declarations, file: name, text })
 }
 
-/// Data shared by all combinations of constants.
 struct CheckContext<'a> {
     arguments: &'a Arguments,
     model: &'a Model,
@@ -254,8 +251,8 @@ fn single(arguments: &Arguments, common: &Common, property: &str, report: &Repor
     Ok(if is_proved(arguments, report) { Exit::Done } else { Exit::NotProved })
 }
 
-/// Writes several answers: a line for each property, or a table with a line for each combination of values. Also writes
-/// the CSV file, if requested.
+/// Writes several answers: as JSON, as a line for each property, or as a table with a line for each combination of
+/// values. Also writes the CSV file, if requested.
 fn write_all(
     arguments: &Arguments,
     common: &Common,
@@ -302,7 +299,6 @@ fn write_all(
     Ok(())
 }
 
-/// Returns the messages of an error.
 fn said(error: &Error) -> Vec<String> {
     match error.diagnostics() {
         [] => vec![error.to_string()],

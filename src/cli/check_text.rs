@@ -42,7 +42,6 @@ pub fn as_text(report: &Report, verbose: bool) -> String {
     text
 }
 
-/// Formats a table with a line for each state: the values of the variables, and the result in this state.
 fn states_text(variables: &[(String, bool)], states: &[Listed]) -> String {
     if states.is_empty() {
         return "no state\n".to_owned();

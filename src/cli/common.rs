@@ -90,7 +90,6 @@ pub(super) struct Common {
 }
 
 impl Common {
-    /// Returns `true` if output to the stream is coloured.
     pub(super) fn colors(&self, stream: &impl IsTerminal) -> bool {
         let is_set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
         let is_dumb = std::env::var_os("TERM").is_some_and(|terminal| terminal == "dumb");

@@ -20,10 +20,8 @@ use crate::cli::compare_table::{as_text, costs_text, csv};
 use crate::cli::drawn::Pages;
 use crate::cli::output;
 
-/// Polling interval of the clock.
 const INTERVAL: Duration = Duration::from_millis(10);
 
-/// Intermediate results: the finished comparisons, and the current one.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SoFar {
     /// Total number of comparisons. `None` while files are read.
@@ -40,7 +38,6 @@ pub(super) struct SoFar {
     pub pages: Pages,
 }
 
-/// An unfinished comparison.
 #[derive(Debug, Clone)]
 pub(super) struct Begun {
     pub pair: Option<Pair>,
@@ -113,7 +110,6 @@ impl Shared {
 }
 
 impl SoFar {
-    /// Returns the message about the reached time limit and the number of available results.
     fn message(&self) -> Message {
         let Some(of) = self.of else {
             return Message::error(
@@ -130,7 +126,8 @@ impl SoFar {
         Message::error("M130", text)
     }
 
-    /// Writes the answer, with a message if it is incomplete.
+    /// Writes the answer and the requested files, with a message if the answer is incomplete. Files are not written if
+    /// nothing was evaluated.
     fn show(mut self, common: &Common, message: Option<Message>) -> Result<(), Failure> {
         let done = self.done.iter().flat_map(|(pair, comparison)| rows(pair.as_ref(), comparison));
         let begun = self

@@ -73,7 +73,6 @@ fn requirement(text: &str) -> Result<(String, String, BigRational), String> {
 }
 
 impl Wanted {
-    /// Returns `true` if no option is given.
     pub(super) fn is_empty(&self) -> bool {
         self.objectives.is_empty()
             && self.requirements.is_empty()

@@ -51,12 +51,10 @@ pub(super) struct Pages {
 }
 
 impl Pages {
-    /// Returns `true` if an HTML page or SVG files are requested.
     pub(super) fn are_wanted(&self) -> bool {
         self.report.is_some() || self.svg.is_some()
     }
 
-    /// Writes the requested HTML page and SVG files of a sheet of pictures.
     pub(super) fn write(&self, sheet: &Sheet) -> Result<(), Failure> {
         if let Some(directory) = &self.svg {
             write_pictures(directory, &sheet.pictures())?;
@@ -75,19 +73,17 @@ pub(super) fn write_pictures(directory: &Path, pictures: &[(String, String)]) ->
 }
 
 impl Drawing {
-    /// Returns `true` if an SVG file is requested.
     pub(super) fn is_file_wanted(&self) -> bool {
         self.svg.is_some()
     }
 
-    /// Writes the picture of a Pareto front to an SVG file, if requested.
     pub(super) fn draw_front(&self, sheet: &Sheet) -> Result<(), Failure> {
         let (Some(file), [(_, picture)]) = (&self.svg, &sheet.pictures()[..]) else { return Ok(()) };
         output::write_file(file, &visible(picture))
     }
 
     /// Writes the timeline of a plan to an SVG file, if requested, and returns the timeline as text for a terminal. The
-    /// text is empty if it is not requested, or if the terminal is too small.
+    /// text is empty without a plan, if it is not requested, or if the terminal is too small.
     pub(super) fn draw(
         &self,
         mission: &Mission,

@@ -93,7 +93,6 @@ fn explain_plan(mission: &Mission, limits: &Limits, common: &Common) -> Result<b
     Ok(changes.complete)
 }
 
-/// Runs `plan`, which computes plans, and shows its progress.
 fn planning<T>(
     common: &Common,
     limits: &Limits,
@@ -105,7 +104,6 @@ fn planning<T>(
     outcome.map_err(|messages| Failure::planning(messages, limits))
 }
 
-/// Prints meaning, cause and remedy of a message code.
 fn code(name: &str, common: &Common) -> Result<Exit, Failure> {
     let Some(found) = codes::find(name) else {
         let catalogue = codes::all();
@@ -122,12 +120,10 @@ fn code(name: &str, common: &Common) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-/// Formats the steps of a plan, one per line.
 fn plan_text(answer: &BestPlan) -> String {
     answer.steps.iter().fold(String::new(), |text, step| text + "    " + &step.summary() + "\n")
 }
 
-/// Formats the cost of the plan `answer`, with the difference from the cost of the plan `best`.
 fn cost_text(answer: &BestPlan, best: &BestPlan) -> String {
     let cost = match (&answer.cost, answer.proved) {
         (None, true) => return "there is no plan".to_owned(),
@@ -173,7 +169,6 @@ fn alteration_text(alteration: &Alteration, about: bool) -> String {
     }
 }
 
-/// Formats the reasons why a design is available or unavailable. The reasons need no planning.
 fn why_text(why: &Availability) -> String {
     let functions = why.functions.join(", ");
     let state = if why.available { "is available" } else { "is not available" };
@@ -225,7 +220,6 @@ fn design_text(found: &DesignExplanation) -> String {
     text + &repairs_text(found)
 }
 
-/// Formats the changes that make an unavailable design available, or an available design unavailable.
 fn repairs_text(found: &DesignExplanation) -> String {
     let DesignExplanation { availability, best, repairs, .. } = found;
     let mut text = String::new();
@@ -258,7 +252,6 @@ fn repairs_text(found: &DesignExplanation) -> String {
     text
 }
 
-/// Formats the smallest changes of the situation that lead to another plan.
 fn changes_text(found: &SmallestChanges) -> String {
     let SmallestChanges { best, changes, complete, .. } = found;
     let mut text = match (&best.cost, best.proved) {

@@ -21,10 +21,9 @@ use crate::cli::common::{Common, Exit, Failure};
 use crate::cli::output;
 use crate::cli::values::seconds;
 
-/// Polling interval of the clock.
 const INTERVAL: Duration = Duration::from_millis(10);
 
-/// Time after 1.1 times the time limit at which a command without an answer is ended.
+/// Additional time, after 1.1 times the time limit, until a command without an answer is ended.
 const GRACE: Duration = Duration::from_millis(150);
 
 /// The option `--time-limit` of commands that have nothing to show before their end, and of those that show what they have.

@@ -15,7 +15,6 @@ pub(super) fn values_text(objectives: &[String], values: &[Exact]) -> String {
     format!("in order: {}\n", pairs(objectives, values))
 }
 
-/// Formats a Pareto front: the values of the objectives and the steps of the plan for each point.
 pub(super) fn front_text(name: &str, objectives: &[String], front: &Front, columns: Option<u16>) -> String {
     let solved: Vec<_> = front.points.iter().filter(|point| point.solution.plan.is_some()).collect();
     let mut text = String::new();

@@ -17,7 +17,6 @@ use serde::Serialize;
 
 use crate::cli::common::{Common, Failure, Format};
 
-/// Set if an answer could not be written.
 static ANSWER_LOST: AtomicBool = AtomicBool::new(false);
 
 /// Set once an answer, or a part of one, is being written.
@@ -101,7 +100,7 @@ pub fn warnings<'a>(common: &Common, messages: impl IntoIterator<Item = &'a Mess
 }
 
 /// Reports errors: text on standard error, or a JSON object as the answer. As text, at most [`MESSAGE_LIMIT`] messages
-/// are written; further ones are counted.
+/// are written; further ones are counted. `--quiet` suppresses warnings in the text.
 pub fn failure(common: &Common, messages: &[Message]) {
     if common.format == Format::Json {
         json_answer(&ErrorAnswer::new(messages));

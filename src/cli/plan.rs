@@ -152,7 +152,6 @@ impl From<Encoding> for StepSemantics {
     }
 }
 
-/// Returns the optimizer's configuration for the options of the command line.
 fn configuration(arguments: &Arguments, limits: Limits) -> Config {
     Config::default()
         .with_horizon(arguments.horizon)
@@ -186,7 +185,6 @@ impl Arguments {
         output::file_named(self.output.as_ref())
     }
 
-    /// Returns the format in which the plan is written.
     fn form(&self, common: &Common) -> PlanFormat {
         match (self.plan_format, common.format) {
             (Some(format), _) => format,
@@ -197,7 +195,7 @@ impl Arguments {
         }
     }
 
-    /// Returns the number of columns for tables, or `None` for files, which have no width.
+    /// Returns the number of columns for tables. `None` for files, which have no width, or if the width is unknown.
     fn columns(&self) -> Option<u16> {
         if self.file().is_some() { None } else { output::columns() }
     }
@@ -281,7 +279,6 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     })
 }
 
-/// Splits the value of `--pareto` at the comma into two objectives.
 fn two(pair: &str) -> Result<[&str; 2], Failure> {
     let parts: Vec<_> = pair.split(',').map(str::trim).collect();
     <[&str; 2]>::try_from(parts).map_err(|parts| {
@@ -291,7 +288,6 @@ fn two(pair: &str) -> Result<[&str; 2], Failure> {
     })
 }
 
-/// Prints the answer, or writes it to a file, and draws the requested pictures.
 fn finish(
     planned: &Planned<'_>,
     mission: &Mission,
@@ -364,7 +360,6 @@ fn show(
     }
 }
 
-/// Maximum number of listed missing values; further ones are only counted.
 const MISSING_SHOWN: usize = 10;
 
 /// Lists values of numeric functions that are missing in the mission, one per line and at most [`MISSING_SHOWN`].
@@ -392,7 +387,6 @@ fn missing_text(missing: &[MissingValue]) -> String {
     }
 }
 
-/// Shows a Pareto front or writes it to files, and returns the exit status.
 fn show_front(
     front: &PlannedFront<'_>,
     name: &str,
@@ -417,7 +411,6 @@ fn show_front(
     Ok(exit(front.front.status))
 }
 
-/// Returns the exit status for a solution status.
 pub(super) fn exit(status: Status) -> Exit {
     match status {
         Status::Optimal => Exit::Done,

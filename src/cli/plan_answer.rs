@@ -31,7 +31,6 @@ pub(super) fn answer_text(name: &str, solution: &Solution, columns: Option<u16>)
     text
 }
 
-/// Formats the statistics of planning (search, formulas, running times), for `--verbose`.
 pub(super) fn statistics_text(solution: &Solution, preparation: &Preparation) -> String {
     let statistics = &solution.statistics;
     let families: Vec<_> =

@@ -15,10 +15,8 @@ use crate::cli::output;
 /// Delay before the first progress line, so that short commands show none.
 const INITIAL_DELAY: Duration = Duration::from_secs(3);
 
-/// Time between two progress lines.
 const INTERVAL: Duration = Duration::from_secs(5);
 
-/// A progress display that ends when it is finished or dropped.
 pub(super) struct Progress {
     bar: ProgressBar,
     message: Arc<Mutex<String>>,
@@ -26,7 +24,6 @@ pub(super) struct Progress {
 }
 
 impl Progress {
-    /// Starts the progress display for the activity `what`.
     pub(super) fn new(what: &'static str, common: &Common) -> Self {
         let is_terminal = std::io::stderr().is_terminal();
         let is_shown = is_terminal && !common.quiet;
@@ -44,19 +41,16 @@ impl Progress {
         Self { bar, message, teller }
     }
 
-    /// Sets the text of the current progress.
     pub(super) fn set_message(&self, text: String) {
         text.clone_into(&mut self.message.lock().unwrap_or_else(PoisonError::into_inner));
         self.bar.set_message(text);
     }
 
-    /// Ends the display.
     pub(super) fn finish(self) {
         drop(self);
     }
 }
 
-/// Runs `work`, and shows the progress of the activity `what` until `work` returns.
 pub(super) fn during<T>(what: &'static str, common: &Common, work: impl FnOnce() -> T) -> T {
     let _progress = Progress::new(what, common);
     work()

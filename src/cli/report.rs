@@ -98,7 +98,6 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     Ok(exit(status))
 }
 
-/// Writes the report of a journal as an HTML page.
 fn journal(arguments: &Arguments, directory: &Path, report: &JournalReport) -> Result<Exit, Failure> {
     let log = log_picture(&directory.display().to_string(), report);
     if let Some(directory) = &arguments.svg {
@@ -121,7 +120,6 @@ fn write(arguments: &Arguments, page: &str, said: &str) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The solution of a mission, and its plan in the form for pictures.
 struct Answer {
     solution: Solution,
     plan: Plan,

@@ -94,7 +94,6 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     ended(drive(common, control, journal, &ready, events, &outlet), &outlet)
 }
 
-/// Opens the journal, if requested, and restores the loop from it.
 fn journal(
     arguments: &Arguments,
     common: &Common,
@@ -156,7 +155,6 @@ fn keep(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     ended(keep_going(common, keeper, journal, &ready, events, &outlet), &outlet)
 }
 
-/// Reads the section `[adaptation]` of a file, or returns the default settings.
 fn adaptation(file: Option<&Path>, knowledge: &Knowledge) -> Result<Settings, Failure> {
     let Some(file) = file else { return Ok(Settings::default()) };
     Ok(Settings::read(file, Some(knowledge))?)

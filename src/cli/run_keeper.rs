@@ -13,7 +13,6 @@ use crate::cli::run_lines::{Line, Lines};
 use crate::cli::run_outlet::{Outlet, unwritten, warn_if_unrecorded};
 use crate::cli::run_session::{Flow, Input, MAX_WAITING, MIN_PAUSE, flow, read};
 
-/// A configuration loop with its inputs and outputs.
 pub(super) struct KeeperSession<'a> {
     common: &'a Common,
     keeper: Keeper,

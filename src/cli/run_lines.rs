@@ -67,7 +67,6 @@ impl Lines {
         self.is_file
     }
 
-    /// Returns the next line, or `None` at the end.
     pub(super) fn next(&mut self, common: &Common) -> Result<Option<Line>, Message> {
         let line = self.look().and_then(|()| match &mut self.source {
             Source::Fresh(_) => Ok(None),
@@ -101,7 +100,6 @@ impl Lines {
     }
 }
 
-/// Returns `true` if standard input is a file on disk.
 fn stdin_is_file() -> bool {
     #[cfg(unix)]
     {

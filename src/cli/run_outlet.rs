@@ -90,7 +90,6 @@ impl Outlet {
         }
     }
 
-    /// Publishes the initial state of the loop: the designs, and the plan if there is one.
     pub(super) fn begin(&self, control: &Loop) {
         if let Some(live) = &self.live {
             live.known(control.designs());
@@ -150,7 +149,6 @@ impl Outlet {
         self.say(&text)
     }
 
-    /// Closes the opened destinations.
     pub(super) fn close(&self) -> Result<(), Message> {
         if let Some(live) = &self.live {
             live.end();
@@ -178,7 +176,6 @@ pub(super) fn unwritten(error: &io::Error) -> Message {
     Message::error("M321", format!("the journal cannot be written: {error}"))
 }
 
-/// Prints a warning if an answer reports that the loop continues without its journal.
 pub(super) fn warn_if_unrecorded<'a>(common: &Common, answers: impl IntoIterator<Item = &'a Answer>) {
     for answer in answers {
         if let Answer::Unrecorded { message } = answer {

@@ -31,7 +31,8 @@ const MAX_STOPPED: u32 = 3;
 /// Minimum pause before the loop reacts to the passing of time.
 pub(super) const MIN_PAUSE: Duration = Duration::from_millis(1);
 
-/// Input of a session: a line with the time at which it was read, plans from another thread, or the end of the lines.
+/// Input of a session: a line with the time at which it was read, plans from another thread, the end of the lines, or
+/// an error in reading them.
 pub(super) enum Input {
     Line(Line, Instant),
     Thoughts(Thoughts),
@@ -39,14 +40,12 @@ pub(super) enum Input {
     Failed(Message),
 }
 
-/// A search for plans on another thread.
 struct PlanSearch {
     question: u64,
     stop: Arc<AtomicBool>,
     is_stopped: bool,
 }
 
-/// Control flow after an input.
 #[derive(PartialEq, Eq)]
 pub(super) enum Flow {
     GoesOn,
@@ -54,7 +53,6 @@ pub(super) enum Flow {
     Over,
 }
 
-/// An adaptation loop with its inputs and outputs.
 pub(super) struct Session<'a> {
     common: &'a Common,
     control: Loop,
@@ -171,7 +169,6 @@ impl<'a> Session<'a> {
         self.answer(number, &answers, read)
     }
 
-    /// Handles a line completely: reacts, deliberates, and writes all answers.
     fn answer_line(&mut self, line: &Line, read: Instant) -> Result<Flow, Failure> {
         let now = self.heard(line);
         let answers = match &mut self.journal {
@@ -238,7 +235,6 @@ impl<'a> Session<'a> {
         Some(due.saturating_sub(self.begun + self.clock.now()).max(MIN_PAUSE))
     }
 
-    /// Reacts to the passing of time if something has become due.
     fn elapse(&mut self) -> Result<Flow, Failure> {
         let now = self.begun + self.clock.now();
         if self.control.due().is_none_or(|due| due > now) {
@@ -265,7 +261,8 @@ impl<'a> Session<'a> {
         is_idle && self.control.is_ahead(&Observation::parse(&line.text))
     }
 
-    /// Advances the pending deliberation before the next line is handled: starts a search, or waits for its result.
+    /// Advances the pending deliberation before the next line is handled: deliberates at once, starts a search, or
+    /// waits for one further input, such as the result of the search.
     fn catch_up(
         &mut self,
         sender: &SyncSender<Input>,
@@ -287,7 +284,8 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Cancels the search for plans if the planning problem has changed.
+    /// Cancels the search for plans if the planning problem has changed, unless [`MAX_STOPPED`] searches in a row were
+    /// cancelled.
     fn stop_thinking(&mut self) {
         let Some(thinking) = &mut self.thinking else { return };
         // A search for an unchanged problem stays useful.
@@ -316,8 +314,8 @@ impl<'a> Session<'a> {
         Ok(Flow::GoesOn)
     }
 
-    /// Deliberates with the result of another thread. A result for an outdated problem is
-    /// discarded, and the search is repeated.
+    /// Deliberates with the result of another thread. A result for an outdated problem is discarded and the search is
+    /// repeated, except after [`MAX_STOPPED`] cancelled searches in a row.
     fn conclude(&mut self, thoughts: Thoughts) -> Result<Flow, Failure> {
         let was_stopped = self.thinking.take().is_some_and(|search| search.is_stopped);
         let is_late = self.stopped >= MAX_STOPPED;
@@ -352,7 +350,6 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// Writes answers to the last line; more may follow.
     fn say(&self, answers: &[Answer]) -> Result<Flow, Failure> {
         warn_if_unrecorded(self.common, answers);
         let number = self.control.beliefs().lines();
@@ -361,7 +358,6 @@ impl<'a> Session<'a> {
         Ok(flow)
     }
 
-    /// Writes the last answers to a line, and the acknowledgement of the line.
     fn answer(&self, number: u64, answers: &[Answer], read: Instant) -> Result<Flow, Failure> {
         warn_if_unrecorded(self.common, answers);
         let flow = flow(self.outlet.answer(number, answers, read))?;

@@ -126,7 +126,6 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     Ok(if incomplete.is_some() { Exit::NothingFound } else { Exit::Done })
 }
 
-/// Reads a mission and a scenario for simulation, and reports all mistakes in the scenario.
 fn experiment(mission: &Path, scenario: &str, common: &Common) -> Result<Experiment, Failure> {
     let read = || Setup::read(mission)?.experiment(scenario);
     during("reading", common, read).map_err(scenario_failure)
@@ -232,7 +231,6 @@ fn text(strategies: &[Strategy], runs: &[Run], unit: TimeUnit) -> String {
     output::table(&header, rows) + &failures_text(strategies, runs)
 }
 
-/// Lists the reasons of failed missions, one line per strategy that has such missions.
 fn failures_text(strategies: &[Strategy], runs: &[Run]) -> String {
     let mut text = String::new();
     for &strategy in strategies {

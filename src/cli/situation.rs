@@ -69,7 +69,6 @@ impl Imports {
 }
 
 impl Situation {
-    /// Returns the options for a mission with a manifest: a scenario, values to set, and failed components.
     pub(super) fn of_mission(
         scenario: Option<String>,
         set: Vec<(String, String)>,
@@ -111,7 +110,6 @@ impl Situation {
         self.setup(inputs, common).map(|setup| setup.mission)
     }
 
-    /// Reads the mission as [`Situation::mission`] does. Returns it with the settings of the manifest.
     pub(super) fn setup(&self, inputs: &[PathBuf], common: &Common) -> Result<Setup, Failure> {
         during("reading", common, || self.read(inputs))
     }
@@ -187,7 +185,6 @@ pub(super) fn scenario_failure(messages: Errors) -> Failure {
     Failure { exit: if is_usage { Exit::Usage } else { Exit::BadInput }, messages }
 }
 
-/// Reads a knowledge base, marks the components in `fail` as failed, and sets the measured attributes in `set`.
 pub(super) fn knowledge(
     documents: &[PathBuf],
     rules: &[String],

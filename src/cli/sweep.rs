@@ -170,7 +170,6 @@ fn say(answer: &SweepAnswer, groups: &[Group], common: &Common) -> Exit {
     if answer.is_complete() { Exit::Done } else { Exit::NotProved }
 }
 
-/// Formats the mean of each group and column as a table, one row per mean.
 fn text(groups: &[Group]) -> String {
     if groups.is_empty() {
         return String::new();

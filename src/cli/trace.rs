@@ -8,7 +8,6 @@ use crate::message::Message;
 use tracing_chrome::{ChromeLayerBuilder, FlushGuard};
 use tracing_subscriber::layer::SubscriberExt as _;
 
-/// A profile that is being recorded to a file.
 pub(super) struct Trace {
     flush: FlushGuard,
     pending: Pending,
@@ -16,10 +15,6 @@ pub(super) struct Trace {
 }
 
 impl Trace {
-    /// Starts to record spans, until [`Trace::end`].
-    ///
-    /// # Errors
-    /// The file cannot be created.
     pub(super) fn begin(file: &Path) -> Result<Self, Message> {
         let (writer, pending) = create(file).map_err(|error| unwritten(file, &error))?;
         let (layer, flush) = ChromeLayerBuilder::new().writer(writer).include_args(true).build();
@@ -29,10 +24,6 @@ impl Trace {
         Ok(Self { flush, pending, file: file.to_owned() })
     }
 
-    /// Stops the recording and completes the file.
-    ///
-    /// # Errors
-    /// The file cannot be written.
     pub(super) fn end(self) -> Result<(), Message> {
         drop(self.flush);
         self.pending.commit().map_err(|error| unwritten(&self.file, &error))

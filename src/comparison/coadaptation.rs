@@ -116,9 +116,7 @@ pub struct Arc {
     pub by: Vec<Option<Traversal>>,
 }
 
-/// Maximum number of places that the encoding of a state supports.
 const MAX_PLACES: usize = 1 << 16;
-/// Maximum number of configurations that the encoding of a state supports.
 const MAX_CONFIGURATIONS: usize = 1 << 12;
 
 /// A configuration: a design of the function that moving requires.
@@ -367,7 +365,6 @@ pub(super) fn components(view: &View<'_>, design: &str) -> Vec<String> {
         .unwrap_or_default()
 }
 
-/// Initial facts and values of a problem, by symbol.
 pub(super) struct Facts {
     facts: BTreeMap<String, Vec<Vec<String>>>,
     values: BTreeMap<Vec<String>, BigRational>,

@@ -44,7 +44,6 @@ impl Compared<'_> {
         compare(self.coadaptation, config, &mut planner, report)
     }
 
-    /// Computes a plan from a state of the process.
     fn plan(&self, risk: Risk, situation: Valuation) -> Result<Planned, Errors> {
         let Self { roles, coadaptation, .. } = *self;
         let mut mission = self.mission.clone();

@@ -168,9 +168,9 @@ pub struct Hindsight {
     /// Least time or energy of a mission that reaches its goal without a loss. `None` if the goal
     /// cannot be reached.
     pub least: Option<f64>,
-    /// Expected least time or energy for a clairvoyant controller, which knows in advance the move
-    /// at which the component is lost. A mission that cannot reach its goal because of the loss
-    /// costs the penalty.
+    /// Expected least time or energy for a clairvoyant controller, which knows in advance the move at which the
+    /// component is lost. At most the penalty is counted in each case, for example if the loss makes the goal
+    /// unreachable. `None` if the expected value is infinite.
     pub expected: Option<f64>,
 }
 

@@ -119,7 +119,6 @@ const SPEEDS: [Speed; 3] = [
     Speed("safe", 0.24, 4000.0, false),
 ];
 
-/// A configuration of the imported mission: a localisation method at a speed.
 #[derive(Clone, Copy)]
 struct LegalConfiguration {
     design: &'static Design,
@@ -165,7 +164,6 @@ impl LegalConfiguration {
 const SPEED: f64 = 0.68;
 /// Energy per metre and milliwatt at [`SPEED`], in the map's unit.
 const ENERGY: f64 = 0.01;
-/// Maximum number of places that the message about an unknown place lists.
 const MAX_LISTED_PLACES: usize = 20;
 /// Energy of the battery that is kept in reserve, in the map's unit.
 const RESERVE_LEVELS: u32 = 500;

@@ -12,7 +12,6 @@ use serde_json::value::RawValue;
 
 use crate::message::{Errors, Message, did_you_mean};
 
-/// A map: its places with their neighbours, and measurements on arcs.
 #[derive(Deserialize)]
 pub(super) struct Map<'t> {
     #[serde(rename = "map", borrow)]
@@ -27,7 +26,6 @@ pub(super) struct Map<'t> {
     unsafe_rectangles: Vec<de::IgnoredAny>,
 }
 
-/// A place of the map.
 #[derive(Deserialize)]
 pub(super) struct Node<'t> {
     #[serde(rename = "node-id", borrow)]
@@ -59,7 +57,6 @@ impl<'de: 't, 't> Deserialize<'de> for Placed<'t> {
     }
 }
 
-/// Measurements on an arc, by configuration.
 pub(super) struct Measured<'t> {
     pub(super) from: String,
     pub(super) to: String,
@@ -83,10 +80,6 @@ impl<'de: 't, 't> Deserialize<'de> for Measured<'t> {
 }
 
 impl<'t> Map<'t> {
-    /// Reads a map.
-    ///
-    /// # Errors
-    /// The text is not JSON of this form, places occur twice, or arcs lead to unknown places.
     pub(super) fn read(file: &str, text: &'t str) -> Result<Self, Errors> {
         let map: Self = serde_json::from_str(text).map_err(|error| {
             let older = if error.to_string().contains("missing field `coords`") {
@@ -106,7 +99,6 @@ impl<'t> Map<'t> {
         if problems.is_empty() { Ok(map) } else { Err(problems.into()) }
     }
 
-    /// Returns the names of all places.
     pub(super) fn places(&self) -> BTreeSet<&str> {
         self.nodes.iter().map(|node| node.id.text.as_str()).collect()
     }
@@ -158,7 +150,6 @@ impl<'t> Map<'t> {
         problems
     }
 
-    /// Returns warnings about parts of the map that are ignored, and about values that are assumed.
     pub(super) fn warnings(&self, file: &str) -> Vec<Message> {
         let mut warnings = Vec::new();
         let mut warn = |text: &str| warnings.push(Message::warning("M132", format!("{file}: {text}")));

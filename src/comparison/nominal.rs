@@ -5,7 +5,7 @@ use num_rational::BigRational;
 use crate::comparison::coadaptation::Coadaptation;
 use crate::comparison::process::{Action, Risk, Valuation};
 
-/// Returns the time that a plan takes from the initial configuration if nothing fails.
+/// Returns the time that a plan takes from the initial configuration if nothing fails. Impossible actions take no time.
 pub(super) fn time_of(mission: &Coadaptation, plan: &[Action]) -> f64 {
     use probabilistic::Number;
     let (mut configuration, mut time) = (mission.initial, 0.0);

@@ -109,7 +109,6 @@ pub(super) struct PlanTable<'a, 'b> {
 }
 
 impl PlanTable<'_, '_> {
-    /// Returns the plan from a state, computed or from the cache. `None` if there is no plan.
     pub(super) fn plan(&mut self, situation: &Valuation) -> Result<Option<Vec<Action>>, Errors> {
         let key = Valuation { hit: false, ..*situation };
         if let Some(plan) = self.plans.get(&key) {

@@ -10,11 +10,10 @@ use probabilistic::{Direction, Error, Mdp, Number, Problem};
 
 use crate::comparison::process::{Process, State};
 
-/// Decision rule: returns the number of the action for a state and a number of executed steps.
-/// `None` ends the mission.
+/// Decision rule: returns the number of the action for a state and a number of executed steps. `None` or an impossible
+/// action ends the mission.
 pub type Decide<'a> = dyn FnMut(State, u32) -> Option<u32> + 'a;
 
-/// The process with a fixed decision rule, which is a Markov chain.
 struct FixedProcess<'a, 'b, N> {
     process: &'a Process<N>,
     decide: RefCell<&'a mut Decide<'b>>,
@@ -52,8 +51,8 @@ impl<N: Number> Generator<N> for FixedProcess<'_, '_, N> {
     }
 }
 
-/// Values of a decision rule. Expected values are sums over the whole mission, until the goal or a
-/// failure. They are `None` if they are infinite or undefined.
+/// Values of a decision rule. Expected values are sums over the whole mission, until the goal or a failure. Infinite or
+/// undefined ones are `None` or NaN.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Measures {

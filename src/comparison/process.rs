@@ -2,7 +2,7 @@
 //! demand.
 //!
 //! The process corrects the published procedure: it has every route, reconfigurations at every place, a permanent
-//! collision flag, and only actions after which the battery is not below the reserve.
+//! collision flag, and only actions that need no energy or keep the battery at the reserve or above.
 
 use fixedbitset::FixedBitSet;
 use num_rational::BigRational;
@@ -101,7 +101,6 @@ struct Move<N> {
     /// first array is for moves at which the component is not lost, the second for moves at which
     /// it is lost.
     outcomes: [[N; 3]; 2],
-    /// Values of the selected rewards for this move.
     rewards: Vec<N>,
 }
 
@@ -121,9 +120,7 @@ pub struct Process<N> {
     goal: usize,
     initial: State,
     reserve: u32,
-    /// Possible moves, by place and configuration.
     moves: Vec<Vec<Vec<Move<N>>>>,
-    /// Possible reconfigurations, by configuration.
     changes: Vec<Vec<Reconfiguration<N>>>,
     /// For each configuration, `true` if it needs the component that may be lost.
     lost: Vec<bool>,

@@ -29,7 +29,6 @@ pub fn program(mission: &Coadaptation, risk: Risk) -> Model {
     )
 }
 
-/// Creates a PRISM model with one module.
 pub(super) fn model(
     remark: String,
     constants: Vec<Constant>,
@@ -51,7 +50,6 @@ pub(super) fn model(
     }
 }
 
-/// Creates an integer variable with values from 0 to `greatest`.
 pub(super) fn range(name: &str, greatest: usize, initial: usize) -> Variable {
     Variable {
         name: name.to_owned(),
@@ -188,7 +186,6 @@ impl ProcessWriter<'_> {
         commands
     }
 
-    /// Returns the outcomes of a move: each probability with its assignments.
     fn ends(&self, traversal: &Traversal, to: usize, spent: &Assignments) -> Vec<(BigRational, Assignments)> {
         let certain = BigRational::one();
         let hit = if self.risk.collisions { traversal.hit.clone() } else { BigRational::zero() };

@@ -15,11 +15,9 @@ use crate::comparison::coadaptation::{Coadaptation, Traversal};
 use crate::comparison::process::Action;
 use probabilistic::Number;
 
-/// Number of shortest routes that the procedure compares.
 pub(super) const ROUTES: usize = 5;
 /// Weight of the priority property, and weight of each other property.
 const WEIGHTS: [f64; 2] = [0.6, 0.2];
-/// Maximum number of partial routes that are examined in the search for routes.
 const MAX_PARTIAL_ROUTES: usize = 2_000_000;
 
 /// Decision of the published procedure, with its predicted values.

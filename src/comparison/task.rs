@@ -1,5 +1,5 @@
-//! Converts any mission to a co-adaptation process. Its places are the states of the ground task,
-//! and its configurations are the designs in the arguments of actions.
+//! Converts any mission to a co-adaptation process. Its places are the states of the ground task, and its
+//! configurations are the combinations of designs in the arguments of actions.
 //!
 //! Missions that declare places and configurations are converted more directly
 //! ([`Coadaptation::new`]). For all other missions, the reachable states of the task are

@@ -96,13 +96,11 @@ pub enum Verdict {
     Together(String),
 }
 
-/// An objective and its designs, in the order of preference.
 struct Group {
     objective: Objective,
     candidates: Vec<Offer>,
 }
 
-/// A candidate design for an objective, with its demands on budgets, its utility, and the reasons that exclude it.
 struct Offer {
     design: String,
     utility: BigRational,
@@ -191,7 +189,6 @@ pub(super) fn choose(
     Ok(Configuration { choices, utility: chosen.utility, optimal: chosen.optimal })
 }
 
-/// Computes demands and utilities of the candidate designs of objectives.
 struct Offers<'a> {
     knowledge: &'a Knowledge,
     wishes: &'a Wishes,
@@ -349,13 +346,11 @@ impl Whole<'_> {
     }
 }
 
-/// Formats a missed requirement.
 fn requirement_text(missed: &Missed) -> String {
     let Missed { attribute, estimation, bound, status } = missed;
     format!("{attribute}: estimated {}, required {}: {status}", decimal(estimation), decimal(bound))
 }
 
-/// Returns the reasons why an objective needs a design; see [`Choice::need`].
 fn need(objective: &Objective) -> Vec<String> {
     let mut need = objective.statuses.clone();
     if objective.updatable {

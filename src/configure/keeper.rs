@@ -74,7 +74,6 @@ impl From<Answer> for KeeperAnswer {
 }
 
 impl Service {
-    /// Marks a request as a repetition.
     #[must_use]
     pub(super) fn repeated(mut self) -> Self {
         if let Self::Reconfigure { repeated, .. } = &mut self {
@@ -100,7 +99,6 @@ pub(super) struct PendingChange {
 pub struct Keeper {
     pub(super) configurator: Configurator,
     pub(super) limit: Option<Duration>,
-    /// Sequence numbers of the received lines.
     pub(super) numbers: Numbers,
     pub(super) effects: u64,
     pub(super) pending_changes: BTreeMap<u64, PendingChange>,
@@ -115,11 +113,8 @@ pub struct Keeper {
     pub(super) filters: Filters,
     pub(super) unrecorded: Unrecorded,
     pub(super) states: FilterStates,
-    /// `true` once the first choice of designs was made.
     pub(super) has_begun: bool,
-    /// Number of received lines.
     pub(super) lines: u64,
-    /// Time of the last line, since the start.
     pub(super) now: Duration,
 }
 
@@ -180,12 +175,13 @@ impl Keeper {
         self.lines
     }
 
-    /// Returns the greatest sequence number of the received lines; `None` if no line has one.
+    /// Returns the greatest sequence number of the accepted lines; `None` if no line has one.
     pub fn sequence(&self) -> Option<u64> {
         self.numbers.greatest()
     }
 
-    /// Returns the gaps between received sequence numbers, as inclusive ranges `[first, last]`.
+    /// Returns the gaps between sequence numbers of accepted lines, as inclusive ranges `[first, last]`. The missing
+    /// lines have not arrived yet, or were refused.
     pub fn missing(&self) -> Vec<[u64; 2]> {
         self.numbers.missing()
     }
@@ -211,7 +207,7 @@ impl Keeper {
 
     /// Handles a line and returns the answers. `now`, the time since the start, is used if the line
     /// has no time of its own. Time never decreases: an earlier time is replaced by the time of the
-    /// previous line.
+    /// previous line. A line is refused if its own time skips too much.
     pub fn handle_at(&mut self, observation: &Observation, now: Duration) -> Vec<KeeperAnswer> {
         let mut answers = Vec::new();
         self.lines += u64::from(!observation.is_timer);
@@ -284,7 +280,6 @@ impl Keeper {
         Ok(())
     }
 
-    /// Asserts the reported status of a component, unless the component's filter holds the report back.
     fn component(
         &mut self,
         component: &str,
@@ -304,7 +299,6 @@ impl Keeper {
         Ok(())
     }
 
-    /// Returns a refusal if no effect with this number was requested.
     fn check_effect(&self, effect: u64) -> Result<(), Refusal> {
         let is_known = (1..=self.effects).contains(&effect);
         is_known.then_some(()).ok_or_else(|| Refusal::new("M305", format!("there was no effect {effect}")))
@@ -461,7 +455,8 @@ fn wrong(message: &Message) -> KeeperAnswer {
     KeeperAnswer::Loop(Answer::Error { code: message.code.clone(), message: message.message.clone() })
 }
 
-/// Returns the reasons why an objective needs a design, and why designs preferred to the chosen one are not used.
+/// Returns the reasons why an objective needs a design, why designs preferred to the chosen one are not used, and which
+/// requirements the chosen design misses.
 fn reasons_of(choice: &Choice) -> Vec<String> {
     let mut because: Vec<String> =
         choice.need.iter().map(|need| format!("{} is {need}", choice.objective)).collect();

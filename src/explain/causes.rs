@@ -111,7 +111,6 @@ fn ways(knowledge: &Knowledge, design: &FunctionDesign) -> Vec<Vec<Alteration>> 
     if ways.is_empty() { repairs(knowledge, design, &all_candidates(knowledge, candidates)) } else { ways }
 }
 
-/// Derives the availability of a design and its causes without planning.
 pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availability {
     let mut availability = Availability {
         design: design.individual.name.clone(),

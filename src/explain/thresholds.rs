@@ -77,14 +77,12 @@ pub(super) fn measured(knowledge: &Knowledge) -> Vec<(String, BigRational)> {
     measurements.filter_map(|measurement| Some((measurement.attribute, measurement.value?))).collect()
 }
 
-/// Result of the search for a change of one value in one direction.
 enum Outcome {
     Found(Box<Change>),
     None,
     AtLimit,
 }
 
-/// A mission with one value to vary, and its current best plan for comparison.
 struct VariedMission<'a> {
     mission: &'a Mission,
     base: BestPlan,
@@ -92,8 +90,8 @@ struct VariedMission<'a> {
 }
 
 impl VariedMission<'_> {
-    /// Computes the best plan after a value of the mission is set. Returns `None` if a limit is
-    /// reached before the plan is proved optimal.
+    /// Computes the best plan after a value of the mission is set. Returns `None` if a limit is reached before the plan
+    /// is proved optimal, or its absence is proved.
     fn with(&self, name: &str, value: &BigRational) -> Result<Option<BestPlan>, Errors> {
         if self.limits.reached() {
             return Ok(None);

@@ -15,14 +15,11 @@ use crate::message::Message;
 /// the loop continued. Both words have the same length, so that renaming needs no disk space.
 pub(super) const INCOMPLETE: &str = "partial";
 
-/// Content of a segment file, up to its first fault.
 #[derive(Debug)]
 pub(super) struct Segment {
     pub(super) number: u64,
     pub(super) digest: String,
-    /// Link before the segment's first record.
     pub(super) before: Link,
-    /// Link after the segment's last sound record.
     pub(super) after: Link,
     /// Sound records of the segment, without its header.
     pub(super) records: Vec<Record>,
@@ -31,7 +28,6 @@ pub(super) struct Segment {
     pub(super) end: End,
 }
 
-/// State of the end of a segment file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum End {
     /// The segment ends with a complete record and its line break.
@@ -52,7 +48,6 @@ impl Segment {
     }
 }
 
-/// Content of a snapshot file: a stored state of the loop.
 #[derive(Debug)]
 pub(super) struct SnapshotFile {
     /// Link at which the snapshot was taken; the segment with the same number begins at this link.
@@ -60,7 +55,6 @@ pub(super) struct SnapshotFile {
     pub(super) data: Value,
 }
 
-/// Segments and snapshots of a journal's directory.
 #[derive(Debug, Default)]
 pub(super) struct JournalFiles {
     /// Segments by number; for an unreadable segment, a description of its fault.
@@ -98,7 +92,6 @@ impl JournalFiles {
         Ok(contents)
     }
 
-    /// Returns the file name of the segment with this number.
     pub(super) fn name(&self, number: u64) -> String {
         name(if self.incomplete == Some(number) { INCOMPLETE } else { "journal" }, number)
     }
@@ -137,7 +130,8 @@ impl JournalFiles {
     }
 
     /// Returns the segments from the given number to the last one, or a description of the first
-    /// fault. Each segment has to continue the record chain of its predecessor.
+    /// fault. Each segment has to continue the record chain of its predecessor, and the last one must not end with an
+    /// `end` record.
     pub(super) fn chain(&self, from: u64) -> Result<Vec<&Segment>, String> {
         let last = self.segments.keys().chain(self.snapshots.keys()).max().copied().unwrap_or(from);
         let mut chain: Vec<&Segment> = Vec::new();
@@ -241,7 +235,6 @@ fn check_opening(record: &Record, number: u64) -> Result<(), String> {
     }
 }
 
-/// Fault of a segment that has an older file format.
 pub(super) const OLD_FORMAT: &str = "is of the format `metaplan-journal/2` or older, which this version does not read; let the version that \
                                      wrote it bring its mission to an end, or begin the mission anew with a journal in another \
                                      directory";
@@ -289,7 +282,8 @@ pub(super) fn require_file(path: &Path) -> io::Result<()> {
     }
 }
 
-/// Opens a file that only its user can access, and creates it if it does not exist.
+/// Opens a regular file as specified by `options`, which may create it. On Unix, only its user can access it
+/// afterwards.
 pub(super) fn open_private(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
     require_file(path)?;
     #[cfg(unix)]
@@ -303,7 +297,7 @@ pub(super) fn open_private(path: &Path, options: &mut OpenOptions) -> io::Result
     options.open(path)
 }
 
-/// Creates a directory that only its user can access, if it does not exist.
+/// Creates a directory and its missing parents. On Unix, only their user can access them.
 pub(super) fn make_directory(path: &Path) -> io::Result<()> {
     let mut builder = std::fs::DirBuilder::new();
     builder.recursive(true);

@@ -13,14 +13,12 @@ use crate::message::Message;
 
 /// Number of attempts to lock; a killed process may still hold the lock for a short time.
 const LOCK_RETRIES: u32 = 10;
-/// Time between two attempts to lock the journal.
 const RETRY_INTERVAL: Duration = Duration::from_millis(20);
 /// Width in characters of the process number, which is in the first line of the lock file.
 const OWNER_CHARACTERS: usize = 10;
 /// Width in characters of the record count, which is in the second line of the lock file.
 const COUNT_CHARACTERS: usize = 20;
 
-/// Exclusive access to a journal until the lock is dropped.
 #[derive(Debug)]
 pub(super) struct Lock {
     file: File,
@@ -72,7 +70,6 @@ impl Lock {
         }
     }
 
-    /// Writes the number of records, and this process's number, to the lock file.
     pub(super) fn store_count(&mut self, records: u64) -> io::Result<()> {
         let owner = std::process::id();
         self.file.seek(SeekFrom::Start(0))?;

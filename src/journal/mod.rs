@@ -87,7 +87,6 @@ pub struct Journal {
     segment: u64,
     file: File,
     link: Link,
-    /// Lock of the journal while it is open.
     lock: Lock,
     /// Number of observations in the current segment, i.e. since its snapshot.
     observations: u64,
@@ -95,7 +94,6 @@ pub struct Journal {
     /// it.
     unfinished: Option<Unfinished>,
     digest: String,
-    /// Reaction of the loop to a failed write: stop, or continue without the journal.
     unrecorded: Unrecorded,
     /// `true` after a failed write with which the loop continues; nothing more is written.
     is_incomplete: bool,
@@ -105,7 +103,7 @@ pub struct Journal {
 
 impl Journal {
     /// Opens the journal in a directory and restores `control`, a loop that has not begun, to its
-    /// state after the last recorded decision. Creates the directory and the journal if they do not
+    /// state after the last recorded reaction or decision. Creates the directory and the journal if they do not
     /// exist. [`Journal::begin`] or [`Journal::begin_reacting`] has to be called next.
     ///
     /// # Errors
@@ -181,9 +179,9 @@ impl Journal {
         Ok(recovery)
     }
 
-    /// Completes the work that the previous process left unfinished, which may require planning.
-    /// Returns the answers that may not have left the program: first the answers to the unfinished
-    /// work, then effects that were not acknowledged.
+    /// Completes the work that the previous process left unfinished, or makes the first decision in a new journal. Both
+    /// may require planning. Returns the answers that may not have left the program: first the answers to the
+    /// unfinished work, then effects that were not acknowledged.
     ///
     /// # Errors
     /// The journal cannot be written; the answers must not leave the program.
@@ -221,8 +219,8 @@ impl Journal {
         self.again(control, answers)
     }
 
-    /// Returns `answers` and all earlier effects that were not acknowledged, which have to be
-    /// output again.
+    /// Flushes the journal. Returns `answers`, followed by all earlier effects that were not acknowledged, which have
+    /// to be output again. A message about a failed write comes first.
     fn again<C: Recoverable>(
         &mut self,
         control: &C,
@@ -352,7 +350,6 @@ impl Journal {
         sync_directory(&self.directory)
     }
 
-    /// Inserts the message about a failed write at the front of the answers, once.
     fn give_notice<C: Recoverable>(&mut self, answers: &mut Vec<C::Answer>) {
         if let Some(message) = self.notice.take() {
             answers.insert(0, Answer::Unrecorded { message }.into());
@@ -412,7 +409,6 @@ impl Journal {
     }
 }
 
-/// Result of [`resume`]: position of a restored loop in its journal.
 struct Resumed<'c> {
     /// Number of the snapshot from which the loop was restored, or 0 without a snapshot.
     from: u64,
@@ -474,8 +470,7 @@ fn create_segment(directory: &Path, after: &Link, digest: &str, number: u64) -> 
     Ok((file, link))
 }
 
-/// Atomically writes a snapshot. An existing snapshot with this number is damaged, and is kept
-/// under another name.
+/// Writes a snapshot atomically. An existing snapshot with this number is damaged, and is kept under another name.
 fn write_snapshot(directory: &Path, number: u64, line: &str) -> io::Result<()> {
     let name = path(directory, "snapshot", number);
     let mut file = tempfile::NamedTempFile::new_in(directory)?;

@@ -8,7 +8,6 @@
 use serde_json::{Value, json};
 use sha2::{Digest as _, Sha256};
 
-/// Name and version of the journal's file format.
 pub(super) const FORMAT: &str = "metaplan-journal/3";
 
 /// Number of hexadecimal digits of the hash in front of each record.
@@ -23,7 +22,6 @@ pub(super) struct Link {
 }
 
 impl Link {
-    /// Returns the link before the first record of a journal.
     pub(super) fn first() -> Self {
         Self { next: 0, digits: "0".repeat(DIGITS) }
     }
@@ -48,7 +46,6 @@ impl Link {
     }
 }
 
-/// A parsed record of a journal.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Record {
     pub(super) number: u64,

@@ -23,9 +23,9 @@ pub(super) enum Unfinished {
     Observation(String, u64),
 }
 
-/// Returns the segments to replay, and the number of the first of them. Replay starts at the newest
-/// sound snapshot whose later segments are also sound. Faults in older files are added to
-/// `warnings`.
+/// Returns the number of the first segment to replay, and the segments from this number on. Replay starts at the newest
+/// sound snapshot, or at the beginning of the journal, such that all later segments are sound. Faults in files that are
+/// not needed are added to `warnings`.
 ///
 /// # Errors
 /// Descriptions of all faults, if no snapshot can be used together with all later segments.
@@ -66,18 +66,15 @@ pub(super) fn usable<'a>(
     Err(format!("{}; {way_out}", problems.join(", ")))
 }
 
-/// Replays recorded observations on a loop, and compares the answers with the recorded ones.
 pub(super) struct Replay<'a, C> {
     pub(super) directory: &'a Path,
     pub(super) control: &'a mut C,
     pub(super) recovery: &'a mut Recovery,
-    /// Number of observations in the segment that was replayed last.
     pub(super) observations: u64,
     pub(super) unfinished: Option<Unfinished>,
 }
 
 impl<C: Recoverable> Replay<'_, C> {
-    /// Replays all records of one segment.
     pub(super) fn segment(&mut self, segment: &Segment) -> Result<(), Message> {
         self.observations = 0;
         // The end record only links segments.
@@ -135,7 +132,6 @@ impl<C: Recoverable> Replay<'_, C> {
         self.compare(next, &answers)
     }
 
-    /// Returns an error if the answers of the replay differ from the recorded ones.
     fn compare(&mut self, written: &Record, answers: &[C::Answer]) -> Result<(), Message> {
         if self.control.decision(answers).agrees(&written.list(0)) {
             return Ok(());

@@ -13,8 +13,8 @@ pub struct Address(pub(super) SocketAddr);
 
 impl Address {
     /// Parses `PORT`, `HOST` or `HOST:PORT`. The default host is the loopback address, which other
-    /// machines cannot reach; the default port is [`DEFAULT_PORT`]. For port 0 the system chooses a
-    /// port.
+    /// machines cannot reach; the default port is [`DEFAULT_PORT`]. An empty text means both defaults. For port 0 the
+    /// system chooses a port.
     ///
     /// # Errors
     /// The text has none of these forms, or the host does not exist.

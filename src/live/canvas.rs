@@ -6,7 +6,6 @@ use crate::mapek::Outlook;
 use crate::report::Painter;
 use crate::visible::visible;
 
-/// The current plan, and its picture after the first request.
 #[derive(Debug, Default)]
 pub(super) struct Canvas {
     painter: Option<Painter>,
@@ -29,8 +28,8 @@ impl Canvas {
         *self.lock() = Shown { outlook: outlook.map(Arc::new), drawn: None };
     }
 
-    /// Returns the picture of the current plan as HTML; its attribute `data-first` is the request
-    /// number of the plan's first step. Empty without a plan.
+    /// Returns the picture of the current plan as HTML; its attribute `data-first` is the action number of the plan's
+    /// first step. Empty without a plan, or without a painter.
     pub(super) fn picture(&self) -> Arc<str> {
         let (outlook, drawn) = {
             let state = self.lock();

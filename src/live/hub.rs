@@ -26,7 +26,6 @@ const MAX_RETAINED_BYTES: usize = 4 << 20;
 /// Above it, the keys that changed longest ago are dropped.
 const MAX_KEYS: usize = 10_000;
 
-/// Maximum number of lines that a client receives at once.
 const MAX_BATCH: usize = 100;
 
 /// The retained lines of a run, and the condition variable that is signalled for new lines.
@@ -40,23 +39,18 @@ pub(super) struct Hub {
 struct RetainedLines {
     lines: VecDeque<Arc<str>>,
     bytes: usize,
-    /// Number of the first retained line.
     first: u64,
     /// For each key, the line that defines its current state, and the number of this line.
     words: BTreeMap<String, (u64, Arc<str>)>,
     ended: bool,
 }
 
-/// Result of waiting for new lines.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum News {
-    /// The next lines in order.
     Lines(Vec<Arc<str>>),
-    /// No new lines within the waiting time.
     Nothing,
     /// Lines that the client has not read were dropped.
     Missed,
-    /// The run has ended and all lines were read.
     Ended,
 }
 
@@ -127,7 +121,6 @@ impl Hub {
 }
 
 impl RetainedLines {
-    /// Returns the number that the next appended line will have.
     fn end(&self) -> u64 {
         self.first + self.lines.len() as u64
     }
@@ -142,7 +135,6 @@ pub(super) struct HubSender {
     start: Instant,
 }
 
-/// Size of the queue in bytes, and number of lines that were dropped.
 #[derive(Debug, Default)]
 struct Backlog {
     dropped: AtomicU64,
@@ -177,22 +169,19 @@ impl HubSender {
         Self { queue, backlog, start: Instant::now() }
     }
 
-    /// Sends an input line of the loop, with its number.
     pub(super) fn send_event(&self, number: u64, text: &str) {
         self.enqueue(Entry::Event(number, text.to_owned()));
     }
 
-    /// Sends an answer, given as the text of a JSON object.
     pub(super) fn send_answer(&self, answer: &str) {
         self.enqueue(Entry::Answer(answer.to_owned()));
     }
 
-    /// Sends the availability of designs.
     pub(super) fn send_designs(&self, designs: Vec<DesignChange>) {
         self.enqueue(Entry::Designs(designs));
     }
 
-    /// Sends whether a plan exists, and the request number of its running action, if there is one.
+    /// Sends whether a plan exists, and the number of the action under way, if there is one.
     pub(super) fn send_plan(&self, exists: bool, under_way: Option<u64>) {
         self.enqueue(Entry::Planned { exists, under_way });
     }

@@ -28,7 +28,6 @@ struct Objective {
     objective: String,
 }
 
-/// Returns the key for the availability of a design.
 pub(super) fn design_key(design: &str) -> String {
     format!("design {design}")
 }

@@ -7,10 +7,8 @@ use std::time::{Duration, Instant};
 /// Maximum number of bytes of a request before its body.
 const MAX_HEAD_BYTES: usize = 16 << 10;
 
-/// Maximum number of headers of a request.
 const MAX_HEADERS: usize = 64;
 
-/// The needed parts of a GET request.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Request {
     pub(super) path: String,
@@ -22,8 +20,8 @@ pub(super) struct Request {
 pub(super) type Refused = (u16, &'static str);
 
 impl Request {
-    /// Reads a request from a connection. Returns a status code for a request that is malformed, too large, not a GET
-    /// request, or not complete within `patience` (408).
+    /// Reads a request from a connection. Returns a status code for a request that is malformed, too large, or not a
+    /// GET request. A request that is not complete within `patience` gives status 408 or a timeout error.
     pub(super) fn read(stream: &mut TcpStream, patience: Duration) -> io::Result<Result<Self, Refused>> {
         let begun = Instant::now();
         let mut bytes = Vec::new();

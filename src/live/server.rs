@@ -21,14 +21,12 @@ const CLIENT_TIMEOUT: Duration = Duration::from_secs(5);
 /// Interval between keep-alive comments on an idle event stream.
 const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(10);
 
-/// Maximum number of concurrent connections.
 const MAX_CONNECTIONS: usize = 16;
 
 /// Maximum time that the program waits at the end of a run, so that clients receive the last lines.
 const SHUTDOWN_GRACE: Duration = Duration::from_millis(500);
 
 const PAGE: &str = include_str!("page/index.html");
-/// Style sheet of this page, in addition to [`picture::STYLE`].
 const STYLE: &str = include_str!("page/live.css");
 const SCRIPT: &str = include_str!("page/live.js");
 
@@ -40,7 +38,6 @@ pub struct Live {
     shared: Arc<SharedState>,
 }
 
-/// State shared by all connections.
 #[derive(Debug)]
 struct SharedState {
     hub: Arc<Hub>,
@@ -153,7 +150,6 @@ fn receive(shared: &Arc<SharedState>, mut stream: TcpStream) {
     drop(answered);
 }
 
-/// Reads the request of a connection and answers it.
 fn answer(shared: &SharedState, stream: &mut TcpStream) -> io::Result<()> {
     stream.set_nodelay(true)?;
     let request = match Request::read(stream, CLIENT_TIMEOUT)? {
@@ -173,7 +169,6 @@ fn answer(shared: &SharedState, stream: &mut TcpStream) -> io::Result<()> {
     }
 }
 
-/// Checks the token of a request or, without a token, the `Host` header.
 fn authorize(shared: &SharedState, request: &Request) -> Result<(), Refused> {
     if let Some(token) = &shared.token {
         let fits = request.authorization.as_deref().is_some_and(|given| token.fits(given));

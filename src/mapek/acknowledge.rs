@@ -14,25 +14,19 @@ use crate::mapek::answer::Command;
 use crate::mapek::beliefs::Beliefs;
 use crate::mapek::receipts::{Acknowledged, Before};
 
-/// Outcome of recording the acknowledgement of an effect.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Receipt {
-    /// No effect has this number.
     Unknown,
-    /// The effect is acknowledged.
     Recorded,
     /// The effect is acknowledged, but the design of the given function is uncertain.
     Doubtful(String),
 }
 
-/// Outcome of a report that a reconfiguration has failed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Failure {
-    /// The given design could not be realised.
     Design(String),
     /// No consequence: the report is old or a duplicate.
     Stale,
-    /// The number does not belong to a reconfiguration.
     NotReconfiguration,
 }
 
@@ -81,7 +75,6 @@ impl Beliefs {
         }
     }
 
-    /// Records the failure of a reconfiguration, before or after its acknowledgement.
     pub(super) fn reconfiguration_failed(&mut self, effect: u64) -> Failure {
         if effect == 0 || effect > self.effects {
             return Failure::NotReconfiguration;
@@ -137,9 +130,9 @@ impl Beliefs {
         Failure::Design(design)
     }
 
-    /// Records that a reconfiguration has arrived, unless a later one of the function is acknowledged. If the function
-    /// was observed with another design while the reconfiguration was pending, the order of observation and
-    /// reconfiguration is unknown, and so is the design.
+    /// Records that a reconfiguration has arrived, unless its arrival or that of a later one of the function is already
+    /// recorded. If the function was observed with another design while the reconfiguration was pending, the order of
+    /// observation and reconfiguration is unknown, and so is the design.
     fn configured(&mut self, effect: u64, function: String, design: String) -> Receipt {
         let history = self.receipts.functions.entry(function.clone()).or_default();
         // A superseded reconfiguration without an answer may have been carried out in between.

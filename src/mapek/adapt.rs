@@ -43,9 +43,8 @@ const FACTS: &str = "facts";
 pub(super) enum Need {
     /// The action under way could not continue unchanged, and a safe effect was requested.
     Interrupted,
-    /// The current plan cannot be kept.
+    /// A new plan is needed, for example because the current plan is invalid or missing.
     Must,
-    /// A better plan may exist.
     Better,
 }
 
@@ -193,7 +192,6 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Returns `true` if the scheduled repetition of an unfinished search is due.
     fn is_retry_due(&self) -> bool {
         self.beliefs.retry.is_some_and(|scheduled| scheduled.at <= self.beliefs.now)
     }
@@ -211,8 +209,8 @@ impl Adaptation<'_> {
     }
 
     /// Searches for a plan for the reasons `because`, and adopts it unless it is the current plan. With
-    /// [`Need::Better`], the plan is adopted only if its benefit is sufficient. Otherwise, the action under way may be
-    /// cancelled or suspended instead. Decides nothing if a search is forbidden.
+    /// [`Need::Better`], the plan is adopted only if its benefit is sufficient. With the other needs, the action under
+    /// way may be cancelled or suspended instead. Decides nothing if a search is forbidden.
     pub(super) fn replan(&mut self, because: Vec<String>, need: Need, answers: &mut Vec<Answer>) {
         let is_necessary = need != Need::Better;
         let reason = because.first().cloned().unwrap_or_default();
@@ -337,7 +335,8 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Returns `true` if `steps` are the action under way followed by the current plan.
+    /// Returns `true` if `steps` are the action under way followed by the current plan. Only actions and their
+    /// arguments are compared.
     fn is_current(&self, steps: &[PlannedStep]) -> bool {
         let key = |step: &PlannedStep| (step.action.clone(), step.arguments.clone());
         let Some(plan) = &self.beliefs.plan else { return false };
@@ -377,7 +376,7 @@ impl Adaptation<'_> {
         self.beliefs.plan = Some(steps);
     }
 
-    /// Reports that no plan was found. If a new plan `is_necessary`, drops the current plan.
+    /// Reports that no plan was found. If `is_necessary`, also drops the current plan.
     fn report_no_plan(&mut self, is_necessary: bool, outcome: Outcome, answers: &mut Vec<Answer>) {
         let status = if outcome.proved { "unsolvable" } else { "unknown" };
         answers.push(Answer::PlanNone { status, because: outcome.because, blocking: outcome.blocking });

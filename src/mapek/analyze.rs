@@ -10,19 +10,15 @@ use crate::mapek::answer::{Answer, DesignChange, ObjectiveChange};
 use crate::mapek::beliefs::Beliefs;
 use crate::mapek::monitor::Base;
 
-/// Changes of available designs and of objectives in error, found by the analysis.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Findings {
-    /// Designs that are no longer available.
     pub(super) lost: BTreeSet<String>,
-    /// Designs that have become available.
     pub(super) gained: BTreeSet<String>,
     /// Objectives that are newly in error, with their statuses, as sentences.
     pub(super) errors: Vec<String>,
 }
 
 impl Findings {
-    /// Returns `true` if nothing was found.
     pub(super) fn is_empty(&self) -> bool {
         self.lost.is_empty() && self.gained.is_empty() && self.errors.is_empty()
     }
@@ -92,7 +88,6 @@ pub(super) fn analyze_change(beliefs: &mut Beliefs, base: Base, answers: &mut Ve
     if base == Base::Watched { analyze(beliefs, answers) } else { Findings::default() }
 }
 
-/// Compares the current availability and statuses with the previous ones, and reports the differences.
 pub(super) fn analyze(beliefs: &mut Beliefs, answers: &mut Vec<Answer>) -> Findings {
     let mut findings = Findings::default();
     let Some(knowledge) = beliefs.mission.knowledge() else { return findings };
@@ -139,7 +134,6 @@ pub(crate) fn changes(
     (changed_designs, changed_objectives)
 }
 
-/// Returns the availability of a design, with the reasons if it is unavailable.
 pub(super) fn availability(knowledge: &Knowledge, design: &str, available: bool) -> DesignChange {
     let because = match knowledge.fault() {
         _ if available => Vec::new(),
@@ -155,7 +149,6 @@ pub(super) fn missing_conclusions(fault: &Fault) -> String {
     format!("it is not known what follows: {}", fault.message)
 }
 
-/// Returns the objectives in error, with their statuses.
 fn statuses(knowledge: &Knowledge) -> BTreeMap<String, Vec<String>> {
     let objectives = knowledge.runtime().objectives().into_iter();
     let in_error = objectives.filter(ontology::runtime::Objective::is_in_error);
@@ -225,7 +218,6 @@ pub(crate) fn fact_text(fact: &Fact, symbols: &Symbols) -> String {
     text
 }
 
-/// Replaces each `<IRI>` in a text by its local name.
 pub(crate) fn with_local_names(text: &str) -> String {
     let mut parts = text.split('<');
     let mut short = parts.next().unwrap_or_default().to_owned();

@@ -245,7 +245,6 @@ impl Command {
     }
 }
 
-/// Serialises the answer as a JSON object of the output format.
 impl Serialize for Answer {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut object = serializer.serialize_map(None)?;
@@ -266,7 +265,6 @@ impl Answer {
         serde_json::to_value(self).unwrap_or_default()
     }
 
-    /// Returns the value of the JSON field `answer`, such as `plan_found`.
     fn kind(&self) -> &'static str {
         match self {
             Self::Inferred { .. } => "inferred",

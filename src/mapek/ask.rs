@@ -8,10 +8,8 @@ use crate::mapek::beliefs::Running;
 use crate::mapek::step::PlannedStep;
 use crate::mission::Mission;
 
-/// Outcome of planning: a plan, or the reason for its absence.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Outcome {
-    /// Steps of the plan, if there is one.
     pub steps: Option<Vec<PlannedStep>>,
     /// Metric of the plan; 0 without a plan.
     pub cost: BigRational,
@@ -49,7 +47,6 @@ impl Question<'_> {
 }
 
 impl Outcome {
-    /// Returns an outcome without a plan.
     pub(super) fn no_plan(proved: bool, because: String) -> Self {
         Self { steps: None, cost: BigRational::default(), proved, because, blocking: Vec::new() }
     }

@@ -27,30 +27,22 @@ use crate::mission::Mission;
 pub struct Beliefs {
     /// Knowledge base and problem in their believed state.
     pub(super) mission: Mission,
-    /// Text of the goal; `None` for the goal of the problem file.
     pub(super) goal: Option<String>,
-    /// Local names of available designs.
     pub(super) available: BTreeSet<String>,
-    /// Objectives in error, with their statuses.
     pub(super) statuses: BTreeMap<String, Vec<String>>,
     /// Axioms and rules that the known facts violate.
     pub(super) violated: BTreeSet<String>,
     /// Fault that stopped the reasoning, as last reported; the conclusions are then incomplete. `None` if they are
     /// complete.
     pub(super) fault: Option<Fault>,
-    /// Believed design of each function: the design that was acknowledged or observed last.
     pub(super) configuration: BTreeMap<String, String>,
-    /// Remaining steps of the plan, without the action under way.
     pub(super) plan: Option<VecDeque<PlannedStep>>,
-    /// The action under way: requested and not ended.
     pub(super) running: Option<Running>,
-    /// Whether the goal was reached, and no later change required a new plan.
     pub(super) reached: bool,
     /// Whether planning has failed and pauses until something changes.
     pub(super) stuck: bool,
     /// Whether the plan is not proved optimal, because its search hit a limit.
     pub(super) unproved: bool,
-    /// Scheduled repetition of a search that hit its time limit.
     pub(super) retry: Option<Retry>,
     /// The step that failed last, with its number of consecutive failures.
     pub(super) failures: Option<(PlannedStep, u32)>,
@@ -64,21 +56,16 @@ pub struct Beliefs {
     pub(super) effects: u64,
     /// Unacknowledged effects (requests to the robot) by number.
     pub(super) outstanding: BTreeMap<u64, Effect>,
-    /// History of acknowledged and superseded reconfigurations, by function.
     pub(super) receipts: Receipts,
     /// Time of the last request and number of repetitions, by number of the outstanding effect.
     pub(super) waits: BTreeMap<u64, Wait>,
     /// Whether the robot has ever reported the start or the progress of an action.
     pub(super) reports_actions: bool,
-    /// Number of handled lines.
     pub(super) lines: u64,
-    /// Sequence numbers of accepted lines.
     pub(super) numbers: Numbers,
-    /// Time of the last line, since the start of the mission.
     pub(super) now: Duration,
     /// Time of the last line that was not refused, since the start of the mission.
     pub(super) considered: Duration,
-    /// States of the filters for measurements and component reports.
     pub(super) filters: FilterStates,
 }
 
@@ -86,15 +73,11 @@ pub struct Beliefs {
 #[derive(Debug, Clone, PartialEq)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub(super) struct Running {
-    /// Number of the action.
     pub(super) action: u64,
-    /// The action with its current designs.
     pub(super) step: PlannedStep,
     /// Completed share of the action, from 0 to 1.
     pub(super) progress: BigRational,
-    /// Whether the loop has requested the cancellation of the action.
     pub(super) cancelling: bool,
-    /// Whether the loop has suspended the action.
     pub(super) suspended: bool,
     /// Whether the action is suspended only until planning has finished.
     pub(super) provisional: bool,
@@ -106,15 +89,11 @@ pub(super) struct Running {
     pub(super) overdue: u32,
     /// Whether the start or progress of the action was reported.
     pub(super) started: bool,
-    /// Whether progress of the action was reported.
     pub(super) progressed: bool,
-    /// Whether the action was suspended and resumed.
     pub(super) resumed: bool,
-    /// Functions with the designs that were last requested for the action.
     pub(super) sent_configuration: Vec<(String, String)>,
 }
 
-/// A scheduled repetition of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Retry {
     /// Time at which the search is due, since the start of the mission.
@@ -123,12 +102,10 @@ pub(super) struct Retry {
     pub(super) attempt: u32,
 }
 
-/// Time of the last request of an outstanding effect, and number of its repetitions.
+/// Time of the last request of an outstanding effect, since the start of the mission, and number of its repetitions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Wait {
-    /// Time of the last request, since the start of the mission.
     pub(super) since: Duration,
-    /// Number of repetitions.
     pub(super) repeats: u32,
 }
 
@@ -221,7 +198,7 @@ impl Beliefs {
     }
 
     /// Returns the requested design of a function if a reconfiguration is pending, and the believed design otherwise;
-    /// `None` if the design is uncertain.
+    /// `None` if the design is unknown or uncertain.
     pub(super) fn expected(&self, function: &str) -> Option<&str> {
         if let Some((_, design)) = self.pending().find(|(name, _)| *name == function) {
             return Some(design);
@@ -328,7 +305,6 @@ impl Beliefs {
         }
     }
 
-    /// Validates the action under way and the remaining plan against the believed situation.
     pub(super) fn verdict(&self) -> Verdict {
         let running = self.running.iter().map(|running| &running.step);
         let steps = running.chain(self.plan.iter().flatten());
@@ -350,7 +326,6 @@ impl Beliefs {
     }
 }
 
-/// Formats a violation as a message.
 fn sentence(violation: &Violation) -> String {
     let unmet = violation.unmet.first().map(|unmet| format!(": {}", unmet.condition)).unwrap_or_default();
     format!("the plan does not fit the situation: {}{unmet}", violation.message)

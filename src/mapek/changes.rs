@@ -6,7 +6,6 @@ use crate::mapek::answer::Answer;
 #[derive(Debug, Clone, Default)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub(super) struct Changes {
-    /// Extent of the change of the knowledge base.
     pub(super) base: Base,
     /// Whether inputs of planning have changed: facts or values of the problem, or facts of the knowledge base.
     pub(super) facts: bool,
@@ -16,7 +15,6 @@ pub(super) struct Changes {
     pub(super) goal: bool,
     /// Whether reported values of the problem differ from the expected ones.
     pub(super) values: bool,
-    /// Whether an action has ended.
     pub(super) ended: bool,
     /// Whether a function of the action under way was reported with a design that the loop has not requested.
     pub(super) observed: bool,
@@ -40,7 +38,7 @@ pub(super) enum Base {
 }
 
 impl Changes {
-    /// Returns `true` if the knowledge base or facts of the problem have changed, or if there is a reason to plan.
+    /// Returns `true` if the knowledge base or an input of planning has changed, or if there is a reason to plan.
     pub(super) fn any(&self) -> bool {
         self.base > Base::Nothing || self.facts || self.predicates || !self.reasons.is_empty()
     }
@@ -50,7 +48,6 @@ impl Changes {
         self.facts || self.goal || self.ended || !self.interruptions.is_empty() || !self.reasons.is_empty()
     }
 
-    /// Adds later changes.
     pub(super) fn extend(&mut self, later: Self) {
         let Self { base, facts, predicates, goal, values, ended, observed, interruptions, reasons, filtered } =
             later;

@@ -36,13 +36,13 @@ const MAX_REASONING_STEPS: u64 = 100_000_000;
 /// Number of unused interned names and values above which the knowledge base is rebuilt without them.
 const MAX_GROWTH: usize = 1024;
 
-/// Upper limit on the time between two lines; a line with a later time is refused. The number of seconds equals the
-/// limit on gaps between sequence numbers.
+/// Upper limit on the lead of a line's own time over the later of the previous line's time and the clock. A line with a
+/// greater lead is refused. The number of seconds equals the limit on gaps between sequence numbers.
 const MAX_TIME_STEP: Duration = Duration::from_secs(1_000_000);
 
 /// Returns the time at which a line is handled, and an error if the line's own time skips too much. Such a time is
-/// ignored. `previous` is the time of the previous line. `now` is used for a line without a time of its own. Time never
-/// decreases.
+/// ignored. `previous` is the time of the previous line. `now` is used if the line has no time of its own, or if this
+/// time is ignored. Time never decreases.
 pub(crate) fn time_of_line(
     previous: Duration,
     now: Duration,
@@ -90,7 +90,6 @@ pub struct Loop {
     pub(super) beliefs: Beliefs,
     monitor: Monitor,
     pub(super) planner: Planner,
-    /// Changes since the last deliberation, if any.
     agenda: Option<Agenda>,
     /// Number of changes of the planning problem since the start, which identifies the current problem.
     pub(super) question: u64,
@@ -308,7 +307,6 @@ impl Loop {
         self.planner.computed.clear();
     }
 
-    /// Returns the planning stage, which borrows the beliefs, the planner and the settings of the loop.
     fn adaptation(&mut self) -> Adaptation<'_> {
         Adaptation { beliefs: &mut self.beliefs, planner: &mut self.planner, settings: &self.settings }
     }
@@ -339,7 +337,6 @@ impl Loop {
         self.digest.clone()
     }
 
-    /// Rebuilds the knowledge base if unused names take up memory.
     fn compact_knowledge(&mut self) {
         let Some(base) = self.beliefs.mission.knowledge_mut().filter(|base| base.growth() > MAX_GROWTH)
         else {
@@ -351,7 +348,6 @@ impl Loop {
     }
 }
 
-/// Converts a refusal to an answer.
 fn refused(Refusal { code, message }: Refusal) -> Answer {
     Answer::Error { code: code.to_owned(), message }
 }

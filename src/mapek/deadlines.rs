@@ -72,7 +72,8 @@ fn suspended_request(beliefs: &Beliefs) -> Option<u64> {
 }
 
 /// Repeats effects that were not acknowledged in time. Returns the reconfigurations that count as failed. Requests of
-/// actions are skipped, because the deadline of the action applies, unless the action is suspended.
+/// actions are skipped, because the deadline of the action applies, unless the action is suspended. Does nothing if the
+/// robot has never acknowledged an effect by its number.
 fn check_effects(beliefs: &mut Beliefs, deadline: Duration, answers: &mut Vec<Answer>) -> Expired {
     let mut expired = Expired::new();
     // This robot may never acknowledge effects.
@@ -87,7 +88,8 @@ fn check_effects(beliefs: &mut Beliefs, deadline: Duration, answers: &mut Vec<An
         if waited < deadline || is_request(effect) && request_of_suspended != Some(*number) {
             continue;
         }
-        // Cancellations and suspensions are repeated without end. Otherwise, the action might go on.
+        // Other effects than reconfigurations are repeated without end. Otherwise, for example, a cancelled action
+        // might go on.
         let is_expired = wait.repeats > 0 && matches!(effect.command, Command::Reconfigure { .. });
         let outcome = if is_expired { OverdueOutcome::Failed } else { OverdueOutcome::Repeated };
         answers.push(Answer::Overdue {
@@ -185,7 +187,6 @@ fn passed_deadline(running: &mut Running, now: Duration, settings: &Settings) ->
     Some(time_since_report.as_secs())
 }
 
-/// Returns the time from the last report of an action to the next deadline of the action.
 fn next_deadline_after(running: &Running, settings: &Settings) -> Duration {
     allowed_silence(running, settings).saturating_mul(running.overdue.saturating_add(1))
 }

@@ -71,7 +71,8 @@ pub(super) fn must_be_sent(beliefs: &Beliefs, running: &Running, pair: &(String,
 }
 
 /// Creates the effect (request to the robot) with `command` and adds it to the answers. Removes the outstanding effects
-/// that it supersedes, and lists their numbers in the new effect.
+/// that it supersedes. The new effect lists their numbers and those of earlier superseded effects that may still
+/// arrive, at most [`MAX_SUPERSEDED`].
 pub(super) fn effect(beliefs: &mut Beliefs, action: u64, command: Command, answers: &mut Vec<Answer>) {
     beliefs.effects += 1;
     let number = beliefs.effects;
@@ -116,7 +117,7 @@ pub(super) fn effect(beliefs: &mut Beliefs, action: u64, command: Command, answe
 
 /// Makes the functions of a step, and no others, the objectives of the knowledge base, grounded by the step's designs.
 /// Designs on whose availability the problem itself decides are omitted with their functions. Without a step, removes
-/// all objectives.
+/// all objectives. An error of the knowledge base is added to `answers`. Does nothing without a knowledge base.
 pub(super) fn objectives(beliefs: &mut Beliefs, step: Option<&PlannedStep>, answers: &mut Vec<Answer>) {
     let mission = &beliefs.mission;
     let mut objectives_with_designs = step.map_or_else(Vec::new, |step| step.configuration.clone());
@@ -148,7 +149,6 @@ pub(super) fn suspend(beliefs: &mut Beliefs, running: Running, reason: &str, ans
     beliefs.running = Some(Running { suspended: true, provisional: false, ..running });
 }
 
-/// Requests that the action under way is resumed, if it is suspended.
 pub(super) fn resume_suspended(beliefs: &mut Beliefs, running: &mut Running, answers: &mut Vec<Answer>) {
     running.provisional = false;
     if std::mem::take(&mut running.suspended) {
@@ -171,7 +171,6 @@ mod tests {
     use crate::mapek::step::PlannedStep;
     use crate::setup::Setup;
 
-    /// Short text of each effect.
     fn words(answers: &[Answer]) -> Vec<String> {
         let word = |command: &Command| match command {
             Command::Reconfigure { function, from, to } => format!("{function} {from:?} {to}"),

@@ -164,7 +164,6 @@ pub enum Event {
     },
 }
 
-/// JSON Schema of the values that [`status`] accepts.
 fn status_schema(_: &mut SchemaGenerator) -> Schema {
     json_schema!({
         "anyOf": [
@@ -179,7 +178,6 @@ fn name_or_null_schema(_: &mut SchemaGenerator) -> Schema {
     json_schema!({ "type": ["string", "null"] })
 }
 
-/// JSON Schema of the values that [`word`] accepts.
 fn word_schema(_: &mut SchemaGenerator) -> Schema {
     json_schema!({ "type": ["string", "number", "boolean"] })
 }

@@ -10,7 +10,7 @@ use crate::mapek::answer::Answer;
 use crate::mapek::effects::{finish, request};
 
 /// Requests the next action if none is under way, or ends the mission if no step remains and the goal holds. A plan
-/// that is not executable in the believed situation is replaced once. If the second plan is not executable either,
+/// that is missing, or invalid in the believed situation, is replaced once. If the second plan is invalid, too,
 /// planning pauses until the situation changes. Does nothing during such a pause, while conclusions are missing, or if
 /// a search is needed but forbidden.
 pub(super) fn execute(adaptation: &mut Adaptation<'_>, answers: &mut Vec<Answer>) {

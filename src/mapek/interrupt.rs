@@ -12,21 +12,15 @@ use num_rational::BigRational;
 use crate::mapek::ask::Outcome;
 use crate::number;
 
-/// Decision about the action under way.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Interruption {
-    /// The action continues.
     None,
-    /// The action is cancelled.
     Cancel {
-        /// Reason, as a sentence.
         because: String,
     },
-    /// The action is suspended, because no plan exists.
     Suspend {
         /// `unsolvable` if the absence of a plan is proved, and `unknown` otherwise.
         status: &'static str,
-        /// Reason for the absence of a plan.
         because: String,
         /// Minimal set of unavailable designs that blocks every plan.
         blocking: Vec<String>,
@@ -72,7 +66,6 @@ mod tests {
     use super::{Interruption, weigh};
     use crate::mapek::ask::Outcome;
 
-    /// An outcome with an empty plan, or without a plan.
     fn outcome(is_plan: bool) -> Outcome {
         Outcome {
             steps: is_plan.then(Vec::new),

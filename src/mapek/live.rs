@@ -17,13 +17,11 @@ use crate::mission::replanner;
 /// Upper limit on the number of configurations for which the action under way is simulated.
 const MAX_CONFIGURATIONS: usize = 256;
 
-/// State of the incremental planner, kept between queries.
 #[derive(Debug, Clone, Default)]
 pub(super) enum Live {
     /// State before the first query: no planner has been built.
     #[default]
     Untried,
-    /// The incremental planner does not support the mission.
     Unsuited,
     /// Planner built for one problem. Also accepts problems that differ only in initial values and available designs.
     Ready(Replanner),

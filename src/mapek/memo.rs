@@ -12,7 +12,6 @@ use crate::mapek::ask::{Outcome, Question};
 use crate::mapek::beliefs::Running;
 use crate::mapek::step::PlannedStep;
 
-/// Upper limit on the number of cached plans.
 const CAPACITY: usize = 16;
 
 /// Planning problems with their outcomes, most recently used first.
@@ -47,20 +46,17 @@ impl Memo {
         }
     }
 
-    /// Clears the cache, for a new goal.
     pub(super) fn clear(&mut self) {
         self.0.clear();
     }
 }
 
 impl StoredQuestion {
-    /// Copies a planning problem. The current plan is copied only if the choice between optimal plans depends on it.
     pub(super) fn new(question: &Question<'_>) -> Self {
         let old = question.old.filter(|_| question.stay_close).map(<[_]>::to_vec);
         Self { problem: question.problem.clone(), running: question.running.cloned(), old }
     }
 
-    /// Returns `true` if both planning problems have the same action under way, or no action.
     pub(super) fn has_same_action(&self, question: &Question<'_>) -> bool {
         self.running.as_ref().map(|running| running.action) == question.running.map(|running| running.action)
     }

@@ -47,7 +47,6 @@ const VALUES: [&str; 2] = ["hasValue", "qa_has_value"];
 pub(super) struct Monitor {
     /// IRIs and local names of the quality attributes of the knowledge base.
     pub(super) attributes: BTreeSet<String>,
-    /// Cache of facts and functions, as text, that are known to fit the domain.
     checked: HashSet<String>,
     pub(super) filters: Filters,
     /// Cache of local names of components, by the reported name.
@@ -55,7 +54,6 @@ pub(super) struct Monitor {
 }
 
 impl Monitor {
-    /// Creates the monitor of a mission.
     pub(super) fn new(mission: &Mission, settings: &Settings) -> Self {
         let kinds =
             mission.knowledge().map(|knowledge| knowledge.view().attribute_types()).unwrap_or_default();
@@ -64,7 +62,6 @@ impl Monitor {
         Self { attributes, checked: HashSet::new(), filters, components: HashMap::new() }
     }
 
-    /// Filters for measurements and component reports.
     pub(super) fn filters(&self) -> &Filters {
         &self.filters
     }
@@ -91,7 +88,6 @@ impl Monitor {
     }
 }
 
-/// Context for applying one event to the beliefs, with a record of the changes.
 pub(super) struct BeliefUpdate<'a> {
     pub(super) monitor: &'a mut Monitor,
     pub(super) beliefs: &'a mut Beliefs,
@@ -156,7 +152,6 @@ impl BeliefUpdate<'_> {
         Ok(())
     }
 
-    /// Records the acknowledgement of an effect by the managed system.
     fn acknowledged(&mut self, effect: u64) -> Result<(), Refusal> {
         match self.beliefs.acknowledge(effect) {
             Receipt::Unknown => Err(Refusal::new("M305", format!("there was no effect {effect}"))),
@@ -171,8 +166,9 @@ impl BeliefUpdate<'_> {
         }
     }
 
-    /// Records that a reconfiguration has failed: the function has the previously acknowledged design, and the
-    /// requested design is marked as unrealisable until the next report about the design.
+    /// Handles a report that a reconfiguration has failed: corrects the believed design of the function, and marks the
+    /// requested design as unrealisable until the next report about the design. An old or repeated report has no
+    /// effect.
     fn failed_reconfiguration(&mut self, effect: u64) -> Result<(), Refusal> {
         if self.beliefs.mission.knowledge().is_none() {
             return Err(Refusal::new("M306", "there is no knowledge base that has designs"));
@@ -251,7 +247,6 @@ impl BeliefUpdate<'_> {
         self.changes.facts |= delta.insert.iter().any(is_concluded) || delta.delete.iter().any(is_lost);
     }
 
-    /// Returns the action under way, or a refusal if no action with the number `action` is under way.
     fn running(&mut self, action: u64) -> Result<&mut Running, Refusal> {
         let running = self.beliefs.running.as_mut().filter(|running| running.action == action);
         running.ok_or_else(|| Refusal::new("M305", format!("no action {action} is under way")))
@@ -348,7 +343,6 @@ impl BeliefUpdate<'_> {
         advance(mission.domain(), &self.beliefs.filled(), &step.to_plan_step(), true).ok()
     }
 
-    /// Applies a reported fact, or a reported value of a numeric function.
     fn fact(&mut self, name: &str, value: &str) -> Result<(), Refusal> {
         let mut words = name.split_whitespace();
         let name = words.by_ref().collect::<Vec<_>>().join(" ");
@@ -373,7 +367,6 @@ impl BeliefUpdate<'_> {
         Ok(())
     }
 
-    /// Returns the argument lists of the facts of a predicate in the believed state.
     fn facts(&self, predicate: &str) -> BTreeSet<Vec<String>> {
         let predicate = Name::new(predicate);
         let word = |term: &Term| match term {

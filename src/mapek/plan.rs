@@ -21,12 +21,12 @@ use crate::number;
 /// Upper limit on the number of doublings of the time limit.
 const MAX_DOUBLINGS: u32 = 3;
 
-/// Planner of the adaptation loop, with its caches.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Planner {
     /// Time limit of one search for a plan; `None` for no limit.
     pub time_limit: Option<Duration>,
-    /// Number of consecutive searches that reached their time limit. Each of them doubles the next time limit.
+    /// Number of consecutive searches that reached their time limit. Each doubles the next time limit, up to
+    /// `MAX_DOUBLINGS` times.
     pub attempt: u32,
     /// Limits in addition to the time limit of one search.
     pub limits: Limits,
@@ -42,11 +42,8 @@ pub(crate) struct Planner {
     pub question_log: Option<Vec<(StoredQuestion, Outcome)>>,
     /// Planning problems with outcomes that another thread has computed, in order.
     pub prepared: VecDeque<(StoredQuestion, Outcome)>,
-    /// Incremental planner, whose state is kept between searches.
     pub live: Live,
-    /// Cache of plans for recurring situations.
     pub memo: Memo,
-    /// Handle by which other threads read the progress of planning.
     pub watch: Watch,
 }
 

@@ -2,9 +2,8 @@
 //!
 //! If an action has lost a design, or its remainder is not executable, the action is reconfigured to available designs
 //! for which the validator accepts the remainder. If no such designs exist, or if there are too many configurations to
-//! try, the action is suspended. This decision
-//! needs no search: each configuration of this one action is simulated once. Planning decides later about the whole
-//! mission.
+//! try, the action is suspended. This decision needs no search: each configuration of this one action is simulated
+//! once. Planning decides later about the whole mission.
 
 use num_rational::BigRational;
 use pddl::ast::Direction;

@@ -12,12 +12,11 @@ const MAX_SUPERSEDED: usize = 16;
 /// request replaces it before the robot has acknowledged it.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct Receipts {
-    /// Whether any reconfiguration was acknowledged explicitly, by its effect number.
+    /// Whether any effect was acknowledged explicitly, by its number.
     pub(super) by_number: bool,
     pub(super) functions: BTreeMap<String, Received>,
 }
 
-/// History of the reconfigurations of one function.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct Received {
     pub(super) last: Option<Acknowledged>,
@@ -31,18 +30,17 @@ pub(super) struct Received {
     pub(super) implied: Option<u64>,
 }
 
-/// The acknowledged reconfiguration with the greatest number.
+/// The reconfiguration with the greatest number among those that were acknowledged, or implied by a report of an
+/// action.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Acknowledged {
     pub(super) effect: u64,
     pub(super) design: String,
-    /// Design before the reconfiguration, if known.
     pub(super) before: Option<Before>,
     /// Whether the reconfiguration was reported as failed after its acknowledgement.
     pub(super) failed: bool,
 }
 
-/// Design of a function before a reconfiguration.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Before {
     pub(super) design: String,
@@ -52,7 +50,7 @@ pub(super) struct Before {
 }
 
 impl Receipts {
-    /// Returns `true` if the robot has acknowledged any reconfiguration explicitly, by its effect number.
+    /// Returns `true` if the robot has acknowledged any effect explicitly, by its number.
     pub(super) fn are_sent(&self) -> bool {
         self.by_number
     }
@@ -63,7 +61,6 @@ impl Receipts {
         self.functions.get(function).is_some_and(|history| !history.superseded.is_empty())
     }
 
-    /// Records that the reconfiguration `effect` of `function` to `design` was superseded before it was answered.
     pub(super) fn supersede(&mut self, effect: u64, function: String, design: String) {
         let superseded = &mut self.functions.entry(function).or_default().superseded;
         superseded.insert(effect, design);
@@ -85,7 +82,6 @@ impl Receipts {
         }
     }
 
-    /// Returns the effect numbers of a function's reconfigurations that were superseded before they were acknowledged.
     pub(super) fn unanswered_superseded(&self, function: &str) -> impl Iterator<Item = &u64> {
         self.functions.get(function).into_iter().flat_map(|history| history.superseded.keys())
     }
@@ -104,7 +100,6 @@ impl Receipts {
         self.functions.iter().find_map(design)
     }
 
-    /// Serialises the history for a snapshot.
     pub(super) fn to_record(&self) -> Value {
         let function = |(name, history): (&String, &Received)| {
             let last = history.last.as_ref().map(|last| {
@@ -117,7 +112,6 @@ impl Receipts {
         json!([self.by_number, self.functions.iter().map(function).collect::<Vec<_>>()])
     }
 
-    /// Inverse of [`Receipts::to_record`]. Returns `None` if the record is malformed.
     pub(super) fn from_record(record: &Value) -> Option<Self> {
         let text = |value: &Value| value.as_str().map(ToOwned::to_owned);
         let superseded = |pair: &Value| Some((pair.get(0)?.as_u64()?, text(pair.get(1)?)?));

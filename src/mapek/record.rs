@@ -65,7 +65,6 @@ fn essence(mut answer: Value) -> Value {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Snapshot(pub Value);
 
-/// Serialises the beliefs.
 pub(super) fn snapshot(beliefs: &Beliefs) -> Snapshot {
     let statements = beliefs.mission.knowledge().map(Knowledge::statements).unwrap_or_default();
     let steps = |steps: &VecDeque<PlannedStep>| steps.iter().map(PlannedStep::to_record).collect::<Vec<_>>();

@@ -12,7 +12,8 @@ use crate::message::did_you_mean;
 impl BeliefUpdate<'_> {
     /// Applies a report that a function has a design without a request of the loop; `None` if it has no design. The
     /// function has this design from now on, and so has the action under way, unless a reconfiguration is pending. The
-    /// loop later considers another design in the same way as after a design has become available.
+    /// loop later considers another design in the same way as after a design has become available. If the action under
+    /// way has lost its design, a new plan is needed.
     pub(super) fn observed(&mut self, function: &str, design: Option<&str>) -> Result<(), Refusal> {
         let designs = self.beliefs.mission.designs_of(function);
         if designs.is_empty() {
@@ -60,7 +61,6 @@ impl BeliefUpdate<'_> {
         Ok(())
     }
 
-    /// Applies a value or status that a filter has accepted.
     pub(super) fn accept(&mut self, accepted: Accepted) -> Result<(), Refusal> {
         match accepted {
             Accepted::Value(attribute, value) => self.measured(&attribute, &value),

@@ -10,7 +10,6 @@ use serde_json::{Value, json};
 
 use crate::mapek::answer::Answer;
 
-/// Upper limit on the number of stored ranges of seen sequence numbers.
 const MAX_RANGES: usize = 256;
 
 /// Upper limit on the distance from the greatest seen number to a new number. Numbers further ahead are refused as
@@ -20,12 +19,9 @@ const MAX_AHEAD: u64 = 1_000_000;
 /// Upper limit on the first sequence number.
 const MAX_FIRST: u64 = 1 << 62;
 
-/// Classification of a sequence number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Classification {
-    /// The number is within the upper limit and was not seen before.
     New,
-    /// The number was seen before.
     Seen,
     /// The number is at most the given mark, the end of the dropped ranges: it is unknown whether the number was seen.
     Stale(u64),
@@ -33,7 +29,6 @@ enum Classification {
     Ahead(u64),
 }
 
-/// Set of seen sequence numbers, stored as ranges.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct Numbers {
     /// Ranges of seen numbers: maps the first number of each range to the last.
@@ -91,7 +86,6 @@ impl Numbers {
         }
     }
 
-    /// Greatest seen number.
     pub(crate) fn greatest(&self) -> Option<u64> {
         self.ranges.last_key_value().map(|(_, last)| *last)
     }
@@ -103,12 +97,10 @@ impl Numbers {
         ends.zip(starts).map(|(from, to)| [from, to]).collect()
     }
 
-    /// Serialises the set for a snapshot.
     pub(crate) fn to_record(&self) -> Value {
         json!([self.mark, self.ranges.iter().collect::<Vec<_>>()])
     }
 
-    /// Inverse of [`Numbers::to_record`]. Returns `None` if the record is malformed.
     pub(crate) fn from_record(record: &Value) -> Option<Self> {
         let range = |pair: &Value| Some((pair.get(0)?.as_u64()?, pair.get(1)?.as_u64()?));
         let ranges = record.get(1)?.as_array()?.iter().map(range).collect::<Option<_>>()?;

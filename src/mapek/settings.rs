@@ -77,11 +77,9 @@ pub struct AdaptationSection {
     unrecorded: Unrecorded,
 }
 
-/// A file that contains only the section `adaptation`.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Section {
-    /// Settings of the adaptation loop.
     #[serde(default)]
     adaptation: AdaptationSection,
 }
@@ -301,7 +299,6 @@ impl Default for Settings {
 /// recovers within seconds.
 const SETTLE: Duration = Duration::from_secs(5);
 
-/// Default of [`Settings::deadline`].
 const DEADLINE: Duration = Duration::from_secs(10);
 
 /// Default time limit of one search for a plan. The robot waits during planning.

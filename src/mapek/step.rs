@@ -30,7 +30,6 @@ pub struct PlannedStep {
     pub cost: BigRational,
 }
 
-/// Serialises the step as an object of the JSON output.
 impl Serialize for PlannedStep {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut object = serializer.serialize_map(None)?;
@@ -69,7 +68,6 @@ impl JsonSchema for PlannedStep {
 }
 
 impl PlannedStep {
-    /// Converts a step of the planner.
     pub(crate) fn new(mission: &Mission, step: &planner::Step) -> Self {
         Self {
             action: step.action.clone(),
@@ -132,7 +130,6 @@ impl PlannedStep {
         step
     }
 
-    /// Converts the step for the validator.
     pub(crate) fn to_plan_step(&self) -> PlanStep {
         PlanStep {
             action: Name::new(&self.action),
@@ -144,7 +141,8 @@ impl PlannedStep {
         }
     }
 
-    /// Writes all JSON fields except the action's name: arguments, configuration, duration and cost.
+    /// Writes all JSON fields except the action's name: arguments (without those that the knowledge base has added),
+    /// configuration, duration and cost.
     pub(crate) fn fields<M: SerializeMap>(&self, object: &mut M) -> Result<(), M::Error> {
         let written = self.arguments.get(..self.written).unwrap_or(&self.arguments);
         object.serialize_entry("arguments", written)?;
@@ -153,7 +151,6 @@ impl PlannedStep {
         object.serialize_entry("cost", &number::to_json(&self.cost))
     }
 
-    /// Serialises all fields for the journal.
     pub(crate) fn to_record(&self) -> Value {
         json!([
             self.action,
@@ -165,7 +162,6 @@ impl PlannedStep {
         ])
     }
 
-    /// Inverse of [`PlannedStep::to_record`]. Returns `None` if the record is malformed.
     pub(crate) fn from_record(record: &Value) -> Option<Self> {
         let text = |value: &Value| value.as_str().map(ToOwned::to_owned);
         let [action, arguments, written, configuration, duration, cost] = record.as_array()?.as_slice()
@@ -183,7 +179,6 @@ impl PlannedStep {
     }
 }
 
-/// Converts pairs of function and design to a JSON object with the functions as keys.
 pub(super) fn configuration_to_json(configuration: &[(String, String)]) -> Map<String, Value> {
     configuration.iter().map(|(function, design)| (function.clone(), json!(design))).collect()
 }
@@ -195,7 +190,6 @@ pub(super) fn configuration_from_record(record: &Value) -> Option<Vec<(String, S
     record.as_array()?.iter().map(pair).collect()
 }
 
-/// Converts steps to a plan for the validator.
 pub(crate) fn plan_text<'a>(steps: impl IntoIterator<Item = &'a PlannedStep>) -> PlanText {
     PlanText { steps: steps.into_iter().map(PlannedStep::to_plan_step).collect() }
 }

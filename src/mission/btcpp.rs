@@ -14,12 +14,10 @@ use planner::{Plan, Step};
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, Event};
 
-/// Type of the behaviour-tree node that changes the design of a function.
 const CHANGE_NODE: &str = "ChangeMode";
 /// Attribute names that BehaviorTree.CPP reserves, so that ports cannot have them.
 const RESERVED: [&str; 2] = ["name", "ID"];
 
-/// A node of the tree: its type, its instance name, and the values of its ports.
 struct Node {
     id: String,
     name: String,
@@ -106,7 +104,6 @@ fn write<W: io::Write>(writer: &mut Writer<W>, mission: &str, nodes: &[Node]) ->
     Ok(())
 }
 
-/// Declares each kind of node, with the ports of all its nodes.
 fn declare<W: io::Write>(writer: &mut Writer<W>, nodes: &[Node]) -> io::Result<()> {
     let mut kinds: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
     for node in nodes {

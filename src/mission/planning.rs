@@ -42,7 +42,7 @@ pub trait Planning {
     /// (starts and ends of actions) are at least `separation` apart, in the domain's time unit.
     ///
     /// # Errors
-    /// All constructs that the planner does not support, with their places.
+    /// All constructs that the planner does not support, with their places; or a limit that was reached.
     fn ground_concurrent(
         &self,
         problem: &Problem,
@@ -139,7 +139,6 @@ fn config(mission: &Mission, objectives: &[Metric], limits: &Limits) -> GroundCo
         .with_limits(limits.clone())
 }
 
-/// Converts errors of grounding and encoding to messages with their source lines.
 fn messages(mission: &Mission, errors: &[planner::Error]) -> Errors {
     let (domain, problem) = (mission.domain_source(), mission.problem_source());
     let message = |error: &planner::Error| match error.place() {

@@ -17,7 +17,6 @@ pub(super) struct Clause {
     pub body: Vec<Literal>,
 }
 
-/// A conjunct in the body of a clause.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Literal {
     /// An atom: predicate and arguments. Type tests are unary atoms, see [`of_type`].
@@ -26,7 +25,6 @@ pub(super) enum Literal {
     Equal(bool, Operand, Operand),
 }
 
-/// An argument of an atom: a variable or an object.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Operand {
     Variable(Name),
@@ -61,9 +59,9 @@ pub(super) fn of_type(r#type: &Name) -> Name {
     Name::new(&format!("type {type}"))
 }
 
-/// Converts a derived predicate to clauses without equalities. Returns `None` unless its condition
-/// consists of conjunctions, disjunctions and existential quantifiers over atoms, equalities and
-/// negated equalities, with distinct variable names.
+/// Converts a derived predicate to clauses without equalities. Returns `None` unless its condition consists of
+/// conjunctions, disjunctions and existential quantifiers over atoms, equalities and negated equalities, with distinct
+/// variable names and at most one type per variable.
 pub(super) fn clauses(derived: &Derived) -> Option<Vec<Clause>> {
     let head = &derived.head;
     let mut variables: BTreeSet<Name> = BTreeSet::new();
@@ -186,7 +184,6 @@ impl Clause {
         Some(self)
     }
 
-    /// Replaces the variables that are keys of `map`.
     fn with(self, map: &BTreeMap<Name, Operand>) -> Self {
         let substitute = |operand: Operand| match &operand {
             Operand::Variable(name) => map.get(name).cloned().unwrap_or(operand),

@@ -157,7 +157,6 @@ fn add(clauses_by_head: &mut BTreeMap<Name, Option<Vec<Clause>>>, head: &Name, c
     }
 }
 
-/// Binding of variables to objects.
 type Bindings<'k> = BTreeMap<&'k Name, &'k Name>;
 
 /// Argument tuples for which a predicate holds, in the order of their discovery and as a set.

@@ -16,7 +16,6 @@ use pddl::ast::{
 use super::clause::{Clause, Fact, Literal};
 use super::settle::{Additions, additions, are_equal};
 
-/// A schema of facts that an action may add.
 #[derive(Debug, Clone)]
 struct Addition {
     predicate: Name,
@@ -35,16 +34,15 @@ enum Argument {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Possible {
     bounded: BTreeSet<Name>,
-    /// Facts that actions may add.
     additions: Vec<Addition>,
-    /// Clauses of the bounded predicates.
     clauses: Vec<Clause>,
 }
 
 impl Possible {
     /// Determines which open predicates (predicates that actions can change) get a bound. A predicate has no bound if
-    /// it depends on a changed predicate with an unrestricted argument, i.e. an argument that actions do not require to
-    /// be a member of a class of the knowledge base.
+    /// one of its axioms is not a clause or leaves a variable unbound. It has no bound either if it depends on a
+    /// predicate without bound, on one that timed initial literals change, or on one that actions add with an argument
+    /// that they do not require to be a member of a class of the knowledge base.
     pub fn new(
         domain: &Domain,
         open: &BTreeMap<Name, Option<Vec<Clause>>>,

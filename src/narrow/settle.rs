@@ -19,7 +19,6 @@ use pddl::ast::{Action, ActionBody, Atom, Condition, Domain, Effect, Name, Term}
 
 use super::clause::{Clause, Fact, Literal, Operand};
 
-/// Maximum depth of unfolding a clause.
 const MAX_DEPTH: usize = 8;
 /// Maximum number of clauses that are examined while one predicate is unfolded.
 const MAX_CLAUSES: usize = 1000;
@@ -188,7 +187,6 @@ fn first_open(clause: &Clause, open: &BTreeSet<Name>) -> Option<usize> {
     clause.body.iter().position(|part| matches!(part, Literal::Holds(name, _) if open.contains(name)))
 }
 
-/// Unfolds the clauses of the predicate `head`.
 struct Unfold<'a> {
     clauses_by_head: &'a BTreeMap<Name, Option<Vec<Clause>>>,
     open: &'a BTreeSet<Name>,

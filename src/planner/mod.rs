@@ -160,8 +160,8 @@ impl<'m, 'r> Planner<'m, 'r> {
     ///
     /// # Errors
     /// Constructs that the planner does not support, with their places; faults of the objectives;
-    /// M107 if the options exclude each other; a limit that was reached before the task was ground;
-    /// or M170, a fault of the planner. It is not an error if no plan is found or optimality is not
+    /// M107 if the options exclude each other; a limit that was reached before the task was ground or the plan was
+    /// validated; or M170, a fault of the planner. It is not an error if no plan is found or optimality is not
     /// proved: see [`Solution::status`].
     pub fn plan(self) -> Result<Planned<'m>, Errors> {
         let objectives = Objectives::read(self.mission, &self.problem, &self.minimize)?;
@@ -256,8 +256,8 @@ impl<'m, 'r> Planner<'m, 'r> {
         Ok(planned)
     }
 
-    /// Plans by search alone, in exact rationals. `refused` has the messages about numbers that are
-    /// too large for integers.
+    /// Plans by search alone, in exact rationals. `refused` has the messages about numbers that are too large for
+    /// integers. Returns these messages as the error if there are several objectives.
     fn exact(self, objectives: Objectives, refused: Errors) -> Result<Planned<'m>, Errors> {
         // The search in rationals supports a single objective.
         if objectives.metrics.len() > 1 {
@@ -389,7 +389,6 @@ fn valued(solution: Solution, objectives: &Objectives) -> Point {
     Point { values: cost.into_iter().filter(|_| !objectives.metrics.is_empty()).collect(), solution }
 }
 
-/// Creates the error M107 for options that exclude each other.
 fn apart(text: &str) -> Errors {
     Message::error("M107", text).into()
 }

@@ -10,9 +10,7 @@ use crate::mission::{Mission, Reading, Unconfirmed, confirm};
 /// metric is kept.
 #[derive(Debug, Clone)]
 pub(super) struct Objectives {
-    /// The objectives as the user wrote them.
     pub(super) texts: Vec<String>,
-    /// The parsed objectives, in the order of `texts`.
     pub(super) metrics: Vec<Metric>,
 }
 
@@ -34,11 +32,11 @@ impl Objectives {
         Ok(Self { texts: texts.to_vec(), metrics })
     }
 
-    /// Executes the plan of `point` with the validator, and compares the value of each objective
-    /// with the planner's value.
+    /// Executes the plan of `point`, if there is one, with the validator, and compares the value of each objective with
+    /// the planner's value.
     ///
     /// # Errors
-    /// M170 if the validator rejects the plan or computes another value; M130 if the time limit is
+    /// M170 if the validator rejects the plan or computes another value; M130 if a limit is
     /// reached.
     pub(super) fn confirm(
         &self,
@@ -62,7 +60,6 @@ impl Objectives {
     }
 }
 
-/// Creates the error for a plan that the validator rejected or could not execute within the limits.
 pub(super) fn unconfirmed(reason: Unconfirmed) -> Message {
     match reason {
         Unconfirmed::Refused(reason) => fault(&reason),
@@ -73,7 +70,6 @@ pub(super) fn unconfirmed(reason: Unconfirmed) -> Message {
     }
 }
 
-/// Creates the error M170 for an internal fault of the planner.
 pub(super) fn fault(reason: &str) -> Message {
     let text = format!("this is a fault of metaplan, not of your input; please report it: {reason}");
     Message::error("M170", text)

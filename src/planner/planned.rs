@@ -21,7 +21,6 @@ pub(super) enum Ground {
     Integers(Task),
     /// Sequential steps, with costs and values that are rationals of any size.
     Exact(ExactTask),
-    /// Overlapping actions; the task is not retained.
     Concurrent,
 }
 
@@ -38,11 +37,11 @@ pub struct Planned<'m> {
     pub values: Vec<Exact>,
     /// Further optimal plans, if requested and if the plan is proved optimal.
     pub alternatives: Option<Alternatives>,
-    /// If the mission is proved unsolvable: unavailable designs that prevent a plan, or the
-    /// information that designs are not the reason.
+    /// If the mission is proved unsolvable: unavailable designs that prevent a plan, or the information that designs
+    /// are not the reason. Always `None` for overlapping actions, and for costs that are too large for integers.
     pub blocking: Option<Blocking>,
-    /// If the mission is proved unsolvable: numeric functions that actions need and that have no
-    /// value.
+    /// If the mission is proved unsolvable: numeric functions that actions need and that have no value. Empty in the
+    /// same cases as [`Planned::blocking`].
     pub missing_values: Vec<MissingValue>,
     /// Messages about numbers that are too large for integers. If there are any, planning used only
     /// search in exact rationals.

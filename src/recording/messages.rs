@@ -9,16 +9,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::mapek::{Event, Observation};
 
-/// Name of the message type for diagnostics.
 pub(super) const DIAGNOSTICS: &str = "diagnostic_msgs/msg/DiagnosticArray";
 
-/// Name of the message type for a text.
 pub(super) const TEXT: &str = "std_msgs/msg/String";
 
-/// The definition of [`Text`], in the format `ros2msg`.
 pub(super) const TEXT_DEFINITION: &str = "string data\n";
 
-/// The definition of [`DiagnosticArray`] and the types of its parts, in the format `ros2msg`.
 pub(super) const DIAGNOSTICS_DEFINITION: &str = "\
 std_msgs/Header header
 DiagnosticStatus[] status
@@ -47,34 +43,29 @@ string key
 string value
 ";
 
-/// The ROS 2 message `std_msgs/msg/String`.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Text {
     pub(super) data: String,
 }
 
-/// The ROS 2 message `builtin_interfaces/msg/Time`.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Time {
     pub(super) sec: i32,
     pub(super) nanosec: u32,
 }
 
-/// The ROS 2 message `std_msgs/msg/Header`.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Header {
     pub(super) stamp: Time,
     pub(super) frame_id: String,
 }
 
-/// The ROS 2 message `diagnostic_msgs/msg/KeyValue`.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct KeyValue {
     pub(super) key: String,
     pub(super) value: String,
 }
 
-/// The ROS 2 message `diagnostic_msgs/msg/DiagnosticStatus`.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct DiagnosticStatus {
     pub(super) level: u8,

@@ -46,24 +46,20 @@ impl<R> std::fmt::Debug for Replay<R> {
     }
 }
 
-/// State of a [`Replay`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
     Reading,
-    /// The file was read to its end.
     Finished,
     /// The file is truncated and was read up to its end.
     Unfinished,
 }
 
-/// Kind of the messages of a channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     /// Event lines of a recorded loop, as JSON.
     Events,
     /// Event lines of a recorded loop, as JSON text in CDR.
     EventTexts,
-    /// Diagnostics messages of ROS 2.
     Diagnostics,
 }
 
@@ -108,7 +104,6 @@ impl<R: Read> Replay<R> {
         self.state == State::Unfinished
     }
 
-    /// Reads the next part of the file.
     fn read(&mut self) -> io::Result<()> {
         let record = match self.reader.next_event() {
             Some(Ok(LinearReadEvent::ReadRequest(need))) => {
@@ -210,7 +205,6 @@ impl<R: Read> Replay<R> {
     }
 }
 
-/// Converts an error of the crate `mcap` to an I/O error.
 fn damaged(error: McapError) -> io::Error {
     match error {
         McapError::Io(error) => error,

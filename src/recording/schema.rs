@@ -3,16 +3,12 @@
 use schemars::Schema;
 use serde_json::{Value, json};
 
-/// Topic of the diagnostics messages.
 pub(super) const DIAGNOSTICS: &str = "/diagnostics";
 
-/// Topic of the loop's input lines.
 pub(super) const EVENTS: &str = "/metaplan/events";
 
-/// Name of the schema of the topic [`EVENTS`].
 pub(super) const EVENT: &str = "metaplan.Event";
 
-/// Name of the schema of the topics in [`ANSWERS`].
 pub(super) const ANSWER: &str = "metaplan.Answer";
 
 /// Topics of answers, each with the kinds of its answers. Kinds that are not listed belong to the
@@ -39,7 +35,6 @@ pub(super) fn topic(kind: &str) -> usize {
     ANSWERS.iter().position(|(_, kinds)| kinds.contains(&kind)).unwrap_or(ANSWERS.len() - 1)
 }
 
-/// Returns the JSON Schema of recorded input lines.
 pub(super) fn event() -> Value {
     json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -69,7 +64,6 @@ pub fn answer_schema() -> Schema {
     Schema::try_from(answer()).unwrap_or_default()
 }
 
-/// Returns the JSON Schema of the loop's answers, in their recorded form.
 pub(super) fn answer() -> Value {
     let texts = json!({"type": "array", "items": {"type": "string"}});
     let step = json!({

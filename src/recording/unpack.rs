@@ -8,7 +8,6 @@ use mcap::records::{ChunkHeader, Record};
 /// Maximum size of a record or an uncompressed chunk, in bytes.
 pub(super) const LARGEST: usize = 1 << 28;
 
-/// Decompresses a chunk and returns its records.
 pub(super) fn records(header: &ChunkHeader, data: &[u8]) -> io::Result<Vec<Record<'static>>> {
     let size = usize::try_from(header.uncompressed_size).unwrap_or(usize::MAX);
     if size > LARGEST {

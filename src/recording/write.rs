@@ -15,7 +15,6 @@ use crate::mapek::Observation;
 use crate::recording::messages::{self, DiagnosticArray, Text, to_cdr};
 use crate::recording::schema;
 
-/// Name and version of the recording format, in the file's metadata.
 const FORMAT: &str = "metaplan-recording/1";
 
 /// Encoding of event lines and answers in a recording.
@@ -49,7 +48,6 @@ impl<W: Write + Seek> std::fmt::Debug for Out<W> {
     }
 }
 
-/// A channel of the file, and the number of messages written to it.
 #[derive(Debug)]
 struct Topic {
     channel: u16,
@@ -68,7 +66,6 @@ pub(super) struct EventMessage<'a> {
     pub(super) text: Option<Cow<'a, str>>,
 }
 
-/// The field that gives the kind of an answer.
 #[derive(Deserialize)]
 struct Kind<'a> {
     #[serde(borrow, default)]
@@ -180,7 +177,6 @@ impl<W: Write + Seek> Out<W> {
     }
 }
 
-/// Encodes a JSON text in the given form.
 fn bytes(form: Form, json: String) -> Vec<u8> {
     match form {
         Form::Json => json.into_bytes(),
@@ -188,7 +184,6 @@ fn bytes(form: Form, json: String) -> Vec<u8> {
     }
 }
 
-/// Converts an error of the crate `mcap` to an I/O error.
 fn failed(error: McapError) -> io::Error {
     match error {
         McapError::Io(error) => error,

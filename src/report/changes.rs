@@ -113,7 +113,6 @@ fn shown(atom: &Atom) -> String {
     format!("({})", words.join(" "))
 }
 
-/// Returns the designs that became available or unavailable, with the reasons.
 fn designs(before: &Mission, after: &Mission) -> Vec<Change> {
     let available = |mission: &Mission| -> BTreeMap<String, bool> {
         let designs = mission.knowledge().into_iter().flat_map(|knowledge| knowledge.catalogue().designs());
@@ -129,7 +128,6 @@ fn designs(before: &Mission, after: &Mission) -> Vec<Change> {
     changes.collect()
 }
 
-/// Returns sentences about the differences between two plans and their costs.
 fn plans(before: &Plan, after: &Plan, costs: &[Cost; 2]) -> Vec<String> {
     let text = match costs {
         [Cost::Of(old), Cost::Of(new)] => return cost_and_design_differences(before, after, [old, new]),
@@ -145,8 +143,6 @@ fn plans(before: &Plan, after: &Plan, costs: &[Cost; 2]) -> Vec<String> {
     vec![text]
 }
 
-/// Returns sentences about the differences between the costs, the used designs and the actions of
-/// two plans.
 fn cost_and_design_differences(before: &Plan, after: &Plan, [old_cost, new_cost]: [&str; 2]) -> Vec<String> {
     let mut texts = Vec::new();
     if old_cost == new_cost {

@@ -151,7 +151,6 @@ pub fn simulation_sheet(mission: &str, scenario: &str, strategies: &[Strategy], 
     }
 }
 
-/// Returns a sentence with the number of missions that reached their goal.
 fn accomplished(done: usize, all: usize) -> String {
     match (done, all) {
         (0, 1) => "The mission was not accomplished.".to_owned(),

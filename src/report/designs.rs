@@ -69,7 +69,7 @@ fn required(requirement: &Requirement, measurements: &[Measurement]) -> String {
 }
 
 /// Returns the reasons for the availability of a design. For an unavailable design, these are the causes found that
-/// rule it out, with derivations.
+/// rule it out, with derivations, or the fault that stopped the reasoning.
 pub(super) fn because(knowledge: &Knowledge, design: &str, available: bool) -> Vec<Reason> {
     if available {
         let text = "nothing says that it is not realisable, and nothing that it is not available".to_owned();

@@ -1,9 +1,9 @@
 //! Infers the places of a mission, their neighbours, and the route of a plan.
 //!
-//! PDDL does not mark places. This module assumes that something moves if an action deletes `(p …
-//! a)` and adds `(p … b)` with parameters `a` and `b` of one type. The objects of this type are
-//! places. Two places are neighbours if a fact or value of the problem has exactly these two places
-//! among its arguments.
+//! PDDL does not mark places. This module assumes that something moves if an action deletes `(p … a)` and adds `(p …
+//! b)` with parameters `a` and `b` of one type. Of these types, the objects of the type that the plan uses most are
+//! places. Two places are neighbours if a fact of the problem, or a value if there is no such fact, has exactly these
+//! two places among its arguments.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -57,7 +57,6 @@ pub(super) fn map(scene: Scene<'_>, plan: &Plan, steps: &mut [Step]) -> Option<M
     Some(Map { places: places.iter().map(place).collect(), ways: ways(scene.problem, &number, &predicates) })
 }
 
-/// The movements of a plan, and the places between which they lead.
 struct Moving<'d> {
     movements: Vec<&'d Movement<'d>>,
     places: Vec<Name>,
@@ -169,7 +168,6 @@ fn ends<'p>(atoms: impl Iterator<Item = &'p Atom>, predicates: &BTreeSet<&Name>)
     matching.filter_map(|atom| atom.arguments.last()).map(|term| name_of(term).clone()).collect()
 }
 
-/// Returns the atoms among the conjuncts of a goal.
 fn goals(goal: &Condition) -> impl Iterator<Item = &Atom> {
     let mut parts = vec![goal];
     std::iter::from_fn(move || {

@@ -22,7 +22,6 @@ pub fn plan_picture(seen: Seen<'_>, solution: &Solution) -> picture::Plan {
     picture
 }
 
-/// Returns the picture of a plan: its steps, curves, and route on the map.
 pub(super) fn drawn(scene: Scene<'_>, plan: &Plan) -> picture::Plan {
     let axis = axis(plan);
     let mut steps = steps(scene.designs, plan, axis);
@@ -42,7 +41,6 @@ pub fn timeline_picture(mission: &Mission, solution: &Solution) -> picture::Plan
     picture::Plan { verdict, steps, axis, search, ..picture::Plan::default() }
 }
 
-/// Returns a sentence with the cost, the lower bound and the proof status.
 fn sentence(solution: &Solution) -> String {
     let cost = solution.plan.as_ref().map(|plan| format!("Cost {}", plan.cost));
     let bound = solution.lower_bound.as_ref().filter(|_| solution.status != Status::Optimal);

@@ -22,7 +22,6 @@ pub struct Seen<'a> {
 /// Maps each design of a knowledge base to the first function that it solves.
 pub(super) type Designs = BTreeMap<String, String>;
 
-/// Input of the drawing functions for a plan: domain, problem, coordinates of places, and designs.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Scene<'a> {
     pub(super) domain: &'a Domain,
@@ -38,7 +37,6 @@ impl<'a> Seen<'a> {
     }
 }
 
-/// Maps each design of the mission's knowledge base to the first function that it solves.
 pub(super) fn known_designs(mission: &Mission) -> Designs {
     let designs = mission.knowledge().into_iter().flat_map(|knowledge| knowledge.catalogue().designs());
     let solved = designs.filter_map(|design| {

@@ -13,6 +13,9 @@
 //!   the requirements \[2\]. The task is planned again when an action has failed;
 //! - *random* works as *greedy*, but chooses a random admissible design.
 //!
+//! All baselines except *none* also plan again if no step is left, the goal is not reached, and other designs are
+//! available than at the last planning.
+//!
 //! [`Admission`] defines which designs are admissible. If a function has no admissible design, the
 //! action keeps the planned design if that is available, and otherwise gets an available one; the
 //! action may become possible later. If the action is impossible with the chosen designs but
@@ -68,8 +71,8 @@ impl Strategy {
     }
 }
 
-/// A running strategy. All strategies use a [`Loop`] for their knowledge about the robot; only
-/// `joint` lets the loop plan.
+/// A running strategy. All strategies use a [`Loop`] for their knowledge about the robot and for its planner; only
+/// `joint` lets the loop decide.
 #[derive(Debug)]
 pub(super) struct Controller {
     strategy: Strategy,
@@ -77,9 +80,8 @@ pub(super) struct Controller {
     plan: VecDeque<PlannedStep>,
     random: fastrand::Rng,
     gave_up: bool,
-    /// Local names of the designs that were available at the last planning.
+    /// Designs that were available at the last planning.
     planned_with: BTreeSet<String>,
-    /// Number of plans that were computed until now.
     pub(super) plans: usize,
 }
 
@@ -97,7 +99,6 @@ impl Controller {
         }
     }
 
-    /// Returns `true` if the strategy has given up, so that it will make no further request.
     pub(super) fn is_done(&self) -> bool {
         self.gave_up
     }
@@ -219,8 +220,6 @@ impl Controller {
         if !whole.admits(&chosen) && whole.admits(step) { step.clone() } else { chosen }
     }
 
-    /// Chooses a new design for each function of the running action whose design is no longer
-    /// available.
     fn replace_lost(&mut self, answers: &mut Vec<Answer>) {
         let beliefs = self.control.beliefs();
         let Some((_, step)) = beliefs.running() else { return };

@@ -8,20 +8,17 @@ use crate::message::{Message, did_you_mean};
 use crate::mission::conditions::{self, Fault, written};
 use crate::mission::{Mission, Mistake, setting};
 
-/// Parsed conditions and numeric functions of a simulation's settings.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Watched {
     /// Condition of each event, in the order of the events. `None` for an event with a time.
     pub(super) events: Vec<Option<Condition>>,
     /// Numeric function that ends the mission when it reaches 0, in the validator's notation.
     pub(super) lifeline: Option<String>,
-    /// Condition that holds once the pipeline is found.
     pub(super) found: Option<Condition>,
     /// Numeric function with the length of the pipeline, without parentheses.
     pub(super) length: Option<String>,
 }
 
-/// Collects the mistakes in a section `simulation`.
 struct Checker<'m> {
     mission: &'m Mission,
     mistakes: Vec<Mistake>,
@@ -90,7 +87,6 @@ impl Checker<'_> {
         }
     }
 
-    /// Checks that a number is above 0.
     fn positive(&mut self, path: Vec<Key>, value: f64) {
         if !(value.is_finite() && value > 0.0) {
             let text = format!("{} is {value}, but should be positive", last(&path));
@@ -98,7 +94,6 @@ impl Checker<'_> {
         }
     }
 
-    /// Checks that a number is at least 0.
     fn not_negative(&mut self, path: Vec<Key>, value: f64) {
         if !(value.is_finite() && value >= 0.0) {
             let text = format!("{} is {value}, but should be at least 0", last(&path));
@@ -106,7 +101,6 @@ impl Checker<'_> {
         }
     }
 
-    /// Checks an event of the simulation. Returns its parsed condition, if it has a valid one.
     fn event(&mut self, index: usize, event: &Disturbance, simulation: &Simulation) -> Option<Condition> {
         let path = |rest: &[&str]| -> Vec<Key> {
             let begin = ["events".into(), index.into()];

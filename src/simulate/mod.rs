@@ -94,7 +94,8 @@ impl Experiment {
     /// before the end of the mission.
     ///
     /// # Errors
-    /// The problem or a disturbance of the scenario does not fit the mission, or the knowledge is inconsistent.
+    /// The problem, or a disturbance or signal of the scenario, does not fit the mission; or the knowledge is
+    /// inconsistent.
     pub fn run(
         &self,
         strategy: Strategy,
@@ -120,7 +121,6 @@ impl Experiment {
     }
 }
 
-/// State of one simulated run: the world, its controller, and the results up to now.
 struct Stage {
     world: World,
     controller: Controller,

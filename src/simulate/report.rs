@@ -63,7 +63,7 @@ pub struct Run {
     pub cancelled: usize,
     /// Number of plans that were requested or computed.
     pub plans: usize,
-    /// Number of changes of a function's design.
+    /// Number of requested changes of a function from one design to another.
     pub reconfigurations: usize,
     /// Number of distinct configurations with which actions were requested.
     pub distinct: usize,
@@ -131,8 +131,8 @@ impl Run {
         short(time * self.time_unit.seconds())
     }
 
-    /// Returns `true` if this run is better than `other`: it alone reached the goal, or both did
-    /// and its metric is better.
+    /// Returns `true` if this run is better than `other`: it alone reached the goal, or both did and its metric is
+    /// better by more than 10⁻⁶.
     pub fn is_better_than(&self, other: &Self) -> bool {
         match (self.accomplished, other.accomplished) {
             (true, true) if self.maximize => self.cost > other.cost + 1e-6,

@@ -1,10 +1,10 @@
 //! The simulated robot: its true state, which changes with time, by disturbances and by the running
 //! action.
 //!
-//! Conditions, durations and effects of actions follow the mission's own domain, with a seeded
-//! deviation of the duration. An action stalls if its designs are not available, or if its
-//! conditions do not hold for the remaining part, and fails when it has stalled for its `patience`.
-//! The seed alone determines everything random, so all strategies face the same world.
+//! Conditions, durations and effects of actions follow the mission's own domain, with a seeded deviation of the
+//! duration. An action stalls while it is suspended, if its designs are not available, or if its conditions do not hold
+//! for the remaining part. It fails when it has stalled for the simulation's `patience`. The seed alone determines
+//! everything random, so all strategies face the same world.
 
 use std::cell::OnceCell;
 
@@ -23,7 +23,6 @@ use crate::simulate::settings::{Disturbance, Simulation};
 /// Times and shares are rounded to multiples of 1 / `GRAIN`.
 const GRAIN: f64 = 1e6;
 
-/// The running action of the simulated robot.
 #[derive(Debug, Clone)]
 struct Job {
     action: u64,
@@ -32,11 +31,9 @@ struct Job {
     progress: f64,
     /// Duration for which the action has stalled without interruption.
     waited: f64,
-    /// `true` if the controller has suspended the action.
     suspended: bool,
 }
 
-/// A scheduled change of a component's status.
 #[derive(Debug, Clone)]
 struct ComponentChange {
     time: f64,
@@ -305,7 +302,6 @@ impl World {
         }
     }
 
-    /// Returns `true` if a condition holds in the current true state.
     fn holds(&self, condition: &Condition) -> bool {
         let goal = condition.clone();
         is_valid(self.truth.domain(), &Problem { goal, constraints: Vec::new(), ..self.filled().clone() })
@@ -377,8 +373,8 @@ impl World {
         is_valid(self.truth.domain(), self.filled())
     }
 
-    /// Returns the value of the mission's metric in the current state, or the elapsed time if the
-    /// mission has no metric.
+    /// Returns the value of the mission's metric in the current state, or the elapsed time if the mission has no metric
+    /// or the value is undefined.
     pub fn cost(&self) -> f64 {
         let metric = metric_after(self.truth.domain(), self.filled(), &exact(self.time));
         metric.map_or(self.time, |metric| number::to_f64(&metric))
@@ -389,8 +385,8 @@ impl World {
         self.filled().metric.as_ref().is_some_and(|metric| metric.direction == Direction::Maximize)
     }
 
-    /// Returns the inspected length of the pipeline, in the unit of the mission's function for the
-    /// length. `None` if the simulation has no such function.
+    /// Returns the inspected length of the pipeline, in the unit of the mission's function for the length. `None` if
+    /// the simulation has no such function, or the function has no value.
     pub fn distance(&self) -> Option<f64> {
         let length = self.truth.value(self.watched.length.as_ref()?)?;
         Some(number::to_f64(&length) * self.inspected)

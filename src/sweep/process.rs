@@ -12,14 +12,14 @@ use super::results::Line;
 use super::study::{Planned, Study};
 use crate::message::Message;
 
-/// Time between two checks whether a process has ended.
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
 
 /// Maximum number of characters of a run's standard error output that are stored.
 const MAX_MESSAGE_CHARACTERS: usize = 2000;
 
-/// Executes a run of a study with `program`, and waits for its end. Returns `None` if a limit is
-/// reached first; the run is killed in this case.
+/// Executes a run of a study with `program`, and waits for its end. Returns `None` if a limit is reached first; the run
+/// is killed in this case. The generator of the run's files is not subject to the limits, but its duration counts
+/// towards the time limit of the run.
 ///
 /// # Errors
 /// The program, or the generator of its files, cannot be executed.

@@ -12,10 +12,8 @@ use serde_json::{Map, Value};
 use super::study::{Shard, Study};
 use crate::message::{Errors, Message};
 
-/// Name and version of the format of result files.
 pub(super) const FORMAT: &str = "metaplan-sweep/1";
 
-/// Message about a file that belongs to another study.
 const OTHER_STUDY: &str = "it belongs to another study, or the study or its files have changed";
 
 /// The first line of a shard's file. It identifies the study.
@@ -24,7 +22,6 @@ struct Header {
     format: String,
     /// Checksum of the study, by which files of other studies are rejected.
     study: String,
-    /// Number of runs of the study.
     runs: usize,
     shard: String,
 }
@@ -40,7 +37,7 @@ pub struct Line {
     pub status: Option<i32>,
     /// `true` if the time limit ended the run.
     pub timed_out: bool,
-    /// Duration of the run, in seconds.
+    /// Duration of the run and of the generator of its files, in seconds.
     pub seconds: f64,
     /// JSON answer of the run; null if the output is not JSON.
     pub answer: Value,
@@ -149,8 +146,7 @@ fn parse(path: &Path, text: &str) -> Result<(Header, Vec<Line>), Message> {
 /// Reads the results in all shard files of a directory, sorted by run, without duplicates.
 ///
 /// # Errors
-/// All faults: files that cannot be read or belong to another study, and runs with differing
-/// answers.
+/// All faults: files that are missing, unreadable, damaged or of another study, and runs with differing answers.
 pub fn read_lines(directory: &Path, study: &Study) -> Result<Vec<Line>, Errors> {
     let failed = |error: io::Error| Errors::from(wrong(directory, &error.to_string()));
     let mut files = Vec::new();

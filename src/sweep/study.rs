@@ -125,7 +125,8 @@ pub struct Study {
     sections: Sections,
     /// Directory of the study's file, which is the working directory of the runs.
     pub directory: PathBuf,
-    /// Checksum of the study, of the files that its command names, and of the program's version.
+    /// Checksum of the study's command, generator, time limit and values, of the files that the command names, and of
+    /// the program's version.
     pub digest: String,
     /// Varied keys with their values. The value of the last key changes from each run to the next.
     keys: Vec<(String, Vec<Value>)>,
@@ -179,8 +180,8 @@ impl Study {
     /// Reads the file of a study.
     ///
     /// # Errors
-    /// The file cannot be read or is not a study, a key has invalid values, or its mission has no
-    /// places for `pairs`.
+    /// The file cannot be read or parsed; otherwise all mistakes in it, such as invalid values of a key, or `pairs`
+    /// with a mission without places.
     pub fn read(file: &Path) -> Result<Self, Errors> {
         let (sections, place): (Sections, ManifestPath) = manifest::read(file)?;
         let wrong_at = |path: &[Key], part: Part, text: String| {
@@ -274,8 +275,8 @@ impl Study {
 
     /// Returns a sample of the runs for checking the study. The sample contains the first run and,
     /// for each value of each key, a run that differs from the first run only in this value. Number
-    /// ranges and pairs contribute only their last value. Each run has the path of keys to its
-    /// value in the file.
+    /// ranges and pairs contribute only their last value. Each run has the path of keys to its value in the file. The
+    /// sample of a study without runs is empty.
     pub fn samples(&self) -> Vec<(Vec<Key>, Planned)> {
         if self.is_empty() {
             return Vec::new();
@@ -345,8 +346,8 @@ impl Study {
         self.sections.time_limit
     }
 
-    /// Returns the arguments of a run's command, without the program's name. `directory` replaces
-    /// `{dir}`.
+    /// Returns the arguments of a run's command, without the program's name. `directory` replaces `{dir}`. The last
+    /// arguments request an answer in JSON without warnings.
     pub fn words(&self, run: &Planned, directory: &Path) -> Vec<String> {
         let mut words: Vec<String> =
             self.sections.command.iter().map(|word| filled(word, &run.vary, directory)).collect();

@@ -94,7 +94,6 @@ fn apply_step(configurator: &mut Configurator, step: &Value) {
     }
 }
 
-/// Returns the design of each served objective, by the name of the objective.
 fn served(configurator: &Configurator) -> BTreeMap<String, String> {
     let objectives = configurator.objectives().into_iter();
     let pair = |objective: ontology::runtime::Objective| {

@@ -19,7 +19,6 @@ use serde_json::{Value, json};
 use crate::common::{control, feed};
 use crate::worlds::{Place, generated, shipped, suave};
 
-/// Last report of each component and attribute.
 #[derive(Debug, Clone, Default)]
 struct LastReports {
     components: BTreeMap<String, &'static str>,
@@ -131,7 +130,6 @@ impl<'a> Life<'a> {
         }
     }
 
-    /// Returns a line with one to five random reports.
     fn burst(&mut self) -> String {
         let count = if self.random.bool() { 1 } else { self.random.usize(2..=5) };
         let (mut components, mut measured) = (Vec::new(), Vec::new());
@@ -269,7 +267,6 @@ fn kinect(status: &str) -> String {
     json!({ "event": "component_status", "component": "c_kinect", "status": status }).to_string()
 }
 
-/// Formats errors, contradictions and effects briefly.
 fn outcomes(answers: &[Answer]) -> Vec<String> {
     let word = |answer: &Answer| match answer {
         Answer::Error { code, .. } => Some(format!("error {code}")),

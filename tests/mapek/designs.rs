@@ -4,7 +4,6 @@ use metaplan::mapek::{Answer, Command, Event, Loop};
 
 use crate::common::{control, feed};
 
-/// Returns the function, the previous design and the new design of each reconfiguration.
 fn reconfigured(answers: &[Answer]) -> Vec<(String, Option<String>, String)> {
     let change = |answer: &Answer| match &answer.effect()?.command {
         Command::Reconfigure { function, from, to } => Some((function.clone(), from.clone(), to.clone())),

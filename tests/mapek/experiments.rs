@@ -233,7 +233,6 @@ fn the_plan_survives_failures_of_unused_components() {
     );
 }
 
-/// Expected text of the newly available designs when the Kinect has recovered.
 const BACK: &str = "+fd_amcl_kinect, +fd_mrpt_kinect";
 const BETTER: [&str; 2] = [
     "plan 304: move wp3 wp6 (f_localization = fd_amcl_kinect); move_in_the_dark wp6 wp9 (f_localization = fd_amcl_kinect)",

@@ -9,10 +9,8 @@ use metaplan::planner::Limits;
 use metaplan::setup::Setup;
 use metaplan::simulate::{Disturbance, Experiment, RandomFailure, Run, Simulation, Strategy};
 
-/// A mission with components that can fail.
 struct Robot {
     mission: &'static str,
-    /// Sets of components that fail together.
     failing: &'static [&'static [&'static str]],
     /// Number of leading entries of `failing` whose permanent failure the mission tolerates.
     spare: usize,
@@ -68,7 +66,6 @@ const ROBOTS: [Robot; 2] = [
     },
 ];
 
-/// Returns all scenarios of a robot with their names.
 fn scenarios(robot: &Robot) -> Vec<(String, Simulation)> {
     let mut scenarios = Vec::new();
     for (failing, number) in robot.failing.iter().zip(0..) {
@@ -120,14 +117,10 @@ fn simulation(robot: &Robot, events: Vec<Disturbance>, failures: Vec<RandomFailu
     simulation
 }
 
-/// Comparison of the loop with another strategy in one scenario.
 struct Comparison {
     strategy: Strategy,
-    /// Mean cost and number of accomplished missions of the other strategy, as text.
     mean_cost_and_count: String,
-    /// Number of missions in which the loop is better.
     better: usize,
-    /// Seeds of missions in which the loop is worse.
     worse: Vec<u64>,
 }
 
@@ -165,7 +158,6 @@ fn setup(robot: &Robot) -> Setup {
     Setup::read(&manifest).expect("the mission is read")
 }
 
-/// Formats the mean cost of the accomplished missions and their number.
 fn mean_cost_and_count(runs: &[Run]) -> String {
     let done: Vec<f64> = runs.iter().filter(|run| run.accomplished).map(|run| run.cost).collect();
     if done.is_empty() {

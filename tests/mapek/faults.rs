@@ -21,7 +21,6 @@ const POLICY: Policy = Policy { sync: Sync::Never, snapshot_every: 9 };
 
 type Files = BTreeMap<String, Vec<u8>>;
 
-/// Runs the script with a journal and returns the files of the journal.
 fn written(pristine: &Loop) -> Files {
     let directory = tempfile::tempdir().expect("a directory");
     let mut control = pristine.clone();
@@ -93,7 +92,6 @@ fn open(files: &Files, pristine: &Loop) -> Outcome {
     sound
 }
 
-/// Number of injected faults per outcome.
 #[derive(Debug, Default)]
 struct Count {
     refused: usize,
@@ -175,7 +173,6 @@ impl Suite {
         self.check("CRLF everywhere", |files| files.values_mut().for_each(|bytes| *bytes = crlf(bytes)));
     }
 
-    /// Removes, duplicates and exchanges records.
     fn lines(&mut self, names: &[String], thorough: bool) {
         for name in names {
             let bytes = self.files[name].clone();
@@ -251,7 +248,6 @@ fn an_unfinished_snapshot_loses_nothing() {
     }
 }
 
-/// Asserts that opening the journal fails with a message that contains `words`.
 fn refused(directory: &Path, control: &Loop, words: &str) {
     let refused = Journal::open(directory, POLICY, &mut control.clone());
     let message = refused.map(|(journal, _)| journal).expect_err("it is refused").message.clone();

@@ -78,7 +78,6 @@ fn fleet() -> Option<Vec<Loop>> {
     Some(vec![first; ROBOTS])
 }
 
-/// Returns the report of a robot's visibility sensor: a sine with a phase per robot, in full precision.
 fn measurement(robot: usize, round: usize) -> Observation {
     let turn = round as f64 / 80.0 + robot as f64 / ROBOTS as f64;
     let value = 2.25 + 1.5 * (std::f64::consts::TAU * turn).sin();

@@ -69,7 +69,6 @@ pub struct Fuzz {
     pub random: fastrand::Rng,
     /// The knowledge base is compared with a recomputed one after each `compare_every` events.
     pub compare_every: usize,
-    /// A loop that has not received any event.
     pristine: Loop,
 }
 
@@ -129,7 +128,6 @@ impl Fuzz {
         (event.to_string(), true)
     }
 
-    /// Returns a line with two to five random reports.
     fn burst(&mut self) -> Value {
         let (random, world) = (&mut self.random, self.world);
         let (mut components, mut measured) = (Vec::new(), Vec::new());

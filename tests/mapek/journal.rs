@@ -71,7 +71,6 @@ pub fn uuv_script() -> Vec<String> {
     numbered(&events)
 }
 
-/// Adds sequence numbers and times to events and returns them as lines.
 fn numbered(events: &[&str]) -> Vec<String> {
     let line =
         |(index, event): (usize, &&str)| format!(r#"{{{event},"seq":{},"time":{}.25}}"#, index + 1, index);
@@ -113,7 +112,6 @@ fn open(directory: &Path, pristine: &Loop) -> (Journal, Loop, Recovery, Vec<Answ
     (journal, control, recovery, answers)
 }
 
-/// Delivers all lines of the script that the loop has not handled yet.
 fn go_on(journal: &mut Journal, control: &mut Loop, robot: &mut Robot) {
     for (index, line) in script().iter().enumerate() {
         if control.beliefs().sequence() < Some(index as u64 + 1) {
@@ -153,7 +151,6 @@ fn a_journal_cut_at_five_hundred_places_restores_the_loop() {
     check(500);
 }
 
-/// Cuts the journal `cuts` times at random positions and checks that the loop is restored each time.
 fn check(cuts: usize) {
     let pristine = control("ugv");
     let (state, effects, _directory) = undisturbed(&pristine);
@@ -190,7 +187,6 @@ fn check(cuts: usize) {
     }
 }
 
-/// Returns the effects that the robot has received after each number of lines.
 fn received(pristine: &Loop) -> Vec<BTreeMap<u64, Effect>> {
     let mut control = pristine.clone();
     let mut robot = Robot::default();

@@ -192,7 +192,6 @@ fn damage_and_another_knowledge_base_are_refused() {
     assert!(message.contains("is damaged"), "{message}");
 }
 
-/// A running `metaplan run --configure` on a pipe.
 struct Program {
     child: Child,
     stdin: ChildStdin,
@@ -243,7 +242,6 @@ impl Program {
         }
     }
 
-    /// Kills the program with SIGKILL.
     fn kill(mut self) {
         self.child.kill().expect("it is killed");
         self.child.wait().expect("it ends");

@@ -14,14 +14,12 @@ use serde_json::Value;
 use crate::common::control;
 use crate::journal::{POLICY, script, state, uuv_script};
 
-/// A mission with the reports of its robot.
 struct Story {
     mission: &'static str,
     script: Vec<String>,
 }
 
 impl Story {
-    /// Returns the effects that the robot acknowledges in the first `sent` lines.
     fn acknowledged(&self, sent: usize) -> Vec<u64> {
         let effect = |line: &String| serde_json::from_str::<Value>(line).ok()?.get("effect")?.as_u64();
         self.script[..sent].iter().filter_map(effect).collect()
@@ -40,7 +38,6 @@ fn manifest(mission: &str) -> PathBuf {
     file
 }
 
-/// A running program with its standard input and its output lines.
 struct Program {
     child: Child,
     stdin: ChildStdin,
@@ -83,7 +80,6 @@ struct Robot {
     effects: BTreeMap<u64, Value>,
     /// Numbers of effects in the order of their first arrival.
     order: Vec<u64>,
-    /// Numbers of acknowledged effects, in the order of acknowledgement.
     acknowledged: Vec<u64>,
     state: Value,
 }
@@ -136,7 +132,6 @@ impl Robot {
         }
     }
 
-    /// Reads and records the answers to one line.
     fn read_answers(&mut self, program: &Program) {
         for answer in &program.lines {
             let is_last = answer["answer"] == "handled";

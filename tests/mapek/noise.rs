@@ -10,7 +10,6 @@ use metaplan::setup::Setup;
 use num_rational::BigRational;
 use serde_json::json;
 
-/// Starts a loop for the ground vehicle, with `settings_text` appended to its manifest.
 fn started(settings_text: &str) -> Loop {
     let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions");
     let text = std::fs::read_to_string(directory.join("ugv.toml")).expect("a manifest");

@@ -188,7 +188,6 @@ fn missed_deadlines_have_the_documented_outcomes() {
     assert!(!silent.beliefs().cancelling());
 }
 
-/// An unfinished search is repeated after pauses of increasing length.
 #[test]
 fn an_unfinished_search_is_repeated() {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/program/ferry/mission.toml");
@@ -210,7 +209,6 @@ fn an_unfinished_search_is_repeated() {
     assert_eq!(ferry.beliefs().lines(), 0, "time that passes is no line");
 }
 
-/// The safe effect does not wait for planning; the test never runs the planner.
 #[test]
 fn a_planner_that_never_ends_does_not_delay_the_safe_effect() {
     let mut ugv = with(|settings| settings.with_time_limit(None));

@@ -4,7 +4,6 @@ use metaplan::mapek::{Answer, Command, Loop};
 
 use crate::common::{control, feed};
 
-/// Formats the effects among the answers briefly.
 fn words(answers: &[Answer]) -> Vec<String> {
     let word = |answer: &Answer| match &answer.effect()?.command {
         Command::Reconfigure { from, to, .. } => {
@@ -54,7 +53,6 @@ fn a_report_in_transit_acknowledges_nothing() {
     assert_eq!(words(&answers)[0], "fd_amcl_kinect to fd_mrpt_lidar", "the next design is asked for");
 }
 
-/// A robot can report a failure after it has acknowledged the arrival of a reconfiguration.
 #[test]
 fn a_reconfiguration_may_fail_after_it_was_acknowledged() {
     let mut ugv = control("ugv");
@@ -103,7 +101,6 @@ fn a_superseded_design_is_not_believed() {
     assert!(words[..resume].iter().any(|word| word.starts_with("none to ")), "{words:?}");
 }
 
-/// If acknowledgements arrive out of order, the greatest number counts.
 #[test]
 fn of_two_acknowledged_reconfigurations_the_later_one_counts() {
     for order in [[1, 3], [3, 1]] {
@@ -170,7 +167,6 @@ fn situation(state: &str) -> Loop {
     ugv
 }
 
-/// Delivers a line without planning. Asserts that the reaction contains the reconfiguration with this number.
 fn feed_reconfiguration(ugv: &mut Loop, line: &str, number: u64) {
     let answers = react(ugv, line);
     let reconfiguration = answers.iter().filter_map(Answer::effect).find(|effect| effect.number == number);

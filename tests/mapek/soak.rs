@@ -104,12 +104,9 @@ fn reaction_times() {
     }
 }
 
-/// A benchmark of the loop with two alternating reports.
 struct Rate {
     subject: &'static str,
-    /// Alternating reports.
     reports: [&'static str; 2],
-    /// Lines that are delivered before the measurement.
     before: &'static [&'static str],
     /// Minimum number of lines per second of processor time, without and with a journal.
     least: [u64; 2],

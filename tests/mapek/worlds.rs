@@ -24,7 +24,8 @@ pub struct Place {
     /// A started loop that has not received any event.
     pub started: Loop,
     pub components: Vec<String>,
-    /// Attributes with values on, between and beyond all of their bounds.
+    /// Attributes with possible values: on and around their bounds, and beyond. Without any bounds, all measured
+    /// attributes have fixed values.
     pub attributes: Vec<(String, Vec<String>)>,
     pub designs: Vec<Design>,
     /// Pairs of a component and a component that it depends on.

@@ -1,6 +1,6 @@
-//! Oracle of a simulation: checks the demands of [`crate`]. It uses the designs, the delivered messages and
-//! the state of the robot. Except for demands (a) and (f), which also read the beliefs of the loop, it does
-//! not depend on the state of the loop.
+//! Oracle of a simulation: checks the demands of [`crate`]. The oracle uses the designs, the delivered messages and the
+//! state of the robot. Demands (a), (f), (g) and (h) also read the beliefs of the loop. Demand (b) compares its
+//! believed design.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,13 +16,11 @@ use crate::{DESIGNS, FUNCTION, GOAL};
 pub struct Judge {
     /// Components that have failed according to the reports that were delivered to the loop.
     failed: BTreeSet<String>,
-    /// Designs whose reconfiguration the robot has refused or the loop has abandoned.
+    /// Designs whose reconfiguration the robot has refused or the loop has abandoned, without a later report about the
+    /// design.
     refused: BTreeSet<String>,
-    /// All effects that the loop has requested, by number.
     requested: BTreeMap<u64, Effect>,
-    /// Effects that a later effect has superseded.
     superseded: BTreeSet<u64>,
-    /// Effects that the loop has abandoned with a report.
     given_up: BTreeSet<u64>,
     /// Design that the loop must believe, derived from the messages by the table of
     /// `docs/reference/events.md`.
@@ -34,13 +32,10 @@ pub struct Judge {
     observed_failures: BTreeSet<u64>,
     /// Whether an outdated observation determined the design before the last reconfiguration.
     was_misled: bool,
-    /// Actions whose start was delivered to the loop.
     started: BTreeSet<u64>,
-    /// Actions whose progress was delivered to the loop.
     progressed: BTreeSet<u64>,
     /// Action that the loop still waits for after its deadline, according to its own report.
     awaited: Option<u64>,
-    /// Actions whose end was delivered to the loop.
     ended: BTreeSet<u64>,
     /// Last decision of the loop about plans, including that the goal is reached.
     plan: Plan,
@@ -147,16 +142,16 @@ impl Judge {
         }
     }
 
-    /// Returns a component that the design requires and that has failed, if there is one.
     fn forbids(&self, design: &str) -> Option<&'static str> {
         let components =
             DESIGNS.iter().find(|entry| entry.0 == design).map(|entry| entry.1).unwrap_or_default();
         components.iter().find(|component| self.failed.contains(**component)).copied()
     }
 
-    /// Demand (a): after the arrival of all outstanding effects and then of all effects in transit, no moving
-    /// action violates the loop's intention. A violation is motion without a design, with a design that the
-    /// delivered reports forbid, or with a design other than the requested one.
+    /// Demands (a) and (g), after the arrival of all outstanding effects and then of all effects in transit. (a): no
+    /// action moves without a design, with a design that the delivered reports forbid, or with another design than the
+    /// requested one. (g): an action that the loop lets continue does not stand still. Nothing is checked while the
+    /// loop is misled by an outdated observation.
     pub fn intended_motion<'a>(
         &self,
         robot: &Robot,
@@ -227,9 +222,9 @@ impl Judge {
         }
     }
 
-    /// Demand (f): if a line makes the design of the action under way unusable, the answers before planning
-    /// contain a safe effect: a change to the best other design, or suspension. `before` is the moving action
-    /// before the line, with its design.
+    /// Demand (f): if a line makes the design of the action under way unusable, the answers before planning contain a
+    /// safe effect: a change to the best other design, suspension or cancellation. No effect is needed if the best
+    /// design is already on its way or in use. `before` is the moving action before the line, with its design.
     pub fn reaction(
         &self,
         before: Option<(u64, String)>,
@@ -271,7 +266,8 @@ impl Judge {
         }
     }
 
-    /// Demand (e): after a restart of the loop, all unanswered reconfigurations are requested again at once.
+    /// Demand (e): after a restart of the loop, the last reconfiguration is requested again at once if it is
+    /// unanswered.
     pub fn repeated(&self, answers: &[Answer]) -> Result<(), String> {
         let numbers: BTreeSet<u64> =
             answers.iter().filter_map(Answer::effect).map(|effect| effect.number).collect();
@@ -292,7 +288,7 @@ impl Judge {
         Ok(())
     }
 
-    /// Demand (a): the robot moves with a forbidden design for at most `bound` consecutive steps.
+    /// Demand (a): the robot moves with a forbidden design for at most `bound` consecutive steps; `None` is no limit.
     pub fn motion(&mut self, robot: &Robot, bound: Option<u64>) -> Result<(), String> {
         let is_moving = robot.action.as_ref().is_some_and(Action::is_moving);
         let forbidden = robot.design.as_ref().filter(|_| is_moving).and_then(|design| self.forbids(design));
@@ -307,8 +303,8 @@ impl Judge {
         }
     }
 
-    /// Demand (b): the believed design follows from the messages. If no reconfiguration is pending, it is the
-    /// actual design.
+    /// Demand (b): the believed design follows from the messages. A believed design is the actual one if it is certain
+    /// and no message about designs is in transit.
     pub fn configuration<'a>(
         &self,
         robot: &Robot,
@@ -354,8 +350,11 @@ impl Judge {
         }
     }
 
-    /// Demand (c): each effect was carried out, superseded, abandoned with a report, or belongs to an action
-    /// that has ended. Demand (d): the goal is reached, or no plan exists.
+    /// Demand (c): each effect was carried out, superseded, abandoned with a report, implied by a report, or belongs to
+    /// an action that has ended. This is not checked for a robot that has never acknowledged an effect.
+    ///
+    /// Demand (d): the goal is reached, or no design can be used and no plan exists. The loop may also have stopped
+    /// after three failures of one step, or wait for reports that the robot never sends.
     pub fn at_the_end(&self, robot: &Robot) -> Result<(), String> {
         let is_open = |(number, effect): &(&u64, &Effect)| {
             let is_moot =
@@ -409,16 +408,15 @@ struct Belief {
     pending: BTreeMap<u64, String>,
     /// Earlier unanswered reconfigurations, which were superseded or abandoned.
     superseded: BTreeMap<u64, String>,
-    /// The acknowledged reconfiguration with the greatest number, if it has not failed since.
+    /// Reconfiguration that counts as carried out last, by an acknowledgement or an implying report.
     last: Option<Last>,
     greatest: u64,
     /// Reconfigurations up to this number may have been carried out before or after an observation of the
     /// design.
     crossed: u64,
-    /// Reconfigurations that count as carried out because a later report implies them, before the first
-    /// acknowledgement by number.
+    /// Reconfigurations that count as carried out because a later report implies them, before the first acknowledgement
+    /// by number.
     implied: BTreeSet<u64>,
-    /// Reconfigurations that have failed according to the delivered messages.
     failed: BTreeSet<u64>,
     /// Superseded reconfigurations up to this number precede an observation of the design, so they leave no
     /// uncertainty.
@@ -475,7 +473,8 @@ impl Belief {
         }
     }
 
-    /// Records the failure of a reconfiguration. Returns its design, which then counts as unrealisable.
+    /// Records the failure of a reconfiguration. Returns its design, which then counts as unrealisable, or `None` if
+    /// the failure has no consequence.
     fn record_failure(&mut self, effect: u64) -> Option<String> {
         self.failed.insert(effect);
         if let Some(design) = self.pending.remove(&effect).or_else(|| self.superseded.remove(&effect)) {
@@ -495,7 +494,8 @@ impl Belief {
         Some(design)
     }
 
-    /// Abandons a pending reconfiguration, which the robot may still carry out. Returns its design.
+    /// Abandons a reconfiguration, which the robot may still carry out. Returns its design, or `None` if the
+    /// reconfiguration is not pending.
     fn give_up(&mut self, effect: u64) -> Option<String> {
         let to = self.pending.remove(&effect)?;
         self.design = None;

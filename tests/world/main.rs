@@ -4,19 +4,21 @@
 //! fail and recover. Reconfigurations and actions fail. The loop crashes, and recovers from its snapshot and the later
 //! lines. After some time, the robot is fair: nothing is lost, nothing fails, and the last reports are repeated.
 //!
-//! The judge ([`judge::Judge`]) is the oracle. It uses [`DESIGNS`], the messages, and the state of the robot.
-//! Rules (a) and (f) also read the beliefs of the loop.
+//! The judge ([`judge::Judge`]) is the oracle. It uses [`DESIGNS`], the messages, and the state of the robot. Demands
+//! (a), (f), (g) and (h) also read the beliefs of the loop.
+//!
 //! Demands:
 //! - (a) After each reaction, before planning, and after the arrival of all outstanding effects and then of all effects
 //!   in transit, no action moves without a design, with a design that the delivered reports forbid, or with another
 //!   design than the loop has requested. The robot does so for a bounded number of steps only.
-//! - (b) The believed configuration follows from the messages by the table of `docs/reference/events.md`. If
-//!   no reconfiguration is pending, the believed configuration is the actual one.
-//! - (c) At the end, each effect was carried out, superseded, abandoned with a report, or belongs to an action that has
-//!   ended.
-//! - (d) At the end, the robot is at the goal, or the last decision is that no plan exists, and this is true.
-//! - (e) A loop restored from its snapshot and the later steps has the state of the crashed loop, and repeats the
-//!   unanswered reconfigurations.
+//! - (b) The believed configuration follows from the messages by the table of `docs/reference/events.md`. If the
+//!   believed design is certain and no message about designs is in transit, it is the actual one.
+//! - (c) At the end, each effect was carried out, superseded, abandoned with a report, implied by a report, or belongs
+//!   to an action that has ended.
+//! - (d) At the end, the robot is at the goal, or the last decision is that no plan exists, and this is true. The loop
+//!   may also have stopped after repeated failures of a step, or wait for reports that the robot never sends.
+//! - (e) A loop restored from its snapshot and the later steps has the state of the crashed loop, and repeats the last
+//!   reconfiguration if it is unanswered.
 //! - (f) A line that makes the design of the action under way unusable is answered with a safe effect at once.
 //! - (g) After planning, and after the arrival of all effects, an action that the loop lets continue is not suspended.
 //! - (h) After planning, an action is suspended only if no design is available or no plan exists.
@@ -61,7 +63,6 @@ const PROBLEM: &str = "(define (problem p) (:domain m) (:objects p0 p1 p2 - plac
   (:init (robot_at p0) (way p0 p1) (way p1 p0) (way p1 p2) (way p2 p1))
   (:goal (robot_at p2)) (:metric minimize (total-time)))";
 
-/// Returns a knowledge base with the designs. According to its estimates, later designs are faster.
 fn knowledge() -> String {
     let mut text = "@prefix : <http://example.org/m#> .\n@prefix owl: <http://www.w3.org/2002/07/owl#> .\n\
         @prefix t: <http://metacontrol.org/tomasys#> .\n\
@@ -85,7 +86,6 @@ fn knowledge() -> String {
     text
 }
 
-/// Creates a loop that has not received any event.
 fn pristine(settings: Settings) -> Loop {
     let directory = tempfile::tempdir().expect("a directory");
     let manifest = "name = \"m\"\n[knowledge]\nfiles = [\"kb.ttl\"]\n[planning]\ndomain = \"domain.pddl\"\n\
@@ -128,7 +128,6 @@ fn faults(seed: u64) -> Faults {
     if seed.is_multiple_of(2) { faults.with_lost_start() } else { faults }
 }
 
-/// Formats the seeds of each kind of violation, with the messages of the first violation of this kind.
 fn summary(violations_found: &[(u64, String)]) -> String {
     let kind = |violation: &str| violation.get(..3).unwrap_or_default().to_owned();
     let mut kinds: BTreeMap<String, Vec<&(u64, String)>> = BTreeMap::new();

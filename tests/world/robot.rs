@@ -1,4 +1,4 @@
-//! Simulated robot with one function. It carries out each effect once and sends reports.
+//! Simulated robot with one function. The robot carries out each effect at most once and sends reports.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,7 +7,6 @@ use serde_json::{Value, json};
 
 use crate::{COMPONENTS, FUNCTION, START};
 
-/// Number of work steps per action.
 const WORK: u32 = 4;
 
 /// The action that the robot is executing.
@@ -27,7 +26,7 @@ pub struct Action {
 }
 
 impl Action {
-    /// Returns `true` if the action has started and is not suspended.
+    /// Returns `true` if the action waits for no design and is not suspended.
     pub fn is_moving(&self) -> bool {
         self.awaited_design.is_none() && !self.suspended
     }
@@ -41,14 +40,14 @@ pub struct Robot {
     pub place: String,
     /// Numbers of effects that were carried out, refused, or superseded before their arrival.
     pub processed: BTreeSet<u64>,
-    /// Reconfigurations that were refused since the last successful one. The successful one is included
-    /// if it failed after its acknowledgement.
+    /// Reconfigurations that were refused since the last successful one. If the successful one failed after its
+    /// acknowledgement, it is included, and so are those refused before it.
     pub refused: BTreeSet<u64>,
     /// Reconfigurations that were refused before the last successful one.
     refused_before: BTreeSet<u64>,
-    /// Answers to effects and reports of ended actions, kept for repetition.
+    /// Answers to effects, reports of late failures, and reports of ended actions, kept for repetition.
     pub past_reports: Vec<Value>,
-    /// Greatest number of an action that has started.
+    /// Greatest number of an action whose request or cancellation has arrived.
     last_started: u64,
     has_restarted: bool,
     /// Whether the function lost its design in a restart and has not got a new design since.
@@ -57,7 +56,6 @@ pub struct Robot {
     before: Option<(u64, String)>,
     /// Action number and effect number of the last reconfiguration that was carried out.
     pub configured: (u64, u64),
-    /// Future actions that were suspended before their request arrived.
     suspended_early: BTreeSet<u64>,
     /// Future actions that were suspended and resumed before their request arrived, with the effect number
     /// and the design of the resumption.
@@ -113,8 +111,8 @@ impl Robot {
         reports
     }
 
-    /// Makes the last reconfiguration fail after its acknowledgement, so that the function has the previous
-    /// design again. Returns the report, or `None` if it can no longer fail.
+    /// Makes the last reconfiguration fail after its acknowledgement, so that the function has the previous design
+    /// again. Returns the report, or `None` if no reconfiguration can fail in this way.
     pub fn fail_late(&mut self) -> Option<Value> {
         let (effect, design) = self.before.take()?;
         self.design = Some(design);
@@ -129,7 +127,7 @@ impl Robot {
         Some(report)
     }
 
-    /// Returns a copy of the robot without its answers, to predict the result of later effects.
+    /// Returns a copy with the state on which later effects depend, to predict their result.
     pub fn prospect(&self) -> Self {
         Self {
             failed: BTreeSet::new(),
@@ -152,7 +150,7 @@ impl Robot {
         }
     }
 
-    /// Carries out an effect. Returns a report about its action, if there is one.
+    /// Carries out an effect. Returns the resulting report about an action, if there is one.
     pub fn carry_out(&mut self, effect: &Effect) -> Option<Value> {
         let number = effect.action;
         let action = self.action.as_mut().filter(|action| action.number == number);
@@ -226,8 +224,8 @@ impl Robot {
         None
     }
 
-    /// Advances the action by one work step, or makes it fail if `fails` is set. Returns a report, if
-    /// there is one.
+    /// Advances a moving action by one work step. With `fails`, the action fails instead, even if it stands still.
+    /// Returns a report, if there is one.
     pub fn work(&mut self, fails: bool) -> Option<Value> {
         let action = self.action.as_mut().filter(|action| action.is_moving() || fails)?;
         action.done += 1;
@@ -267,9 +265,8 @@ impl Robot {
         json!({ "event": "configuration_observed", "function": FUNCTION, "design": self.design })
     }
 
-    /// Returns repeated reports of the statuses of all components and of ended actions, as from robots that
-    /// publish them periodically. Answers to effects are not repeated: the loop has to repeat unanswered
-    /// effects.
+    /// Returns repeated reports of the statuses of all components, of ended actions and, after a restart, of the
+    /// design. Answers to effects are not repeated: the loop has to repeat unanswered effects.
     pub fn periodic_reports(&self) -> Vec<Value> {
         let mut reports: Vec<Value> = COMPONENTS.iter().map(|component| self.status(component)).collect();
         reports.extend(self.past_reports.iter().filter(|past_reports| is_end(past_reports)).cloned());
@@ -278,7 +275,6 @@ impl Robot {
     }
 }
 
-/// Returns the design of the robot's function in a configuration.
 fn design_in(configuration: &[(String, String)]) -> Option<&String> {
     configuration.iter().find(|(function, _)| function == FUNCTION).map(|pair| &pair.1)
 }

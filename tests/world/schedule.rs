@@ -11,22 +11,18 @@ use crate::judge::Judge;
 use crate::robot::Robot;
 use crate::{COMPONENTS, DESIGNS, FUNCTION};
 
-/// Simulated time of one step.
 const STEP: Duration = Duration::from_millis(500);
 
 /// Number of steps with faults, and number of steps in the subsequent fair phase, which has no faults.
 const STEPS: (u64, u64) = (60, 300);
 
-/// Maximum number of logged messages in the report of a violation.
 const MAX_LOG: usize = 400;
 
 /// Range of the additional delay of a belated message, in steps: longer than two deadlines of the loop.
 const BELATED: (u64, u64) = (45, 90);
 
-/// Number of loop steps after which a new snapshot is taken.
 const SNAPSHOT_EVERY: usize = 23;
 
-/// Maximum number of reactions of the loop before the next deliberation (planning).
 const MAX_UNDELIBERATED: u32 = 4;
 
 /// Fault rates of a schedule. Unless stated otherwise, each number is a percentage.
@@ -42,7 +38,7 @@ pub struct Faults {
     pub fails: u32,
     pub crashes: u32,
     pub restarts: u32,
-    /// Percentage of reconfigurations that fail after their acknowledgement.
+    /// Percentage of steps at which the last reconfiguration fails after its acknowledgement.
     pub late: u32,
     /// Percentage of steps with an observation of the function's design.
     pub observes: u32,
@@ -61,7 +57,7 @@ pub struct Faults {
 }
 
 impl Faults {
-    /// Returns the fault rates of a seed. Each kind of fault is absent from some schedules.
+    /// Returns the fault rates of a seed. Each kind of fault except `breaks` is absent from some schedules.
     pub fn of(seed: u64) -> Self {
         let mut random = Rng::with_seed(seed ^ 0x5eed);
         let mut share = |maximum: u32| if random.bool() { 0 } else { random.u32(0..=maximum) };
@@ -129,20 +125,16 @@ pub struct Schedule<'a> {
     random: Rng,
     faults: Faults,
     now: u64,
-    /// Number of the last event line.
+    /// Sequence number of the last report; 0 if reports have none.
     line: u64,
-    /// Messages in transit, by step of arrival and a random number that orders the messages of one step.
+    /// Messages in transit, by step of arrival and a number that orders the messages of one step.
     messages: BTreeMap<(u64, u64), Message>,
     /// Result of planning in parallel to the events that is not adopted yet.
     thoughts: Option<Thoughts>,
-    /// Number of reactions since the last deliberation.
     undeliberated: u32,
-    /// Last snapshot of the loop, if any.
     snapshot: Option<Snapshot>,
-    /// Loop steps since the last snapshot.
     steps: Vec<Step>,
     judge: Judge,
-    /// Log of all messages, if enabled.
     log: Option<Vec<String>>,
 }
 
@@ -180,7 +172,7 @@ impl<'a> Schedule<'a> {
 
     /// Runs the schedule to its end.
     ///
-    /// Returns the first violation, with the last messages.
+    /// Returns the first violation. With the log, the fault rates and the last messages follow.
     pub fn run(mut self) -> Result<(), String> {
         self.deliberate();
         for now in 1..=STEPS.0 + STEPS.1 {
@@ -268,7 +260,6 @@ impl<'a> Schedule<'a> {
         self.judge.motion(&self.robot, bound)
     }
 
-    /// Sends the reports of a robot in the fair phase.
     fn fair_reports(&mut self) {
         if self.now == STEPS.0 + 1 && self.random.bool() {
             self.robot.failed.clear();
@@ -286,8 +277,8 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    /// Returns the maximum number of steps for which the robot may move with a design that the delivered
-    /// reports forbid. `None` if the last message about the design may have been lost or refused.
+    /// Returns the maximum number of steps for which the robot may move with a design that the delivered reports
+    /// forbid. `None` while messages about designs may be lost, refused or late.
     fn bound(&self) -> Option<u64> {
         // Two deadlines and one step each way: the effect is repeated once, and then abandoned.
         let deadlines = 2 * 20 + 6;
@@ -305,7 +296,6 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    /// Simulated time since the start of the mission.
     fn time(&self) -> Duration {
         STEP * u32::try_from(self.now).unwrap_or(u32::MAX)
     }
@@ -319,14 +309,14 @@ impl<'a> Schedule<'a> {
         self.post(&Message::Event(event));
     }
 
-    /// Sends a report that cannot be lost.
     fn report_safely(&mut self, event: Value) {
         let lost = std::mem::take(&mut self.faults.lost);
         self.report(event);
         self.faults.lost = lost;
     }
 
-    /// Puts a message in transit. It can be lost, duplicated, and overtaken by later messages.
+    /// Puts a message in transit. In the phase with faults, the message can be lost, duplicated, and overtaken by later
+    /// messages.
     fn post(&mut self, message: &Message) {
         // Before the first acknowledgement, the loop cannot detect whether this robot sends acknowledgements.
         let is_safe = self.now == 0 && !self.faults.start;
@@ -353,7 +343,7 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    /// Delivers a line or a timer to the loop, and checks the reaction.
+    /// Delivers a line or a timer to the loop, checks the reaction, and continues the deliberation.
     fn deliver(&mut self, line: &str) -> Result<(), String> {
         if line != Observation::TIMER {
             self.log(|| format!("loop hears {line}"));
@@ -383,7 +373,7 @@ impl<'a> Schedule<'a> {
         self.judge.configuration(&self.robot, &self.control, self.messages.values())
     }
 
-    /// Deliberates, starts planning in parallel to the events, or adopts the resulting plans.
+    /// Deliberates, starts planning in parallel to the events, adopts the resulting plans, or does nothing.
     fn continue_deliberation(&mut self) -> Result<(), String> {
         if !self.faults.beside || self.undeliberated >= MAX_UNDELIBERATED {
             return self.finish_deliberation();
@@ -436,7 +426,6 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    /// Sends the effects among the answers to the robot and logs all answers.
     fn send(&mut self, answers: Vec<Answer>) {
         for answer in answers {
             self.log(|| answer.to_json().to_string());
@@ -446,7 +435,6 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    /// Replaces the loop by a loop that is restored from the snapshot and the later steps.
     fn crash(&mut self) -> Result<(), String> {
         self.log(|| "crash".to_owned());
         let mut restored = self.pristine.clone();
@@ -476,7 +464,6 @@ impl<'a> Schedule<'a> {
     }
 }
 
-/// Formats an effect briefly: number, kind, action and design.
 fn brief(effect: &Effect) -> String {
     let json = Answer::Effect(effect.clone()).to_json();
     format!("{} {} {} {}", json["effect"], json["answer"], json["action"], json["to"])

@@ -12,7 +12,7 @@ use task::task::{Fact, Operator, State, Task};
 pub struct GoalCount {
     /// Goal facts of basic variables. Rules derive the other variables, so that one step can change any number of them.
     goal_facts: Vec<Fact>,
-    /// Maximum number of goal facts that one operator makes true; at least 1.
+    /// Upper bound on the number of goal facts that one operator makes true; at least 1.
     facts_per_step: usize,
     /// Cost of the cheapest operator with its cheapest designs.
     cheapest: Int,
@@ -59,13 +59,11 @@ mod tests {
 
     use super::GoalCount;
 
-    /// Random tasks: robots with designs, batteries, conditional effects and derived predicates.
     fn tasks() -> impl Iterator<Item = Task> {
         let tasks = (0..40).flat_map(|seed| [ground_text(fleet(seed)), ground_text(depot(seed))]);
         tasks.filter(|task| task.unreachable.is_none())
     }
 
-    /// Optimal cost of a task, `None` if there is no plan.
     fn optimal_cost(outcome: SearchOutcome) -> Option<Int> {
         match outcome {
             SearchOutcome::Optimal(plan) => Some(plan.cost),

@@ -32,9 +32,7 @@ pub(crate) enum Side {
 /// A value beyond which a design cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Bound {
-    /// Value of the bound, in the attribute's unit.
     pub value: BigRational,
-    /// Side on which the design can be used.
     pub side: Side,
     /// Hysteresis: distance by which a sample must satisfy a violated bound before the bound counts as satisfied again,
     /// in the attribute's unit.
@@ -77,47 +75,40 @@ pub(crate) struct AttributeFilter {
     pub of: usize,
     /// Time for which all samples must have crossed a bound before the crossing is believed.
     pub debounce: Micros,
-    /// Least plausible value.
     pub minimum: Option<BigRational>,
-    /// Greatest plausible value.
     pub maximum: Option<BigRational>,
     /// Greatest plausible distance between consecutive samples. A sample at a greater distance is rejected, unless the
     /// previous sample was rejected, too, and lies within this distance.
     pub jump: Option<BigRational>,
     /// Time without a plausible sample after which the sensor counts as silent; `None` for never.
     pub period: Option<Micros>,
-    /// Value that is believed while the sensor is silent.
     pub stale: Stale,
 }
 
-/// State of the filter of one attribute.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct AttributeState {
-    /// Value that was accepted last.
     believed: Option<BigRational>,
     /// Last plausible sample; `None` after silence.
     plausible: Option<BigRational>,
-    /// Last sample rejected as a jump.
+    /// Last sample rejected as a jump; `None` after a plausible sample.
     suspect: Option<BigRational>,
     /// For each of the last samples, oldest first, whether the sample has crossed a bound relative to the believed
     /// value.
     recent: VecDeque<bool>,
     /// Time since which all samples have crossed a bound, and the last of these samples; `None` without a crossing.
     crossing: Option<(Micros, BigRational)>,
-    /// Time of the last plausible sample.
     last_sample_time: Option<Micros>,
-    /// Whether the sensor counts as silent.
     silent: bool,
-    /// Number of samples held back since a crossing of a bound was last believed.
+    /// Number of samples held back since a crossing of a bound was last believed, or since silence last set the worst
+    /// value.
     pub held: u64,
 }
 
-/// Reason why a sample is held back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Hold {
-    /// The sample is outside the plausible range.
     Range,
-    /// The sample is implausibly far from the previous sample.
+    /// The sample is implausibly far from the last plausible sample, and from the last sample that was held for this
+    /// reason.
     Jump,
     /// The sample satisfies a violated bound, but by less than the hysteresis.
     Hysteresis,
@@ -126,7 +117,6 @@ pub(crate) enum Hold {
 }
 
 impl Hold {
-    /// Word for the reason in answers.
     pub(crate) fn word(self) -> &'static str {
         match self {
             Self::Range => "range",
@@ -137,7 +127,6 @@ impl Hold {
     }
 }
 
-/// Result of filtering a sample.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Verdict {
     /// Newly believed value. The value differs from the sample if the sample satisfies some violated bounds by less
@@ -344,7 +333,6 @@ impl AttributeFilter {
 }
 
 impl Bound {
-    /// Returns `true` if a value satisfies the bound.
     pub(crate) fn keeps(&self, value: &BigRational) -> bool {
         match self.side {
             Side::Least => *value >= self.value,
@@ -362,12 +350,10 @@ impl Bound {
 }
 
 impl AttributeState {
-    /// Returns the initial state of a filter with a believed value.
     pub(crate) fn believing(value: Option<BigRational>) -> Self {
         Self { believed: value, ..Self::default() }
     }
 
-    /// Serialises the state for a snapshot.
     pub(crate) fn to_record(&self) -> Value {
         let text = |value: &Option<BigRational>| value.as_ref().map(ToString::to_string);
         json!([
@@ -382,7 +368,6 @@ impl AttributeState {
         ])
     }
 
-    /// Inverse of [`AttributeState::to_record`]. Returns `None` if the record is malformed.
     pub(crate) fn from_record(record: &Value) -> Option<Self> {
         let [believed, plausible, suspect, recent, crossing, last_sample_time, silent, held] =
             record.as_array()?.as_slice()

@@ -14,7 +14,6 @@ pub(crate) struct ComponentFilter {
     pub heal: Micros,
 }
 
-/// State of the filter of one component.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct ComponentState {
     /// Whether the component is believed to have failed; `None` if unknown.
@@ -71,17 +70,14 @@ impl ComponentFilter {
 }
 
 impl ComponentState {
-    /// Returns the initial state of a filter, with the belief whether the component has failed.
     pub(crate) fn believing(has_failed: Option<bool>) -> Self {
         Self { has_failed, ..Self::default() }
     }
 
-    /// Serialises the state for a snapshot.
     pub(crate) fn to_record(&self) -> Value {
         json!([self.has_failed, self.change.map(|(since, status)| json!([since, word(status)])), self.held])
     }
 
-    /// Inverse of [`ComponentState::to_record`]. Returns `None` if the record is malformed.
     pub(crate) fn from_record(record: &Value) -> Option<Self> {
         let [has_failed, change, held] = record.as_array()?.as_slice() else { return None };
         Some(Self {
@@ -95,7 +91,6 @@ impl ComponentState {
     }
 }
 
-/// Spelling of a status in events.
 pub(super) fn word(status: Status) -> &'static str {
     match status {
         Status::Failed => "FALSE",

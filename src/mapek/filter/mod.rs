@@ -57,7 +57,6 @@ impl FilterSettings {
     }
 }
 
-/// Configured filters of measured attributes and components, by local name.
 #[derive(Debug, Clone)]
 pub(crate) struct Filters {
     measured: BTreeMap<String, AttributeFilter>,
@@ -66,14 +65,12 @@ pub(crate) struct Filters {
     has_components: bool,
 }
 
-/// States of all filters, by local name of the attribute or component.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct FilterStates {
     measured: BTreeMap<String, AttributeState>,
     components: BTreeMap<String, ComponentState>,
 }
 
-/// A newly believed report.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Accepted {
     /// Value of an attribute, by local name.
@@ -85,7 +82,6 @@ pub(crate) enum Accepted {
 }
 
 impl Filters {
-    /// Creates the filters from the settings and the bounds stated by the designs of `knowledge`.
     pub(crate) fn new(settings: &FilterSettings, knowledge: Option<&Knowledge>) -> Self {
         let mut bounds = knowledge.map(stated_bounds).unwrap_or_default();
         for name in settings.measured.keys() {
@@ -264,14 +260,12 @@ impl Accepted {
 }
 
 impl FilterStates {
-    /// Serialises the states for a snapshot.
     pub(crate) fn to_record(&self) -> Value {
         let measured = self.measured.iter().map(|(name, state)| (name.clone(), state.to_record()));
         let components = self.components.iter().map(|(name, state)| (name.clone(), state.to_record()));
         json!([Value::Object(measured.collect()), Value::Object(components.collect())])
     }
 
-    /// Inverse of [`FilterStates::to_record`]. Returns `None` if the record is malformed.
     pub(crate) fn from_record(record: &Value) -> Option<Self> {
         let [measured, components] = record.as_array()?.as_slice() else { return None };
         let measured = measured.as_object()?.iter();

@@ -17,10 +17,8 @@ use crate::number;
 /// An optional, unparsed number of a manifest, with its position in the file.
 type Number = Option<Spanned<toml::Value>>;
 
-/// Sections `adaptation.components.NAME` of a manifest, by component.
 pub(crate) type ComponentsSection = BTreeMap<String, ComponentSection>;
 
-/// Sections `adaptation.measured.NAME` of a manifest, by attribute.
 pub(crate) type MeasuredsSection = BTreeMap<String, MeasuredSection>;
 
 /// The section `adaptation.components.NAME` of a manifest.

@@ -136,7 +136,6 @@ impl MeasuredSettings {
     }
 }
 
-/// Converts a duration to microseconds.
 pub(super) fn micros(time: Duration) -> Micros {
     u64::try_from(time.as_micros()).unwrap_or(u64::MAX)
 }

@@ -10,7 +10,6 @@ use ontology::tomasys::change::Status;
 use super::attribute::{AttributeFilter, AttributeState, Bound, Elapsed, Side, Stale, Verdict};
 use super::component::{ComponentFilter, ComponentState};
 
-/// Converts thousandths to a number.
 fn value(thousandths: i64) -> BigRational {
     BigRational::new(thousandths.into(), 1000.into())
 }
@@ -26,7 +25,6 @@ fn is_kept(bound: &Bound, samples: &[BigRational]) -> bool {
     bound.keeps(decisive.unwrap_or(&samples[0]))
 }
 
-/// Random bounds of the given sides, farther from each other than their bands.
 fn random_bounds(random: &mut Rng, sides: &[Side]) -> Vec<Bound> {
     let count = random.i64(1..=4);
     (0..count)
@@ -34,7 +32,6 @@ fn random_bounds(random: &mut Rng, sides: &[Side]) -> Vec<Bound> {
         .collect()
 }
 
-/// A random sample, often near a bound.
 fn random_sample(random: &mut Rng, bounds: &[Bound]) -> BigRational {
     if random.bool() {
         return value(random.i64(0..1200));

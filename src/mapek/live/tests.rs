@@ -127,11 +127,9 @@ fn map(width: usize, height: usize, seed: u64) -> World {
     ugv(&format!("map of {count} places"), mission, count)
 }
 
-/// Counts of comparison results.
 #[derive(Default)]
 struct Tally {
     compared: usize,
-    /// Number of planning problems that the incremental planner did not support.
     unanswered: usize,
     live: Duration,
     scratch: Duration,

@@ -62,7 +62,6 @@ pub struct MissingValue {
 /// and to the actions that need the value.
 type Needed = BTreeMap<(Name, Vec<Name>), (bool, BTreeSet<String>)>;
 
-/// A duration of an action that is negative for some arguments.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct NegativeDuration {
     pub(super) action: String,
@@ -81,9 +80,7 @@ pub(super) struct Numbers<'m> {
     /// Predicates that are not static: actions, derived predicates, timed literals or the
     /// availability of designs change them.
     dynamic: HashSet<Name>,
-    /// Functions that actions change.
     changed: HashSet<Name>,
-    /// Functions to which actions assign a value.
     assigned: HashSet<Name>,
     facts: HashMap<Name, HashSet<Vec<Name>>>,
     values: HashMap<Name, HashMap<Vec<Name>, BigRational>>,
@@ -385,7 +382,6 @@ impl<'m> Numbers<'m> {
         designs.iter().find(|design| design.individual.name == name)
     }
 
-    /// Creates a warning about a design, with its position in the knowledge base.
     pub(super) fn about(&self, design: &str, code: &str, text: String) -> Message {
         match (self.mission.knowledge(), self.design(design)) {
             (Some(knowledge), Some(design)) => doubt_about(knowledge, code, &design.individual.iri, text),
@@ -393,7 +389,6 @@ impl<'m> Numbers<'m> {
         }
     }
 
-    /// Returns the name of the knowledge base's file that contains a design.
     fn file_of(&self, design: &str) -> String {
         self.about(design, "M230", String::new()).file.clone().unwrap_or_default()
     }

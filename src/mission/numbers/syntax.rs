@@ -28,8 +28,6 @@ pub(super) fn object<'a>(term: &'a Term, binding: &'a Binding<'_>) -> Option<&'a
     }
 }
 
-/// Returns the arguments of an atom under a binding, or `None` if a variable of the atom is not
-/// bound.
 pub(super) fn bound_arguments(atom: &Atom, binding: &Binding<'_>) -> Option<Vec<Name>> {
     atom.arguments.iter().map(|term| object(term, binding).cloned()).collect()
 }
@@ -124,7 +122,6 @@ pub(super) fn in_condition<'a>(condition: &'a Condition, needed: &mut Vec<&'a At
     }
 }
 
-/// Collects the functions that the unconditional parts of an effect read.
 pub(super) fn in_effect<'a>(effect: &'a Effect, needed: &mut Vec<&'a Atom>) {
     match effect {
         Effect::And(parts) => parts.iter().for_each(|part| in_effect(part, needed)),

@@ -13,7 +13,6 @@ use crate::message::{Message, did_you_mean};
 /// counted.
 const MAX_NAMED: usize = 3;
 
-/// Builds the warnings about missing numbers and negative durations.
 impl Numbers<'_> {
     pub(super) fn no_estimation(
         &self,
