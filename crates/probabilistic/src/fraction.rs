@@ -59,7 +59,6 @@ fn reduced(numerator: i128, denominator: u128) -> Fraction {
     Long(Box::new(BigRational::new_raw(BigInt::from(numerator), BigInt::from(denominator))))
 }
 
-/// Returns the sum of two short fractions, or their difference if `is_difference`.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "products of two words below 2^63 and the sum of two such products fit into 128 bits; divisors are at least 1"
@@ -102,7 +101,6 @@ fn product((a, b): (i64, NonZeroU64), is_negative: bool, (c, d): (u64, u64)) -> 
 }
 
 impl Fraction {
-    /// Converts to an arbitrary-precision rational.
     fn long(&self) -> Cow<'_, BigRational> {
         match self {
             Short(numerator, denominator) => {
@@ -233,7 +231,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Integers of all bit lengths, including values around the limits of a signed word.
+    /// Integers with magnitudes up to 2^71, including values around the limits of a signed word.
     fn part() -> impl Strategy<Value = i128> {
         let sizes = (0_u32..72, any::<i128>()).prop_map(|(bits, number)| number >> (127 - bits));
         let word = i128::from(i64::MAX);

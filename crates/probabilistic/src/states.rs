@@ -22,7 +22,6 @@ pub struct States<S> {
 enum Numbers {
     /// For each state code, the number of the state plus one, or 0 if the state was not inserted.
     Table(Vec<u32>),
-    /// State numbers by the hashes of the states.
     Hash(HashTable),
 }
 
@@ -46,7 +45,6 @@ impl HashTable {
         Self { entries: vec![0; 1 << bits], shift: 32_u32.saturating_sub(bits) }
     }
 
-    /// Returns the first slot that is probed for a hash.
     const fn home(&self, hash: u32) -> usize {
         hash as usize >> self.shift
     }

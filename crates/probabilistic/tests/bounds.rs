@@ -32,7 +32,6 @@ fn enclosed(model: &str, question: &str) -> BigRational {
     exact
 }
 
-/// Returns the codes of the errors in a model.
 fn error_codes(model: &str, question: &str, exactness: Exactness) -> Vec<&'static str> {
     match outcome(model, question, &Options::default().with_exactness(exactness)) {
         Err(Error::Model(problems)) => problems.iter().map(|problem| problem.code).collect(),

@@ -316,7 +316,6 @@ fn properties_of_rewards_need_no_semicolon_before() {
     );
 }
 
-/// Each unsupported property is rejected alone; all other properties of the file are answered.
 #[test]
 fn unsupported_properties_do_not_affect_the_others() {
     let text = "P=? [ F \"a\" ]

@@ -20,7 +20,6 @@ use crate::solve::{Direction, NONE, Problem, solve_within};
 struct Ends {
     /// For each state the index of its end component, or [`NONE`] outside all end components.
     block: Vec<u32>,
-    /// Number of end components.
     count: usize,
     /// The choices whose targets all lie in the end component of their state.
     alive: FixedBitSet,
@@ -176,7 +175,6 @@ fn without_policy<N>(values: Valued<N>) -> Valued<N> {
     Valued { policy: None, ..values }
 }
 
-/// Extends `set` by all states from which a state of `set` is reachable.
 fn reach_back<N: Number>(mdp: &Mdp<N>, set: &mut FixedBitSet) {
     loop {
         let reaches =
@@ -251,12 +249,10 @@ struct EcQuotient<N> {
     /// For each original state its index in the quotient, or [`NONE`] for a state of infinite
     /// value.
     place: Vec<u32>,
-    /// The singleton set of the state in which the process stops.
     end: FixedBitSet,
 }
 
 impl<N: Number> EcQuotient<N> {
-    /// Computes the quotient, omitting the states in `infinite`.
     fn new(mdp: &Mdp<N>, ends: &Ends, rewards: &[N], infinite: &FixedBitSet) -> Checked<Self> {
         let mut place = vec![NONE; mdp.states()];
         let mut members: Vec<Vec<usize>> = Vec::new();

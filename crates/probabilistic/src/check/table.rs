@@ -30,12 +30,10 @@ pub struct Row {
     pub choice: usize,
 }
 
-/// Prefixes an error description with the position of a table row, counted from 1.
 fn numbered(number: usize, description: &str) -> String {
     format!("state {}: {description}", number.saturating_add(1))
 }
 
-/// Name and version of the JSON format.
 const FORMAT: &str = "metaplan-policy/1";
 
 impl PolicyTable {

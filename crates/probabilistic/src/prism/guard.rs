@@ -12,7 +12,6 @@ pub struct Guard {
     /// The conjuncts after the tests, in the order of the text. A false conjunct prevents the evaluation of later
     /// conjuncts, which might fail.
     remainder: Vec<Code>,
-    /// The variables that a conjunct fixes to a single value: variable index and value.
     fixed: Vec<(u32, i64)>,
 }
 
@@ -64,7 +63,6 @@ impl Guard {
     }
 }
 
-/// Appends the conjuncts of a condition to `parts`.
 fn flatten(code: Code, parts: &mut Vec<Code>) {
     match code {
         Code::All(inner) => inner.into_iter().for_each(|part| flatten(part, parts)),
@@ -72,7 +70,6 @@ fn flatten(code: Code, parts: &mut Vec<Code>) {
     }
 }
 
-/// Returns the range test that is equivalent to an expression, or `None`.
 fn test(code: &Code) -> Option<Test> {
     // A Boolean variable holds if it is not 0.
     let flag = |variable: u32, inside| Test { variable, least: 0, greatest: 0, inside };
