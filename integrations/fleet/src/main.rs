@@ -250,8 +250,8 @@ fn own_name() -> String {
     format!("{host}-{}-{:04x}", std::process::id(), fastrand::u16(..))
 }
 
-/// Returns a flag that becomes true on the first SIGTERM or SIGINT. A second signal ends the
-/// program immediately.
+/// Returns a flag that becomes true on the first SIGINT, SIGTERM or SIGHUP. A second signal ends the program
+/// immediately.
 fn signals() -> Result<watch::Receiver<bool>, Errors> {
     let (stop, heard) = watch::channel(false);
     let handler = move || {

@@ -30,13 +30,11 @@ use crate::planner::{
     Chosen, DOMAIN, Found, Joint, NoPlan, PROBLEM, PlanPublisher, Request, on_a_thread, plan_message, solve,
 };
 
-/// Timeout for requests to the experts.
 const EXPERT_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Pause before the next planning attempt if no plan was found, unless the knowledge base changes.
 const RETRY_PAUSE: Duration = Duration::from_secs(5);
 
-/// Pause after the execution of a plan has failed.
 const FAILURE_PAUSE: Duration = Duration::from_secs(1);
 
 /// Polling interval of the knowledge base and the stop flag.
@@ -82,7 +80,6 @@ struct Controller {
     plan_publisher: PlanPublisher,
 }
 
-/// Outcome of executing one plan.
 enum Outcome {
     Done,
     Failed(String),
@@ -152,7 +149,6 @@ impl Controller {
         }
     }
 
-    /// Requests the current domain and problem from PlanSys2's experts, and returns them as PDDL.
     async fn request_problem(&self) -> Result<(String, String), String> {
         let domain = self.node.caller::<GetDomain>("domain_expert/get_domain");
         let domain = domain

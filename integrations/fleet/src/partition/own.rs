@@ -30,7 +30,6 @@ pub(super) struct Partition<S> {
     /// Revision of the last snapshot of a robot.
     pub(super) snapshots: u64,
     pub(super) jobs: FuturesUnordered<BoxFuture<'static, Done>>,
-    /// Number of events that are read but not decided.
     pub(super) waiting: usize,
     pub(super) is_progressing: bool,
     pub(super) clock: u64,

@@ -17,7 +17,6 @@ use tokio::sync::{broadcast, mpsc, oneshot, watch};
 use super::{Bucket, Entry, Fault, Message, Receipt, Store, Stored, Stream};
 use crate::wire::Address;
 
-/// Name of the database file in the directory.
 const FILE: &str = "fleet.redb";
 
 /// Maximum number of writes in one transaction.
@@ -59,7 +58,6 @@ struct Inner {
     notices: broadcast::Sender<(String, String)>,
 }
 
-/// A write, with the channel for its result.
 struct Request {
     write: Write,
     done: oneshot::Sender<Answer>,
@@ -174,7 +172,6 @@ fn prepare(database: &Database, partitions: u32) -> Result<u32, redb::Error> {
     Ok(known)
 }
 
-/// State of the writer thread.
 struct Writer {
     database: Arc<Database>,
     /// Time of the last write of each value that expires.

@@ -71,7 +71,6 @@ fn can_mount() -> bool {
 }
 
 impl Cluster {
-    /// Starts three servers on free ports, connected through proxies.
     pub(super) fn begin(seed: u64) -> Self {
         let directory =
             tempfile::Builder::new().prefix(&format!("chaos-{seed}-")).tempdir().expect("a directory");
@@ -121,7 +120,6 @@ impl Cluster {
         self.0.directory.path().join(name)
     }
 
-    /// Returns the URLs of the servers.
     pub(super) fn url(&self) -> String {
         self.0.clients.map(|port| format!("nats://127.0.0.1:{port}")).join(",")
     }
@@ -295,7 +293,6 @@ impl Cluster {
         line.split_whitespace().next().and_then(|text| text.parse::<u64>().ok()).unwrap_or_default() / 1024
     }
 
-    /// Returns the last lines of all logs.
     pub(super) fn logs(&self) -> String {
         let mut text = String::new();
         for entry in fs::read_dir(self.0.directory.path()).into_iter().flatten().flatten() {

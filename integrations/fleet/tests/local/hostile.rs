@@ -58,7 +58,6 @@ async fn hostile_messages_change_nothing_and_are_counted() {
     assert_eq!(told, 8);
 }
 
-/// Invalid events of an enrolled robot are answered with an error, as by `metaplan run`.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn nonsense_of_a_robot_is_answered_with_an_error() {
     let folder = tempfile::tempdir().expect("a directory");
