@@ -39,7 +39,6 @@ impl Said {
     }
 }
 
-/// Parsed arguments of a run.
 #[derive(Debug)]
 struct Invocation {
     domain: PathBuf,

@@ -30,7 +30,6 @@ use crate::node::{CallError, Caller, Node, Publisher, Responder, depth, is_lyric
 use crate::perform::{Call, End, Perform, Progress, Running};
 use crate::procedure::{self, Procedures, Seen};
 
-/// Timeout of a function's reply with its mode.
 const MODE_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// Number of mode requests to a new server, one per period: the first ones may be lost before it
@@ -41,12 +40,13 @@ const MAX_MODE_REQUESTS: u32 = 3;
 #[derive(Clone)]
 enum Means {
     /// Services of `system_modes`.
-    Modes { change: Arc<Caller<ChangeMode>>, get_mode: Arc<Caller<GetMode>> },
-    /// Steps of the settings.
+    Modes {
+        change: Arc<Caller<ChangeMode>>,
+        get_mode: Arc<Caller<GetMode>>,
+    },
     Steps,
 }
 
-/// A function of the robot.
 struct Function {
     means: Means,
     /// Running call. A new call replaces it.
@@ -54,9 +54,8 @@ struct Function {
     /// Ends the running steps before their next one.
     is_replaced: Arc<AtomicBool>,
     mode_request: Option<Task<()>>,
-    /// Servers of the mode.
+    /// GUIDs of the mode's servers, or of the servers of the nodes that steps use.
     servers: BTreeSet<[u8; 16]>,
-    /// Number of remaining mode requests.
     remaining_requests: u32,
 }
 
@@ -76,7 +75,6 @@ pub(super) struct Robot {
 }
 
 impl Robot {
-    /// Creates the topics and services.
     pub(super) fn connect(
         node: &Arc<Node>,
         settings: &Settings,
@@ -142,8 +140,8 @@ impl Robot {
         })
     }
 
-    /// Waits until every function has its servers and diagnostics have a writer, or the time is up.
-    /// Returns the missing ones.
+    /// Waits until every function has its servers, or the time is up. Returns descriptions of the missing
+    /// servers, and of a missing writer of diagnostics.
     pub(super) async fn wait(&self, within: Duration) -> Vec<String> {
         let missing = self.functions.iter().map(|(name, function)| async move {
             match &function.means {
@@ -161,8 +159,8 @@ impl Robot {
         missing
     }
 
-    /// Returns the mode of each function, if it is known. Missing replies are logged and published
-    /// as events.
+    /// Returns the mode of each function, if it is known. Missing replies are logged and published as events,
+    /// except those of functions whose modes cannot be observed.
     pub(super) async fn modes(&self) -> Vec<(String, Option<String>)> {
         let request = |(name, function): (&String, &Function)| {
             let (name, means) = (name.clone(), function.means.clone());
@@ -196,7 +194,7 @@ impl Robot {
         answers.into_iter().map(logged).collect()
     }
 
-    /// Returns the possible modes of each function of `system_modes`, if it replies.
+    /// Returns the possible modes of each function of `system_modes` that replies.
     pub(super) async fn available(&self, settings: &Settings) -> Vec<(String, Vec<String>)> {
         let request = |name: &String| {
             let service = format!("/{}/get_available_modes", settings.functions.system(name));
@@ -212,8 +210,8 @@ impl Robot {
         futures::future::join_all(answers).await.into_iter().flatten().collect()
     }
 
-    /// Calls `change_mode`, or executes the steps of the mode. A running call of the function is cancelled; running steps
-    /// are undone first.
+    /// Calls `change_mode`, or executes the steps of the mode. A running call of the function is cancelled;
+    /// running steps are undone first.
     pub(super) fn change(&mut self, change: Change, within: Duration) {
         let Some(function) = self.functions.get_mut(&change.function) else { return };
         let inputs = self.inputs.clone();
@@ -281,7 +279,6 @@ impl Robot {
         }
     }
 
-    /// Requests the mode of a function.
     pub(super) fn request_mode(&mut self, name: &str) {
         let Some(function) = self.functions.get_mut(name) else { return };
         let (inputs, name) = (self.inputs.clone(), name.to_owned());
@@ -331,12 +328,10 @@ impl Robot {
         .detach();
     }
 
-    /// Returns the diagnostics since the last call, as a line of events.
     pub(super) fn diagnosed(&self) -> String {
         self.diagnosed.line()
     }
 
-    /// Replies to a task request.
     pub(super) fn reply(&self, number: u64, success: bool) {
         let mut replies = self.replies.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(responder) = replies.remove(&number) {
@@ -379,7 +374,7 @@ impl Robot {
         self.performing.insert(number, (running, task));
     }
 
-    /// Cancels an action.
+    /// Cancels an action. An action that is not running is reported as cancelled.
     pub(super) fn stop(&self, number: u64) {
         match self.performing.get(&number) {
             Some((running, _)) => running.cancel(),
@@ -395,7 +390,6 @@ impl Robot {
         self.events.publish(std_msgs::msg::String { data: event.to_string() });
     }
 
-    /// Publishes the status of the manager on `/diagnostics`.
     pub(super) fn diagnose(&self, level: u8, message: &str, values: Vec<(&str, String)>) {
         let values = values.into_iter().map(|(key, value)| KeyValue { key: key.to_owned(), value }).collect();
         let status = DiagnosticStatus {
@@ -478,7 +472,6 @@ fn subscribe_transitions(
 
 type Replies = Arc<Mutex<HashMap<u64, Responder<TaskService>>>>;
 
-/// Serves the requests to start and end tasks.
 fn serve_tasks(node: &Arc<Node>, inputs: &Sender<Input>, replies: &Replies) -> Result<(), Message> {
     let count = Arc::new(AtomicU64::new(0));
     for (service, is_request) in [("/task/request", true), ("/task/cancel", false)] {

@@ -1,5 +1,5 @@
-//! Topics that are subscribed to once they have a publisher, and topics of which only the arrival of messages is observed,
-//! because this program need not know their type.
+//! Topics that are subscribed to once they have a publisher, and topics of which only the arrival of messages
+//! is observed, because this program need not know their type.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -14,7 +14,6 @@ use smol::Timer;
 use crate::interfaces::Msg;
 use crate::node::{Node, Severity, client_name, creation_error, qos};
 
-/// Period of the search for a publisher.
 const SEARCH_PERIOD: Duration = Duration::from_millis(100);
 
 /// Arrivals of messages on a topic.
@@ -97,7 +96,6 @@ impl Node {
 }
 
 impl Node {
-    /// Creates a subscription that does not read the content of messages.
     fn raw_subscription(
         &self,
         topic: &ros2_client::Name,
@@ -143,6 +141,7 @@ impl Node {
 }
 
 /// Returns package and name of a message type from its DDS name, such as `std_msgs::msg::dds_::Bool_`.
+/// Returns `None` for other types.
 fn message_type(dds: &str) -> Option<(&str, &str)> {
     let (package, name) = dds.split_once("::msg::dds_::")?;
     Some((package, name.strip_suffix('_')?))

@@ -18,10 +18,9 @@ use crate::node::rmw::{Mapping, Rmw, Vendor};
 /// Polling interval while waiting for discovery.
 const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
-/// Time to wait for further participants if all discovered ones support both mappings.
+/// Time to wait for further participants if no discovered one determines the mapping.
 const DISCOVERY_WAIT: Duration = Duration::from_secs(1);
 
-/// State of the graph.
 #[derive(Debug)]
 pub(crate) struct Graph {
     rmw: Rmw,
@@ -43,11 +42,9 @@ struct GraphState {
     expected: BTreeMap<String, Expected>,
     /// Problems that are not reported yet.
     complaints: Vec<String>,
-    /// Problems that were reported.
     reported: BTreeSet<String>,
 }
 
-/// Type of a topic.
 #[derive(Debug, Clone)]
 pub(crate) struct Expected {
     /// DDS name of the type.
@@ -64,18 +61,15 @@ pub(crate) struct Topics {
 }
 
 impl Topics {
-    /// Topics of the service with this full name.
     pub(crate) fn of(service: &str) -> Self {
         Self { requests: format!("rq{service}Request"), replies: format!("rr{service}Reply") }
     }
 }
 
-/// A server of a service.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Server {
-    /// Mapping of its services.
     pub(crate) mapping: Mapping,
-    /// Reader of its requests.
+    /// GUID of the reader of its requests.
     pub(crate) reader: [u8; 16],
 }
 
@@ -93,11 +87,9 @@ struct Endpoint {
 /// Names and types of the interfaces of the other nodes.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct Endpoints {
-    /// Types of the topics that have a publisher, without those that every node has.
+    /// Types of the topics that have a publisher, by name, without the topics that every node has.
     pub(crate) topics: BTreeMap<String, String>,
-    /// Types of the services.
     pub(crate) services: BTreeMap<String, String>,
-    /// Types of the actions.
     pub(crate) actions: BTreeMap<String, String>,
     /// Nodes with a lifecycle.
     pub(crate) lifecycle_nodes: Vec<String>,
@@ -257,7 +249,6 @@ impl Graph {
         self.state().endpoints.values().any(|endpoint| !endpoint.is_reader && endpoint.topic == topic)
     }
 
-    /// Returns the interfaces of the other nodes.
     pub(crate) fn interfaces(&self) -> Endpoints {
         let mut interfaces = Endpoints::default();
         for endpoint in self.state().endpoints.values() {
@@ -281,8 +272,8 @@ impl Graph {
         Some(Writer { type_name: writer.type_name.clone(), is_latched: writer.is_latched })
     }
 
-    /// Returns the server of a service if there is one. An endpoint with another type name is an error. A differing type hash is
-    /// not: DDS has matched the type names, and the warning has been logged.
+    /// Returns the server of a service if there is one. An endpoint with another type name is an error. A
+    /// differing type hash is not: DDS has matched the type names, and the warning has been logged.
     pub(crate) fn server(&self, topics: &Topics) -> Option<Result<Server, String>> {
         let state = self.state();
         let endpoint = |topic: &str, is_reader: bool| {
@@ -303,11 +294,12 @@ impl Graph {
         Some(Ok(Server { mapping: mapping.unwrap_or(Mapping::Enhanced), reader: *guid }))
     }
 
-    /// Returns `true` if a reply to this client arrives: its reply reader is matched with our reply writer. A server that replies
-    /// earlier loses the reply.
+    /// Returns `true` if a reply to this client arrives: its reply reader is matched with our reply writer. A
+    /// server that replies earlier loses the reply.
     ///
-    /// Fast DDS identifies a client by its reply reader, and other enhanced clients by their request writer. Cyclone DDS sends eight
-    /// bytes that are no GUID, so that every participant that writes requests must have as many reply readers matched.
+    /// Fast DDS identifies a client by its reply reader, and other enhanced clients by their request writer.
+    /// Cyclone DDS sends eight bytes that are no GUID, so that every participant that writes requests must
+    /// have as many reply readers matched.
     pub(crate) fn can_reply(&self, topics: &Topics, client: Gid) -> bool {
         let client = client.to_bytes16();
         let state = self.state();
@@ -336,8 +328,9 @@ impl Graph {
         state.endpoints.iter().filter(|(_, endpoint)| fits(endpoint)).map(|(guid, _)| *guid).collect()
     }
 
-    /// Waits for the mapping of our own services: that of the first participant that supports only
-    /// a single one.
+    /// Waits for the mapping of our own services: a fixed one, or that of the first participant that supports
+    /// only a single one. Without such a participant, the enhanced mapping is selected [`DISCOVERY_WAIT`]
+    /// after the first discovery.
     pub(crate) async fn mapping(&self) -> Mapping {
         loop {
             if let Some(mapping) = self.decide() {

@@ -11,7 +11,8 @@ use ros2_client::rosout::RosoutRaw as _;
 
 use crate::node::Node;
 
-/// Upper limit on the number of remembered warnings, each of which is logged only once.
+/// Upper limit on the number of remembered warnings, each of which is logged only once. All of them are
+/// forgotten when the limit is reached.
 const MAX_WARNED: usize = 1000;
 
 /// Severity of a log message.
@@ -66,7 +67,6 @@ impl Severity {
 }
 
 impl Node {
-    /// Returns `true` if the node logs messages of this severity.
     pub(crate) fn is_logged(&self, severity: Severity) -> bool {
         severity >= self.least
     }

@@ -151,7 +151,6 @@ impl Node {
         self.graph.has_writer(&format!("rt{}", self.resolve(topic)))
     }
 
-    /// Returns the interfaces of the other nodes that are discovered.
     pub(crate) fn endpoints(&self) -> Endpoints {
         self.graph.interfaces()
     }
@@ -167,7 +166,6 @@ impl Node {
         tasks.push(smol::spawn(work));
     }
 
-    /// Logs the problems of the graph periodically.
     fn report_complaints(self: &Arc<Self>) {
         const PERIOD: Duration = Duration::from_millis(100);
         let node = Arc::downgrade(self);
@@ -183,19 +181,16 @@ impl Node {
     }
 }
 
-/// DDS name of a message type.
 fn dds_type(package: &str, kind: &str, name: &str) -> String {
     format!("{package}::{kind}::dds_::{name}_")
 }
 
-/// Converts a full name to a name of the client library.
 fn client_name(full: &str) -> Result<ros2_client::Name, Message> {
     ros2_client::Name::parse(full).map_err(|error| {
         Message::error("N121", format!("`{full}` is not the name of a topic or service: {error}"))
     })
 }
 
-/// Error about an entity that could not be created.
 fn creation_error(entity: &str, error: &dyn std::fmt::Display) -> Message {
     Message::error("N122", format!("{entity} could not be made: {error}"))
 }
@@ -205,7 +200,6 @@ pub(crate) fn is_lyrical() -> bool {
     std::env::var("ROS_DISTRO").is_ok_and(|name| ["lyrical", "rolling"].contains(&name.trim()))
 }
 
-/// Returns the current time as a ROS timestamp.
 pub(crate) fn now() -> crate::interfaces::builtin_interfaces::msg::Time {
     let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
     crate::interfaces::builtin_interfaces::msg::Time {

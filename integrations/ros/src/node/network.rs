@@ -68,7 +68,6 @@ impl Network {
         Ok((Self { domain, loopback }, warnings))
     }
 
-    /// Creates a builder of a DDS participant in this domain and discovery range.
     pub(crate) fn participant(self) -> DomainParticipantBuilder {
         let builder = DomainParticipantBuilder::new(self.domain);
         if self.loopback { builder.with_only_networks([Ipv4Addr::LOCALHOST]) } else { builder }

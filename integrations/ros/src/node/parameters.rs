@@ -36,7 +36,6 @@ pub(crate) fn any_value(_: &ParameterValue) -> Result<(), &'static str> {
     Ok(())
 }
 
-/// Accepts a duration in seconds.
 fn duration(value: &ParameterValue) -> Result<(), &'static str> {
     match value {
         ParameterValue::Double(seconds) if Duration::try_from_secs_f64(*seconds).is_ok() => Ok(()),
@@ -45,7 +44,6 @@ fn duration(value: &ParameterValue) -> Result<(), &'static str> {
 }
 
 impl Declared {
-    /// Converts a value to the type of this parameter and checks it.
     fn accept(&self, value: ParameterValue) -> Result<ParameterValue, String> {
         let value = fitting(&self.value, value)?;
         (self.check)(&value)?;
@@ -55,7 +53,6 @@ impl Declared {
 
 type Table = BTreeMap<String, Declared>;
 
-/// Callback for parameters that are set.
 type Listener = dyn Fn(&str, &ParameterValue) + Send + Sync;
 
 impl Node {
@@ -218,7 +215,7 @@ impl Node {
         })
     }
 
-    /// Sets all parameters, or none of them if one is refused.
+    /// Sets all parameters, or none of them if one does not pass its check.
     fn set(
         &self,
         table: &Mutex<Table>,

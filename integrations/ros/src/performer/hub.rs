@@ -24,7 +24,6 @@ use crate::performer::feedback;
 /// Queue depth of the topic, as in PlanSys2.
 pub(super) const QUEUE_DEPTH: usize = 100;
 
-/// Period of repeated requests while no performer has responded.
 const REQUEST_PERIOD: Duration = Duration::from_secs(1);
 
 /// Upper limit on the time to wait for a performer.
@@ -52,7 +51,6 @@ impl Hub {
         Ok(Arc::new(Self { name, publisher, listeners }))
     }
 
-    /// Name of this node in messages on the topic.
     pub(super) fn name(&self) -> &str {
         &self.name
     }
@@ -78,7 +76,6 @@ struct Negotiation {
     performer: Option<String>,
 }
 
-/// Reaction of the executor to a message.
 #[derive(Debug, PartialEq)]
 enum Reaction {
     Nothing,
@@ -152,7 +149,6 @@ async fn negotiate(
     messages: &Receiver<ActionExecution>,
     performance: &Performance,
 ) -> End {
-    /// Event that ends a wait.
     enum Next {
         Message(Option<ActionExecution>),
         Canceled,

@@ -82,7 +82,6 @@ fn part(done: f32, whole: f32) -> Option<f32> {
     (whole > 0.0).then(|| (done / whole).clamp(0.0, 1.0))
 }
 
-/// Creates a feedback message.
 fn feedback(completion: Option<f32>, text: impl Into<String>) -> Progress {
     Progress::Feedback { completion, text: text.into() }
 }

@@ -14,14 +14,12 @@ use crate::perform::{Call, End, Perform, Progress, Running};
 use crate::performer::hub::{Hub, QUEUE_DEPTH};
 use crate::performer::{Offered, Poses, performers};
 
-/// Period of the published status.
 const HEARTBEAT: Duration = Duration::from_secs(1);
 
 /// Time without a confirmation after which the executor is assumed to have chosen another
 /// performer.
 const EXECUTOR_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// State of an offered action.
 enum Stage {
     Idle,
     /// The performer has responded to a request for these arguments at this time.

@@ -115,7 +115,6 @@ impl Chosen {
         Ok(chosen)
     }
 
-    /// Returns the current planning parameters.
     pub(crate) fn get(&self) -> Manner {
         self.lock().clone()
     }

@@ -36,7 +36,6 @@ const MAX_REQUESTS: usize = 8;
 /// State of the planner that the services share.
 struct Planner {
     node: Arc<Node>,
-    /// Number of requests that are currently being planned.
     busy: AtomicUsize,
     /// Mission whose knowledge base restricts the designs.
     joint: Option<Arc<Joint>>,
@@ -75,7 +74,6 @@ pub struct Options {
     pub settings: Option<PathBuf>,
 }
 
-/// Polling interval of the stop flag.
 const STOP_POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Serves as PlanSys2's planner until `stop` is set, and performs the actions that the settings
@@ -104,7 +102,6 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
 }
 
 impl Planner {
-    /// Creates the three services.
     fn answer(self: &Arc<Self>, lifecycle: &Arc<Lifecycle>) -> Result<(), Message> {
         let (planner, phase) = (Arc::clone(self), Arc::clone(lifecycle));
         self.node.serve::<GetPlan>("planner/get_plan", move |request, answer| {

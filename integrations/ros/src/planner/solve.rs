@@ -1,9 +1,9 @@
 //! Planning for PlanSys2: computes the best plan of a domain and a problem, or the reason why no plan exists.
 //!
-//! PlanSys2's problems have no metric, so the parameters can provide one. Durative actions may
-//! overlap, as in POPF, and the makespan is minimised if there is no metric. Plans are sequential
-//! if no overlapping plan is found in time or a knowledge base is used, because a function has only
-//! one design at a time.
+//! PlanSys2's problems have no metric, so the parameters can provide one. Durative actions may overlap, as in
+//! POPF, and the makespan is minimised if there is no metric. Plans are sequential if no overlapping plan is
+//! found in time. By default, they are also sequential if a knowledge base is used, because a function has
+//! only one design at a time.
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -220,7 +220,8 @@ impl FilledMission<'_> {
         Ok(Some(solution).filter(|solution| solution.status != Status::Unknown))
     }
 
-    /// Computes an optimal sequential plan and alternatives of the same cost.
+    /// Computes the best sequential plan within the limits, and alternatives of the same cost. A task whose
+    /// numbers exceed the range of the SAT encoding gets no alternatives.
     fn sequence(&self, limits: Limits) -> Result<(Solution, Vec<Plan>), NoPlan> {
         let config = Config::default().with_limits(limits);
         let task = match self.mission.ground(self.problem, &[], &config.limits) {

@@ -9,7 +9,6 @@ use crate::interfaces::std_msgs::msg::String as Text;
 use crate::node::{Node, Publisher, Severity, latched};
 use crate::planner::{Found, NoPlan};
 
-/// Publisher of planning results in the log and on the topic `~/plan`.
 #[derive(Debug)]
 pub(crate) struct PlanPublisher {
     node: Arc<Node>,

@@ -24,13 +24,10 @@ use crate::procedure::{self, Procedure, Procedures, Seen};
 use crate::reasoner::keeping::{Keeping, Outcome, Output, Wanted};
 use crate::reasoner::memory::{MemoryFile, Remembered};
 
-/// Timeout of a mode change.
 const CHANGE_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Timeout of a function's reply with its mode.
 const MODE_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Input of the reasoner.
 enum Input {
     Wanted(Offer, QoS),
     Cancel(GoalId, CancelRequest),
@@ -236,8 +233,8 @@ impl Network {
         }
     }
 
-    /// Executes the steps of a mode, if the settings have some. Otherwise requests the mode from MROS's bridge, or from the
-    /// function itself if there is no bridge.
+    /// Executes the steps of a mode, if the settings have some. Otherwise requests the mode from MROS's
+    /// bridge, or from the function itself if only its service has a server.
     fn configure(&mut self, wanted: Wanted) {
         if self.procedures.contains(&wanted.function) {
             self.execute(wanted);
