@@ -17,7 +17,6 @@ const SHRINK_THRESHOLD: usize = 100_000;
 struct Frame {
     node: u32,
     visit_number: u32,
-    /// Number of edges of the node that were already followed.
     followed: u32,
 }
 

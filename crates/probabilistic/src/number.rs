@@ -15,7 +15,6 @@ const TOLERANCE: f64 = 1e-12;
 /// model or as sums of such numbers.
 const WHOLE: f64 = 4e15;
 
-/// Returns `true` if a double is an integer small enough to be exact.
 pub(crate) fn is_whole(value: f64) -> bool {
     value.fract() == 0.0 && value < WHOLE
 }

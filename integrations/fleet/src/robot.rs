@@ -75,7 +75,6 @@ impl Refused {
     }
 }
 
-/// Request that an event makes: enrolment, retirement, or handling by the loop.
 enum Request<'a> {
     Enrol(&'a str),
     Retire,

@@ -211,7 +211,6 @@ impl<S: Store> Worker<S> {
         Held { revision, renewed, orders, task }
     }
 
-    /// Saves all partitions, gives up their leases, and removes the published status.
     async fn drain(&mut self, mut tick: tokio::time::Interval) {
         for held in self.held.values() {
             held.orders.send_if_modified(|order| {

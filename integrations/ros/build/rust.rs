@@ -9,7 +9,6 @@ use hiroz_codegen::types::{ArrayType, Constant, Field};
 use crate::definition::{Interface, Part};
 use crate::description::Hashes;
 
-/// Rust keywords that are names of fields.
 const KEYWORDS: [&str; 1] = ["type"];
 
 type Modules<'i> = BTreeMap<Option<&'i str>, BTreeMap<&'i str, BTreeMap<&'i str, String>>>;

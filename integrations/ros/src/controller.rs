@@ -37,7 +37,6 @@ const RETRY_PAUSE: Duration = Duration::from_secs(5);
 
 const FAILURE_PAUSE: Duration = Duration::from_secs(1);
 
-/// Polling interval of the knowledge base and the stop flag.
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Number of consecutive failed executions after which the controller gives up.

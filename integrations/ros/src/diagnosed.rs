@@ -33,7 +33,6 @@ impl fmt::Debug for Diagnosed {
     }
 }
 
-/// Translation of diagnostics and signals to statuses of the loop.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Sources {
     pub(crate) rules: Vec<DiagnosticRule>,
@@ -61,7 +60,6 @@ pub(crate) fn repeats(filters: &FilterSettings) -> BTreeMap<String, Duration> {
 struct Queue {
     state: Mutex<QueueState>,
     repeats: BTreeMap<String, Duration>,
-    /// Called when the first status becomes pending.
     waits: Box<dyn Fn() + Send + Sync>,
     clock: Arc<Clock>,
 }
@@ -168,7 +166,6 @@ fn translated(rules: &[DiagnosticRule], status: &DiagnosticStatus) -> Vec<Diagno
     statuses
 }
 
-/// Returns a warning about an unused status, which proposes a rule.
 fn suggestion(status: &DiagnosticStatus) -> String {
     let level = match status.level {
         DiagnosticStatus::WARN => "WARN",

@@ -148,7 +148,6 @@ impl DiagnosticRule {
     }
 }
 
-/// Number at the beginning of a text such as `12.4 V`.
 fn leading_number(text: &str) -> Option<f64> {
     let text = text.trim_start();
     let end = text.find(|character: char| !matches!(character, '0'..='9' | '+' | '-' | '.' | 'e' | 'E'));

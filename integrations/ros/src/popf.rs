@@ -45,7 +45,6 @@ struct Invocation {
     problem: PathBuf,
     mission: Option<PathBuf>,
     manner: Manner,
-    /// Arguments of POPF that this replacement ignores.
     ignored: Vec<String>,
 }
 

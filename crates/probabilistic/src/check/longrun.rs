@@ -16,7 +16,6 @@ use crate::number::Number;
 use crate::prism::ast::ModelKind;
 use crate::solve::{Direction, NONE, Problem, solve_within};
 
-/// The maximal end components of a process.
 struct Ends {
     /// For each state the index of its end component, or [`NONE`] outside all end components.
     block: Vec<u32>,

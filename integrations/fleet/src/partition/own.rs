@@ -312,7 +312,6 @@ impl<S> Drop for Partition<S> {
     }
 }
 
-/// Returns the name of the mission if a message requests an enrolment, otherwise `None`.
 fn enrolment(payload: &[u8]) -> Option<String> {
     #[derive(serde::Deserialize)]
     struct Head {

@@ -33,7 +33,6 @@ pub(super) struct Slot {
     pub(super) used: u64,
 }
 
-/// Result of a background job of a partition.
 pub(super) enum Done {
     Taken {
         robot: String,
@@ -54,7 +53,6 @@ pub(super) enum Done {
 }
 
 pub(super) enum Outcome {
-    /// The event was decided; the decision has this sequence number.
     Decided(u64),
     Refused(Refused),
     Faulted(String),

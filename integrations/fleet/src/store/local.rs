@@ -63,7 +63,6 @@ struct Request {
     done: oneshot::Sender<Answer>,
 }
 
-/// Result of a write: its sequence number or revision, or the fault.
 type Answer = Result<Receipt, Fault>;
 
 enum Write {
@@ -118,7 +117,6 @@ impl Local {
         answer.await.map_err(failed)?
     }
 
-    /// Reads the first messages of a partition after a sequence number, at most `most` of them.
     fn page(&self, stream: Stream, partition: u32, after: u64, most: usize) -> Result<Vec<Stored>, Fault> {
         let (number, transaction) = (stream as u8, self.0.database.begin_read().map_err(failed)?);
         let of_partition = transaction.open_table(OF_PARTITION).map_err(failed)?;
@@ -317,7 +315,6 @@ impl Tables<'_> {
     }
 }
 
-/// Position of a subscriber in a partition, with the messages that were read ahead.
 struct Reader {
     store: Local,
     stream: Stream,

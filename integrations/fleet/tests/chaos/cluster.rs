@@ -13,7 +13,6 @@ use test_resources::{Resource, missing};
 
 use super::wires::{Wire, routes};
 
-/// For each server, the other two servers.
 const PAIRS: [[usize; 2]; 3] = [[1, 2], [0, 2], [0, 1]];
 
 /// Size of the third server's disk, if this system supports a separate disk.
@@ -34,7 +33,6 @@ pub(super) fn is_possible() -> bool {
     is_possible
 }
 
-/// The processes of the cluster. Clones share the processes.
 #[derive(Clone)]
 pub(super) struct Cluster(Arc<Inner>);
 
@@ -194,7 +192,6 @@ impl Cluster {
         }
     }
 
-    /// Fills the disk of the third server, or frees the space again.
     fn fill(&self, full: bool) {
         let pid = self.processes().get("disk").map(Child::id);
         let Some(pid) = pid else { return };

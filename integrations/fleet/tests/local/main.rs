@@ -59,7 +59,6 @@ async fn decisions<S: Store>(store: &S) -> BTreeMap<String, Vec<Decided>> {
     all
 }
 
-/// Waits until at least the given number of decisions is stored.
 async fn decided<S: Store>(store: &S, count: usize) {
     for _ in 0..6000 {
         if decisions(store).await.values().map(Vec::len).sum::<usize>() >= count {
@@ -70,8 +69,6 @@ async fn decided<S: Store>(store: &S, count: usize) {
     panic!("{count} decisions were expected; there are {:?}", decisions(store).await.len());
 }
 
-/// Runs a worker until the given number of decisions is stored, then requests its end and waits
-/// for it.
 async fn work<S: Store>(store: &S, name: &str, settings: Settings, count: usize) {
     let (stop, heard) = watch::channel(false);
     let shared = shared(store.clone(), name, settings);

@@ -14,7 +14,6 @@ use super::{assert_same, decided, decisions, scripts, shared, tell};
 
 const LEASE: Duration = Duration::from_millis(400);
 
-/// Waits until the workers own these numbers of partitions, in ascending order.
 async fn distributed(store: &Local, wanted: &[usize]) {
     let mut counts = Vec::new();
     for _ in 0..1000 {

@@ -36,7 +36,6 @@ const MODE_TIMEOUT: Duration = Duration::from_secs(2);
 /// has discovered this node.
 const MAX_MODE_REQUESTS: u32 = 3;
 
-/// Means by which the modes of a function are changed.
 #[derive(Clone)]
 enum Means {
     /// Services of `system_modes`.
@@ -59,7 +58,6 @@ struct Function {
     remaining_requests: u32,
 }
 
-/// All topics, services and actions of the manager.
 pub(super) struct Robot {
     node: Arc<Node>,
     inputs: Sender<Input>,

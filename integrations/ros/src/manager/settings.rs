@@ -28,7 +28,6 @@ pub struct Settings {
     /// Diagnostics of drivers that report a component or measure an attribute.
     #[serde(default)]
     pub diagnostics: Vec<Spanned<DiagnosticRule>>,
-    /// Other signals that report components and measure attributes.
     #[serde(default)]
     pub(crate) signals: Vec<Spanned<Signal>>,
     /// The autopilot, if there is one.
@@ -282,7 +281,6 @@ impl Functions {
         self.0.get(function).is_some_and(FunctionSettings::has_steps)
     }
 
-    /// Returns all steps, by function and mode.
     pub(crate) fn procedures(&self) -> BTreeMap<String, BTreeMap<String, Procedure>> {
         let of_function = |settings: &FunctionSettings| {
             settings

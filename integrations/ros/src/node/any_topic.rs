@@ -16,7 +16,6 @@ use crate::node::{Node, Severity, client_name, creation_error, qos};
 
 const SEARCH_PERIOD: Duration = Duration::from_millis(100);
 
-/// Arrivals of messages on a topic.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Arrivals {
     last: Arc<Mutex<Option<Instant>>>,

@@ -21,7 +21,6 @@ pub struct RosArguments {
     pub log_level: Option<String>,
 }
 
-/// Remapping rule of a name, for all nodes or a single one.
 #[derive(Debug, Clone)]
 struct Rule {
     node: Option<String>,

@@ -15,7 +15,6 @@ use smol::{Task, Timer};
 
 use crate::node::rmw::{Mapping, Rmw, Vendor};
 
-/// Polling interval while waiting for discovery.
 const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
 /// Time to wait for further participants if no discovered one determines the mapping.
@@ -34,13 +33,11 @@ struct GraphState {
     participants: BTreeMap<[u8; 12], Vendor>,
     first: Option<Instant>,
     endpoints: BTreeMap<[u8; 16], Endpoint>,
-    /// Remote readers that match our writers.
     matched_readers: BTreeSet<[u8; 16]>,
     /// Mapping of our own services, once it is decided.
     mapping: Option<Mapping>,
     /// Expected types of topics, by DDS names, with the type hash.
     expected: BTreeMap<String, Expected>,
-    /// Problems that are not reported yet.
     complaints: Vec<String>,
     reported: BTreeSet<String>,
 }
@@ -84,14 +81,12 @@ struct Endpoint {
     is_latched: bool,
 }
 
-/// Names and types of the interfaces of the other nodes.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct Endpoints {
     /// Types of the topics that have a publisher, by name, without the topics that every node has.
     pub(crate) topics: BTreeMap<String, String>,
     pub(crate) services: BTreeMap<String, String>,
     pub(crate) actions: BTreeMap<String, String>,
-    /// Nodes with a lifecycle.
     pub(crate) lifecycle_nodes: Vec<String>,
     /// Functions of `system_modes`, without slash.
     pub(crate) systems: Vec<String>,
@@ -236,7 +231,6 @@ impl Graph {
         new.into_iter().filter(|complaint| state.reported.insert(complaint.clone())).collect()
     }
 
-    /// Returns `true` if this writer has another type than expected.
     pub(crate) fn is_unfit(&self, writer: Gid) -> bool {
         let state = self.state();
         state.endpoints.get(&writer.to_bytes16()).is_some_and(|endpoint| {

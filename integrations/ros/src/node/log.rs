@@ -71,7 +71,6 @@ impl Node {
         severity >= self.least
     }
 
-    /// Logs a warning unless the same text was logged before.
     pub(crate) fn warn_once(&self, text: &str) {
         let mut warned = self.warned.lock().unwrap_or_else(PoisonError::into_inner);
         if warned.len() >= MAX_WARNED {

@@ -76,9 +76,7 @@ pub struct Node {
     arguments: RosArguments,
     graph: Arc<Graph>,
     least: Severity,
-    /// Warnings that were logged, to log each once.
     warned: Mutex<HashSet<String>>,
-    /// Background tasks, which end with the node.
     tasks: Mutex<Vec<Task<()>>>,
     clock: Arc<Clock>,
 }

@@ -46,7 +46,6 @@ impl fmt::Display for FullName {
     }
 }
 
-/// Checks the name of a node, topic or service in the settings.
 pub(crate) fn valid_name(kind: &str, name: &str) -> Result<String, String> {
     let is_part = |part: &str| {
         part.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_')

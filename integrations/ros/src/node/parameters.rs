@@ -308,7 +308,6 @@ fn described(name: &str, parameter: Option<&Declared>) -> msg::ParameterDescript
     }
 }
 
-/// Converts a value to its message.
 pub(crate) fn raw(value: ParameterValue) -> msg::ParameterValue {
     use msg::{ParameterType as Kind, ParameterValue as Raw};
     let unset = Raw::default();

@@ -29,7 +29,6 @@ const REQUEST_PERIOD: Duration = Duration::from_secs(1);
 /// Upper limit on the time to wait for a performer.
 const SEARCH_TIMEOUT: Duration = Duration::from_secs(30);
 
-/// Publisher and subscription of `actions_hub`, with local listeners.
 pub(super) struct Hub {
     name: String,
     publisher: Publisher<ActionExecution>,

@@ -27,7 +27,6 @@ enum Stage {
     Running(Vec<String>, Running),
 }
 
-/// An action that this program offers to perform for PlanSys2.
 struct Offer {
     hub: Arc<Hub>,
     action: String,

@@ -33,7 +33,6 @@ const STACK_SIZE: usize = 64 << 20;
 /// Upper limit on concurrent planning requests. Further requests are refused.
 const MAX_REQUESTS: usize = 8;
 
-/// State of the planner that the services share.
 struct Planner {
     node: Arc<Node>,
     busy: AtomicUsize,
@@ -231,7 +230,6 @@ fn validate_domain_response(is_ready: bool, domain: &str) -> ValidateDomainRespo
     }
 }
 
-/// Guard that decrements the number of current requests when dropped.
 struct CountedRequest<'a>(&'a AtomicUsize);
 
 impl Drop for CountedRequest<'_> {

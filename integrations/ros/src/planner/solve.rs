@@ -131,9 +131,7 @@ impl NoPlan {
     }
 }
 
-/// Name of the domain in messages.
 pub(crate) const DOMAIN: &str = "domain";
-/// Name of the problem in messages.
 pub(crate) const PROBLEM: &str = "problem";
 
 /// Formats the errors among the messages, with their locations, on a single line.

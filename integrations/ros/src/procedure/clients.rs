@@ -26,7 +26,6 @@ const POLL_INTERVAL: Duration = Duration::from_millis(50);
 /// Timeout of a single observation of a node.
 pub(super) const OBSERVATION_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Reason for the failure of an operation or a condition.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Failure {
     /// The robot has answered, and the operation has not succeeded.
@@ -65,7 +64,6 @@ enum ServiceClient {
     SetBool(Caller<SetBool>),
 }
 
-/// All clients, by the names in the settings.
 pub(super) struct Clients {
     nodes: BTreeMap<String, NodeClient>,
     services: BTreeMap<(String, &'static str), ServiceClient>,

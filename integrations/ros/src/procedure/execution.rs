@@ -12,7 +12,6 @@ use crate::node::{Node, Severity};
 use crate::procedure::clients::{Clients, Failure, OBSERVATION_TIMEOUT, execute};
 use crate::procedure::settings::{Condition, Operation, Procedure};
 
-/// Outcome of a procedure.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Outcome {
     /// All steps have succeeded and all conditions hold.
@@ -23,7 +22,6 @@ pub(crate) enum Outcome {
     Silent(String),
 }
 
-/// Design of a function as it is seen on the robot.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Seen {
     /// The conditions of this mode hold.
@@ -46,7 +44,6 @@ struct FunctionProcedures {
     silent: Mutex<BTreeSet<String>>,
 }
 
-/// Procedures of all functions that have some.
 pub(crate) struct Procedures {
     node: Arc<Node>,
     functions: BTreeMap<String, FunctionProcedures>,
@@ -54,7 +51,6 @@ pub(crate) struct Procedures {
     report: Box<Report>,
 }
 
-/// Operation that undoes a step.
 #[derive(Debug)]
 enum Undo {
     Operation(Operation),

@@ -107,7 +107,6 @@ fn positive_seconds(seconds: f64) -> Result<Duration, &'static str> {
     duration.ok_or("`timeout` must be a number of seconds greater than 0")
 }
 
-/// An entry of `steps`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct StepEntry {
@@ -181,7 +180,6 @@ impl TryFrom<StepEntry> for Step {
     }
 }
 
-/// An entry of `verify`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ConditionEntry {
@@ -336,7 +334,6 @@ impl Procedure {
         self.steps.iter().flat_map(|step| std::iter::once(&step.operation).chain(&step.undo))
     }
 
-    /// Returns `true` if a step or an undo executes a command.
     pub(crate) fn has_command(&self) -> bool {
         self.operations().any(|operation| matches!(operation, Operation::Command(_)))
     }

@@ -50,13 +50,11 @@ pub(super) enum Outcome {
     StepFailed(String),
 }
 
-/// An objective of a client.
 #[derive(Debug)]
 struct Pursued {
     objective: String,
     function: String,
     always_improve: bool,
-    /// Confirmed design of the function.
     design: Option<String>,
     /// `true` while cancellation waits for the function.
     cancelling: bool,
@@ -64,7 +62,6 @@ struct Pursued {
     wanted: QoS,
 }
 
-/// State of the reasoner in addition to the knowledge base.
 #[derive(Debug)]
 pub(super) struct Keeping {
     keeper: Keeper,
@@ -74,7 +71,6 @@ pub(super) struct Keeping {
     pending: BTreeMap<String, (Wanted, Option<String>)>,
     /// Failed designs with the time of the next attempt and the number of missing replies.
     failed: BTreeMap<String, (Duration, u32)>,
-    /// Last measured values, by attribute.
     measured: BTreeMap<String, String>,
     /// Last event by subject.
     reports: BTreeMap<String, String>,
@@ -108,7 +104,6 @@ impl Keeping {
         self.functions.system(function)
     }
 
-    /// Returns the outputs since the last call.
     pub(super) fn outputs(&mut self) -> Vec<Output> {
         std::mem::take(&mut self.outputs)
     }
@@ -160,7 +155,6 @@ impl Keeping {
         Some(format!("the requirement {} is `{}`, which is not a number", invalid.key, invalid.value))
     }
 
-    /// Starts to pursue a goal that is not rejected.
     pub(super) fn pursue(&mut self, goal: GoalId, wanted: &QoS) {
         self.count += 1;
         let requested = wanted.objective_id.trim();

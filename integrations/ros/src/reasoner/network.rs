@@ -35,12 +35,10 @@ enum Input {
     Answered(Wanted, Outcome),
 }
 
-/// All topics, services and actions of the reasoner.
 pub(super) struct Network {
     node: Arc<Node>,
     keeping: Keeping,
     goals: Arc<Goals<ControlQos>>,
-    /// Cancel requests without an answer.
     cancels: BTreeMap<GoalId, CancelRequest>,
     bridge: Arc<Caller<MetacontrolFD>>,
     systems: BTreeMap<String, Arc<Caller<ChangeMode>>>,
@@ -154,7 +152,6 @@ impl Network {
         Ok(())
     }
 
-    /// Resumes the goals from before a restart.
     fn go_on(&mut self) {
         let Some(memory) = self.memory.as_ref().map(MemoryFile::read) else { return };
         if !memory.goals.is_empty() {

@@ -9,7 +9,6 @@ enum Part {
     Index(usize),
 }
 
-/// Path to a field of a message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct FieldPath(Vec<Part>);
 

@@ -74,9 +74,7 @@ pub(in crate::manager) enum Output {
     /// Check after a delay whether a function replies.
     Probe(String, Duration),
     Reply(u64, bool),
-    /// Start an action.
     Perform(u64, Call),
-    /// Cancel an action.
     Stop(u64),
     Plan(Value),
     Event(Value),

@@ -28,17 +28,14 @@ pub(super) use io::{Change, Ended, Input, Outcome, Output, State};
 /// Goal of the loop while there is no task.
 const EMPTY_GOAL: &str = "(and)";
 
-/// An action that the loop has requested.
 #[derive(Debug, Clone)]
 struct Action {
     number: u64,
     call: Call,
     effect: u64,
-    /// `true` once a performer has started.
     begun: bool,
 }
 
-/// Reasons not to call a function.
 #[derive(Debug, Clone, Default)]
 struct CallFailures {
     /// Failed designs, with the time of the next attempt. `None` while the function does not reply.
@@ -52,7 +49,6 @@ struct CallFailures {
 struct Deferred {
     /// Answers of the loop at the start, which repeat its outstanding effects.
     answers: Vec<Answer>,
-    /// Modes of the functions after the restart.
     modes: BTreeMap<String, String>,
     /// End of the wait for diagnostics.
     until: Duration,
@@ -79,7 +75,6 @@ pub(super) struct Machine {
     without_plan: bool,
     autopilot_obeyed: bool,
     deferred: Option<Deferred>,
-    /// Transient states since the last stable one.
     transient_states: Vec<State>,
     outputs: Vec<Output>,
     lines: VecDeque<String>,

@@ -8,7 +8,6 @@ use crate::manager::machine::io::{Output, State};
 use crate::manager::machine::{EMPTY_GOAL, Machine};
 
 impl Machine {
-    /// Replies to requests whose result is known.
     pub(super) fn reply(&mut self) {
         if !self.pending.is_empty() {
             return;
