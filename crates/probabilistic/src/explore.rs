@@ -168,12 +168,9 @@ pub fn explore<N: Number, G: Generator<N>>(
     Ok(exploration.explored)
 }
 
-/// An exploration that can be interrupted and resumed.
 pub(crate) struct Exploration<S, N> {
     pub explored: Explored<S, N>,
-    /// The number of the next state to expand.
     next: usize,
-    /// The number of the expanded state at which progress is reported next.
     next_report: usize,
 }
 

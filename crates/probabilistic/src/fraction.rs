@@ -244,8 +244,6 @@ mod tests {
             .prop_map(|(above, below)| BigRational::new(BigInt::from(above), BigInt::from(below)))
     }
 
-    /// Checks that `fraction` has the expected value, and that it is short if and only if both
-    /// parts fit into words.
     fn is(fraction: &Fraction, expected: &BigRational) {
         let fits = i64::try_from(expected.numer()).is_ok() && i64::try_from(expected.denom()).is_ok();
         assert_eq!(matches!(fraction, Short(..)), fits, "{fraction:?} {expected}");

@@ -37,7 +37,6 @@ struct HashTable {
     shift: u32,
 }
 
-/// Number of bits of a slot number in the initial table.
 const INITIAL_BITS: u32 = 8;
 
 impl HashTable {
@@ -85,7 +84,6 @@ const fn upper(entry: u64) -> u32 {
     (entry >> 32) as u32
 }
 
-/// Returns the state number of an entry if the entry has the given hash, otherwise `None`.
 #[expect(clippy::cast_possible_truncation, reason = "the lower half")]
 const fn number_of(entry: u64, hash: u32) -> Option<u32> {
     if upper(entry) == hash { (entry as u32).checked_sub(1) } else { None }

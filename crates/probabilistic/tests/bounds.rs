@@ -24,7 +24,6 @@ fn encloses(quantity: &Quantity, exact: &BigRational) -> bool {
         && end(quantity.upper).is_some_and(|upper| upper >= *exact)
 }
 
-/// Returns the exact value, after checking that the bounds computed in doubles enclose it.
 fn enclosed(model: &str, question: &str) -> BigRational {
     let exact = value(model, question, Exactness::Always).exact.expect("a fraction");
     let rounded = value(model, question, Exactness::Never);

@@ -123,7 +123,6 @@ fn survive_property(question: &str) {
     }
 }
 
-/// The properties that other tests mutate are valid and supported.
 #[test]
 fn intact_properties_have_answers() {
     let model = prism::parse(MODEL).expect("a model");

@@ -242,7 +242,6 @@ async fn run(command: Command) -> Result<(), Errors> {
     Ok(())
 }
 
-/// Returns a unique name for this worker: host, process id and a random part.
 fn own_name() -> String {
     let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
     let host: String =

@@ -186,8 +186,6 @@ fn reach_back<N: Number>(mdp: &Mdp<N>, set: &mut FixedBitSet) {
     }
 }
 
-/// Computes the maximal end components within the states `inside`, by repeated decomposition into
-/// strongly connected components.
 fn end_components<N: Number>(mdp: &Mdp<N>, inside: &FixedBitSet) -> Ends {
     let n = mdp.states();
     let within = |choice: usize| mdp.targets(choice).iter().all(|target| inside.contains(*target as usize));

@@ -256,8 +256,6 @@ impl Processes {
         Ok(Self { exact: None, doubles: Some(doubles), budget: 0 })
     }
 
-    /// Frees the index from states to state numbers, which only the evaluation of a given policy
-    /// needs. The solver can then use this memory.
     fn forget_numbers(&mut self) {
         self.exact.iter_mut().for_each(|explored| explored.states.forget_numbers());
         self.doubles.iter_mut().for_each(|explored| explored.states.forget_numbers());

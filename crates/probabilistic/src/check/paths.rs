@@ -12,7 +12,6 @@ use crate::policy::with_secondary;
 use crate::prism::ast::{ModelKind, Path, RewardPath, StepBound, Steps};
 use crate::solve::{Direction, Problem, Solution, draft, solve_within};
 
-/// Upper limit (exclusive) on the bound of a step-bounded operator.
 const MAX_STEPS: u32 = 1_000_000_000;
 
 /// Values in all states, with a memoryless policy that attains them if one was computed.

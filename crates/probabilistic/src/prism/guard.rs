@@ -15,7 +15,6 @@ pub struct Guard {
     fixed: Vec<(u32, i64)>,
 }
 
-/// A test that a variable lies inside a range, or outside of it if `inside` is `false`.
 #[derive(Debug, Clone, Copy)]
 struct Test {
     variable: u32,

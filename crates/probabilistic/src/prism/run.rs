@@ -204,7 +204,6 @@ impl<N> JointStep<N> {
     }
 }
 
-/// Returns the commands of a group that are enabled in a state, in the order of the model.
 pub(super) fn enabled<'a, N: Number>(
     group: &'a Group<N>,
     values: &'a [i64],

@@ -248,7 +248,6 @@ struct Row<N> {
     leaving: N,
 }
 
-/// The quantities that determine the rounding error of an elimination.
 struct Precision {
     widest: usize,
     /// Whether a product has underflowed.

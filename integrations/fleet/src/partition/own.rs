@@ -27,7 +27,7 @@ pub(super) struct Partition<S> {
     /// Sequence numbers of the last event that was read, and of the last known decision, both over all
     /// robots of the partition.
     pub(super) seen: (u64, u64),
-    /// Revision of the last snapshot of a robot.
+    /// Greatest revision of all snapshots of the partition's robots.
     pub(super) snapshots: u64,
     pub(super) jobs: FuturesUnordered<BoxFuture<'static, Done>>,
     pub(super) waiting: usize,

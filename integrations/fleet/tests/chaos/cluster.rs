@@ -15,7 +15,6 @@ use super::wires::{Wire, routes};
 
 const PAIRS: [[usize; 2]; 3] = [[1, 2], [0, 2], [0, 1]];
 
-/// Size of the third server's disk, if this system supports a separate disk.
 const DISK: &str = "64m";
 
 fn program() -> String {

@@ -6,7 +6,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// A proxy for the connections between two servers, regardless of which server opens them.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Wire {
     is_cut: Arc<AtomicBool>,

@@ -187,8 +187,6 @@ async fn two_owners_of_one_partition_decide_each_event_once() {
     }
 }
 
-/// Checks that only the comparison with the previous decision prevents two owners from deciding an
-/// event twice: without the comparison, both decide.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn without_the_comparison_events_are_decided_twice() {
     let (events, answers) = scripts::play("ugv", "kinect_comes_and_goes", 1, 30);
