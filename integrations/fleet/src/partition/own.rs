@@ -27,7 +27,8 @@ pub(super) struct Partition<S> {
     /// Sequence numbers of the last event that was read, and of the last known decision, both over all
     /// robots of the partition.
     pub(super) seen: (u64, u64),
-    /// Greatest revision of all snapshots of the partition's robots.
+    /// Greatest revision of the snapshots that this owner has stored. Initially the value of the stored
+    /// progress.
     pub(super) snapshots: u64,
     pub(super) jobs: FuturesUnordered<BoxFuture<'static, Done>>,
     pub(super) waiting: usize,

@@ -133,8 +133,8 @@ impl Settings {
         self.signals.iter().map(|signal| signal.get_ref().clone()).collect()
     }
 
-    /// Checks that the mission has the components and attributes of diagnostics and signals. `attribute` returns the reason
-    /// why a name cannot be measured.
+    /// Checks that the mission has the components and attributes of diagnostics and signals. `attribute`
+    /// returns the reason why a name cannot be measured.
     ///
     /// # Errors
     /// All names that the mission does not have.

@@ -107,8 +107,9 @@ impl Node {
         inner.create_subscription(&topic, Some(profile))
     }
 
-    /// Subscribes to a topic once it has a publisher, with the quality of service of that publisher: the last sample of a
-    /// latched topic is received, and no sample of another one is requested again.
+    /// Subscribes to a topic once it has a publisher. If the publisher is latched, samples are received
+    /// reliably, beginning with the last one. Otherwise, only new samples are received, with best effort. A
+    /// failed subscription is logged.
     ///
     /// # Errors
     /// The name is not a valid topic name.

@@ -46,8 +46,8 @@ impl Clock {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Returns the time since the creation of the clock. Simulated time stands still while the simulation is paused, and
-    /// does not go back when the simulation is started again.
+    /// Returns the time since the creation of the clock. Simulated time stands still while the simulation is
+    /// paused, and does not go back when the simulation is started again.
     pub(crate) fn elapsed(&self) -> Duration {
         let mut state = self.state();
         state.count();

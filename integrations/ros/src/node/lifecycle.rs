@@ -199,7 +199,7 @@ impl Events {
 
 /// Lifecycle of a managed node.
 pub struct Lifecycle {
-    /// A weak reference, because the node holds its services, which hold this.
+    /// A weak reference, because the node holds its services, which hold this lifecycle.
     node: Weak<Node>,
     phase: Mutex<Phase>,
     events: Events,

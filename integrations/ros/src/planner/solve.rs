@@ -289,10 +289,6 @@ impl FilledMission<'_> {
     }
 }
 
-/// Checks that a source is a valid PDDL domain.
-///
-/// # Errors
-/// Fails with all errors of the domain.
 pub(crate) fn check_domain(domain: &Source) -> Result<(), Errors> {
     let (tree, mut diagnostics) = pddl::parse_domain(domain);
     if let Some(tree) = &tree {

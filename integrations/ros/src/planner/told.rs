@@ -16,10 +16,6 @@ pub(crate) struct PlanPublisher {
 }
 
 impl PlanPublisher {
-    /// Creates the publisher and its topic.
-    ///
-    /// # Errors
-    /// Fails if the topic cannot be created.
     pub(crate) fn new(node: &Arc<Node>) -> Result<Self, Errors> {
         let plans = node.publisher("~/plan", latched(1))?;
         Ok(Self { node: Arc::clone(node), plans })

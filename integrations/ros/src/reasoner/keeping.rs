@@ -210,7 +210,6 @@ impl Keeping {
         self.outputs.push(Output::Configure(wanted));
     }
 
-    /// Handles a line of events in the format of the loop.
     pub(super) fn handle_line(&mut self, line: &str) {
         let observation = Observation::parse(line);
         for event in observation.events.iter().flatten() {

@@ -23,7 +23,8 @@ const SILENCE: Duration = Duration::from_secs(2);
 pub(crate) struct Signal {
     pub(crate) source: Source,
     pub(crate) target: Target,
-    /// Least time between two reports.
+    /// Least time between two reports of a field or a rate. Reports of silence, presence and states are not
+    /// limited.
     pub(crate) every: Duration,
     filter: Filter,
 }

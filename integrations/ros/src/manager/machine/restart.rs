@@ -63,7 +63,6 @@ impl Machine {
         }
     }
 
-    /// Restores the action that was running when the previous run of the program ended.
     pub(super) fn restore_action(&mut self) {
         let Some((number, step)) = self.control.beliefs().running() else { return };
         let call = call(step);
