@@ -51,10 +51,10 @@ pub struct Options {
     pub version: PlanVersion,
 }
 
-/// Runs until PlanSys2's goal is reached or `stop` is set.
+/// Runs until a plan for PlanSys2's goal is executed, until the goal already holds, or until `stop` is set.
 ///
 /// # Errors
-/// Fails if the mission or a parameter of the command line is wrong, or
+/// Fails if the mission or a parameter of the command line is wrong, if a topic cannot be created, or if
 /// `MAX_FAILURES` consecutive executions have failed.
 pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(), Errors> {
     let setup = Setup::read(&options.mission)?;
@@ -136,8 +136,7 @@ impl Controller {
         Ok(())
     }
 
-    /// Returns the best plan for PlanSys2's current problem. Without a plan, publishes or logs the
-    /// reason and returns `None`.
+    /// Plans for PlanSys2's current problem. Without a plan, publishes or logs the reason and returns `None`.
     async fn find(&self) -> Option<Found> {
         match self.request_problem().await {
             Ok((domain, problem)) => self.plan(domain, problem).await.ok(),

@@ -41,9 +41,9 @@ pub(crate) struct Sources {
     pub(crate) repeats: BTreeMap<String, Duration>,
 }
 
-/// Returns for each attribute the time after which an equal value must be reported again; zero if every
-/// sample must be reported. Otherwise, a filter that counts samples or waits for them would treat a constant
-/// value as silence.
+/// Returns the time after which an equal value must be reported again, for each attribute whose filter needs
+/// repetitions. The time is a quarter of the filter's period or debounce time, or zero if every sample
+/// counts. Without repetitions, the filter would treat a constant value as silence.
 pub(crate) fn repeats(filters: &FilterSettings) -> BTreeMap<String, Duration> {
     let mut repeats = BTreeMap::new();
     for (attribute, measured) in &filters.measured {

@@ -76,7 +76,7 @@ struct Diagnostic {
     /// Most severe level so far, to which `message` belongs.
     level: u8,
     message: String,
-    /// Keys whose values begin with a number, with the last such value.
+    /// Last value of each key whose first word is a number.
     numbers: BTreeMap<String, String>,
 }
 
@@ -222,8 +222,8 @@ fn section(text: &mut String, title: &str, tables: &[String]) {
     }
 }
 
-/// Returns the component with the longest name that is a part of `name`, or a placeholder. Case and the
-/// prefix `c_` are ignored.
+/// Returns the component with the longest name that is a part of `name`, or a placeholder. Case, the prefix
+/// `c_`, and the difference between `_` and a space are ignored.
 fn component<'n>(names: &'n Names, name: &str) -> &'n str {
     let name = name.to_lowercase();
     let is_similar = |component: &&String| {

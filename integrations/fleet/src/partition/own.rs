@@ -27,8 +27,7 @@ pub(super) struct Partition<S> {
     /// Sequence numbers of the last event that was read, and of the last known decision, both over all
     /// robots of the partition.
     pub(super) seen: (u64, u64),
-    /// Greatest revision of the snapshots that this owner has stored. Initially the value of the stored
-    /// progress.
+    /// Greatest known revision of the snapshots of the partition's robots.
     pub(super) snapshots: u64,
     pub(super) jobs: FuturesUnordered<BoxFuture<'static, Done>>,
     pub(super) waiting: usize,
@@ -266,7 +265,7 @@ impl<S: Store> Partition<S> {
         }
     }
 
-    /// Counts a refused event, and publishes the reason to the sender of the event.
+    /// Counts a refused event, and publishes the reason as a notice to the clients of the robot.
     fn say(&self, event: &Stored, refused: Refused) {
         self.refuse(Some((event.subject.clone(), refused.sentence().to_owned())), refused.name());
     }

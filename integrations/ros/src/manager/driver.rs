@@ -140,7 +140,7 @@ struct Driver {
 
 impl Driver {
     /// Waits until the functions are present or `stop` is set, and logs the missing ones periodically.
-    /// Requests of tasks wait for at most [`TASK_WAIT`] and are then refused.
+    /// Requests to start or end a task wait for at most [`TASK_WAIT`]; a start is then refused.
     fn wait_for_functions(
         &mut self,
         sender: &Sender<Input>,
@@ -155,8 +155,7 @@ impl Driver {
                 self.diagnose();
             }
             let missing = smol::block_on(self.robot.wait(SEARCH_TIME));
-            // The writer of diagnostics may start later, because no mode is changed before its
-            // first message.
+            // The writer of diagnostics may start later: it is reported as missing, but not waited for.
             let is_there = missing.iter().all(|text| text.contains("/diagnostics"));
             while let Ok(input) = inputs.try_recv() {
                 // Clients of tasks wait for a reply, so their requests are kept with the time of arrival.
@@ -205,7 +204,7 @@ impl Driver {
         Ok(())
     }
 
-    /// Checks that every design is a mode of its function.
+    /// Checks that the designs of each function of `system_modes` that replies are modes of the function.
     fn fits(&self) -> Result<(), Message> {
         let mut missing = Vec::new();
         for (function, available) in smol::block_on(self.robot.available(&self.settings)) {

@@ -372,7 +372,7 @@ impl Robot {
         self.performing.insert(number, (running, task));
     }
 
-    /// Cancels an action. An action that is not running is reported as cancelled.
+    /// Cancels an action. An action that was not started by this program is reported as cancelled.
     pub(super) fn stop(&self, number: u64) {
         match self.performing.get(&number) {
             Some((running, _)) => running.cancel(),

@@ -257,7 +257,7 @@ impl Functions {
         self.0.get(function).and_then(|settings| settings.system.as_deref()).unwrap_or(function)
     }
 
-    /// Returns the node of a function.
+    /// Returns the node of a function, by default `<system>_node`.
     pub fn node(&self, function: &str) -> String {
         let node = self.0.get(function).and_then(|node| node.node.clone());
         node.unwrap_or_else(|| format!("{}_node", self.system(function)))

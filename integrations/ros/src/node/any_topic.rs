@@ -42,8 +42,8 @@ impl Node {
         Ok(arrivals)
     }
 
-    /// Subscribes to a topic with the type of its first publisher, and calls `arrived` for each message. The content
-    /// of the messages is not read.
+    /// Subscribes to a topic with the type of a publisher, once there is one, and calls `arrived` for each
+    /// message. The content of the messages is not read.
     ///
     /// # Errors
     /// The name is not a valid topic name.

@@ -10,7 +10,7 @@ use crate::interfaces::builtin_interfaces::msg::Time;
 use crate::interfaces::rosgraph_msgs::msg::Clock as ClockMessage;
 use crate::node::{Node, Severity, qos};
 
-/// Time without a message on `/clock` after which a warning is logged.
+/// Time from the subscription to `/clock` until a warning is logged if no message has arrived.
 const CLOCK_WAIT: Duration = Duration::from_secs(5);
 
 #[derive(Debug)]

@@ -83,7 +83,8 @@ struct Endpoint {
 
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct Endpoints {
-    /// Types of the topics that have a publisher, by name, without the topics that every node has.
+    /// Types of the topics that have a publisher, by name. `/rosout`, `/parameter_events`, `/diagnostics`,
+    /// and the topics of lifecycles and actions are omitted.
     pub(crate) topics: BTreeMap<String, String>,
     pub(crate) services: BTreeMap<String, String>,
     pub(crate) actions: BTreeMap<String, String>,
@@ -93,7 +94,8 @@ pub(crate) struct Endpoints {
 }
 
 impl Endpoints {
-    /// Adds an endpoint. Returns `None` if it belongs to no interface of ROS 2.
+    /// Adds the topic, service or action that an endpoint publishes or serves, unless it is omitted. Returns
+    /// `None` for other endpoints.
     fn add(&mut self, endpoint: &Endpoint) -> Option<()> {
         let (package, rest) = endpoint.type_name.split_once("::")?;
         let (kind, rest) = rest.split_once("::dds_::")?;
@@ -120,7 +122,7 @@ impl Endpoints {
     }
 }
 
-/// First publisher of a topic.
+/// A publisher of a topic.
 #[derive(Debug, Clone)]
 pub(crate) struct Writer {
     /// DDS name of the type.
@@ -211,7 +213,8 @@ impl Graph {
         }
     }
 
-    /// Sets the expected type of a topic. Endpoints with another type are reported and ignored.
+    /// Sets the expected type of a topic. Endpoints with another type or type hash are reported, and the
+    /// messages of such writers are ignored.
     pub(crate) fn expect(&self, topic: String, expected: Expected) {
         let mut state = self.state();
         let complaints: Vec<String> = state
@@ -322,9 +325,9 @@ impl Graph {
         state.endpoints.iter().filter(|(_, endpoint)| fits(endpoint)).map(|(guid, _)| *guid).collect()
     }
 
-    /// Waits for the mapping of our own services: a fixed one, or that of the first participant that supports
-    /// only a single one. Without such a participant, the enhanced mapping is selected [`DISCOVERY_WAIT`]
-    /// after the first discovery.
+    /// Waits for the mapping of our own services: a fixed one, or that of a discovered participant that
+    /// supports only a single one. Without such a participant, the enhanced mapping is selected
+    /// [`DISCOVERY_WAIT`] after the first discovery.
     pub(crate) async fn mapping(&self) -> Mapping {
         loop {
             if let Some(mapping) = self.decide() {

@@ -231,8 +231,8 @@ impl Lifecycle {
         Ok(active)
     }
 
-    /// Serves the lifecycle of a node that starts unconfigured. `change` is called before each
-    /// transition with the target state.
+    /// Serves the lifecycle of a node that starts unconfigured. `change` is called in each transition with
+    /// the target state. If it returns `false`, the node keeps its state.
     ///
     /// # Errors
     /// A topic cannot be created.

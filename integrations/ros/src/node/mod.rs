@@ -1,10 +1,10 @@
-//! A node of a ROS 2 graph over DDS: topics, services, actions, parameters, log and lifecycle,
-//! without a ROS installation.
+//! A node of a ROS 2 graph over DDS: topics, services, actions, parameters, log and lifecycle, without a ROS
+//! installation.
 //!
-//! Names are expanded and remapped as in ROS 2. Received messages are passed to closures on a
-//! thread of the executor, which must return quickly. Samples of the wrong type and endpoints with
-//! another type are reported and ignored. Our own services wait for the first participant that
-//! reveals its mapping of services, see `rmw`.
+//! Names are expanded and remapped as in ROS 2. Received messages are passed to closures on a thread of the
+//! executor, which must return quickly. Samples of the wrong type and endpoints with another type are
+//! reported and ignored. Our own services wait until a participant reveals its mapping of services, at most
+//! for one second after the first discovery (see `rmw`).
 
 mod action;
 mod any_topic;
@@ -91,7 +91,7 @@ impl Node {
     /// Joins the graph. [`Node::declare`] must be called next, to declare the parameters.
     ///
     /// # Errors
-    /// The name is wrong, or the network is not available.
+    /// The name is wrong, the log level is unknown, or the network is not available.
     pub fn open(opening: Opening) -> Result<Arc<Self>, Message> {
         let Opening { name, arguments, network, rmw } = opening;
         let name = arguments.node(&name);
@@ -193,7 +193,7 @@ fn creation_error(entity: &str, error: &dyn std::fmt::Display) -> Message {
     Message::error("N122", format!("{entity} could not be made: {error}"))
 }
 
-/// Returns `true` if the environment specifies Lyrical or later, in which some types differ.
+/// Returns `true` if `ROS_DISTRO` is `lyrical` or `rolling`, in which some message types differ.
 pub(crate) fn is_lyrical() -> bool {
     std::env::var("ROS_DISTRO").is_ok_and(|name| ["lyrical", "rolling"].contains(&name.trim()))
 }

@@ -56,12 +56,13 @@ type Table = BTreeMap<String, Declared>;
 type Listener = dyn Fn(&str, &ParameterValue) + Send + Sync;
 
 impl Node {
-    /// Declares the parameters of the node, applies the values of the command line, and serves
-    /// them. `changed` is called for each parameter that is set later. Returns warnings about
-    /// undeclared parameters.
+    /// Declares the parameters of the node, applies the values of the command line, and serves them.
+    /// `changed` is called for each parameter that is set later. Returns warnings about undeclared
+    /// parameters.
     ///
     /// # Errors
-    /// The command line gives a value of another type.
+    /// The command line gives a value of another type or a value that the check rejects, or a topic or
+    /// service cannot be created.
     pub fn declare(
         self: &Arc<Self>,
         declared: Vec<Declared>,

@@ -32,7 +32,7 @@ pub use settings::{By, Distribution, Offered, Pose, Poses};
 /// Creates the performers that the settings configure, by action name.
 ///
 /// # Errors
-/// Fails with all invalid names of topics and actions.
+/// Fails with the errors about all topics that cannot be created.
 pub fn performers(
     node: &Arc<Node>,
     actions: &BTreeMap<String, By>,

@@ -76,7 +76,7 @@ pub fn offer(
 /// Performs the actions that the settings offer for PlanSys2's executor.
 ///
 /// # Errors
-/// Fails with all invalid names of topics and actions.
+/// Fails with the errors about topics that cannot be created.
 pub fn offers(node: &Arc<Node>, offered: &BTreeMap<String, Offered>, poses: &Poses) -> Result<(), Errors> {
     let by = offered.iter().map(|(action, offered)| (action.clone(), offered.by.clone())).collect();
     for (action, performer) in performers(node, &by, poses)? {

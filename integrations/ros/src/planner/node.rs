@@ -75,11 +75,11 @@ pub struct Options {
 
 const STOP_POLL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Serves as PlanSys2's planner until `stop` is set, and performs the actions that the settings
-/// offer.
+/// Serves as PlanSys2's planner until `stop` is set, and performs the actions that the settings offer.
 ///
 /// # Errors
-/// Fails if the mission, the settings or a parameter of the command line is wrong.
+/// Fails if the mission, the settings or a parameter of the command line is wrong, or a topic cannot be
+/// created.
 pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(), Errors> {
     let setup = options.mission.as_deref().map(Setup::read).transpose()?;
     for warning in setup.iter().flat_map(|setup| setup.mission.warnings()) {

@@ -151,7 +151,8 @@ fn one_line(messages: &[Message]) -> String {
 /// plans.
 const OVERLAPPING_SHARE: f64 = 0.7;
 
-/// Computes the best plan for a request. A panic of the planner is returned as [`NoPlan::Fault`].
+/// Computes a plan for a request; an optimal one, if the time limit permits. A panic of the planner is
+/// returned as [`NoPlan::Fault`].
 ///
 /// # Errors
 /// Fails with the reason why there is no plan.

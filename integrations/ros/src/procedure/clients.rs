@@ -30,7 +30,7 @@ pub(super) const OBSERVATION_TIMEOUT: Duration = Duration::from_secs(2);
 pub(super) enum Failure {
     /// The robot has answered, and the operation has not succeeded.
     Refused(String),
-    /// The robot has not answered.
+    /// The robot has given no valid answer in time.
     Silent(String),
     /// A newer request replaces the procedure.
     Replaced,
@@ -261,7 +261,7 @@ impl Clients {
     }
 
     /// Sets parameters atomically and checks the values afterwards. Passes the earlier values to `before`.
-    /// Returns without a call if the node has the values.
+    /// Sets nothing if the node already has the values.
     pub(super) async fn set(
         &self,
         node: &str,

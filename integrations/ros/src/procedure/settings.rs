@@ -21,7 +21,8 @@ pub(crate) struct Procedure {
     pub(crate) steps: Vec<Step>,
     /// Conditions that must hold after the last step, in addition to the results of the steps.
     pub(crate) conditions: Vec<Condition>,
-    /// Time for all steps and conditions. `None` selects the parameter `call_timeout`.
+    /// Time for all steps and conditions. `None` selects the timeout of the caller: the parameter
+    /// `call_timeout` of the manager, or the fixed timeout of the reasoner.
     pub(crate) timeout: Option<Duration>,
 }
 

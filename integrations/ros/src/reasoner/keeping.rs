@@ -189,8 +189,8 @@ impl Keeping {
         self.publish_status(goal);
     }
 
-    /// Cancels a goal: requests the unground mode of its function, and ends the goal when the mode is
-    /// set. The cancellation of an unknown goal is rejected.
+    /// Cancels a goal: requests the unground mode of its function, and ends the goal when the mode is set.
+    /// Without such a mode, the goal ends at once. The cancellation of an unknown goal is rejected.
     pub(super) fn cancel(&mut self, goal: GoalId) {
         let Some(pursued) = self.goals.get_mut(&goal) else {
             self.outputs.push(Output::Cancelled(goal, false));

@@ -16,7 +16,7 @@ use crate::validated::validated;
 /// Default of the least time between two reports of a signal.
 const REPORT_INTERVAL: Duration = Duration::from_millis(100);
 
-/// Default of the time without a message after which a topic is silent.
+/// Default of the period in which the messages of a topic are counted for its rate.
 const SILENCE: Duration = Duration::from_secs(2);
 
 #[derive(Debug, Clone, PartialEq)]
@@ -85,7 +85,8 @@ impl Condition {
     }
 }
 
-/// Returns the number of a JSON value. Truth values are 0 and 1; other values have no number.
+/// Converts a JSON value to a number. Truth values become 0 and 1. Returns `None` for texts, lists and
+/// objects.
 pub(crate) fn number(value: &Value) -> Option<f64> {
     match value {
         Value::Bool(truth) => Some(f64::from(u8::from(*truth))),

@@ -34,7 +34,7 @@ const GRANT_PERIOD: Duration = Duration::from_secs(2);
 pub(super) struct Grant {
     /// End of the period in which reports of other modes are not believed.
     until: Duration,
-    /// Modes that were granted shortly before; reports of them may be late.
+    /// Modes that the function had shortly before; reports of them may be late.
     earlier: Vec<String>,
     /// `true` if another mode was reported.
     is_contradicted: bool,
@@ -243,8 +243,8 @@ impl Machine {
         format!("{function} answers again")
     }
 
-    /// Retries designs whose delay is over, requests the modes of contradicted grants whose period is over,
-    /// and passes a due tick to the loop.
+    /// Retries designs whose delay is over, and requests the modes of contradicted grants whose period is
+    /// over. Passes a due tick to the loop in the state EXECUTE.
     pub(super) fn tick(&mut self) -> String {
         let now = self.now;
         let mut back = Vec::new();

@@ -207,8 +207,8 @@ impl Machine {
         self.lines.push_back(event.to_json().to_string());
     }
 
-    /// Enters the state that follows from the running work. Each transition is noted in the
-    /// journal.
+    /// Enters the state that follows from the running work, and answers requests whose result is known. Each
+    /// transition is noted in the journal.
     fn enter(&mut self, because: &str) -> Result<(), Message> {
         if self.state == State::WaitGraph {
             return Ok(());
