@@ -121,12 +121,12 @@ impl Fraction {
         Some(Short(rational.numer().to_i64()?, NonZeroU64::new(denominator)?))
     }
 
-    /// Returns numerator divided by denominator, rounded once. Returns `None` if a part may not be
-    /// an exact double.
+    /// Returns numerator divided by denominator, rounded once. Returns `None` if a part may not be an exact
+    /// double.
     ///
-    /// The quotient is an integer only if no rounding occurs. For the denominator d, the magnitude
-    /// of the quotient is below 2^53 / d, so the rounding error is less than 1 / d. A fraction that
-    /// is not an integer differs from every integer by at least 1 / d.
+    /// The quotient is an integer only if no rounding occurs. For the denominator d, the magnitude of the
+    /// quotient is at most 2^53 / d, so the rounding error is less than 1 / d. A fraction that is not an
+    /// integer differs from every integer by at least 1 / d.
     #[expect(clippy::cast_precision_loss, reason = "both are at most 2^53")]
     fn quotient(&self) -> Option<f64> {
         match self {
@@ -139,7 +139,7 @@ impl Fraction {
         }
     }
 
-    /// Returns the nearest double, or `None` if its magnitude is too small or too large, see
+    /// Converts the fraction to a double. Returns `None` if its magnitude is too small or too large, see
     /// [`rounded`].
     pub fn rounded(&self) -> Option<f64> {
         self.quotient().or_else(|| rounded(&self.long()))

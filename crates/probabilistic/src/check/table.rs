@@ -87,12 +87,11 @@ impl PolicyTable {
         Ok(table)
     }
 
-    /// Returns for each state of an explored model the index of the policy's choice, or [`NONE`]
-    /// for a state without a row.
+    /// Returns for each state of an explored model the index of the policy's choice, or [`NONE`] for a state
+    /// without a row.
     ///
     /// # Errors
-    /// The table does not match the model: an unknown variable, an unreached state, or a different
-    /// choice.
+    /// The table does not match the model: a missing variable, an unreached state, or a different choice.
     pub fn choices<N: Number>(
         &self,
         program: &Program<N>,
