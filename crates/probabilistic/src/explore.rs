@@ -91,7 +91,6 @@ impl<S: Clone, N: Number> Choices<S, N> {
         self.ends.push((action, self.transitions.len()));
     }
 
-    /// Returns the current position, for [`Self::back_to`].
     pub(crate) fn mark(&self) -> [usize; 3] {
         [self.transitions.len(), self.ends.len(), self.rewards.len()]
     }
@@ -169,18 +168,13 @@ pub fn explore<N: Number, G: Generator<N>>(
     Ok(exploration.explored)
 }
 
-/// An exploration that can be interrupted and resumed.
 pub(crate) struct Exploration<S, N> {
-    /// The explored part of the process.
     pub explored: Explored<S, N>,
-    /// The number of the next state to expand.
     next: usize,
-    /// The number of the expanded state at which progress is reported next.
     next_report: usize,
 }
 
 impl<S: Clone + Eq + Hash, N: Number> Exploration<S, N> {
-    /// Creates an exploration that contains the initial states only.
     pub fn new<G: Generator<N, State = S>>(generator: &G, bounds: &Bounds<'_>) -> Result<Self, Error> {
         let mut states = States::new(generator.codes());
         for start in generator.starts() {
@@ -234,7 +228,6 @@ const BATCH: usize = 32;
 /// Number of expanded states between two progress reports.
 const REPORT_INTERVAL: usize = 65_536;
 
-/// The choices of up to [`BATCH`] consecutive states.
 struct Batch<S, N> {
     choices: Choices<S, N>,
     /// For each state, the end of its choices in `choices`.
@@ -264,8 +257,6 @@ impl<S: Clone + Eq + Hash, N: Number> Batch<S, N> {
 }
 
 impl<S: Clone + Eq + Hash, N: Number> Explored<S, N> {
-    /// Adds the choices of a batch to the process; `first` is the number of the first state in the
-    /// batch.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "no more deadlocks than states, which are counted by 32 bits, and positions in lists"

@@ -59,7 +59,6 @@ fn reduced(numerator: i128, denominator: u128) -> Fraction {
     Long(Box::new(BigRational::new_raw(BigInt::from(numerator), BigInt::from(denominator))))
 }
 
-/// Returns the sum of two short fractions, or their difference if `is_difference`.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "products of two words below 2^63 and the sum of two such products fit into 128 bits; divisors are at least 1"
@@ -102,7 +101,6 @@ fn product((a, b): (i64, NonZeroU64), is_negative: bool, (c, d): (u64, u64)) -> 
 }
 
 impl Fraction {
-    /// Converts to an arbitrary-precision rational.
     fn long(&self) -> Cow<'_, BigRational> {
         match self {
             Short(numerator, denominator) => {
@@ -123,12 +121,12 @@ impl Fraction {
         Some(Short(rational.numer().to_i64()?, NonZeroU64::new(denominator)?))
     }
 
-    /// Returns numerator divided by denominator, rounded once. Returns `None` if a part may not be
-    /// an exact double.
+    /// Returns numerator divided by denominator, rounded once. Returns `None` if a part may not be an exact
+    /// double.
     ///
-    /// The quotient is an integer only if no rounding occurs. For the denominator d, the magnitude
-    /// of the quotient is below 2^53 / d, so the rounding error is less than 1 / d. A fraction that
-    /// is not an integer differs from every integer by at least 1 / d.
+    /// The quotient is an integer only if no rounding occurs. For the denominator d, the magnitude of the
+    /// quotient is at most 2^53 / d, so the rounding error is less than 1 / d. A fraction that is not an
+    /// integer differs from every integer by at least 1 / d.
     #[expect(clippy::cast_precision_loss, reason = "both are at most 2^53")]
     fn quotient(&self) -> Option<f64> {
         match self {
@@ -141,7 +139,7 @@ impl Fraction {
         }
     }
 
-    /// Returns the nearest double, or `None` if its magnitude is too small or too large, see
+    /// Converts the fraction to a double. Returns `None` if its magnitude is too small or too large, see
     /// [`rounded`].
     pub fn rounded(&self) -> Option<f64> {
         self.quotient().or_else(|| rounded(&self.long()))
@@ -233,7 +231,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Integers of all bit lengths, including values around the limits of a signed word.
+    /// Integers with magnitudes up to 2^71, including values around the limits of a signed word.
     fn part() -> impl Strategy<Value = i128> {
         let sizes = (0_u32..72, any::<i128>()).prop_map(|(bits, number)| number >> (127 - bits));
         let word = i128::from(i64::MAX);
@@ -246,8 +244,6 @@ mod tests {
             .prop_map(|(above, below)| BigRational::new(BigInt::from(above), BigInt::from(below)))
     }
 
-    /// Checks that `fraction` has the expected value, and that it is short if and only if both
-    /// parts fit into words.
     fn is(fraction: &Fraction, expected: &BigRational) {
         let fits = i64::try_from(expected.numer()).is_ok() && i64::try_from(expected.denom()).is_ok();
         assert_eq!(matches!(fraction, Short(..)), fits, "{fraction:?} {expected}");

@@ -6,7 +6,6 @@
 
 use crate::mdp::dense;
 
-/// Number that marks an unvisited node.
 const UNSEEN: u32 = 0;
 /// Number that marks a node whose component is complete.
 const DONE: u32 = u32::MAX;
@@ -15,12 +14,9 @@ const DONE: u32 = u32::MAX;
 /// component is reported.
 const SHRINK_THRESHOLD: usize = 100_000;
 
-/// A call frame of the depth-first search.
 struct Frame {
     node: u32,
-    /// The visit number of the node.
     visit_number: u32,
-    /// Number of edges of the node that were already followed.
     followed: u32,
 }
 
@@ -104,7 +100,6 @@ pub fn visit_components<'a, E>(
 /// Strongly connected components in reverse topological order.
 #[derive(Debug, Clone)]
 pub struct Components {
-    /// The nodes, component by component.
     nodes: Vec<u32>,
     /// The start of each component in `nodes`, followed by the length of `nodes`.
     starts: Vec<u32>,

@@ -78,7 +78,6 @@ pub fn write(name: &str, model: &Model) -> Result<Value, Error> {
     }))
 }
 
-/// Returns `true` if a variable or a constant has this name.
 fn is_taken(model: &Model, name: &str) -> bool {
     let declared = model.modules.iter().flat_map(|module| &module.variables).chain(&model.globals);
     let mut names = declared.map(|v| &v.name).chain(model.constants.iter().map(|constant| &constant.name));
@@ -151,7 +150,6 @@ fn recursion(model: &Model, formula: &Named) -> Option<Diagnostic> {
     None
 }
 
-/// Returns the conjuncts of a condition from left to right.
 fn parts(condition: &Expr) -> Vec<&Expr> {
     let (mut stack, mut conjuncts) = (vec![condition], Vec::new());
     while let Some(part) = stack.pop() {
@@ -277,14 +275,12 @@ impl Writer<'_> {
             .reduce(|left, right| json!({ "op": "+", "left": left, "right": right }))
     }
 
-    /// Returns the variables whose values are determined by conjuncts `variable = value` of a
-    /// condition, each with its value.
     fn fixed<'a>(&self, condition: &'a Expr) -> Vec<(&'a str, i64)> {
         parts(condition).into_iter().filter_map(|part| self.fixes(part)).collect()
     }
 
-    /// Returns the variable and the value of a condition `variable = value`, or `None` for another
-    /// condition.
+    /// Returns the variable and the value of a condition `variable = value`. Returns `None` for another
+    /// condition, or if the name belongs to a formula.
     fn fixes<'a>(&self, part: &'a Expr) -> Option<(&'a str, i64)> {
         let ExprKind::Binary(BinaryOp::Equal, left, right) = &part.kind else { return None };
         let (ExprKind::Name(name), ExprKind::Int(value)) = (&left.kind, &right.kind) else { return None };

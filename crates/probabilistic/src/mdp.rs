@@ -30,7 +30,6 @@ pub struct Mdp<N> {
     first_transition: Vec<u32>,
     targets: Vec<u32>,
     probabilities: Vec<N>,
-    /// The action number of each choice, as given by the generator.
     actions: Vec<u32>,
 }
 

@@ -15,12 +15,10 @@ const TOLERANCE: f64 = 1e-12;
 /// model or as sums of such numbers.
 const WHOLE: f64 = 4e15;
 
-/// Returns `true` if a double is an integer small enough to be exact.
 pub(crate) fn is_whole(value: f64) -> bool {
     value.fract() == 0.0 && value < WHOLE
 }
 
-/// Converts a count of objects in memory to a double.
 #[expect(
     clippy::cast_precision_loss,
     reason = "what is counted is in memory, so that there is less of it than 2^53"
@@ -38,8 +36,8 @@ pub trait Number: Clone + Debug + PartialOrd + Send + Sync + 'static {
     fn zero() -> Self;
     /// One.
     fn one() -> Self;
-    /// Converts a rational to the nearest number of this type. A double is integral only if it is
-    /// exact: a value that would be rounded to an integer becomes the adjacent double.
+    /// Converts a rational to the nearest number of this type. A double with a magnitude below 4·10^15 is
+    /// integral only if it is exact: a value that would be rounded to an integer becomes the adjacent double.
     fn from_rational(value: &BigRational) -> Self;
     /// Converts a double to this type; infinities and NaN become zero.
     fn from_f64(value: f64) -> Self;
@@ -70,7 +68,6 @@ pub trait Number: Clone + Debug + PartialOrd + Send + Sync + 'static {
     fn size(&self) -> u64;
 }
 
-/// Implements the arithmetic methods of [`Number`] by operators.
 macro_rules! arithmetic {
     () => {
         fn plus(&self, other: &Self) -> Self {

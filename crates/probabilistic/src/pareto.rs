@@ -67,10 +67,7 @@ pub struct Bounded<N> {
     pub upper: f64,
 }
 
-/// Upper limit on the number of computed vertices of a Pareto front.
 const MAX_VERTICES: usize = 2000;
-/// Upper limit on the number of branch-and-bound nodes in the search for the best deterministic
-/// policy.
 const MAX_BRANCHES: usize = 3000;
 
 /// A problem with two objectives in the same process, prepared for optimisation.
@@ -81,7 +78,6 @@ pub struct Pareto<'a, N> {
     /// For each objective, the optimal loss in each state if only this objective is optimised.
     /// Unspecified in states of infinite cost.
     alone: [Vec<N>; 2],
-    /// For each objective, the greatest error of its losses in `alone`.
     alone_errors: [f64; 2],
     /// The states in either target, without the blocked states.
     terminal: FixedBitSet,

@@ -22,7 +22,6 @@ pub struct States<S> {
 enum Numbers {
     /// For each state code, the number of the state plus one, or 0 if the state was not inserted.
     Table(Vec<u32>),
-    /// State numbers by the hashes of the states.
     Hash(HashTable),
 }
 
@@ -38,7 +37,6 @@ struct HashTable {
     shift: u32,
 }
 
-/// Number of bits of a slot number in the initial table.
 const INITIAL_BITS: u32 = 8;
 
 impl HashTable {
@@ -46,7 +44,6 @@ impl HashTable {
         Self { entries: vec![0; 1 << bits], shift: 32_u32.saturating_sub(bits) }
     }
 
-    /// Returns the first slot that is probed for a hash.
     const fn home(&self, hash: u32) -> usize {
         hash as usize >> self.shift
     }
@@ -87,7 +84,6 @@ const fn upper(entry: u64) -> u32 {
     (entry >> 32) as u32
 }
 
-/// Returns the state number of an entry if the entry has the given hash, otherwise `None`.
 #[expect(clippy::cast_possible_truncation, reason = "the lower half")]
 const fn number_of(entry: u64, hash: u32) -> Option<u32> {
     if upper(entry) == hash { (entry as u32).checked_sub(1) } else { None }

@@ -24,7 +24,6 @@ fn encloses(quantity: &Quantity, exact: &BigRational) -> bool {
         && end(quantity.upper).is_some_and(|upper| upper >= *exact)
 }
 
-/// Returns the exact value, after checking that the bounds computed in doubles enclose it.
 fn enclosed(model: &str, question: &str) -> BigRational {
     let exact = value(model, question, Exactness::Always).exact.expect("a fraction");
     let rounded = value(model, question, Exactness::Never);
@@ -32,7 +31,6 @@ fn enclosed(model: &str, question: &str) -> BigRational {
     exact
 }
 
-/// Returns the codes of the errors in a model.
 fn error_codes(model: &str, question: &str, exactness: Exactness) -> Vec<&'static str> {
     match outcome(model, question, &Options::default().with_exactness(exactness)) {
         Err(Error::Model(problems)) => problems.iter().map(|problem| problem.code).collect(),

@@ -10,7 +10,6 @@ fn first(problems: &[Diagnostic]) -> String {
     format!("{} {}:{}", problem.code, problem.place.line, problem.place.column)
 }
 
-/// Returns the value of a property as text, or the code, line and column of the first error.
 fn value_or_error(model: &str, question: &str) -> String {
     value_or_error_with(model, question, Exactness::Auto)
 }

@@ -53,7 +53,6 @@ fn error(model: &str, question: &str) -> (&'static str, String) {
     }
 }
 
-/// Checks the exact value, and that the bounds computed in doubles enclose it tightly.
 fn agree(model: &str, question: &str, expected: &str) {
     let value = |exactness| match outcome(model, question, exactness) {
         Outcome::Value(answer) => answer,
@@ -200,7 +199,6 @@ fn several_initial_states_yield_a_range() {
     assert!(matches!(result, Outcome::Truth(true, _)), "{result:?}");
 }
 
-/// A bound on an accumulated reward is equivalent to a bound on a counter in the model.
 #[test]
 fn reward_bounds_agree_with_a_counter() {
     let counted = PROCESS
@@ -316,7 +314,6 @@ fn properties_of_rewards_need_no_semicolon_before() {
     );
 }
 
-/// Each unsupported property is rejected alone; all other properties of the file are answered.
 #[test]
 fn unsupported_properties_do_not_affect_the_others() {
     let text = "P=? [ F \"a\" ]

@@ -20,7 +20,6 @@ impl Random {
     }
 }
 
-/// Creates a guard over the variables of a module, and sometimes of another module.
 fn guard(random: &mut Random, module: u64, modules: u64) -> String {
     let other = random.below(modules);
     match random.below(6) {
@@ -112,7 +111,6 @@ fn random_models_are_explored_to_the_same_process() {
     }
 }
 
-/// Behaviours beyond the limit of the cache are recomputed on every request.
 #[test]
 fn behaviours_beyond_the_cache_limit_are_recomputed() {
     let text = "mdp

@@ -111,8 +111,6 @@ fn survive(text: &str) {
     }
 }
 
-/// Checks a property of `MODEL` if the text can be parsed. Errors are accepted; only a panic fails
-/// the test.
 fn survive_property(question: &str) {
     thread_local! {
         static READ: prism::ast::Model = prism::parse(MODEL).expect("a model");
@@ -125,7 +123,6 @@ fn survive_property(question: &str) {
     }
 }
 
-/// The properties that other tests mutate are valid and supported.
 #[test]
 fn intact_properties_have_answers() {
     let model = prism::parse(MODEL).expect("a model");
@@ -196,7 +193,6 @@ fn exact_and_rounded_answers_agree() {
     }
 }
 
-/// Returns the number of random cases: the value of `PROPTEST_CASES`, or 200.
 fn cases() -> u32 {
     std::env::var("PROPTEST_CASES").ok().and_then(|text| text.parse().ok()).unwrap_or(200)
 }

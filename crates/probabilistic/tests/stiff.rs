@@ -23,8 +23,6 @@ fn value(model: &str, question: &str, exactness: Exactness) -> Quantity {
     }
 }
 
-/// Checks the exact value, both by request and by default, and that the bounds computed in doubles
-/// are tight.
 fn agree(model: &str, question: &str, expected: &BigRational) {
     for exactness in [Exactness::Always, Exactness::Auto] {
         assert_eq!(value(model, question, exactness).exact.as_ref(), Some(expected), "{question}");
@@ -74,7 +72,6 @@ fn a_huge_expected_time_is_exact() {
     }
 }
 
-/// A stiff process with a choice, whose alternatives have almost equal values in doubles.
 #[test]
 fn the_better_choice_in_a_stiff_process_is_found() {
     for n in [28, 50] {

@@ -155,8 +155,8 @@ async fn beginning<S: Store>(
     Ok(reached)
 }
 
-/// Writes the decisions after the sequence numbers in `reached`, by partition, until the output is
-/// closed. Updates `reached`.
+/// Writes the decisions after the sequence numbers in `reached`, by partition, of one robot or of all robots
+/// if `robot` is `None`. Updates `reached`. Ends when the output is closed or the log fails.
 async fn write_decisions<S: Store>(
     store: &S,
     robot: Option<&str>,
@@ -248,7 +248,6 @@ async fn is_done(shared: &Shared<Local>, written: &Mutex<BTreeMap<u32, u64>>) ->
     Ok(true)
 }
 
-/// Writes the status of a fleet to standard output, as JSON or as text.
 pub(crate) fn status(status: &Status, as_json: bool) -> Result<(), Message> {
     let text = if as_json {
         format!("{}\n", serde_json::to_string(status).unwrap_or_default())

@@ -242,7 +242,6 @@ async fn run(command: Command) -> Result<(), Errors> {
     Ok(())
 }
 
-/// Returns a unique name for this worker: host, process id and a random part.
 fn own_name() -> String {
     let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
     let host: String =
@@ -250,8 +249,8 @@ fn own_name() -> String {
     format!("{host}-{}-{:04x}", std::process::id(), fastrand::u16(..))
 }
 
-/// Returns a flag that becomes true on the first SIGTERM or SIGINT. A second signal ends the
-/// program immediately.
+/// Returns a flag that becomes true on the first SIGINT, SIGTERM or SIGHUP. A second signal ends the program
+/// immediately.
 fn signals() -> Result<watch::Receiver<bool>, Errors> {
     let (stop, heard) = watch::channel(false);
     let handler = move || {

@@ -23,12 +23,10 @@ pub struct Robot {
     control: Control,
 }
 
-/// The adaptation loop of a robot.
 #[derive(Debug, Default)]
 enum Control {
     #[default]
     None,
-    /// Loaded in memory.
     Warm(Box<Loop>),
     /// Unloaded: compressed snapshot of a few kilobytes.
     Cold(Vec<u8>),
@@ -77,7 +75,6 @@ impl Refused {
     }
 }
 
-/// Request that an event makes: enrolment, retirement, or handling by the loop.
 enum Request<'a> {
     Enrol(&'a str),
     Retire,
@@ -254,7 +251,6 @@ fn compressed(known: &Value) -> Vec<u8> {
     lz4_flex::compress_prepend_size(known.to_string().as_bytes())
 }
 
-/// Decompresses the output of [`compressed`].
 fn decompressed(bytes: &[u8]) -> Value {
     let text = lz4_flex::decompress_size_prepended(bytes).unwrap_or_default();
     serde_json::from_slice(&text).unwrap_or_default()

@@ -102,7 +102,7 @@ pub struct PartitionStatus {
     pub partition: u32,
     /// Name of the worker that leases the partition, if any.
     pub worker: Option<String>,
-    /// Number of ownership changes of the partition.
+    /// Number of times that a worker has taken over the partition, or has recovered it again.
     pub epoch: u64,
     /// Sequence number up to which the effects of all events are contained in snapshots.
     pub events: u64,

@@ -83,7 +83,7 @@ pub struct Decided {
     pub plans: Vec<Value>,
     /// Name of the worker that has decided.
     pub worker: String,
-    /// Number of ownership changes of the partition until the decision.
+    /// The partition's [`Progress::epoch`] at the time of the decision.
     pub epoch: u64,
 }
 
@@ -104,7 +104,7 @@ impl Decided {
 /// revision of the previous write, which rejects writes of former owners.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Progress {
-    /// Number of ownership changes of the partition.
+    /// Number of times that a worker has taken over the partition, or has recovered it again.
     pub epoch: u64,
     /// Sequence number up to which the effects of all events are contained in snapshots.
     pub events: u64,

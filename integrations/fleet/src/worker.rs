@@ -19,7 +19,6 @@ use crate::partition::{End, Order, Shared, serve};
 use crate::store::{Bucket, Entry, Fault, Store};
 use crate::wire::{Presence, partition_of};
 
-/// A partition that this worker has leased.
 struct Held {
     revision: u64,
     /// Time at which the last successful renewal was begun, or the acquisition of the lease.
@@ -28,7 +27,6 @@ struct Held {
     task: JoinHandle<End>,
 }
 
-/// A worker with its leased partitions.
 struct Worker<S> {
     shared: Arc<Shared<S>>,
     lease: Duration,
@@ -60,9 +58,9 @@ pub async fn run<S: Store>(shared: Arc<Shared<S>>, mut stop: watch::Receiver<boo
 }
 
 impl<S: Store> Worker<S> {
-    /// Publishes the worker's status, renews its leases, and handles partitions whose task has ended.
-    /// Then, unless `draining`, takes free partitions or gives partitions back, so that the worker
-    /// has its share. Does not change the partitions if the log cannot be read.
+    /// Publishes the worker's status, renews its leases, and handles partitions whose task has ended. Then,
+    /// unless `draining`, takes free partitions or gives partitions back, so that the worker has its share.
+    /// Neither takes nor gives back partitions if the log cannot be read.
     async fn round(&mut self, draining: bool) {
         self.present(draining).await;
         self.renew().await;
@@ -213,7 +211,6 @@ impl<S: Store> Worker<S> {
         Held { revision, renewed, orders, task }
     }
 
-    /// Saves all partitions, gives up their leases, and removes the published status.
     async fn drain(&mut self, mut tick: tokio::time::Interval) {
         for held in self.held.values() {
             held.orders.send_if_modified(|order| {

@@ -23,7 +23,6 @@ use crate::definition::Interface;
 /// Type hashes by variant (`None` for the default) and full name.
 pub type Hashes = BTreeMap<(Option<String>, String), String>;
 
-/// Type descriptions by full name.
 type Descriptions = BTreeMap<String, TypeDescription>;
 
 const TIME: &str = "builtin_interfaces/msg/Time";

@@ -1,4 +1,4 @@
-//! Interfaces and their hashes → the text of Rust modules `[VARIANT::]PACKAGE::{msg, srv, action}`.
+//! Generates Rust modules `[VARIANT::]PACKAGE::{msg, srv, action}` from interfaces and their hashes.
 
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -9,13 +9,11 @@ use hiroz_codegen::types::{ArrayType, Constant, Field};
 use crate::definition::{Interface, Part};
 use crate::description::Hashes;
 
-/// Rust keywords that are names of fields.
 const KEYWORDS: [&str; 1] = ["type"];
 
-/// Texts of modules, by variant, package and folder.
 type Modules<'i> = BTreeMap<Option<&'i str>, BTreeMap<&'i str, BTreeMap<&'i str, String>>>;
 
-/// Returns the modules of all interfaces.
+/// Returns the text of the modules of all interfaces.
 pub fn modules(interfaces: &[Interface], hashes: &Hashes) -> Result<String, Box<dyn Error>> {
     let mut modules = Modules::new();
     for interface in interfaces {
@@ -48,7 +46,8 @@ pub fn modules(interfaces: &[Interface], hashes: &Hashes) -> Result<String, Box<
     Ok(text)
 }
 
-/// Returns the functions that find a message type by its name.
+/// Returns the text of a list of message names, and of a function that visits a message type by its name.
+/// Both omit variants.
 pub fn dispatch(interfaces: &[Interface]) -> String {
     let messages =
         || interfaces.iter().filter(|interface| interface.folder == "msg" && interface.variant.is_none());
@@ -68,8 +67,8 @@ pub fn dispatch(interfaces: &[Interface]) -> String {
     )
 }
 
-/// A slice of entries, one for each structure (`Entry::of::<T>(variant, name)`) and one for each other type that has a hash
-/// (`Entry::hash(variant, name, hash)`).
+/// Returns the text of a slice with one entry for each structure, `Entry::of::<T>(variant, name)`, and for
+/// each other type that has a hash, `Entry::hash(variant, name, hash)`.
 pub fn table(interfaces: &[Interface], hashes: &Hashes) -> String {
     let mut lines = Vec::new();
     let mut structures = Vec::new();
@@ -88,7 +87,6 @@ pub fn table(interfaces: &[Interface], hashes: &Hashes) -> String {
     format!("&[\n{}\n]", lines.join("\n"))
 }
 
-/// Returns the Rust name of a structure.
 fn rust_name(interface: &Interface, part: &Part) -> String {
     format!("{}{}", interface.name, part.suffix.trim_start_matches('_'))
 }
@@ -200,7 +198,8 @@ fn primitive(name: &str) -> Option<&'static str> {
     })
 }
 
-/// Bounds are part of neither the bytes nor the type.
+/// Returns the Rust type of a field. The maximum length of a sequence or string changes neither the
+/// serialised bytes nor the Rust type.
 fn rust_type(field: &Field, interface: &Interface, all: &[Interface]) -> Result<String, Box<dyn Error>> {
     let kind = &field.field_type;
     let known = primitive(&kind.base_type).map(str::to_owned);

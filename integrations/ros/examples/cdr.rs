@@ -1,10 +1,13 @@
-//! Values of the interfaces between JSON and CDR, for comparison with other implementations. One JSON object on a line, one answer each:
+//! Converts values of the interfaces between JSON and CDR, for comparison with other implementations. Each
+//! input line is a JSON object and gets one line of output:
 //!
-//! - `{"type": "std_msgs/msg/Bool", "value": {"data": true}}` → `{"cdr": "0001000001"}`, little endian, with the header of four bytes
+//! - `{"type": "std_msgs/msg/Bool", "value": {"data": true}}` → `{"cdr": "0001000001"}`: little endian, with the
+//!   header of four bytes
 //! - `{"type": "std_msgs/msg/Bool", "cdr": "0001000001"}` → `{"value": {"data": true}}`
 //! - `{"list": true}` → `{"types": [{"type": …, "rihs01": …, "structure": true}, …]}`
 //!
-//! `"variant": "lyrical"` chooses the type of a distribution that differs. What cannot be done is answered by `{"error": …}`.
+//! `"variant": "lyrical"` selects the type of a distribution that differs. The output for an invalid request
+//! is `{"error": …}`.
 
 use std::io::BufRead;
 
@@ -17,7 +20,6 @@ use serde_json::{Value, json};
 /// Encapsulation header of plain CDR, little endian.
 const HEADER: [u8; 4] = [0, 1, 0, 0];
 
-/// Conversions between JSON and CDR for one type.
 struct Codec {
     encode: fn(Value) -> Result<Vec<u8>, String>,
     decode: fn(&[u8]) -> Result<Value, String>,
@@ -54,7 +56,6 @@ fn decode<T: Structure>(bytes: &[u8]) -> Result<Value, String> {
     serde_json::to_value(&value).map_err(|error| error.to_string())
 }
 
-/// A request: one line of the input.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Request {

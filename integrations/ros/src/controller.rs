@@ -30,16 +30,13 @@ use crate::planner::{
     Chosen, DOMAIN, Found, Joint, NoPlan, PROBLEM, PlanPublisher, Request, on_a_thread, plan_message, solve,
 };
 
-/// Timeout for requests to the experts.
 const EXPERT_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Pause before the next planning attempt if no plan was found, unless the knowledge base changes.
 const RETRY_PAUSE: Duration = Duration::from_secs(5);
 
-/// Pause after the execution of a plan has failed.
 const FAILURE_PAUSE: Duration = Duration::from_secs(1);
 
-/// Polling interval of the knowledge base and the stop flag.
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Number of consecutive failed executions after which the controller gives up.
@@ -54,10 +51,10 @@ pub struct Options {
     pub version: PlanVersion,
 }
 
-/// Runs until PlanSys2's goal is reached or `stop` is set.
+/// Runs until a plan for PlanSys2's goal is executed, until the goal already holds, or until `stop` is set.
 ///
 /// # Errors
-/// Fails if the mission or a parameter of the command line is wrong, or
+/// Fails if the mission or a parameter of the command line is wrong, if a topic cannot be created, or if
 /// `MAX_FAILURES` consecutive executions have failed.
 pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(), Errors> {
     let setup = Setup::read(&options.mission)?;
@@ -82,7 +79,6 @@ struct Controller {
     plan_publisher: PlanPublisher,
 }
 
-/// Outcome of executing one plan.
 enum Outcome {
     Done,
     Failed(String),
@@ -140,8 +136,7 @@ impl Controller {
         Ok(())
     }
 
-    /// Returns the best plan for PlanSys2's current problem. Without a plan, publishes or logs the
-    /// reason and returns `None`.
+    /// Plans for PlanSys2's current problem. Without a plan, publishes or logs the reason and returns `None`.
     async fn find(&self) -> Option<Found> {
         match self.request_problem().await {
             Ok((domain, problem)) => self.plan(domain, problem).await.ok(),
@@ -152,7 +147,6 @@ impl Controller {
         }
     }
 
-    /// Requests the current domain and problem from PlanSys2's experts, and returns them as PDDL.
     async fn request_problem(&self) -> Result<(String, String), String> {
         let domain = self.node.caller::<GetDomain>("domain_expert/get_domain");
         let domain = domain

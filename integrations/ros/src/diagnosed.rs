@@ -23,7 +23,7 @@ const MAX_UNUSED: usize = 20;
 /// slow loop does not fall behind.
 pub(crate) struct Diagnosed {
     queue: Arc<Queue>,
-    /// Observations of signals, which end with this value.
+    /// Tasks that observe the signals. They end when this value is dropped.
     _signals: Vec<Task<()>>,
 }
 
@@ -33,19 +33,17 @@ impl fmt::Debug for Diagnosed {
     }
 }
 
-/// Translation of diagnostics and signals to statuses of the loop.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Sources {
-    /// Rules for diagnostics of drivers.
     pub(crate) rules: Vec<DiagnosticRule>,
-    /// Other signals.
     pub(crate) signals: Vec<Signal>,
-    /// Greatest time between two reports of equal values, by attributes.
+    /// Greatest time between two reports of equal values, by attribute (see [`repeats`]).
     pub(crate) repeats: BTreeMap<String, Duration>,
 }
 
-/// Returns the time after which an equal value must be reported again, by attributes: a filter that counts samples or waits
-/// for them would otherwise treat a constant value as silence.
+/// Returns the time after which an equal value must be reported again, for each attribute whose filter needs
+/// repetitions. The time is a quarter of the filter's period or debounce time, or zero if every sample
+/// counts. Without repetitions, the filter would treat a constant value as silence.
 pub(crate) fn repeats(filters: &FilterSettings) -> BTreeMap<String, Duration> {
     let mut repeats = BTreeMap::new();
     for (attribute, measured) in &filters.measured {
@@ -59,11 +57,9 @@ pub(crate) fn repeats(filters: &FilterSettings) -> BTreeMap<String, Duration> {
     repeats
 }
 
-/// Pending statuses, and the last status of each subject.
 struct Queue {
     state: Mutex<QueueState>,
     repeats: BTreeMap<String, Duration>,
-    /// Called when the first status becomes pending.
     waits: Box<dyn Fn() + Send + Sync>,
     clock: Arc<Clock>,
 }
@@ -71,14 +67,14 @@ struct Queue {
 #[derive(Debug, Default)]
 struct QueueState {
     header: Header,
-    /// Pending statuses by subject.
     statuses: Vec<(String, DiagnosticStatus)>,
-    /// Last values by subject, with their time.
+    /// Last values by subject (message and keys of a status), with the time of their report.
     last: HashMap<String, (Vec<KeyValue>, Duration)>,
 }
 
 impl Queue {
-    /// Adds statuses. Repeated ones are ignored, unless a filter needs them.
+    /// Adds statuses, which replace pending ones of their subjects. A status with the last values of its
+    /// subject is ignored, unless a filter needs the repetition.
     fn add(&self, header: Header, statuses: impl IntoIterator<Item = DiagnosticStatus>) {
         let now = self.clock.elapsed();
         let mut guard = self.state.lock().unwrap_or_else(PoisonError::into_inner);
@@ -107,9 +103,9 @@ impl Queue {
 }
 
 impl Diagnosed {
-    /// Subscribes to diagnostics and signals, and calls `waits` when the first status becomes pending. Repeated
-    /// statuses are ignored. An unused status at level WARN or above is reported once, with a rule
-    /// that would use it.
+    /// Subscribes to diagnostics and signals, and calls `waits` when the first status becomes pending.
+    /// Repeated statuses are ignored. An unused status of another node at level WARN or above is reported
+    /// once, with a rule that would use it. At most [`MAX_UNUSED`] statuses are reported.
     pub(crate) fn subscribe(
         node: &Arc<Node>,
         sources: Sources,
@@ -158,8 +154,8 @@ impl Diagnosed {
     }
 }
 
-/// Translates a status to the loop's statuses: itself if a monitor of MROS has published it, and
-/// the results of matching rules.
+/// Translates a status to the loop's statuses: itself if it has a message of the monitors of MROS, and the
+/// results of matching rules.
 fn translated(rules: &[DiagnosticRule], status: &DiagnosticStatus) -> Vec<DiagnosticStatus> {
     let mut statuses: Vec<DiagnosticStatus> =
         rules.iter().filter_map(|rule| rule.translate(status)).collect();
@@ -170,7 +166,6 @@ fn translated(rules: &[DiagnosticRule], status: &DiagnosticStatus) -> Vec<Diagno
     statuses
 }
 
-/// Warns about an unused status and proposes a rule.
 fn suggestion(status: &DiagnosticStatus) -> String {
     let level = match status.level {
         DiagnosticStatus::WARN => "WARN",

@@ -1,7 +1,9 @@
-//! Rules of `ros.toml` that translate a robot's own diagnostics into statuses of components and measurements of attributes.
+//! Rules of `ros.toml` that translate a robot's own diagnostics into statuses of components and measurements
+//! of attributes.
 //!
-//! A driver publishes `diagnostic_msgs/DiagnosticStatus` with a level and a text of its own. A rule selects such statuses by patterns, and
-//! names the component whose status the level is, or the attribute whose value one of the key/value pairs is.
+//! A driver publishes `diagnostic_msgs/DiagnosticStatus` with a level and a text of its own. A rule selects
+//! such statuses by patterns. It names the component whose status the level is, or the attribute whose value
+//! one of the key/value pairs is.
 
 use serde::{Deserialize, Deserializer};
 
@@ -14,7 +16,7 @@ pub(crate) const MEASUREMENT: &str = "QA status";
 /// Message of a status that reports components, in the spelling of MROS.
 pub(crate) const COMPONENT: &str = "Component status";
 
-/// Selects diagnostics and translates them.
+/// A rule that selects diagnostics and translates them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DiagnosticRule {
     name: Pattern,
@@ -23,16 +25,16 @@ pub struct DiagnosticRule {
     target: Target,
 }
 
-/// Target of a selected status.
 #[derive(Debug, Clone, PartialEq)]
 enum Target {
-    /// A component has failed at this level and above, and works below it.
+    /// A component, which has failed at the level `fails_at` and above, and works below it.
     Component { component: String, fails_at: Level },
-    /// The number behind a key is the value of an attribute, in another unit if there is a conversion.
+    /// An attribute, whose value is the number of the pair with the key `key`, converted to another unit if
+    /// there is a conversion.
     Attribute { attribute: String, key: String, conversion: Option<Conversion> },
 }
 
-/// A linear conversion of units.
+/// A linear conversion of units: number · scale + offset.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Conversion {
     scale: f64,
@@ -50,7 +52,6 @@ enum Level {
     Stale = DiagnosticStatus::STALE as isize,
 }
 
-/// A table `[[diagnostics]]`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Entry {
@@ -105,7 +106,7 @@ impl TryFrom<Entry> for DiagnosticRule {
 }
 
 impl DiagnosticRule {
-    /// Returns the component or the attribute.
+    /// Returns the component or the attribute that the rule concerns; the other part of the pair is `None`.
     pub(crate) fn target(&self) -> (Option<&str>, Option<&str>) {
         match &self.target {
             Target::Component { component, .. } => (Some(component), None),
@@ -113,7 +114,8 @@ impl DiagnosticRule {
         }
     }
 
-    /// Translates a status that the rule selects.
+    /// Translates a status. Returns `None` if the rule does not select the status, or if the number of an
+    /// attribute is missing.
     pub(crate) fn translate(&self, status: &DiagnosticStatus) -> Option<DiagnosticStatus> {
         let is_selected = self.name.matches(&status.name)
             && self.hardware_id.matches(&status.hardware_id)
@@ -146,7 +148,6 @@ impl DiagnosticRule {
     }
 }
 
-/// Number at the beginning of a text such as `12.4 V`.
 fn leading_number(text: &str) -> Option<f64> {
     let text = text.trim_start();
     let end = text.find(|character: char| !matches!(character, '0'..='9' | '+' | '-' | '.' | 'e' | 'E'));

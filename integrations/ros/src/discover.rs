@@ -1,6 +1,8 @@
-//! Discovery of a robot: observes its graph, its diagnostics and its sensors for some seconds, and writes settings to start from.
+//! Discovery of a robot: observes its graph, its diagnostics and its sensors for some seconds, and writes
+//! settings to start from.
 //!
-//! All tables of the written file are comments, so that the file changes nothing until a person has chosen from them.
+//! All tables of the written file are comments, so the file changes nothing until a person has chosen from
+//! them.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -17,10 +19,8 @@ use crate::interfaces::lifecycle_msgs::srv::{GetState, GetStateRequest};
 use crate::manager::components;
 use crate::node::{Endpoints, Node, Severity, keep_all};
 
-/// Period of the search for new topics.
 const SEARCH_PERIOD: Duration = Duration::from_millis(200);
 
-/// Timeout of the state of a lifecycle node.
 const STATE_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// Placeholder for a component that has to be filled in.
@@ -29,7 +29,8 @@ const COMPONENT: &str = "COMPONENT";
 /// Placeholder for an attribute that has to be filled in.
 const ATTRIBUTE: &str = "ATTRIBUTE";
 
-/// Types of sensors whose rate is measured. Images and point clouds are not, because they would load the network.
+/// Types of sensors whose rate is measured. Images and point clouds are excluded, because they would load the
+/// network.
 const RATED: [&str; 5] = [
     "sensor_msgs/msg/Imu",
     "sensor_msgs/msg/LaserScan",
@@ -38,7 +39,8 @@ const RATED: [&str; 5] = [
     "nav_msgs/msg/Odometry",
 ];
 
-/// Fields that are offered as measurements, by types, with the scale to the usual unit.
+/// Fields that are offered as measurements: message type, field, and factor that converts the value to the
+/// usual unit.
 const MEASURED: [(&str, &str, f64); 8] = [
     ("sensor_msgs/msg/BatteryState", "percentage", 100.0),
     ("sensor_msgs/msg/Illuminance", "illuminance", 1.0),
@@ -61,40 +63,37 @@ pub struct Options {
     pub mission: Option<PathBuf>,
 }
 
-/// Names of a mission.
 #[derive(Debug, Default)]
 struct Names {
     components: Vec<String>,
-    /// Designs by functions.
     designs: BTreeMap<String, Vec<String>>,
 }
 
-/// Statuses of one name on `/diagnostics`.
+/// Summary of all statuses with one name on `/diagnostics`.
 #[derive(Debug, Clone, Default, PartialEq)]
 struct Diagnostic {
     hardware_id: String,
-    /// Most severe level, with its message.
+    /// Most severe level so far, to which `message` belongs.
     level: u8,
     message: String,
-    /// Keys whose values are numbers, with the last value.
+    /// Last value of each key whose first word is a number.
     numbers: BTreeMap<String, String>,
 }
 
-/// The robot as it was observed.
 #[derive(Debug, Default)]
 struct Robot {
     endpoints: Endpoints,
     diagnostics: BTreeMap<String, Diagnostic>,
-    /// Labels of the states of lifecycle nodes.
+    /// Labels of the states of lifecycle nodes, by node.
     states: BTreeMap<String, String>,
-    /// Messages per second, by topics.
+    /// Messages per second, by topic.
     rates: BTreeMap<String, f64>,
 }
 
 /// Observes the robot, and writes the settings.
 ///
 /// # Errors
-/// The mission is wrong, or the file exists or cannot be written.
+/// The mission or a parameter of the command line is wrong, or the file exists or cannot be written.
 pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(), Errors> {
     if let Some(file) = options.output.as_ref().filter(|file| file.exists()) {
         let text = format!("{} exists and is not overwritten", file.display());
@@ -135,7 +134,7 @@ fn names(setup: &Setup) -> Names {
     Names { components: components(mission.knowledge()), designs: designs.collect() }
 }
 
-/// Observes the robot until the time is up or `stop` is set.
+/// Observes the robot until the time is up or `stop` is set. Then requests the states of its lifecycle nodes.
 fn observe(node: &Arc<Node>, duration: Duration, stop: &AtomicBool) -> Result<Robot, Message> {
     let diagnostics: Arc<Mutex<BTreeMap<String, Diagnostic>>> = Arc::default();
     let noted = Arc::clone(&diagnostics);
@@ -191,7 +190,7 @@ fn note(diagnostic: &mut Diagnostic, status: DiagnosticStatus) {
     }
 }
 
-/// Writes the settings. Every table is a comment; without `# ` it is valid.
+/// Returns the text of the settings. Every table is a comment, and is valid without `# `.
 fn settings(robot: &Robot, names: &Names) -> String {
     let mut text = String::from(
         "# Settings of Metaplan for the robot that was observed. Remove `# ` before the lines that you need, and fill in the\n\
@@ -210,7 +209,6 @@ fn settings(robot: &Robot, names: &Names) -> String {
     text
 }
 
-/// Adds a section with its tables as comments.
 fn section(text: &mut String, title: &str, tables: &[String]) {
     if tables.is_empty() {
         return;
@@ -224,7 +222,8 @@ fn section(text: &mut String, title: &str, tables: &[String]) {
     }
 }
 
-/// Returns the component whose name is a part of another name, or a placeholder.
+/// Returns the component with the longest name that is a part of `name`, or a placeholder. Case, the prefix
+/// `c_`, and the difference between `_` and a space are ignored.
 fn component<'n>(names: &'n Names, name: &str) -> &'n str {
     let name = name.to_lowercase();
     let is_similar = |component: &&String| {
@@ -266,12 +265,10 @@ fn diagnostics(robot: &Robot, names: &Names) -> Vec<String> {
     tables
 }
 
-/// Writes a text in TOML.
 fn quoted(text: &str) -> String {
     toml::Value::from(text).to_string()
 }
 
-/// Writes a comment on the same line.
 fn comment(text: &str) -> String {
     format!("# {}", text.replace(char::is_control, " "))
 }

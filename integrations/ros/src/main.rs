@@ -66,14 +66,14 @@ enum Role {
     Discover,
 }
 
-/// Parses a time that is greater than 0.
+/// Parses a positive number of seconds, up to one day.
 fn seconds(text: &str) -> Result<f64, String> {
     let time = text.parse().ok().filter(|seconds| (f64::MIN_POSITIVE..=86_400.0).contains(seconds));
     time.ok_or_else(|| "a number of seconds from 0 to 86400 is expected".to_owned())
 }
 
 impl Role {
-    /// What the node is called, unless it is said otherwise. PlanSys2 looks for its planner by its name.
+    /// Default name of the node. PlanSys2 finds its planner by the name `planner`.
     fn node(self) -> &'static str {
         match self {
             Self::Manager | Self::Reasoner | Self::Controller => "metaplan",

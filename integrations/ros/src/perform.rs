@@ -131,7 +131,6 @@ impl Performance {
         self.forward(Progress::Feedback { completion, text: text.into() });
     }
 
-    /// Sends a message to the manager.
     pub(crate) fn forward(&self, progress: Progress) {
         // The receiver may have been dropped.
         let _ = self.progress.try_send(progress);

@@ -39,14 +39,12 @@ impl Said {
     }
 }
 
-/// Parsed arguments of a run.
 #[derive(Debug)]
 struct Invocation {
     domain: PathBuf,
     problem: PathBuf,
     mission: Option<PathBuf>,
     manner: Manner,
-    /// Arguments of POPF that this replacement ignores.
     ignored: Vec<String>,
 }
 

@@ -29,7 +29,6 @@ use keeping::Keeping;
 use memory::MemoryFile;
 use network::Network;
 
-/// Time limit of a design selection.
 const SELECTION_TIME_LIMIT: std::time::Duration = std::time::Duration::from_secs(1);
 
 /// Options of the reasoner.
@@ -49,7 +48,8 @@ pub struct Options {
 /// Serves objectives until `stop` is set.
 ///
 /// # Errors
-/// The mission or its settings are wrong, or a topic or service cannot be created.
+/// The mission or its settings are wrong, a topic or service cannot be created, or the state file cannot be
+/// read or written.
 pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(), Errors> {
     let to_errors = |message: Message| Errors::from(message);
     let Setup { mission, .. } = Setup::read(&options.mission)?;

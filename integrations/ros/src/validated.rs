@@ -6,8 +6,8 @@ use std::marker::PhantomData;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, Visitor};
 
-/// Deserialises a table with independent keys and converts it. Unlike with `#[serde(try_from)]`, an error of the conversion
-/// has the position of the table, and not that of the list which contains it.
+/// Deserialises a table with independent keys and converts it. Unlike with `#[serde(try_from)]`, an error of
+/// the conversion has the position of the table, and not that of the list which contains it.
 pub(crate) fn validated<'de, E, T, D>(deserializer: D) -> Result<T, D::Error>
 where
     E: Deserialize<'de>,

@@ -156,8 +156,8 @@ fn a_variant_has_its_own_fields() {
     check(&lyrical, &[&[0, 0, 0, 0, 1, 0, 0, 0], &states]);
 }
 
-/// Expected values: `rosidl_generator_type_description` 4.9.5 (from `PyPI`: `ros-rosidl-generator-type-description`), applied to the
-/// definitions below `interfaces/`.
+/// Expected values: `rosidl_generator_type_description` 4.9.5 (from `PyPI`:
+/// `ros-rosidl-generator-type-description`), applied to the definitions below `interfaces/`.
 #[test]
 fn hashes_of_messages_are_those_of_rosidl() {
     let cases = [

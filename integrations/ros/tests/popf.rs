@@ -58,7 +58,6 @@ fn actions(items: &[PlanItem]) -> Vec<&str> {
     items.iter().map(|item| item.action.as_str()).collect()
 }
 
-/// Writes a domain and a problem to a new directory. Returns the directory and the two paths.
 fn files(domain: &str, problem: &str) -> (tempfile::TempDir, [String; 2]) {
     let directory = tempfile::tempdir().expect("a directory");
     let paths = [("domain.pddl", domain), ("problem.pddl", problem)].map(|(name, text)| {
@@ -185,7 +184,8 @@ fn the_knowledge_base_of_a_mission_joins_in() {
     assert!(text.contains("optimal, proved") && text.contains(" = fd_"), "{text}");
 }
 
-/// `ros2 run PACKAGE PROGRAM` runs `lib/PACKAGE/PROGRAM` of the first prefix of `AMENT_PREFIX_PATH` whose index names the package.
+/// `ros2 run PACKAGE PROGRAM` runs `lib/PACKAGE/PROGRAM` of the first prefix of `AMENT_PREFIX_PATH` whose
+/// index names the package.
 #[cfg(unix)]
 #[test]
 fn the_overlay_is_where_ros2_run_looks() {

@@ -74,7 +74,7 @@ pub enum Outcome {
         randomised: Answer,
         /// The best value found over deterministic policies; undefined if no policy was found.
         deterministic: Answer,
-        /// `true` if the deterministic value is proved optimal.
+        /// `true` if the deterministic value is proved optimal, or if no policy satisfies the bound.
         proved: bool,
     },
 }

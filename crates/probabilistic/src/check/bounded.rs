@@ -24,11 +24,12 @@ use crate::solve::{Direction, Problem, Work, solve_within};
 const MAX_BUDGET: usize = 100_000;
 
 impl<N: Number> Query<'_, N> {
-    /// Computes for each state the minimal or maximal probability of reaching a terminal state of
-    /// `problem` while the reward structure `name` accumulates at most the bound in `steps`.
+    /// Computes for each state the minimal or maximal probability of reaching a terminal state of `problem`
+    /// while the reward structure `name` accumulates at most the bound in `steps`.
     ///
-    /// Returns an error for a lower bound on the reward, and if a policy is given. Without any
-    /// bound, solves `problem` itself.
+    /// Returns an error if a policy is given, for a lower bound on the reward, for a bound below 0 or from
+    /// [`MAX_BUDGET`] on, and for rewards that are not whole numbers. Without any bound, solves `problem`
+    /// itself.
     pub fn until_within_reward(
         &self,
         problem: Problem<'_, N>,
@@ -111,8 +112,6 @@ impl<N: Number> Query<'_, N> {
     }
 }
 
-/// Converts rewards to nonnegative integers. Returns an error if a reward is fractional or
-/// negative.
 fn whole_rewards<N: Number>(rewards: &[N]) -> Checked<Vec<usize>> {
     let whole = |reward: &N| {
         let value = reward.to_f64();

@@ -24,16 +24,15 @@ pub enum Filtered {
     States(Vec<Listed>),
 }
 
-/// The values of the filtered property in all states.
 enum Values<N> {
     Numbers(Vector<N>),
     Truth(FixedBitSet),
 }
 
 impl<N: Number> Query<'_, N> {
-    /// Evaluates `filter` for the property `inner` over the states that satisfy `states`, or over
-    /// all states if `states` is `None`. Fails if there is no such state, or if the filter does not
-    /// fit the type of `inner`.
+    /// Evaluates `filter` for the property `inner` over the states that satisfy `states`, or over all states
+    /// if `states` is `None`. Fails if there is no such state, if the filter `state` applies to several
+    /// states, or if the filter does not fit the type of `inner`.
     pub fn filtered(&self, filter: Filter, inner: &Expr, states: Option<&Expr>) -> Checked<Filtered> {
         let chosen = states.map_or_else(|| Ok(self.every()), |states| self.truth(states))?;
         let values = match self.kind_of(inner)? {
@@ -101,14 +100,12 @@ impl<N: Number> Query<'_, N> {
         })
     }
 
-    /// Returns the values of the model's variables in `state`.
     fn values_of(&self, state: usize) -> Vec<i64> {
         let mut values = Vec::new();
         self.program.unpack(&self.explored.states[state], &mut values);
         values
     }
 
-    /// Sorts states by the values of their variables.
     fn sorted(&self, states: impl Iterator<Item = usize>) -> Vec<usize> {
         let mut states: Vec<usize> = states.collect();
         states.sort_by_cached_key(|state| self.values_of(*state));
@@ -124,7 +121,6 @@ fn whole(number: usize) -> Answer {
     Answer::from_exact(BigRational::from(BigInt::from(number)))
 }
 
-/// Returns the only state of a set, or an error if there are several states or none.
 fn only(chosen: &FixedBitSet) -> Checked<usize> {
     let mut states = chosen.ones();
     match (states.next(), states.next()) {

@@ -16,11 +16,9 @@ use crate::number::Number;
 use crate::prism::ast::ModelKind;
 use crate::solve::{Direction, NONE, Problem, solve_within};
 
-/// The maximal end components of a process.
 struct Ends {
     /// For each state the index of its end component, or [`NONE`] outside all end components.
     block: Vec<u32>,
-    /// Number of end components.
     count: usize,
     /// The choices whose targets all lie in the end component of their state.
     alive: FixedBitSet,
@@ -176,7 +174,6 @@ fn without_policy<N>(values: Valued<N>) -> Valued<N> {
     Valued { policy: None, ..values }
 }
 
-/// Extends `set` by all states from which a state of `set` is reachable.
 fn reach_back<N: Number>(mdp: &Mdp<N>, set: &mut FixedBitSet) {
     loop {
         let reaches =
@@ -189,8 +186,6 @@ fn reach_back<N: Number>(mdp: &Mdp<N>, set: &mut FixedBitSet) {
     }
 }
 
-/// Computes the maximal end components within the states `inside`, by repeated decomposition into
-/// strongly connected components.
 fn end_components<N: Number>(mdp: &Mdp<N>, inside: &FixedBitSet) -> Ends {
     let n = mdp.states();
     let within = |choice: usize| mdp.targets(choice).iter().all(|target| inside.contains(*target as usize));
@@ -251,12 +246,10 @@ struct EcQuotient<N> {
     /// For each original state its index in the quotient, or [`NONE`] for a state of infinite
     /// value.
     place: Vec<u32>,
-    /// The singleton set of the state in which the process stops.
     end: FixedBitSet,
 }
 
 impl<N: Number> EcQuotient<N> {
-    /// Computes the quotient, omitting the states in `infinite`.
     fn new(mdp: &Mdp<N>, ends: &Ends, rewards: &[N], infinite: &FixedBitSet) -> Checked<Self> {
         let mut place = vec![NONE; mdp.states()];
         let mut members: Vec<Vec<usize>> = Vec::new();

@@ -39,8 +39,7 @@ pub use answer::{Answer, Listed, Outcome, Precision, Quantity};
 pub use options::{Exactness, Options};
 pub use table::{PolicyTable, Row};
 
-/// Upper limit on the number of transitions up to which a model is explored in rationals by
-/// default.
+/// Number of transitions from which on a model is explored in doubles instead of rationals by default.
 const MAX_EXACT_TRANSITIONS: usize = 150_000;
 
 /// Returns the default budget of exact arithmetic for one property of a model with this number of
@@ -97,11 +96,11 @@ pub fn check(model: &Model, property: &Property, options: &Options<'_>) -> Resul
     reports.into_iter().next().unwrap_or_else(|| Err(Error::Property(Vec::new().into())))
 }
 
-/// Checks several properties of a model. The model is explored only once.
+/// Checks several properties of a model. The properties share the exploration of the model.
 ///
 /// # Errors
-/// An error in the model, the constants or the policy, or an exceeded limit. An error in a single
-/// property is returned instead of the report for that property.
+/// An error in the model, the constants or the declarations, or an exceeded limit. An error in the policy or
+/// in a single property is returned instead of the report for the property.
 pub fn check_all<'p>(
     model: &Model,
     properties: impl IntoIterator<Item = &'p Property>,
@@ -180,7 +179,6 @@ fn end_of(property: &Property, names: &Names, options: &Options<'_>) -> Option<E
     is_of_states(&end, names).then_some(end)
 }
 
-/// Adds the constants and labels of a property file to a model.
 fn join(model: &Model, declarations: &Declarations) -> Model {
     let mut joined = model.clone();
     joined.constants.extend(declarations.constants.iter().cloned());
@@ -208,7 +206,6 @@ fn blame(error: Error, model: &Model, joined: &Model, settings: &Settings) -> Er
     }
 }
 
-/// A model explored in exact arithmetic, in doubles, or in both.
 struct Processes {
     exact: Option<Explored<Packed, Fraction>>,
     doubles: Option<Explored<Packed, f64>>,
@@ -259,8 +256,6 @@ impl Processes {
         Ok(Self { exact: None, doubles: Some(doubles), budget: 0 })
     }
 
-    /// Frees the index from states to state numbers, which only the evaluation of a given policy
-    /// needs. The solver can then use this memory.
     fn forget_numbers(&mut self) {
         self.exact.iter_mut().for_each(|explored| explored.states.forget_numbers());
         self.doubles.iter_mut().for_each(|explored| explored.states.forget_numbers());
@@ -328,8 +323,6 @@ fn report<N: Number>(
     }
 }
 
-/// Returns the indices of the reward structures that the property and the tie-breaking of its
-/// policy require.
 fn required_rewards(
     names: &[String],
     property: &Property,

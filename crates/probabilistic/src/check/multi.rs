@@ -115,7 +115,6 @@ fn constrained<N: Number>(
     }
 }
 
-/// Returns `true` if the reward is accumulated until a set of states is reached (`F`).
 fn reaches(path: &RewardPath) -> bool {
     matches!(path, RewardPath::Reach(_))
 }

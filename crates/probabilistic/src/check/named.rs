@@ -7,13 +7,13 @@ use crate::error::{Diagnostic, Error, Place};
 use crate::prism::ast::{Expr, ExprKind, Model, Path, Property, RewardPath};
 use crate::property::Declarations;
 
-/// Upper limit on the number of references replaced in one property.
 const MAX_REFERENCES: usize = 1000;
 
 /// Returns the property with each reference to a named property replaced by its definition.
 ///
 /// # Errors
-/// A circular reference, or more than [`MAX_REFERENCES`] references.
+/// A circular reference, a reference to a property that is not supported, or more than [`MAX_REFERENCES`]
+/// references.
 pub fn expand_references<'p>(
     property: &'p Property,
     model: &Model,
@@ -33,7 +33,6 @@ struct Expansion<'a> {
     declarations: &'a Declarations,
     /// The names of the properties whose definitions are being expanded, outermost first.
     within: Vec<String>,
-    /// Number of expanded references.
     expanded_count: usize,
     problem: Option<Diagnostic>,
 }

@@ -61,7 +61,6 @@ impl<N: Number> Query<'_, N> {
         }
     }
 
-    /// Computes the value of a `P`, `R` or `S` operator in all states.
     fn valued(&self, property: &Property) -> Checked<Valued<N>> {
         match property {
             Property::Probability(question, path) => self.path(self.direction(question)?, path),

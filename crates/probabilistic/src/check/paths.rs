@@ -12,10 +12,9 @@ use crate::policy::with_secondary;
 use crate::prism::ast::{ModelKind, Path, RewardPath, StepBound, Steps};
 use crate::solve::{Direction, Problem, Solution, draft, solve_within};
 
-/// Upper limit (exclusive) on the bound of a step-bounded operator.
 const MAX_STEPS: u32 = 1_000_000_000;
 
-/// Values in all states, with a policy that attains them, if a memoryless policy does.
+/// Values in all states, with a memoryless policy that attains them if one was computed.
 #[derive(Debug)]
 pub struct Valued<N> {
     pub vector: Vector<N>,
@@ -131,7 +130,6 @@ impl<N: Number> Query<'_, N> {
         Ok(vector.into())
     }
 
-    /// Returns the least and greatest number of steps of a step-bounded operator.
     fn span(&self, steps: &Steps) -> Checked<Range> {
         let least = match &steps.least {
             None => 0,
@@ -146,7 +144,6 @@ impl<N: Number> Query<'_, N> {
         Ok(Range { least, most: Some(most) })
     }
 
-    /// Returns the greatest integer that an upper step bound admits.
     fn at_most(&self, bound: &StepBound) -> Checked<u32> {
         self.limit(bound, 0_i8.saturating_sub(i8::from(bound.strict)))
     }
@@ -227,8 +224,8 @@ impl<N: Number> Query<'_, N> {
         Ok(Valued { vector: Vector::solved(solution, span), policy: Some(policy) })
     }
 
-    /// Solves a problem; returns `None` if exact arithmetic exceeds its budget. In exact
-    /// arithmetic, policy iteration starts from an optimal policy computed in doubles.
+    /// Solves a problem; returns `None` if exact arithmetic exceeds its budget. If no policy is given, exact
+    /// policy iteration starts from a policy computed in doubles, where possible.
     fn solve_hinted(&self, problem: Problem<'_, N>) -> Option<Solution<N>> {
         let doubles = self.doubles.as_ref().filter(|_| problem.allowed.is_none());
         let hint = doubles.and_then(|mdp| {

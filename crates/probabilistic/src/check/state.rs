@@ -164,8 +164,9 @@ impl<N: Number> Query<'_, N> {
         Ok((code, sets))
     }
 
-    /// Replaces nested properties, predefined labels and comparisons of property values by Boolean
-    /// variables. For each variable, the set of states in which it is true is appended to `sets`.
+    /// Replaces nested properties, predefined labels and comparisons of property values by Boolean variables.
+    /// For each variable, the set of states in which it is true is appended to `sets`. The first error is
+    /// stored in `stopped`.
     fn with_sets(&self, expression: &Expr, sets: &mut Vec<FixedBitSet>, stopped: &mut Option<Stop>) -> Expr {
         expression.rewrite(&mut |part| {
             let set = match &part.kind {
@@ -210,7 +211,6 @@ impl<N: Number> Query<'_, N> {
         labelled
     }
 
-    /// Returns the states in which a comparison of two numeric expressions with properties holds.
     fn compared(&self, op: BinaryOp, left: &Expr, right: &Expr) -> Checked<FixedBitSet> {
         let (left, right) = (self.numbers(left)?, self.numbers(right)?);
         let mut satisfying = FixedBitSet::with_capacity(self.mdp().states());
@@ -304,8 +304,9 @@ pub fn compare(op: BinaryOp, order: std::cmp::Ordering) -> bool {
     }
 }
 
-/// Combines two vectors state by state with an arithmetic operator. The resulting errors include
-/// the errors of the operands and the rounding of the operation.
+/// Combines two vectors state by state with an arithmetic operator. The resulting errors include the errors
+/// of the operands and the rounding of the operation. Fails for a division by zero and for an operation whose
+/// result with an infinite operand is undefined.
 fn joined<N: Number>(op: BinaryOp, left: &Vector<N>, right: &Vector<N>, at: &Expr) -> Checked<Vector<N>> {
     let fault = |text: &str| Stop::Wrong(property_error("Q303", at.place, text));
     let mut vector = Vector::exactly(Vec::with_capacity(left.values.len()), Span::Any);

@@ -30,12 +30,10 @@ pub struct Row {
     pub choice: usize,
 }
 
-/// Prefixes an error description with the position of a table row, counted from 1.
 fn numbered(number: usize, description: &str) -> String {
     format!("state {}: {description}", number.saturating_add(1))
 }
 
-/// Name and version of the JSON format.
 const FORMAT: &str = "metaplan-policy/1";
 
 impl PolicyTable {
@@ -89,12 +87,11 @@ impl PolicyTable {
         Ok(table)
     }
 
-    /// Returns for each state of an explored model the index of the policy's choice, or [`NONE`]
-    /// for a state without a row.
+    /// Returns for each state of an explored model the index of the policy's choice, or [`NONE`] for a state
+    /// without a row.
     ///
     /// # Errors
-    /// The table does not match the model: an unknown variable, an unreached state, or a different
-    /// choice.
+    /// The table does not match the model: a missing variable, an unreached state, or a different choice.
     pub fn choices<N: Number>(
         &self,
         program: &Program<N>,

@@ -110,7 +110,6 @@ impl<N: Number> Module<N> {
         [self.prevented.len(), self.commands.len(), self.updates.len(), self.edits.len()]
     }
 
-    /// Truncates all lists to `cached_lengths`, which removes an uncached behaviour.
     fn discard_uncached(&mut self) {
         let [behaviours, commands, updates, edits] = self.cached_lengths;
         self.prevented.truncate(behaviours);
@@ -120,7 +119,6 @@ impl<N: Number> Module<N> {
         self.edits.truncate(edits);
     }
 
-    /// Returns the number of entries of each behaviour in `slots`.
     fn width(&self) -> usize {
         self.actions.len().saturating_add(2)
     }

@@ -45,7 +45,8 @@ pub struct Fault(pub &'static str);
 
 type Result<T> = std::result::Result<T, Fault>;
 
-/// Upper limit on the total size of both operands of an arithmetic operation, in bits.
+/// Upper limit in bits on the total size of both operands of an arithmetic operation, and on the estimated
+/// size of a power that is computed exactly.
 const MAX_OPERAND_BITS: u64 = 100_000;
 
 const OVERFLOW: Fault = Fault("an integer grows out of its range");

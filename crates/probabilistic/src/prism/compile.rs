@@ -12,12 +12,10 @@ use crate::prism::code::{Code, Fault};
 use crate::prism::expression::Cursor;
 use crate::prism::lexer::{Kind, tokens};
 
-/// The declaration of a name.
 #[derive(Debug, Clone)]
 enum Meaning {
     Constant(Code, Type),
     Variable(u32, Type),
-    /// The index of the formula.
     Formula(usize),
 }
 
@@ -29,7 +27,6 @@ pub struct Names {
     labels: FxHashMap<String, Expr>,
     /// The formulas and labels whose definitions are being expanded, outermost first.
     open: Vec<String>,
-    /// Nesting depth of the current expression, with formulas expanded.
     depth: usize,
     /// Number of compiled subexpressions: of the current top-level expression, and of all expressions.
     parts: [usize; 2],
@@ -47,7 +44,8 @@ impl Names {
     /// Declares the constants, formulas and labels of a model. Variables are added with [`Names::variable`].
     ///
     /// # Errors
-    /// A constant without a value, a value of another type, a circular definition, or a name declared twice.
+    /// A constant without a value, a value of another type, a value for an unknown constant, a circular
+    /// definition, or a name declared twice.
     pub fn new(model: &Model, settings: &Settings) -> Result<Self, Error> {
         let mut names = Self {
             meanings: FxHashMap::default(),
@@ -394,7 +392,6 @@ fn duplicate(description: &str, place: Place) -> Diagnostic {
     Diagnostic::new("Q206", place, format!("the {description} is given a second time here"))
 }
 
-/// Appends the operands of a chain of the operator `op` from left to right.
 fn flatten<'a>(op: BinaryOp, expression: &'a Expr, parts: &mut Vec<&'a Expr>) {
     let mut stack = Vec::from([expression]);
     while let Some(next) = stack.pop() {

@@ -6,12 +6,11 @@ use crate::prism::ast::{BinaryOp, Expr, ExprKind, Function};
 use crate::prism::lexer::{Kind, Token};
 use crate::prism::reserved::is_keyword;
 
-/// Upper limit on the nesting depth of an expression.
 const MAX_DEPTH: usize = 200;
 /// Upper limits on the number of operators in an expression: of arithmetic operators and implications, and of all
 /// others.
 const MAX_OPERATORS: [usize; 2] = [500, 20_000];
-/// Upper limit on the number of operators of each kind in an expression of a property.
+/// Additional upper limit on the number of operators of each kind in an expression of a property.
 const MAX_PROPERTY_OPERATORS: usize = 2_000;
 
 /// A parser state: a position in a list of tokens, with counters for the size limits.
@@ -186,7 +185,6 @@ impl<'a> Cursor<'a> {
         Ok(result)
     }
 
-    /// Returns the binary operator at the next token with its precedence, or `None`.
     fn operator(&self) -> Option<(BinaryOp, u8)> {
         let Kind::Sign(sign) = self.peek() else { return None };
         // `=?` ends a property operator. The `?` of a conditional expression follows an operand, never `=`.
@@ -197,7 +195,6 @@ impl<'a> Cursor<'a> {
         Some((op, op.sign().1))
     }
 
-    /// Parses a chain of binary operators whose precedences are at least `least`.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "refused as soon as it passes its limit; strengths are below 20"

@@ -12,11 +12,9 @@ pub struct Guard {
     /// The conjuncts after the tests, in the order of the text. A false conjunct prevents the evaluation of later
     /// conjuncts, which might fail.
     remainder: Vec<Code>,
-    /// The variables that a conjunct fixes to a single value: variable index and value.
     fixed: Vec<(u32, i64)>,
 }
 
-/// A test that a variable lies inside a range, or outside of it if `inside` is `false`.
 #[derive(Debug, Clone, Copy)]
 struct Test {
     variable: u32,
@@ -64,7 +62,6 @@ impl Guard {
     }
 }
 
-/// Appends the conjuncts of a condition to `parts`.
 fn flatten(code: Code, parts: &mut Vec<Code>) {
     match code {
         Code::All(inner) => inner.into_iter().for_each(|part| flatten(part, parts)),
@@ -72,7 +69,6 @@ fn flatten(code: Code, parts: &mut Vec<Code>) {
     }
 }
 
-/// Returns the range test that is equivalent to an expression, or `None`.
 fn test(code: &Code) -> Option<Test> {
     // A Boolean variable holds if it is not 0.
     let flag = |variable: u32, inside| Test { variable, least: 0, greatest: 0, inside };

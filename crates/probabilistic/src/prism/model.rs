@@ -26,7 +26,6 @@ pub const UNNAMED: u32 = u32::MAX - 1;
 /// The commands of a module that have the same action, or no action.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Group<N> {
-    /// The index of the module.
     pub module: usize,
     pub commands: Vec<Command<N>>,
     /// Index of the commands by the value of a variable: the variable, its least value, and the
@@ -42,10 +41,8 @@ pub(super) struct Mask {
     pub table: Vec<Vec<u64>>,
 }
 
-/// A reward structure.
 #[derive(Debug, Clone)]
 pub(super) struct Structure<N> {
-    /// The items of state rewards.
     pub states: Vec<RewardItem<N>>,
     /// The items for commands without an action.
     pub unnamed: Vec<RewardItem<N>>,
@@ -74,7 +71,6 @@ pub struct Program<N> {
     pub(super) rewards: Vec<Structure<N>>,
     /// The indices of the reward structures whose rewards are computed for each choice.
     pub(super) computed_rewards: Vec<usize>,
-    /// The initial states.
     pub(super) starts: Vec<Packed>,
     /// Condition under which a state is made absorbing instead of being expanded.
     pub(super) stop: Option<Code>,
@@ -85,8 +81,9 @@ impl<N: Number> Program<N> {
     /// [`Self::with_rewards`] selects them.
     ///
     /// # Errors
-    /// All errors in names and types; undefined constants without a value in `settings`, and unknown constants in
-    /// `settings`.
+    /// An undefined constant without a value in `settings`, an unknown constant in `settings`, or errors in
+    /// names, types and ranges. The errors in variables are returned without those in commands, rewards and
+    /// labels, which may follow from them.
     pub fn new(model: &Model, settings: &Settings) -> Result<Self, Error> {
         let mut names = Names::new(model, settings)?;
         let mut problems = Vec::new();
@@ -301,7 +298,6 @@ impl<N: Number> Program<N> {
         self.mask();
     }
 
-    /// Computes, for each value of an indexed variable, the actions that may be enabled.
     fn mask(&mut self) {
         let words = self.actions.len().div_ceil(64);
         let mut masks: Vec<Mask> = Vec::new();

@@ -245,7 +245,6 @@ fn module(cursor: &mut Cursor<'_>, model: &mut Model, problems: &mut Vec<Diagnos
     Ok(())
 }
 
-/// Parses a variable or a command and adds it to the module.
 fn member(cursor: &mut Cursor<'_>, module: &mut Module) -> Read<()> {
     if cursor.is("[") {
         module.commands.push(command(cursor)?);

@@ -30,7 +30,6 @@ pub struct Remembered<'a, N> {
     memory: Option<RefCell<Memory<N>>>,
 }
 
-/// The caches and the buffers.
 struct Memory<N> {
     team: Team<N>,
     stops: Memo<bool>,
@@ -45,13 +44,11 @@ struct Team<N> {
     /// For each action, the modules that synchronise on it: module index, and position of the action in the module's
     /// list.
     actions: Vec<Vec<(usize, usize)>>,
-    /// For each module, the index of its behaviour in the current state.
     behaviours: Vec<usize>,
     /// The actions that are disabled by at least one module in the current state, as a bit set.
     prevented: u128,
 }
 
-/// Caches of the rewards of choices, for commands without an action and for each action.
 struct Rewards<N> {
     unnamed: Memo<Sums<N>>,
     named: Vec<Memo<Sums<N>>>,
@@ -65,7 +62,6 @@ struct Combiner<N> {
 
 /// The index of a module and the range of its enabled commands, one of which is executed.
 type Part = (usize, std::ops::Range<Chosen>);
-/// The modules that synchronise on an action, with their enabled commands.
 type Parts = SmallVec<[Part; 8]>;
 
 impl<'a, N: Number> Remembered<'a, N> {
@@ -152,7 +148,6 @@ impl<N: Number> Memory<N> {
         }
     }
 
-    /// Adds all choices of a state of a Markov decision process. Returns `None` if an evaluation fails.
     fn choices(
         &mut self,
         program: &Program<N>,
@@ -172,8 +167,9 @@ impl<N: Number> Memory<N> {
         })
     }
 
-    /// Adds the only choice of a state of a Markov chain: a uniform distribution over the combinations of enabled
-    /// commands. Returns `None` if an evaluation fails.
+    /// Adds the only choice of a state of a Markov chain: a uniform distribution over the combinations of
+    /// enabled commands. A state without enabled commands gets no choice. Returns `None` if an evaluation
+    /// fails.
     fn step(&mut self, program: &Program<N>, state: &Packed, choices: &mut Choices<Packed, N>) -> Option<()> {
         let Self { team, state_sums, action_sums_cache, combiner, .. } = self;
         let (mut combinations, mut last_action) = (0_usize, UNNAMED);
@@ -238,8 +234,8 @@ impl<N: Number> Team<N> {
         Some(())
     }
 
-    /// Calls `visit` with each enabled action and the participating modules with their commands. Returns `None` as
-    /// soon as `visit` does.
+    /// Calls `visit` for the enabled commands without an action of each module, and for each enabled action
+    /// with the participating modules and their commands. Returns `None` as soon as `visit` does.
     fn each_action(&self, mut visit: impl FnMut(u32, &[Part]) -> Option<()>) -> Option<()> {
         for (number, module) in self.modules.iter().enumerate() {
             let commands = module.free(self.behaviours[number]);
@@ -359,15 +355,12 @@ impl<N: Number> Rewards<N> {
         }
     }
 
-    /// Returns the rewards of an action in a state: one for each reward structure whose rewards are
-    /// computed. Returns `None` if an evaluation fails.
     fn get(&mut self, program: &Program<N>, action: u32, state: &Packed) -> Option<&Sums<N>> {
         let memo = self.named.get_mut(action as usize).unwrap_or(&mut self.unnamed);
         memo.get(state, || program.action_rewards(action, &program.values_of(state)).ok())
     }
 }
 
-/// Creates a cache of reward sums. For each computed reward structure, `items` returns the items that are summed.
 fn sums<'a, N: Number>(
     program: &'a Program<N>,
     items: impl Fn(&usize) -> &'a Vec<RewardItem<N>>,

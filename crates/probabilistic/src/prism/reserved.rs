@@ -1,6 +1,5 @@
 //! Reserved words of the PRISM language.
 
-/// Reserved words of PRISM and of the model checker Storm.
 const RESERVED: [&str; 50] = [
     "A",
     "bool",

@@ -18,7 +18,6 @@ use crate::prism::command::{Command, RewardItem, Variable};
 use crate::prism::model::{Group, Program, UNNAMED};
 use crate::prism::state::{Packed, above_least};
 
-/// The values of the variables in a state.
 pub(super) type Values = SmallVec<[i64; 16]>;
 /// The rewards of a state or choice: one for each reward structure whose rewards are computed.
 pub(super) type Sums<N> = SmallVec<[N; 4]>;
@@ -42,9 +41,9 @@ struct JointStep<N> {
 }
 
 impl<N: Number> Program<N> {
-    /// Collects the enabled commands of the synchronising modules in `joint`. Returns `false` if a
-    /// module has no enabled command. Fails if their combinations have more than [`MAX_COMBINED`]
-    /// successors.
+    /// Collects the enabled commands of the synchronising modules in `joint`. Returns `false` if a module has
+    /// no enabled command. Fails if an expression has no valid value, or if the combinations of the commands
+    /// of several modules have more than [`MAX_COMBINED`] successors.
     fn synchronise(
         &self,
         joint: &mut JointStep<N>,
@@ -84,7 +83,6 @@ impl<N: Number> Program<N> {
         Ok(true)
     }
 
-    /// Appends the updates of a command, evaluated in a state, to `joint`.
     fn effects(&self, joint: &mut JointStep<N>, command: &Command<N>, values: &[i64]) -> Result<(), Error> {
         for (update, probability) in command.updates.iter().zip(&*command.probabilities(values)?) {
             if probability.is_zero() {
@@ -165,7 +163,6 @@ impl<N> JointStep<N> {
         }
     }
 
-    /// Clears the lists and starts a joint step of another action.
     fn begin(&mut self, action: u32) {
         self.action = action;
         self.modules.clear();
@@ -174,19 +171,16 @@ impl<N> JointStep<N> {
         self.changes.clear();
     }
 
-    /// Returns the positions of a module's commands in `commands`.
     fn of(&self, module: usize) -> std::ops::Range<usize> {
         let end = self.modules.get(module.saturating_add(1)).map_or(self.commands.len(), |end| *end as usize);
         self.modules[module] as usize..end
     }
 
-    /// Returns the positions of a command's updates in `updates`.
     fn updates_of(&self, command: usize) -> std::ops::Range<usize> {
         let begin = command.checked_sub(1).map_or(0, |before| self.commands[before]);
         begin as usize..self.commands[command] as usize
     }
 
-    /// Returns the number of combinations of one command per module.
     fn combinations(&self) -> usize {
         (0..self.modules.len()).map(|module| self.of(module).len()).product()
     }
@@ -210,7 +204,6 @@ impl<N> JointStep<N> {
     }
 }
 
-/// Returns the commands of a group that are enabled in a state, in the order of the model.
 pub(super) fn enabled<'a, N: Number>(
     group: &'a Group<N>,
     values: &'a [i64],
@@ -231,12 +224,10 @@ pub(super) fn enabled<'a, N: Number>(
 }
 
 impl<N: Number> Program<N> {
-    /// Returns the values of the variables in a state.
     pub(super) fn values_of(&self, state: &Packed) -> Values {
         self.layout.values(state).collect()
     }
 
-    /// Returns the state reward of the structure with this index.
     pub(crate) fn state_reward(&self, structure: usize, values: &[i64]) -> Result<N, Error> {
         sum(&self.rewards[structure].states, values)
     }
@@ -274,8 +265,6 @@ impl<N: Number> Program<N> {
         })
     }
 
-    /// Adds to the current choice the transitions of a command that is executed without other
-    /// modules.
     fn single_command(
         &self,
         command: &Command<N>,
@@ -296,7 +285,6 @@ impl<N: Number> Program<N> {
         Ok(())
     }
 
-    /// Adds all choices of a state of a Markov decision process.
     fn choices(
         &self,
         state: &Packed,
@@ -340,8 +328,8 @@ impl<N: Number> Program<N> {
         Ok(())
     }
 
-    /// Adds the only choice of a state of a Markov chain: a uniform distribution over the combinations of enabled
-    /// commands.
+    /// Adds the only choice of a state of a Markov chain: a uniform distribution over the combinations of
+    /// enabled commands. A state without enabled commands gets no choice.
     fn step(&self, state: &Packed, values: &Values, choices: &mut Choices<Packed, N>) -> Result<(), Error> {
         let mut joint_steps: SmallVec<[JointStep<N>; 1]> = SmallVec::new();
         let mut collect = |action: u32, groups: &[Group<N>]| {
@@ -422,7 +410,6 @@ fn at(Fault(text): Fault, place: Place) -> Error {
     Diagnostic::new("Q303", place, text).into()
 }
 
-/// Sums the rewards of the items whose guards hold in a state.
 fn sum<N: Number>(items: &[RewardItem<N>], values: &[i64]) -> Result<N, Error> {
     let mut sum = N::zero();
     for item in items {

@@ -17,7 +17,6 @@ enum Words {
     Boxed(Box<[u64]>),
 }
 
-/// Number of words that are stored inline, without an allocation.
 const INLINE_WORDS: usize = 2;
 
 impl Default for Words {
@@ -126,7 +125,6 @@ pub fn above_least(value: i64, least: i64) -> usize {
 pub struct Layout {
     fields: Vec<Field>,
     words: usize,
-    /// Number of used bits in the last word.
     used: u32,
     /// The indices of the variables, by descending size of their ranges.
     order: Vec<u32>,
@@ -240,7 +238,6 @@ impl Field {
         packed.words()[self.word as usize] >> self.shift & self.mask
     }
 
-    /// Returns the number of values in the range, or `None` if it exceeds `usize`.
     fn size(&self) -> Option<usize> {
         usize::try_from(self.greatest).ok()?.checked_add(1)
     }

@@ -36,8 +36,7 @@ pub struct Listed {
     pub name: Option<String>,
     /// The parsed property.
     pub property: Property,
-    /// The source text of the property, without its name and without comments that follow the
-    /// property.
+    /// The source text of the property after its name, up to the first comment in or after the property.
     pub text: String,
     /// Position of the property in the file, after its name.
     pub place: Place,

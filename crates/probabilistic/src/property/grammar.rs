@@ -8,7 +8,6 @@ use crate::prism::expression::{Cursor, PropertySyntax, Read};
 use crate::prism::lexer::{Kind, tokens};
 use crate::solve::Direction;
 
-/// Description of a property, for error messages.
 const PROPERTY: &str = "a property (`Pmax=? [ F … ]`, `R{\"name\"}min=? [ F … ]`)";
 
 /// The parsers that extend expressions by the syntax of properties.
@@ -153,7 +152,6 @@ fn probability(cursor: &mut Cursor<'_>, suffix: &str) -> Read<Property> {
     filtered(cursor, Property::Probability(question, path), place)
 }
 
-/// Parses the optional name of the reward structure, `{"name"}`.
 fn reward_name(cursor: &mut Cursor<'_>) -> Read<Option<String>> {
     if !cursor.take("{") {
         return Ok(None);
@@ -369,7 +367,6 @@ fn ltl(place: Place) -> Diagnostic {
     Diagnostic::new("Q403", place, text)
 }
 
-/// Returns `true` if an expression contains a temporal operator outside of nested properties.
 fn has_temporal(expression: &Expr) -> bool {
     match &expression.kind {
         ExprKind::Temporal(_) => true,

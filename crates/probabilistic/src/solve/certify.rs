@@ -16,7 +16,6 @@ use crate::solve::problem::Direction;
 use crate::solve::quotient::Quotient;
 use crate::solve::work::Work;
 
-/// Upper limit on the rounds of policy iteration that maximise the expected number of steps.
 const MAX_ROUNDS: usize = 200;
 
 /// Upper limit on the number of sweeps that improve the policy in each round.
@@ -28,8 +27,8 @@ pub fn rounding(widest: usize) -> f64 {
     (64.0 + 3.0 * count(widest)) * f64::EPSILON
 }
 
-/// Returns an upper bound on the absolute error of the value of each block (merged end component).
-/// Errors in the values of successors outside the component are not included.
+/// Returns an upper bound on the absolute error of the value of each block (merged end component). The bounds
+/// are infinite if a check fails. Errors in the values of successors outside the component are not included.
 pub fn certify<N: Number>(
     quotient: &Quotient<N>,
     policy: &[u32],

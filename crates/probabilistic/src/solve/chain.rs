@@ -222,7 +222,6 @@ impl<N: Number> Chain<'_, N> {
         Some(Solved { values, relative })
     }
 
-    /// Returns the greatest relative error among the successors of a component.
     fn worst_outside(&self, component: &[u32], relative: &[f64]) -> f64 {
         let targets = component.iter().flat_map(|state| self.targets(*state as usize));
         targets.fold(0.0, |worst, target| worst.max(relative[*target as usize]))
@@ -242,7 +241,6 @@ fn rounding<N: Number>(states: usize, widest: usize) -> f64 {
     if N::EXACT { 0.0 } else { n * n * (count(widest) + 8.0) * f64::EPSILON }
 }
 
-/// A row of the component under elimination.
 struct Row<N> {
     /// The entries, sorted by column. Columns are local state numbers in the component.
     entries: Vec<(u32, N)>,
@@ -250,9 +248,7 @@ struct Row<N> {
     leaving: N,
 }
 
-/// The quantities that determine the rounding error of an elimination.
 struct Precision {
-    /// The greatest number of entries in any row.
     widest: usize,
     /// Whether a product has underflowed.
     lost: bool,

@@ -217,7 +217,6 @@ impl<N: Number> Run<'_, N> {
         Some(())
     }
 
-    /// Returns the greatest error of the value of a successor outside the component.
     fn outside_error(&self, local: &Local<N>) -> f64 {
         if N::EXACT {
             return 0.0;
@@ -228,7 +227,6 @@ impl<N: Number> Run<'_, N> {
             .fold(0.0, |error, target| error.max(self.solution.errors[*target as usize]))
     }
 
-    /// Marks the values of the component as unknown by infinite errors.
     fn mark_unknown(&mut self, local: &Local<N>) {
         for state in &local.states {
             self.solution.errors[*state as usize] = f64::INFINITY;
@@ -361,7 +359,6 @@ fn members(ends: &EndComponents) -> (Vec<u32>, Vec<u32>) {
     (starts, members)
 }
 
-/// Builds the equations of a component whose end components are merged into blocks.
 fn quotient<N: Number>(local: &mut Local<N>, ends: &EndComponents) -> Quotient<N> {
     if !ends.inside.contains(&true) {
         return unmerged(local);

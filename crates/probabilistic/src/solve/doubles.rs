@@ -19,13 +19,13 @@ const RATIONAL_LIMITS: (u64, usize) = (1_000_000_000, 3000);
 /// than [`TIGHT`] are not required.
 const IMPROVEMENT_LIMIT: u64 = 100_000_000;
 
-/// Computes bounds on the values of all blocks (merged end components). Returns `None` if no method
-/// finds bounds.
+/// Computes bounds on the values of all blocks (merged end components). Returns `None` if there are no values
+/// of policy iteration and interval iteration finds no bounds. If no method tightens the bounds on values of
+/// policy iteration, their errors may be large or infinite.
 ///
-/// For a Markov chain, elimination has a small relative error. With choices, a certificate bounds
-/// the error. If the probability of leaving a component is tiny, no certificate exists in doubles,
-/// and the component is solved in rationals. If elimination is too expensive, interval iteration
-/// computes bounds from both sides.
+/// For a Markov chain, elimination has a small relative error. With choices, a certificate bounds the error.
+/// If the probability of leaving a component is tiny, no certificate exists in doubles, and the component is
+/// solved in rationals. If elimination is too expensive, interval iteration computes bounds from both sides.
 pub fn enclosed<N: Number>(
     quotient: &Quotient<N>,
     iterated: Option<Iterated<N>>,

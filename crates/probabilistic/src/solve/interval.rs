@@ -35,7 +35,7 @@ const MAX_WORK: u64 = 30_000_000_000;
 const UPPER_SWEEPS: usize = 40;
 /// Distance of the initial bounds from approximate values, as a fraction of the required width.
 const INITIAL_SHARE: f64 = 0.45;
-/// Number of sweeps with the rows of a fixed policy between two sweeps over all rows.
+/// Maximum number of sweeps with the rows of a fixed policy between two sweeps over all rows.
 const POLICY_SWEEPS: usize = 25;
 
 /// Computes bounds on the values of all blocks (merged end components) with a width of at most
@@ -70,7 +70,6 @@ struct Rows<'a, N> {
     sorted: Option<(&'a [u32], &'a [u32])>,
     /// The first row of each position, followed by the number of rows.
     blocks: &'a [u32],
-    /// The first transition of each row, followed by the number of transitions.
     first: &'a [u32],
     /// The position of the target block of each transition.
     columns: &'a [u32],
@@ -375,8 +374,6 @@ mod tests {
     use crate::solve::chain;
     use crate::solve::work::Work;
 
-    /// A random walk on a square torus with two choices at each place. Each step leaves the square
-    /// with probability 1/50.
     fn square(side: u32) -> Quotient<f64> {
         let mut quotient =
             Quotient { first: vec![0], rows: chain::Rows::new(), choices: Vec::new(), widest: 4 };

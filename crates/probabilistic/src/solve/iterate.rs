@@ -69,7 +69,6 @@ pub fn iterate<N: Number>(
     Some(Iterated { policy, values, relative })
 }
 
-/// Computes the values of a policy.
 fn chain<N: Number>(quotient: &Quotient<N>, policy: &[u32], work: &mut Work) -> Option<Solved<N>> {
     Chain { rows: &quotient.rows, policy, costs: None }.solve(work)
 }

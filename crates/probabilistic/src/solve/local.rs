@@ -149,7 +149,6 @@ pub fn end_components<N: Number>(local: &Local<N>, eligible: impl Fn(usize) -> b
     }
 }
 
-/// Removes choices that lead to states without remaining choices, repeatedly.
 fn remove_dead_ends<N: Number>(local: &Local<N>, alive: &mut [bool]) {
     let (owners, users) = (local.owners(), Users::new(&local.rows, local.states.len()));
     let mut remaining = vec![0_u32; local.states.len()];

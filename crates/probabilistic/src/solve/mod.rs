@@ -38,7 +38,6 @@ pub use local::NONE;
 pub use problem::{Direction, Problem, Solution};
 pub(crate) use work::Work;
 
-/// Error: exact arithmetic exceeds its budget.
 struct TooMuchWork;
 
 /// Solves a problem. Returns `None` if exact arithmetic exceeds its default budget.

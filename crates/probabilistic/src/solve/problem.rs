@@ -119,7 +119,6 @@ impl<N: Number> Solution<N> {
 /// values that depend on such products.
 pub(super) const UNDERFLOW_BOUND: f64 = 1e-280;
 
-/// The working state of the solver while it solves the components one after another.
 pub(crate) struct Run<'a, N> {
     pub problem: Problem<'a, N>,
     pub solution: Solution<N>,

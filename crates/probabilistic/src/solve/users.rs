@@ -6,7 +6,6 @@ use crate::solve::chain::Rows;
 /// For each column, the rows with an entry in this column, in ascending order. A row is listed once
 /// per entry.
 pub struct Users {
-    /// Start of each column in `rows`, followed by the length of `rows`.
     starts: Vec<u32>,
     rows: Vec<u32>,
 }

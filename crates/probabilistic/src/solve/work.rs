@@ -15,17 +15,15 @@ pub struct Work {
     remaining: u64,
     /// Required width of bounds, relative to the value. Narrower bounds are not computed.
     pub tight: f64,
-    /// Remaining budget for solving components in rationals whose bounds in doubles are
-    /// insufficient.
     spare: u64,
-    /// Number of entries that elimination has visited, including elimination in doubles.
     touched: u64,
 }
 
 /// Size in bits up to which a fraction usually has a numerator and denominator of one word each.
 const SHORT_BITS: u64 = 126;
 
-/// Total budget for solving components in rationals whose bounds in doubles are insufficient.
+/// Total budget, in work units, for solving in rationals those components whose bounds in doubles are
+/// insufficient.
 const SPARE_BUDGET: u64 = 1_000_000_000;
 
 impl Work {

@@ -43,14 +43,13 @@ pub(super) async fn persist<T, F: Future<Output = Result<T, Fault>>>(
     Err(Fault::Conflict)
 }
 
-/// Waits for a random time before another attempt. The upper limit is 10 ms, doubled with each
-/// attempt, and at most 5 s. Random pauses prevent synchronised retries.
+/// Waits for a random time before another attempt. The upper limit is 10 ms · 2^attempt, and at most 5 s.
+/// Random pauses prevent synchronised retries.
 pub(crate) async fn pause(attempt: u32) {
     let limit = 5_000.min(10_u64 << attempt.min(10));
     tokio::time::sleep(Duration::from_millis(fastrand::u64(1..=limit))).await;
 }
 
-/// Serialises a value as JSON.
 pub(super) fn bytes(value: &impl serde::Serialize) -> Vec<u8> {
     serde_json::to_vec(value).unwrap_or_default()
 }

@@ -128,8 +128,8 @@ pub enum End {
 }
 
 /// Recovers and runs a partition until it is ordered to end, or until it has to be recovered again
-/// ([`End::Fenced`]). [`Order::Abandon`] ends it immediately, [`Order::Drain`] after everything is
-/// saved.
+/// ([`End::Fenced`]). [`Order::Abandon`] or a dropped sender of `orders` ends it immediately,
+/// [`Order::Drain`] after everything is saved.
 pub async fn serve<S: Store>(shared: Arc<Shared<S>>, partition: u32, orders: watch::Receiver<Order>) -> End {
     let mut abandoned = orders.clone();
     let work = async {

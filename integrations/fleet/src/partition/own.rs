@@ -27,10 +27,9 @@ pub(super) struct Partition<S> {
     /// Sequence numbers of the last event that was read, and of the last known decision, both over all
     /// robots of the partition.
     pub(super) seen: (u64, u64),
-    /// Revision of the last snapshot of a robot.
+    /// Greatest known revision of the snapshots of the partition's robots.
     pub(super) snapshots: u64,
     pub(super) jobs: FuturesUnordered<BoxFuture<'static, Done>>,
-    /// Number of events that are read but not decided.
     pub(super) waiting: usize,
     pub(super) is_progressing: bool,
     pub(super) clock: u64,
@@ -266,7 +265,7 @@ impl<S: Store> Partition<S> {
         }
     }
 
-    /// Counts a refused event, and publishes the reason to the sender of the event.
+    /// Counts a refused event, and publishes the reason as a notice to the clients of the robot.
     fn say(&self, event: &Stored, refused: Refused) {
         self.refuse(Some((event.subject.clone(), refused.sentence().to_owned())), refused.name());
     }
@@ -313,7 +312,6 @@ impl<S> Drop for Partition<S> {
     }
 }
 
-/// Returns the name of the mission if a message requests an enrolment, otherwise `None`.
 fn enrolment(payload: &[u8]) -> Option<String> {
     #[derive(serde::Deserialize)]
     struct Head {

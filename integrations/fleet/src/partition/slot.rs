@@ -7,7 +7,6 @@ use crate::robot::{Refused, Robot};
 use crate::store::{Fault, Stored};
 use crate::wire::{Decided, Progress};
 
-/// A robot of a partition, with its queued events and unsaved decisions.
 #[derive(Default)]
 pub(super) struct Slot {
     /// State of the robot. `None` while an event is being handled.
@@ -28,25 +27,32 @@ pub(super) struct Slot {
     /// Revision of the last snapshot of the robot; 0 without a snapshot.
     pub(super) revision: u64,
     pub(super) is_saving: bool,
-    /// `true` if the robot cannot handle events.
     pub(super) faulted: bool,
     /// Number of events that the partition had handled when the robot was last used; 0 if the robot is
     /// not loaded.
     pub(super) used: u64,
 }
 
-/// Result of a background job of a partition.
 pub(super) enum Done {
-    /// An event of a robot was handled.
-    Taken { robot: String, own: Box<Robot>, event: Stored, outcome: Outcome },
-    /// A snapshot of a robot was stored; it contains all events up to this one.
-    Kept { robot: String, event: u64, revision: Result<u64, Fault> },
-    /// The progress of the partition was stored.
-    Progressed { progress: Progress, revision: Result<u64, Fault> },
+    Taken {
+        robot: String,
+        own: Box<Robot>,
+        event: Stored,
+        outcome: Outcome,
+    },
+    /// A snapshot of a robot, which contains all events up to `event`, was stored or could not be stored.
+    Kept {
+        robot: String,
+        event: u64,
+        revision: Result<u64, Fault>,
+    },
+    Progressed {
+        progress: Progress,
+        revision: Result<u64, Fault>,
+    },
 }
 
 pub(super) enum Outcome {
-    /// The event was decided; the decision has this sequence number.
     Decided(u64),
     Refused(Refused),
     Faulted(String),

@@ -12,7 +12,6 @@ use crate::robot::{Faulted, Robot};
 use crate::store::{Fault, Message, Store, Stored, Stream};
 use crate::wire::Decided;
 
-/// Data for handling an event of a robot.
 pub(super) struct Task<S> {
     pub(super) shared: Arc<Shared<S>>,
     pub(super) name: String,
@@ -66,8 +65,9 @@ impl<S: Store> Task<S> {
         Done::Taken { robot: self.name, own, event, outcome }
     }
 
-    /// Appends a decision if the robot's last decision has the sequence number `chain`. Retries
-    /// until the result is known.
+    /// Appends a decision if the robot's last decision has the sequence number `chain`. Retries until the
+    /// result is known. Returns [`Outcome::Fenced`] if the robot has another last decision, and
+    /// [`Outcome::Faulted`] if the decision is too long for the server.
     async fn publish(&self, event: &Stored, decided: &Decided) -> Outcome {
         let (store, payload) = (&self.shared.store, bytes(decided));
         let id = format!("{}:{}:{}:{}", self.name, event.sequence, self.epoch, self.shared.worker);

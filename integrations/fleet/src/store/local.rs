@@ -17,7 +17,6 @@ use tokio::sync::{broadcast, mpsc, oneshot, watch};
 use super::{Bucket, Entry, Fault, Message, Receipt, Store, Stored, Stream};
 use crate::wire::Address;
 
-/// Name of the database file in the directory.
 const FILE: &str = "fleet.redb";
 
 /// Maximum number of writes in one transaction.
@@ -59,13 +58,11 @@ struct Inner {
     notices: broadcast::Sender<(String, String)>,
 }
 
-/// A write, with the channel for its result.
 struct Request {
     write: Write,
     done: oneshot::Sender<Answer>,
 }
 
-/// Result of a write: its sequence number or revision, or the fault.
 type Answer = Result<Receipt, Fault>;
 
 enum Write {
@@ -120,7 +117,6 @@ impl Local {
         answer.await.map_err(failed)?
     }
 
-    /// Reads the first messages of a partition after a sequence number, at most `most` of them.
     fn page(&self, stream: Stream, partition: u32, after: u64, most: usize) -> Result<Vec<Stored>, Fault> {
         let (number, transaction) = (stream as u8, self.0.database.begin_read().map_err(failed)?);
         let of_partition = transaction.open_table(OF_PARTITION).map_err(failed)?;
@@ -174,7 +170,6 @@ fn prepare(database: &Database, partitions: u32) -> Result<u32, redb::Error> {
     Ok(known)
 }
 
-/// State of the writer thread.
 struct Writer {
     database: Arc<Database>,
     /// Time of the last write of each value that expires.
@@ -320,7 +315,6 @@ impl Tables<'_> {
     }
 }
 
-/// Position of a subscriber in a partition, with the messages that were read ahead.
 struct Reader {
     store: Local,
     stream: Stream,

@@ -51,7 +51,6 @@ pub struct Layout {
     pub lease: Duration,
 }
 
-/// Number of messages that are fetched at once.
 const BATCH: usize = 500;
 
 /// Timeout of a request to the server.

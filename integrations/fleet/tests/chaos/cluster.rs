@@ -13,10 +13,8 @@ use test_resources::{Resource, missing};
 
 use super::wires::{Wire, routes};
 
-/// For each server, the other two servers.
 const PAIRS: [[usize; 2]; 3] = [[1, 2], [0, 2], [0, 1]];
 
-/// Size of the third server's disk, if this system supports a separate disk.
 const DISK: &str = "64m";
 
 fn program() -> String {
@@ -34,7 +32,6 @@ pub(super) fn is_possible() -> bool {
     is_possible
 }
 
-/// The processes of the cluster. Clones share the processes.
 #[derive(Clone)]
 pub(super) struct Cluster(Arc<Inner>);
 
@@ -71,7 +68,6 @@ fn can_mount() -> bool {
 }
 
 impl Cluster {
-    /// Starts three servers on free ports, connected through proxies.
     pub(super) fn begin(seed: u64) -> Self {
         let directory =
             tempfile::Builder::new().prefix(&format!("chaos-{seed}-")).tempdir().expect("a directory");
@@ -121,7 +117,6 @@ impl Cluster {
         self.0.directory.path().join(name)
     }
 
-    /// Returns the URLs of the servers.
     pub(super) fn url(&self) -> String {
         self.0.clients.map(|port| format!("nats://127.0.0.1:{port}")).join(",")
     }
@@ -196,7 +191,6 @@ impl Cluster {
         }
     }
 
-    /// Fills the disk of the third server, or frees the space again.
     fn fill(&self, full: bool) {
         let pid = self.processes().get("disk").map(Child::id);
         let Some(pid) = pid else { return };
@@ -295,7 +289,6 @@ impl Cluster {
         line.split_whitespace().next().and_then(|text| text.parse::<u64>().ok()).unwrap_or_default() / 1024
     }
 
-    /// Returns the last lines of all logs.
     pub(super) fn logs(&self) -> String {
         let mut text = String::new();
         for entry in fs::read_dir(self.0.directory.path()).into_iter().flatten().flatten() {

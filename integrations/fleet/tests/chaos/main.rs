@@ -68,7 +68,6 @@ async fn open(cluster: &Cluster, lease: u64) -> Nats {
     panic!("the servers do not answer: {}", cluster.logs());
 }
 
-/// Reads all messages of a partition, with retries.
 async fn read(store: &Nats, stream: Stream, partition: u32) -> Vec<Stored> {
     for _ in 0..60 {
         match store.history(stream, partition, 0).await {

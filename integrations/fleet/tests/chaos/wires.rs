@@ -6,7 +6,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// A proxy for the connections between two servers, regardless of which server opens them.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Wire {
     is_cut: Arc<AtomicBool>,
@@ -37,7 +36,6 @@ impl Wire {
         port
     }
 
-    /// Closes all open connections and refuses new ones.
     pub(super) fn cut(&self) {
         let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
         self.is_cut.store(true, Ordering::SeqCst);
@@ -47,13 +45,11 @@ impl Wire {
         }
     }
 
-    /// Accepts new connections again.
     pub(super) fn mend(&self) {
         self.is_cut.store(false, Ordering::SeqCst);
     }
 }
 
-/// Copies all bytes in one direction until the connection is closed.
 fn carry(mut from: TcpStream, mut to: TcpStream) {
     // Either end may be closed.
     let _ = std::io::copy(&mut from, &mut to);

@@ -26,7 +26,6 @@ struct Crashing {
 }
 
 impl Crashing {
-    /// Creates a log that never stops responding.
     fn never(inner: Local, fences: bool) -> Self {
         let left = Arc::new(AtomicU64::new(u64::MAX));
         Self { inner, left, carries_out: false, fences, over: Arc::default() }
@@ -156,7 +155,6 @@ async fn a_crash_between_any_two_operations_neither_loses_nor_repeats() {
     assert!(crashes > 30, "there were {crashes} crashes");
 }
 
-/// Two workers run the same partition at the same time; each event must be decided once.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn two_owners_of_one_partition_decide_each_event_once() {
     for seed in 0..4 {
@@ -189,8 +187,6 @@ async fn two_owners_of_one_partition_decide_each_event_once() {
     }
 }
 
-/// Checks that only the comparison with the previous decision prevents two owners from deciding an
-/// event twice: without the comparison, both decide.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn without_the_comparison_events_are_decided_twice() {
     let (events, answers) = scripts::play("ugv", "kinect_comes_and_goes", 1, 30);

@@ -58,7 +58,6 @@ async fn hostile_messages_change_nothing_and_are_counted() {
     assert_eq!(told, 8);
 }
 
-/// Invalid events of an enrolled robot are answered with an error, as by `metaplan run`.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn nonsense_of_a_robot_is_answered_with_an_error() {
     let folder = tempfile::tempdir().expect("a directory");
@@ -78,7 +77,6 @@ async fn nonsense_of_a_robot_is_answered_with_an_error() {
     assert_eq!(made["r"][3].answers[0]["answer"], "error");
 }
 
-/// A robot can send events even if another client has used its message ids.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn forged_ids_keep_nobody_from_saying_something() {
     let folder = tempfile::tempdir().expect("a directory");
@@ -103,8 +101,6 @@ async fn forged_ids_keep_nobody_from_saying_something() {
     assert_eq!(good, events.iter().map(String::as_bytes).collect::<Vec<_>>(), "each once, though sent twice");
 }
 
-/// A worker that was suspended for a long time tries to append after an outdated decision, and is
-/// rejected.
 #[tokio::test]
 async fn an_old_epoch_is_refused() {
     let folder = tempfile::tempdir().expect("a directory");

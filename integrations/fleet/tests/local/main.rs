@@ -21,7 +21,6 @@ use metaplan_fleet::worker;
 use serde_json::Value;
 use tokio::sync::watch;
 
-/// Reads the missions of this repository.
 fn missions() -> Missions {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../missions");
     Missions::read(&folder).unwrap_or_else(|errors| panic!("{errors}"))
@@ -36,7 +35,6 @@ fn shared<S: Store>(store: S, name: &str, settings: Settings) -> Arc<Shared<S>> 
     Arc::new(Shared::new(store, missions(), name.to_owned(), settings))
 }
 
-/// Appends events of a robot and returns their sequence numbers.
 async fn tell<S: Store>(store: &S, robot: &str, events: &[String]) -> Vec<u64> {
     let subject = Address::of(robot, store.partitions()).to_string();
     let mut sequences = Vec::new();
@@ -48,7 +46,6 @@ async fn tell<S: Store>(store: &S, robot: &str, events: &[String]) -> Vec<u64> {
     sequences
 }
 
-/// Returns all decisions by robot, in order.
 async fn decisions<S: Store>(store: &S) -> BTreeMap<String, Vec<Decided>> {
     let mut all: BTreeMap<String, Vec<Decided>> = BTreeMap::new();
     for partition in 0..store.partitions() {
@@ -62,7 +59,6 @@ async fn decisions<S: Store>(store: &S) -> BTreeMap<String, Vec<Decided>> {
     all
 }
 
-/// Waits until at least the given number of decisions is stored.
 async fn decided<S: Store>(store: &S, count: usize) {
     for _ in 0..6000 {
         if decisions(store).await.values().map(Vec::len).sum::<usize>() >= count {
@@ -73,8 +69,6 @@ async fn decided<S: Store>(store: &S, count: usize) {
     panic!("{count} decisions were expected; there are {:?}", decisions(store).await.len());
 }
 
-/// Runs a worker until the given number of decisions is stored, then requests its end and waits
-/// for it.
 async fn work<S: Store>(store: &S, name: &str, settings: Settings, count: usize) {
     let (stop, heard) = watch::channel(false);
     let shared = shared(store.clone(), name, settings);

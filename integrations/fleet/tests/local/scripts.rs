@@ -10,7 +10,6 @@ use metaplan::setup::Setup;
 use metaplan::simulate::Strategy;
 use serde_json::{Value, json};
 
-/// Missions, each with a scenario that can be simulated.
 pub(super) const SCENARIOS: [(&str, &str); 4] = [
     ("ugv", "kinect_comes_and_goes"),
     ("uuv", "battery_under_way"),

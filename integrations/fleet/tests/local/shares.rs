@@ -14,7 +14,6 @@ use super::{assert_same, decided, decisions, scripts, shared, tell};
 
 const LEASE: Duration = Duration::from_millis(400);
 
-/// Waits until the workers own the given numbers of partitions.
 async fn distributed(store: &Local, wanted: &[usize]) {
     let mut counts = Vec::new();
     for _ in 0..1000 {
@@ -32,8 +31,8 @@ async fn distributed(store: &Local, wanted: &[usize]) {
     panic!("partitions are distributed as {counts:?}, not as {wanted:?}");
 }
 
-/// Waits until each partition was recovered `epoch` times. A lease is visible before the recovery
-/// is complete.
+/// Waits until each partition was recovered at least `epoch` times. A lease is visible before the recovery is
+/// complete.
 async fn taken_over(store: &Local, epoch: u64) {
     let mut partitions = Vec::new();
     for _ in 0..1000 {

@@ -1,6 +1,7 @@
 //! Compile-time description of an interface: its name, its parts and its type hash.
 //!
-//! A type hash (RIHS01, [1]) is what ROS 2 since Iron puts into an endpoint's user data; Humble has none.
+//! A type hash (RIHS01, [1]) is the identification of a type that ROS 2 since Iron puts into an endpoint's
+//! user data; Humble has none.
 //!
 //! [1] REP-2011, Evolving Message Types; REP-2016, ROS 2 Interface Type Descriptions.
 
@@ -24,10 +25,8 @@ pub trait Msg: Structure {
 
 /// Operation on a message type that is known by its name only.
 pub(crate) trait MessageVisitor {
-    /// Result of the operation.
     type Output;
 
-    /// Executes the operation.
     fn visit<M: Msg>(self) -> Self::Output;
 }
 
@@ -43,8 +42,9 @@ pub trait Service {
     const NAME: &'static str;
 }
 
-/// Type hashes of the two topics of a service. ROS 2 announces on each topic the hash of the message on that topic
-/// (`rmw_create_service` and `rmw_create_client` of `rmw_fastrtps_cpp` and `rmw_cyclonedds_cpp`), not the hash of the service.
+/// Type hashes of the two topics of a service. ROS 2 announces on each topic the hash of the message on that
+/// topic (`rmw_create_service` and `rmw_create_client` of `rmw_fastrtps_cpp` and `rmw_cyclonedds_cpp`), not
+/// the hash of the service.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ServiceHashes {
     /// Hash of the request message.

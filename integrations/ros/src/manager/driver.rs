@@ -30,14 +30,12 @@ const PERIOD: Duration = Duration::from_secs(1);
 /// Limit on the number of inputs that are kept while the manager is inactive.
 const MAX_DELAYED_INPUTS: usize = 100_000;
 
-/// Time of a single search for the functions.
 const SEARCH_TIME: Duration = Duration::from_millis(200);
 
 /// Time after which a task that is requested while functions are missing is refused. SUAVE's
 /// mission node waits for five seconds.
 const TASK_WAIT: Duration = Duration::from_secs(4);
 
-/// Period of log messages about missing parts of the graph.
 const GRAPH_LOG_PERIOD: Duration = Duration::from_secs(5);
 
 /// Options of the manager.
@@ -106,7 +104,6 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
     driver.drive(&inputs, stop).map_err(Errors::from)
 }
 
-/// Returns the names of the components of a knowledge base.
 pub(crate) fn components(knowledge: Option<&Knowledge>) -> Vec<String> {
     let components = knowledge.map(|knowledge| knowledge.view().components()).unwrap_or_default();
     components.into_iter().map(|component| component.individual.name).collect()
@@ -130,19 +127,20 @@ struct Driver {
     machine: Machine,
     robot: Robot,
     settings: Settings,
-    /// `true` while the lifecycle state is active. Other inputs wait.
+    /// `true` while the lifecycle state is active. Otherwise, tasks are refused and other inputs wait.
     active: Arc<AtomicBool>,
     /// Timeout of calls, in milliseconds.
     timeout: Arc<AtomicU64>,
     clock: Arc<Clock>,
     /// Time of the clock when the program started.
     origin: Duration,
-    /// Time of the last line in the journal.
+    /// Time of the last line in the journal; zero without a journal.
     start_time: Duration,
 }
 
 impl Driver {
-    /// Waits for the functions and logs the missing ones periodically. Task requests wait as well.
+    /// Waits until the functions are present or `stop` is set, and logs the missing ones periodically.
+    /// Requests to start or end a task wait for at most [`TASK_WAIT`]; a start is then refused.
     fn wait_for_functions(
         &mut self,
         sender: &Sender<Input>,
@@ -157,8 +155,7 @@ impl Driver {
                 self.diagnose();
             }
             let missing = smol::block_on(self.robot.wait(SEARCH_TIME));
-            // The writer of diagnostics may start later, because no mode is changed before its
-            // first message.
+            // The writer of diagnostics may start later: it is reported as missing, but not waited for.
             let is_there = missing.iter().all(|text| text.contains("/diagnostics"));
             while let Ok(input) = inputs.try_recv() {
                 // Clients of tasks wait for a reply, so their requests are kept with the time of arrival.
@@ -207,7 +204,7 @@ impl Driver {
         Ok(())
     }
 
-    /// Checks that every design is a mode of its function.
+    /// Checks that the designs of each function of `system_modes` that replies are modes of the function.
     fn fits(&self) -> Result<(), Message> {
         let mut missing = Vec::new();
         for (function, available) in smol::block_on(self.robot.available(&self.settings)) {
@@ -255,7 +252,8 @@ impl Driver {
         Ok(())
     }
 
-    /// While the node is inactive, refuses tasks and keeps other inputs.
+    /// While the node is inactive, refuses tasks and keeps other inputs. They are handled when the node is
+    /// active, or when [`MAX_DELAYED_INPUTS`] are kept.
     fn wait_for_activation(&mut self, inputs: &Receiver<Input>) -> Result<(), Message> {
         let mut delayed = Vec::new();
         while !self.active.load(Ordering::Relaxed) && delayed.len() < MAX_DELAYED_INPUTS {

@@ -30,7 +30,6 @@ use crate::node::{CallError, Caller, Node, Publisher, Responder, depth, is_lyric
 use crate::perform::{Call, End, Perform, Progress, Running};
 use crate::procedure::{self, Procedures, Seen};
 
-/// Timeout of a function's reply with its mode.
 const MODE_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// Time after which an observation that has shown no mode is repeated.
@@ -40,16 +39,16 @@ const OBSERVATION_DELAY: Duration = Duration::from_millis(500);
 /// has discovered this node.
 const MAX_MODE_REQUESTS: u32 = 3;
 
-/// Means by which the modes of a function are changed.
 #[derive(Clone)]
 enum Means {
     /// Services of `system_modes`.
-    Modes { change: Arc<Caller<ChangeMode>>, get_mode: Arc<Caller<GetMode>> },
-    /// Steps of the settings.
+    Modes {
+        change: Arc<Caller<ChangeMode>>,
+        get_mode: Arc<Caller<GetMode>>,
+    },
     Steps,
 }
 
-/// A function of the robot.
 struct Function {
     means: Means,
     /// Running call. A new call replaces it.
@@ -57,13 +56,11 @@ struct Function {
     /// Ends the running steps before their next one.
     is_replaced: Arc<AtomicBool>,
     mode_request: Option<Task<()>>,
-    /// Servers of the mode.
+    /// GUIDs of the mode's servers, or of the servers of the nodes that steps use.
     servers: BTreeSet<[u8; 16]>,
-    /// Number of remaining mode requests.
     remaining_requests: u32,
 }
 
-/// All topics, services and actions of the manager.
 pub(super) struct Robot {
     node: Arc<Node>,
     inputs: Sender<Input>,
@@ -79,7 +76,6 @@ pub(super) struct Robot {
 }
 
 impl Robot {
-    /// Creates the topics and services.
     pub(super) fn connect(
         node: &Arc<Node>,
         settings: &Settings,
@@ -145,8 +141,8 @@ impl Robot {
         })
     }
 
-    /// Waits until every function has its servers and diagnostics have a writer, or the time is up.
-    /// Returns the missing ones.
+    /// Waits until every function has its servers, or the time is up. Returns descriptions of the missing
+    /// servers, and of a missing writer of diagnostics.
     pub(super) async fn wait(&self, within: Duration) -> Vec<String> {
         let missing = self.functions.iter().map(|(name, function)| async move {
             match &function.means {
@@ -164,8 +160,8 @@ impl Robot {
         missing
     }
 
-    /// Returns the mode of each function, if it is known. Missing replies are logged and published
-    /// as events.
+    /// Returns the mode of each function, if it is known. Missing replies are logged and published as events,
+    /// except those of functions whose modes cannot be observed.
     pub(super) async fn modes(&self) -> Vec<(String, Option<String>)> {
         let request = |(name, function): (&String, &Function)| {
             let (name, means) = (name.clone(), function.means.clone());
@@ -201,7 +197,7 @@ impl Robot {
         answers.into_iter().map(logged).collect()
     }
 
-    /// Returns the possible modes of each function of `system_modes`, if it replies.
+    /// Returns the possible modes of each function of `system_modes` that replies.
     pub(super) async fn available(&self, settings: &Settings) -> Vec<(String, Vec<String>)> {
         let request = |name: &String| {
             let service = format!("/{}/get_available_modes", settings.functions.system(name));
@@ -217,8 +213,8 @@ impl Robot {
         futures::future::join_all(answers).await.into_iter().flatten().collect()
     }
 
-    /// Calls `change_mode`, or executes the steps of the mode. A running call of the function is cancelled; running steps
-    /// are undone first.
+    /// Calls `change_mode`, or executes the steps of the mode. A running call of the function is cancelled;
+    /// running steps are undone first.
     pub(super) fn change(&mut self, change: Change, within: Duration) {
         let Some(function) = self.functions.get_mut(&change.function) else { return };
         let inputs = self.inputs.clone();
@@ -286,7 +282,6 @@ impl Robot {
         }
     }
 
-    /// Requests the mode of a function.
     pub(super) fn request_mode(&mut self, name: &str) {
         let Some(function) = self.functions.get_mut(name) else { return };
         let (inputs, name) = (self.inputs.clone(), name.to_owned());
@@ -340,12 +335,10 @@ impl Robot {
         .detach();
     }
 
-    /// Returns the diagnostics since the last call, as a line of events.
     pub(super) fn diagnosed(&self) -> String {
         self.diagnosed.line()
     }
 
-    /// Replies to a task request.
     pub(super) fn reply(&self, number: u64, success: bool) {
         let mut replies = self.replies.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(responder) = replies.remove(&number) {
@@ -388,7 +381,7 @@ impl Robot {
         self.performing.insert(number, (running, task));
     }
 
-    /// Cancels an action.
+    /// Cancels an action. An action that was not started by this program is reported as cancelled.
     pub(super) fn stop(&self, number: u64) {
         match self.performing.get(&number) {
             Some((running, _)) => running.cancel(),
@@ -404,7 +397,6 @@ impl Robot {
         self.events.publish(std_msgs::msg::String { data: event.to_string() });
     }
 
-    /// Publishes the status of the manager on `/diagnostics`.
     pub(super) fn diagnose(&self, level: u8, message: &str, values: Vec<(&str, String)>) {
         let values = values.into_iter().map(|(key, value)| KeyValue { key: key.to_owned(), value }).collect();
         let status = DiagnosticStatus {
@@ -487,7 +479,6 @@ fn subscribe_transitions(
 
 type Replies = Arc<Mutex<HashMap<u64, Responder<TaskService>>>>;
 
-/// Serves the requests to start and end tasks.
 fn serve_tasks(node: &Arc<Node>, inputs: &Sender<Input>, replies: &Replies) -> Result<(), Message> {
     let count = Arc::new(AtomicU64::new(0));
     for (service, is_request) in [("/task/request", true), ("/task/cancel", false)] {

@@ -28,7 +28,6 @@ pub struct Settings {
     /// Diagnostics of drivers that report a component or measure an attribute.
     #[serde(default)]
     pub diagnostics: Vec<Spanned<DiagnosticRule>>,
-    /// Other signals that report components and measure attributes.
     #[serde(default)]
     pub(crate) signals: Vec<Spanned<Signal>>,
     /// The autopilot, if there is one.
@@ -47,7 +46,6 @@ pub struct Settings {
     source: Source,
 }
 
-/// Name and text of the settings file.
 #[derive(Debug, Clone, Default)]
 struct Source {
     name: String,
@@ -55,7 +53,6 @@ struct Source {
 }
 
 impl Source {
-    /// Creates an error at a key or a table.
     fn error<T>(&self, code: &str, key: &Spanned<T>, text: impl Into<String>) -> Message {
         let place = position(&self.text, key.span().start);
         Message::at(code, &self.name, Some(place), text).with_source(&self.text)
@@ -83,8 +80,8 @@ pub struct Autopilot {
     pub mode: String,
 }
 
-/// Functions on the robot: their names and designs in `system_modes`, by default those of the knowledge base, or the steps
-/// that put their designs into effect.
+/// Functions on the robot: their names and designs in `system_modes`, by default those of the knowledge base,
+/// or the steps that put their designs into effect.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(transparent)]
 pub struct Functions(BTreeMap<Spanned<String>, FunctionSettings>);
@@ -98,10 +95,10 @@ struct FunctionSettings {
     node: Option<String>,
     /// Mode while the function is not needed.
     unground: Option<String>,
-    /// Modes of designs.
+    /// Modes of designs, by design. The default is the name of the design.
     #[serde(default)]
     modes: BTreeMap<String, String>,
-    /// Steps by designs. If there are any, `system_modes` is not used.
+    /// Steps, by design. If there are any, `system_modes` is not used.
     #[serde(default)]
     designs: BTreeMap<Spanned<String>, Procedure>,
 }
@@ -128,18 +125,16 @@ impl Settings {
         Ok(Self { source: Source { name, text }, ..settings? })
     }
 
-    /// Returns the rules for diagnostics.
     pub(crate) fn rules(&self) -> Vec<DiagnosticRule> {
         self.diagnostics.iter().map(|rule| rule.get_ref().clone()).collect()
     }
 
-    /// Returns the other signals.
     pub(crate) fn signals(&self) -> Vec<Signal> {
         self.signals.iter().map(|signal| signal.get_ref().clone()).collect()
     }
 
-    /// Checks that the mission has the components and attributes of diagnostics and signals. `attribute` returns the reason
-    /// why a name cannot be measured.
+    /// Checks that the mission has the components and attributes of diagnostics and signals. `attribute`
+    /// returns the reason why a name cannot be measured.
     ///
     /// # Errors
     /// All names that the mission does not have.
@@ -174,7 +169,8 @@ impl Settings {
     /// Checks the steps of designs against the designs of the mission, by functions.
     ///
     /// # Errors
-    /// A function or a design does not exist, a design has no steps, or a command is not allowed.
+    /// A function or a design does not exist, a design has no steps, a function has both steps and names for
+    /// `system_modes`, or a command is not allowed.
     pub(crate) fn check_steps(
         &self,
         designs: &BTreeMap<String, Vec<String>>,
@@ -256,12 +252,12 @@ fn position(text: &str, at: usize) -> (usize, usize) {
 }
 
 impl Functions {
-    /// Returns the system of a function.
+    /// Returns the name of a function's system, by default the name of the function.
     pub fn system<'s>(&'s self, function: &'s str) -> &'s str {
         self.0.get(function).and_then(|settings| settings.system.as_deref()).unwrap_or(function)
     }
 
-    /// Returns the node of a function.
+    /// Returns the node of a function, by default `<system>_node`.
     pub fn node(&self, function: &str) -> String {
         let node = self.0.get(function).and_then(|node| node.node.clone());
         node.unwrap_or_else(|| format!("{}_node", self.system(function)))
@@ -285,7 +281,6 @@ impl Functions {
         self.0.get(function).is_some_and(FunctionSettings::has_steps)
     }
 
-    /// Returns all steps, by functions and modes.
     pub(crate) fn procedures(&self) -> BTreeMap<String, BTreeMap<String, Procedure>> {
         let of_function = |settings: &FunctionSettings| {
             settings
@@ -338,7 +333,7 @@ mod tests {
         assert!(message.text().contains("ros.toml:2:8"), "{}", message.text());
     }
 
-    /// Reads settings and returns the first error of the file, or of the check against two functions.
+    /// Reads settings and returns the error of the file, or all errors of the check against two functions.
     fn wrong(text: &str, are_commands_allowed: bool) -> String {
         let directory = tempfile::tempdir().expect("a directory");
         let file = directory.path().join("ros.toml");

@@ -29,7 +29,8 @@ pub use caller::{Accepted, ActionCaller, GoalError, Pursued};
 /// events of a server.
 const POLL_INTERVAL: Duration = Duration::from_millis(2);
 
-/// Time for which the result of an ended goal remains available to clients, as in `rcl_action`.
+/// Minimum time for which the result of an ended goal remains available to clients, as in `rcl_action`. Older
+/// results are removed when another goal ends.
 const LIFETIME: Duration = Duration::from_secs(15 * 60);
 
 type Server<A> = ActionServer<<A as Action>::Goal, <A as Action>::Result, <A as Action>::Feedback>;
@@ -212,7 +213,6 @@ impl<A: Action> Goals<A> {
         }
     }
 
-    /// Publishes the status of all accepted goals.
     fn publish_status(&self) {
         let status = |(goal_id, known): (&GoalId, &Known<A::Result>)| GoalStatus {
             goal_info: GoalInfo { goal_id: *goal_id, stamp: known.accepted },

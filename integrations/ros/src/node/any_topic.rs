@@ -1,5 +1,5 @@
-//! Topics that are subscribed to once they have a publisher, and topics of which only the arrival of messages is observed,
-//! because this program need not know their type.
+//! Topics that are subscribed to once they have a publisher, and topics of which only the arrival of messages
+//! is observed, because this program need not know their type.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -14,10 +14,8 @@ use smol::Timer;
 use crate::interfaces::Msg;
 use crate::node::{Node, Severity, client_name, creation_error, qos};
 
-/// Period of the search for a publisher.
 const SEARCH_PERIOD: Duration = Duration::from_millis(100);
 
-/// Arrivals of messages on a topic.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Arrivals {
     last: Arc<Mutex<Option<Instant>>>,
@@ -44,8 +42,8 @@ impl Node {
         Ok(arrivals)
     }
 
-    /// Subscribes to a topic with the type of its first publisher, and calls `arrived` for each message. The content
-    /// of the messages is not read.
+    /// Subscribes to a topic with the type of a publisher, once there is one, and calls `arrived` for each
+    /// message. The content of the messages is not read.
     ///
     /// # Errors
     /// The name is not a valid topic name.
@@ -97,7 +95,6 @@ impl Node {
 }
 
 impl Node {
-    /// Creates a subscription that does not read the content of messages.
     fn raw_subscription(
         &self,
         topic: &ros2_client::Name,
@@ -110,8 +107,9 @@ impl Node {
         inner.create_subscription(&topic, Some(profile))
     }
 
-    /// Subscribes to a topic once it has a publisher, with the quality of service of that publisher: the last sample of a
-    /// latched topic is received, and no sample of another one is requested again.
+    /// Subscribes to a topic once it has a publisher. If the publisher is latched, samples are received
+    /// reliably, beginning with the last one. Otherwise, only new samples are received, with best effort. A
+    /// failed subscription is logged.
     ///
     /// # Errors
     /// The name is not a valid topic name.
@@ -143,6 +141,7 @@ impl Node {
 }
 
 /// Returns package and name of a message type from its DDS name, such as `std_msgs::msg::dds_::Bool_`.
+/// Returns `None` for other types.
 fn message_type(dds: &str) -> Option<(&str, &str)> {
     let (package, name) = dds.split_once("::msg::dds_::")?;
     Some((package, name.strip_suffix('_')?))

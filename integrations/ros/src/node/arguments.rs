@@ -21,7 +21,6 @@ pub struct RosArguments {
     pub log_level: Option<String>,
 }
 
-/// Remapping rule of a name, for all nodes or a single one.
 #[derive(Debug, Clone)]
 struct Rule {
     node: Option<String>,
@@ -205,8 +204,8 @@ fn flatten(name: &str, value: &Value, nodes: &str, found: &mut Vec<Assigned>, me
     }
 }
 
-/// Converts a YAML value to a parameter. Returns `None` for mappings, null, and lists of mixed
-/// types.
+/// Converts a YAML value to a parameter. Returns `None` for mappings, null, and lists of mixed types other
+/// than numbers.
 pub(crate) fn parameter_value(value: &Value) -> Option<ParameterValue> {
     Some(match value {
         Value::Bool(truth) => ParameterValue::Boolean(*truth),
@@ -223,7 +222,7 @@ pub(crate) fn parameter_value(value: &Value) -> Option<ParameterValue> {
                 )
             } else if all_items(Value::is_bool) {
                 ParameterValue::BooleanArray(list.iter().filter_map(Value::as_bool).collect())
-            // A list of integers and fractions is a list of doubles.
+            // Only integers: a list that also has fractions is a list of doubles.
             } else if all_items(Value::is_i64) {
                 ParameterValue::IntegerArray(list.iter().filter_map(Value::as_i64).collect())
             } else if all_items(Value::is_number) {

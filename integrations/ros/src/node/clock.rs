@@ -1,5 +1,5 @@
-//! Clock of a node: time of the system, or simulated time on `/clock` with the parameter `use_sim_time` (ROS 2 design article
-//! "Clock and Time").
+//! Clock of a node: time of the system, or simulated time on `/clock` with the parameter `use_sim_time` (ROS
+//! 2 design article "Clock and Time").
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -10,10 +10,9 @@ use crate::interfaces::builtin_interfaces::msg::Time;
 use crate::interfaces::rosgraph_msgs::msg::Clock as ClockMessage;
 use crate::node::{Node, Severity, qos};
 
-/// Time without a message on `/clock` after which a warning is logged.
+/// Time from the subscription to `/clock` until a warning is logged if no message has arrived.
 const CLOCK_WAIT: Duration = Duration::from_secs(5);
 
-/// Clock of a node.
 #[derive(Debug)]
 pub(crate) struct Clock {
     state: Mutex<ClockState>,
@@ -28,7 +27,6 @@ struct ClockState {
     is_simulated: bool,
     /// Last message on `/clock`, as time since the epoch of the simulation.
     simulated: Option<Duration>,
-    /// `true` once `/clock` is subscribed to.
     is_subscribed: bool,
 }
 
@@ -48,8 +46,8 @@ impl Clock {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Returns the time since the creation of the clock. Simulated time stands still while the simulation is paused, and
-    /// does not go back when the simulation is started again.
+    /// Returns the time since the creation of the clock. Simulated time stands still while the simulation is
+    /// paused, and does not go back when the simulation is started again.
     pub(crate) fn elapsed(&self) -> Duration {
         let mut state = self.state();
         state.count();
@@ -70,11 +68,10 @@ impl Clock {
         }
     }
 
-    /// Handles a message on `/clock`.
     fn simulate(&self, time: Duration) {
         let mut state = self.state();
         if state.is_simulated {
-            // A new simulation starts at an earlier time, from which is counted on.
+            // A new simulation starts at an earlier time, so its first message adds nothing.
             let step = state.simulated.map_or(Duration::ZERO, |last| time.saturating_sub(last));
             state.elapsed += step;
         }
@@ -106,7 +103,6 @@ impl ClockState {
 }
 
 impl Node {
-    /// Returns the clock.
     pub(crate) fn clock(&self) -> Arc<Clock> {
         Arc::clone(&self.clock)
     }

@@ -15,13 +15,11 @@ use smol::{Task, Timer};
 
 use crate::node::rmw::{Mapping, Rmw, Vendor};
 
-/// Polling interval while waiting for discovery.
 const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
-/// Time to wait for further participants if all discovered ones support both mappings.
+/// Time to wait for further participants if no discovered one determines the mapping.
 const DISCOVERY_WAIT: Duration = Duration::from_secs(1);
 
-/// State of the graph.
 #[derive(Debug)]
 pub(crate) struct Graph {
     rmw: Rmw,
@@ -35,19 +33,15 @@ struct GraphState {
     participants: BTreeMap<[u8; 12], Vendor>,
     first: Option<Instant>,
     endpoints: BTreeMap<[u8; 16], Endpoint>,
-    /// Remote readers that match our writers.
     matched_readers: BTreeSet<[u8; 16]>,
     /// Mapping of our own services, once it is decided.
     mapping: Option<Mapping>,
     /// Expected types of topics, by DDS names, with the type hash.
     expected: BTreeMap<String, Expected>,
-    /// Problems that are not reported yet.
     complaints: Vec<String>,
-    /// Problems that were reported.
     reported: BTreeSet<String>,
 }
 
-/// Type of a topic.
 #[derive(Debug, Clone)]
 pub(crate) struct Expected {
     /// DDS name of the type.
@@ -64,18 +58,15 @@ pub(crate) struct Topics {
 }
 
 impl Topics {
-    /// Topics of the service with this full name.
     pub(crate) fn of(service: &str) -> Self {
         Self { requests: format!("rq{service}Request"), replies: format!("rr{service}Reply") }
     }
 }
 
-/// A server of a service.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Server {
-    /// Mapping of its services.
     pub(crate) mapping: Mapping,
-    /// Reader of its requests.
+    /// GUID of the reader of its requests.
     pub(crate) reader: [u8; 16],
 }
 
@@ -90,23 +81,21 @@ struct Endpoint {
     is_latched: bool,
 }
 
-/// Names and types of the interfaces of the other nodes.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct Endpoints {
-    /// Types of the topics that have a publisher, without those that every node has.
+    /// Types of the topics that have a publisher, by name. `/rosout`, `/parameter_events`, `/diagnostics`,
+    /// and the topics of lifecycles and actions are omitted.
     pub(crate) topics: BTreeMap<String, String>,
-    /// Types of the services.
     pub(crate) services: BTreeMap<String, String>,
-    /// Types of the actions.
     pub(crate) actions: BTreeMap<String, String>,
-    /// Nodes with a lifecycle.
     pub(crate) lifecycle_nodes: Vec<String>,
     /// Functions of `system_modes`, without slash.
     pub(crate) systems: Vec<String>,
 }
 
 impl Endpoints {
-    /// Adds an endpoint. Returns `None` if it belongs to no interface of ROS 2.
+    /// Adds the topic, service or action that an endpoint publishes or serves, unless it is omitted. Returns
+    /// `None` for other endpoints.
     fn add(&mut self, endpoint: &Endpoint) -> Option<()> {
         let (package, rest) = endpoint.type_name.split_once("::")?;
         let (kind, rest) = rest.split_once("::dds_::")?;
@@ -133,7 +122,7 @@ impl Endpoints {
     }
 }
 
-/// First publisher of a topic.
+/// A publisher of a topic.
 #[derive(Debug, Clone)]
 pub(crate) struct Writer {
     /// DDS name of the type.
@@ -224,7 +213,8 @@ impl Graph {
         }
     }
 
-    /// Sets the expected type of a topic. Endpoints with another type are reported and ignored.
+    /// Sets the expected type of a topic. Endpoints with another type or type hash are reported, and the
+    /// messages of such writers are ignored.
     pub(crate) fn expect(&self, topic: String, expected: Expected) {
         let mut state = self.state();
         let complaints: Vec<String> = state
@@ -244,7 +234,6 @@ impl Graph {
         new.into_iter().filter(|complaint| state.reported.insert(complaint.clone())).collect()
     }
 
-    /// Returns `true` if this writer has another type than expected.
     pub(crate) fn is_unfit(&self, writer: Gid) -> bool {
         let state = self.state();
         state.endpoints.get(&writer.to_bytes16()).is_some_and(|endpoint| {
@@ -257,7 +246,6 @@ impl Graph {
         self.state().endpoints.values().any(|endpoint| !endpoint.is_reader && endpoint.topic == topic)
     }
 
-    /// Returns the interfaces of the other nodes.
     pub(crate) fn interfaces(&self) -> Endpoints {
         let mut interfaces = Endpoints::default();
         for endpoint in self.state().endpoints.values() {
@@ -281,8 +269,8 @@ impl Graph {
         Some(Writer { type_name: writer.type_name.clone(), is_latched: writer.is_latched })
     }
 
-    /// Returns the server of a service if there is one. An endpoint with another type name is an error. A differing type hash is
-    /// not: DDS has matched the type names, and the warning has been logged.
+    /// Returns the server of a service if there is one. An endpoint with another type name is an error. A
+    /// differing type hash is not: DDS has matched the type names, and the warning has been logged.
     pub(crate) fn server(&self, topics: &Topics) -> Option<Result<Server, String>> {
         let state = self.state();
         let endpoint = |topic: &str, is_reader: bool| {
@@ -303,11 +291,12 @@ impl Graph {
         Some(Ok(Server { mapping: mapping.unwrap_or(Mapping::Enhanced), reader: *guid }))
     }
 
-    /// Returns `true` if a reply to this client arrives: its reply reader is matched with our reply writer. A server that replies
-    /// earlier loses the reply.
+    /// Returns `true` if a reply to this client arrives: its reply reader is matched with our reply writer. A
+    /// server that replies earlier loses the reply.
     ///
-    /// Fast DDS identifies a client by its reply reader, and other enhanced clients by their request writer. Cyclone DDS sends eight
-    /// bytes that are no GUID, so that every participant that writes requests must have as many reply readers matched.
+    /// Fast DDS identifies a client by its reply reader, and other enhanced clients by their request writer.
+    /// Cyclone DDS sends eight bytes that are no GUID, so that every participant that writes requests must
+    /// have as many reply readers matched.
     pub(crate) fn can_reply(&self, topics: &Topics, client: Gid) -> bool {
         let client = client.to_bytes16();
         let state = self.state();
@@ -336,8 +325,9 @@ impl Graph {
         state.endpoints.iter().filter(|(_, endpoint)| fits(endpoint)).map(|(guid, _)| *guid).collect()
     }
 
-    /// Waits for the mapping of our own services: that of the first participant that supports only
-    /// a single one.
+    /// Waits for the mapping of our own services: a fixed one, or that of a discovered participant that
+    /// supports only a single one. Without such a participant, the enhanced mapping is selected
+    /// [`DISCOVERY_WAIT`] after the first discovery.
     pub(crate) async fn mapping(&self) -> Mapping {
         loop {
             if let Some(mapping) = self.decide() {

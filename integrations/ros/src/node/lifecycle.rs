@@ -32,11 +32,9 @@ pub enum Phase {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum PrimaryState {
-    /// The node is not configured.
     Unconfigured,
     /// The node is configured and does not work.
     Inactive,
-    /// The node works.
     Active,
 }
 
@@ -51,8 +49,8 @@ impl PrimaryState {
         }
     }
 
-    /// Returns the next transition on the way to another state. Active and unconfigured nodes pass through the
-    /// inactive state.
+    /// Returns the next transition on the way to another state, or `None` if the state is reached. Active and
+    /// unconfigured nodes pass through the inactive state.
     pub(crate) fn toward(self, target: Self) -> Option<Transition> {
         let (id, label) = match (self, target) {
             (Self::Unconfigured, Self::Inactive | Self::Active) => {
@@ -79,13 +77,12 @@ impl fmt::Display for PrimaryState {
     }
 }
 
-/// Transition between primary states.
 struct PhaseChange {
     id: u8,
     label: &'static str,
     from: Phase,
     to: Phase,
-    /// Transition state.
+    /// Id and label of the transition state.
     via: (u8, &'static str),
 }
 
@@ -202,11 +199,11 @@ impl Events {
 
 /// Lifecycle of a managed node.
 pub struct Lifecycle {
-    /// A weak reference, because the node holds its services, which hold this.
+    /// A weak reference, because the node holds its services, which hold this lifecycle.
     node: Weak<Node>,
     phase: Mutex<Phase>,
     events: Events,
-    /// Performs a transition. On failure the node keeps its state.
+    /// Performs a transition to the given state. Returns `false` on failure; the node then keeps its state.
     change: Box<dyn Fn(Phase) -> bool + Send + Sync>,
 }
 
@@ -234,8 +231,8 @@ impl Lifecycle {
         Ok(active)
     }
 
-    /// Serves the lifecycle of a node that starts unconfigured. `change` is called before each
-    /// transition with the target state.
+    /// Serves the lifecycle of a node that starts unconfigured. `change` is called in each transition with
+    /// the target state. If it returns `false`, the node keeps its state.
     ///
     /// # Errors
     /// A topic cannot be created.

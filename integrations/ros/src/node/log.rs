@@ -11,7 +11,8 @@ use ros2_client::rosout::RosoutRaw as _;
 
 use crate::node::Node;
 
-/// Upper limit on the number of remembered warnings, each of which is logged only once.
+/// Upper limit on the number of remembered warnings, each of which is logged only once. All of them are
+/// forgotten when the limit is reached.
 const MAX_WARNED: usize = 1000;
 
 /// Severity of a log message.
@@ -66,12 +67,10 @@ impl Severity {
 }
 
 impl Node {
-    /// Returns `true` if the node logs messages of this severity.
     pub(crate) fn is_logged(&self, severity: Severity) -> bool {
         severity >= self.least
     }
 
-    /// Logs a warning unless the same text was logged before.
     pub(crate) fn warn_once(&self, text: &str) {
         let mut warned = self.warned.lock().unwrap_or_else(PoisonError::into_inner);
         if warned.len() >= MAX_WARNED {

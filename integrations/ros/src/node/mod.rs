@@ -1,10 +1,10 @@
-//! A node of a ROS 2 graph over DDS: topics, services, actions, parameters, log and lifecycle,
-//! without a ROS installation.
+//! A node of a ROS 2 graph over DDS: topics, services, actions, parameters, log and lifecycle, without a ROS
+//! installation.
 //!
-//! Names are expanded and remapped as in ROS 2. Received messages are passed to closures on a
-//! thread of the executor, which must return quickly. Samples of the wrong type and endpoints with
-//! another type are reported and ignored. Our own services wait for the first participant that
-//! reveals its mapping of services, see `rmw`.
+//! Names are expanded and remapped as in ROS 2. Received messages are passed to closures on a thread of the
+//! executor, which must return quickly. Samples of the wrong type and endpoints with another type are
+//! reported and ignored. Our own services wait until a participant reveals its mapping of services, at most
+//! for one second after the first discovery (see `rmw`).
 
 mod action;
 mod any_topic;
@@ -76,9 +76,7 @@ pub struct Node {
     arguments: RosArguments,
     graph: Arc<Graph>,
     least: Severity,
-    /// Warnings that were logged, to log each once.
     warned: Mutex<HashSet<String>>,
-    /// Background tasks, which end with the node.
     tasks: Mutex<Vec<Task<()>>>,
     clock: Arc<Clock>,
 }
@@ -93,7 +91,7 @@ impl Node {
     /// Joins the graph. [`Node::declare`] must be called next, to declare the parameters.
     ///
     /// # Errors
-    /// The name is wrong, or the network is not available.
+    /// The name is wrong, the log level is unknown, or the network is not available.
     pub fn open(opening: Opening) -> Result<Arc<Self>, Message> {
         let Opening { name, arguments, network, rmw } = opening;
         let name = arguments.node(&name);
@@ -151,7 +149,6 @@ impl Node {
         self.graph.has_writer(&format!("rt{}", self.resolve(topic)))
     }
 
-    /// Returns the interfaces of the other nodes that are discovered.
     pub(crate) fn endpoints(&self) -> Endpoints {
         self.graph.interfaces()
     }
@@ -167,7 +164,6 @@ impl Node {
         tasks.push(smol::spawn(work));
     }
 
-    /// Logs the problems of the graph periodically.
     fn report_complaints(self: &Arc<Self>) {
         const PERIOD: Duration = Duration::from_millis(100);
         let node = Arc::downgrade(self);
@@ -183,29 +179,25 @@ impl Node {
     }
 }
 
-/// DDS name of a message type.
 fn dds_type(package: &str, kind: &str, name: &str) -> String {
     format!("{package}::{kind}::dds_::{name}_")
 }
 
-/// Converts a full name to a name of the client library.
 fn client_name(full: &str) -> Result<ros2_client::Name, Message> {
     ros2_client::Name::parse(full).map_err(|error| {
         Message::error("N121", format!("`{full}` is not the name of a topic or service: {error}"))
     })
 }
 
-/// Error about an entity that could not be created.
 fn creation_error(entity: &str, error: &dyn std::fmt::Display) -> Message {
     Message::error("N122", format!("{entity} could not be made: {error}"))
 }
 
-/// Returns `true` if the environment specifies Lyrical or later, in which some types differ.
+/// Returns `true` if `ROS_DISTRO` is `lyrical` or `rolling`, in which some message types differ.
 pub(crate) fn is_lyrical() -> bool {
     std::env::var("ROS_DISTRO").is_ok_and(|name| ["lyrical", "rolling"].contains(&name.trim()))
 }
 
-/// Returns the current time as a ROS timestamp.
 pub(crate) fn now() -> crate::interfaces::builtin_interfaces::msg::Time {
     let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
     crate::interfaces::builtin_interfaces::msg::Time {

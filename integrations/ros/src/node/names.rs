@@ -3,7 +3,6 @@
 
 use std::fmt;
 
-/// The full name of a node.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct FullName {
     /// `/` or `/a/b`.
@@ -47,7 +46,6 @@ impl fmt::Display for FullName {
     }
 }
 
-/// Checks the name of a node, topic or service in the settings.
 pub(crate) fn valid_name(kind: &str, name: &str) -> Result<String, String> {
     let is_part = |part: &str| {
         part.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_')
@@ -62,8 +60,9 @@ pub(crate) fn valid_name(kind: &str, name: &str) -> Result<String, String> {
     ))
 }
 
-/// Returns `true` if a pattern of a parameter file matches a node: `*` matches a part of a name,
-/// `**` any number of parts. A pattern without namespace matches a node name in every namespace.
+/// Returns `true` if a pattern of a parameter file matches a node: `*` matches a part of a name, `**` any
+/// number of parts. A pattern that is a single name matches the nodes of this name in every namespace, even
+/// with a leading slash.
 pub(crate) fn is_match(pattern: &str, full: &str, name: &str) -> bool {
     let bare = pattern.trim_start_matches('/');
     if bare == name {

@@ -13,8 +13,8 @@ const GREATEST_DOMAIN: u16 = 232;
 pub struct Network {
     /// ROS domain id: `ROS_DOMAIN_ID`, by default 0.
     pub domain: u16,
-    /// `true` to restrict discovery to this machine: `ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST`, or
-    /// `ROS_LOCALHOST_ONLY=1` of older distributions.
+    /// `true` to restrict discovery to this machine: `ROS_AUTOMATIC_DISCOVERY_RANGE` is `LOCALHOST` (or
+    /// `OFF`, which is not supported), or `ROS_LOCALHOST_ONLY=1` of older distributions.
     pub loopback: bool,
 }
 
@@ -68,7 +68,6 @@ impl Network {
         Ok((Self { domain, loopback }, warnings))
     }
 
-    /// Creates a builder of a DDS participant in this domain and discovery range.
     pub(crate) fn participant(self) -> DomainParticipantBuilder {
         let builder = DomainParticipantBuilder::new(self.domain);
         if self.loopback { builder.with_only_networks([Ipv4Addr::LOCALHOST]) } else { builder }

@@ -36,7 +36,6 @@ pub(crate) fn any_value(_: &ParameterValue) -> Result<(), &'static str> {
     Ok(())
 }
 
-/// Accepts a duration in seconds.
 fn duration(value: &ParameterValue) -> Result<(), &'static str> {
     match value {
         ParameterValue::Double(seconds) if Duration::try_from_secs_f64(*seconds).is_ok() => Ok(()),
@@ -45,7 +44,6 @@ fn duration(value: &ParameterValue) -> Result<(), &'static str> {
 }
 
 impl Declared {
-    /// Converts a value to the type of this parameter and checks it.
     fn accept(&self, value: ParameterValue) -> Result<ParameterValue, String> {
         let value = fitting(&self.value, value)?;
         (self.check)(&value)?;
@@ -55,16 +53,16 @@ impl Declared {
 
 type Table = BTreeMap<String, Declared>;
 
-/// Callback for parameters that are set.
 type Listener = dyn Fn(&str, &ParameterValue) + Send + Sync;
 
 impl Node {
-    /// Declares the parameters of the node, applies the values of the command line, and serves
-    /// them. `changed` is called for each parameter that is set later. Returns warnings about
-    /// undeclared parameters.
+    /// Declares the parameters of the node, applies the values of the command line, and serves them.
+    /// `changed` is called for each parameter that is set later. Returns warnings about undeclared
+    /// parameters.
     ///
     /// # Errors
-    /// The command line gives a value of another type.
+    /// The command line gives a value of another type or a value that the check rejects, or a topic or
+    /// service cannot be created.
     pub fn declare(
         self: &Arc<Self>,
         declared: Vec<Declared>,
@@ -218,7 +216,7 @@ impl Node {
         })
     }
 
-    /// Sets all parameters, or none of them if one is refused.
+    /// Sets all parameters, or none of them if one does not pass its check.
     fn set(
         &self,
         table: &Mutex<Table>,
@@ -311,7 +309,6 @@ fn described(name: &str, parameter: Option<&Declared>) -> msg::ParameterDescript
     }
 }
 
-/// Converts a value to its message.
 pub(crate) fn raw(value: ParameterValue) -> msg::ParameterValue {
     use msg::{ParameterType as Kind, ParameterValue as Raw};
     let unset = Raw::default();

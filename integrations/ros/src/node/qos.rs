@@ -22,7 +22,6 @@ pub(crate) fn sensor_data() -> QosProfile {
     QosProfile::default().reliability_best_effort().history(History::KeepLast { depth: 5 })
 }
 
-/// Profile of services.
 pub(crate) fn service() -> QosProfile {
     depth(10)
 }

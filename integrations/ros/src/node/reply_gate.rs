@@ -18,7 +18,6 @@ use crate::node::graph::{Graph, Topics};
 /// middlewares of ROS 2.
 const TIMEOUT: Duration = Duration::from_millis(100);
 
-/// Interval between two checks of the waiting requests.
 const RECHECK: Duration = Duration::from_millis(1);
 
 /// Upper limit on the number of clients in [`ReplyGate::admitted`]. All clients are removed when
@@ -42,12 +41,10 @@ struct Waiting<T> {
 }
 
 impl<T> ReplyGate<T> {
-    /// Creates an empty queue for the service with the full name `service`.
     pub(crate) fn new(service: &str) -> Self {
         Self { topics: Topics::of(service), waiting: VecDeque::new(), admitted: BTreeSet::new() }
     }
 
-    /// Appends a request to the queue.
     pub(crate) fn push(&mut self, id: RmwRequestId, request: T) {
         self.waiting.push_back(Waiting { since: Instant::now(), id, request });
     }

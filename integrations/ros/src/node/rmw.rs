@@ -76,7 +76,6 @@ pub(crate) enum Vendor {
     Cyclone,
     /// `RustDDS`, 01.12, the DDS library of this program, which supports both mappings.
     Own,
-    /// Another vendor.
     Other,
 }
 

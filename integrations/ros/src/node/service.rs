@@ -55,7 +55,7 @@ pub enum CallError {
         /// Time waited, in seconds.
         waited: String,
     },
-    /// The server has another type or type hash.
+    /// The server has another type.
     #[error("{service} is not what it should be: {complaint}")]
     Unfit {
         /// Full name of the service.

@@ -75,7 +75,9 @@ impl Node {
         Ok(Publisher { inner })
     }
 
-    /// Subscribes to a topic for the lifetime of the node. `take` receives each valid message.
+    /// Subscribes to a topic for the lifetime of the node. `take` receives each valid message of a writer
+    /// with the expected type. Messages that were published before the subscription are received only if
+    /// `qos` is transient local.
     ///
     /// # Errors
     /// Fails if the name is invalid, or the topic exists with another type.

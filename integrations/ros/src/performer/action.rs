@@ -29,7 +29,6 @@ pub(super) trait Meaning: Action + Sized + 'static {
     /// created.
     fn goal(settings: &Self::Settings, call: &Call) -> Result<Self::Goal, String>;
 
-    /// Converts feedback of the ROS action to progress of the action of the plan.
     fn progress(call: &Call, feedback: &Self::Feedback) -> Progress;
 
     /// Returns the reason why a goal has not achieved its purpose according to its result, even if
@@ -37,7 +36,6 @@ pub(super) trait Meaning: Action + Sized + 'static {
     fn shortfall(result: &Self::Result) -> Option<String>;
 }
 
-/// Performer that executes actions of a plan as goals for a ROS action server.
 pub(super) struct Client<A: Meaning> {
     caller: Arc<ActionCaller<A>>,
     settings: A::Settings,
@@ -74,7 +72,6 @@ impl<A: Meaning> Perform for Client<A> {
     }
 }
 
-/// Sends a goal and forwards its progress until the goal ends.
 async fn follow<A: Meaning>(
     caller: &ActionCaller<A>,
     goal: A::Goal,

@@ -24,13 +24,11 @@ use crate::performer::feedback;
 /// Queue depth of the topic, as in PlanSys2.
 pub(super) const QUEUE_DEPTH: usize = 100;
 
-/// Period of repeated requests while no performer has responded.
 const REQUEST_PERIOD: Duration = Duration::from_secs(1);
 
 /// Upper limit on the time to wait for a performer.
 const SEARCH_TIMEOUT: Duration = Duration::from_secs(30);
 
-/// Publisher and subscription of `actions_hub`, with local listeners.
 pub(super) struct Hub {
     name: String,
     publisher: Publisher<ActionExecution>,
@@ -52,7 +50,6 @@ impl Hub {
         Ok(Arc::new(Self { name, publisher, listeners }))
     }
 
-    /// Name of this node in messages on the topic.
     pub(super) fn name(&self) -> &str {
         &self.name
     }
@@ -78,7 +75,6 @@ struct Negotiation {
     performer: Option<String>,
 }
 
-/// Reaction of the executor to a message.
 #[derive(Debug, PartialEq)]
 enum Reaction {
     Nothing,
@@ -152,7 +148,6 @@ async fn negotiate(
     messages: &Receiver<ActionExecution>,
     performance: &Performance,
 ) -> End {
-    /// Event that ends a wait.
     enum Next {
         Message(Option<ActionExecution>),
         Canceled,

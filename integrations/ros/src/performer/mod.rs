@@ -32,7 +32,7 @@ pub use settings::{By, Distribution, Offered, Pose, Poses};
 /// Creates the performers that the settings configure, by action name.
 ///
 /// # Errors
-/// Fails with all invalid names of topics and actions.
+/// Fails with the errors about all topics that cannot be created.
 pub fn performers(
     node: &Arc<Node>,
     actions: &BTreeMap<String, By>,
@@ -82,7 +82,6 @@ fn part(done: f32, whole: f32) -> Option<f32> {
     (whole > 0.0).then(|| (done / whole).clamp(0.0, 1.0))
 }
 
-/// Creates a feedback message.
 fn feedback(completion: Option<f32>, text: impl Into<String>) -> Progress {
     Progress::Feedback { completion, text: text.into() }
 }

@@ -11,7 +11,6 @@ use crate::performer::action::{Client, Meaning};
 use crate::performer::settings::argument;
 use crate::performer::{Distribution, Poses, feedback, part};
 
-/// Settings from which goals for Nav2 are created.
 #[derive(Debug, Clone)]
 pub(super) struct Navigation {
     poses: Poses,
@@ -19,7 +18,6 @@ pub(super) struct Navigation {
     behavior_tree: String,
 }
 
-/// Creates a client of the action server `server` with the message types of a distribution.
 pub(super) fn performer(
     node: &Arc<Node>,
     server: &str,
@@ -65,8 +63,8 @@ fn error(code: u16, text: &str) -> Option<String> {
     (code != 0).then(|| format!("Nav2 says error {code}{because}"))
 }
 
-/// Implements [`Meaning`] for the types of one distribution. The types have the same fields, except
-/// for additional fields of the result.
+/// Implements [`Meaning`] for the types of one distribution. The types have the same fields, except for
+/// additional fields of the result and of the feedback.
 macro_rules! meaning {
     ($($path:ident)::+, |$result:ident| $shortfall:expr) => {
         impl Meaning for $($path)::+::action::NavigateToPose {

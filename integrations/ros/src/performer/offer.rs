@@ -14,14 +14,12 @@ use crate::perform::{Call, End, Perform, Progress, Running};
 use crate::performer::hub::{Hub, QUEUE_DEPTH};
 use crate::performer::{Offered, Poses, performers};
 
-/// Period of the published status.
 const HEARTBEAT: Duration = Duration::from_secs(1);
 
 /// Time without a confirmation after which the executor is assumed to have chosen another
 /// performer.
 const EXECUTOR_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// State of an offered action.
 enum Stage {
     Idle,
     /// The performer has responded to a request for these arguments at this time.
@@ -29,7 +27,6 @@ enum Stage {
     Running(Vec<String>, Running),
 }
 
-/// An action that this program offers to perform for PlanSys2.
 struct Offer {
     hub: Arc<Hub>,
     action: String,
@@ -79,7 +76,7 @@ pub fn offer(
 /// Performs the actions that the settings offer for PlanSys2's executor.
 ///
 /// # Errors
-/// Fails with all invalid names of topics and actions.
+/// Fails with the errors about topics that cannot be created.
 pub fn offers(node: &Arc<Node>, offered: &BTreeMap<String, Offered>, poses: &Poses) -> Result<(), Errors> {
     let by = offered.iter().map(|(action, offered)| (action.clone(), offered.by.clone())).collect();
     for (action, performer) in performers(node, &by, poses)? {

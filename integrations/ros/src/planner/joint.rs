@@ -28,12 +28,11 @@ impl Joint {
         Ok(Arc::new(Self { mission: Mutex::new(mission), diagnosed }))
     }
 
-    /// Returns the mission in its current state.
     pub(crate) fn mission(&self) -> Mission {
         self.lock().clone()
     }
 
-    /// Returns the currently available designs, by object names.
+    /// Returns the names of the currently available designs, in lower case.
     pub(crate) fn available(&self) -> BTreeSet<String> {
         let mission = self.lock();
         let designs = mission.knowledge().map(|knowledge| knowledge.view().function_designs());

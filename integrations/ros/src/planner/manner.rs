@@ -15,7 +15,7 @@ const DEFAULT_TIMEOUT: f64 = 15.0;
 /// Share of the timeout for planning. The reply must arrive before the client times out.
 const PLANNING_SHARE: f64 = 0.9;
 
-/// Default number of alternative plans in the reply of `get_plan_array`.
+/// Default upper limit on the number of alternative plans in the reply of `get_plan_array`.
 const DEFAULT_ALTERNATIVES: usize = 3;
 
 fn declared() -> Vec<Declared> {
@@ -93,7 +93,7 @@ impl Chosen {
     /// parameters before.
     ///
     /// # Errors
-    /// Fails if the command line gives a parameter a value of another type.
+    /// Fails if the command line gives a parameter an invalid value.
     pub(crate) fn declare(node: &Arc<Node>) -> Result<Arc<Self>, Errors> {
         let manner = Manner {
             metric: None,
@@ -115,7 +115,6 @@ impl Chosen {
         Ok(chosen)
     }
 
-    /// Returns the current planning parameters.
     pub(crate) fn get(&self) -> Manner {
         self.lock().clone()
     }

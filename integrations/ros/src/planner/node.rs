@@ -33,10 +33,8 @@ const STACK_SIZE: usize = 64 << 20;
 /// Upper limit on concurrent planning requests. Further requests are refused.
 const MAX_REQUESTS: usize = 8;
 
-/// State of the planner that the services share.
 struct Planner {
     node: Arc<Node>,
-    /// Number of requests that are currently being planned.
     busy: AtomicUsize,
     /// Mission whose knowledge base restricts the designs.
     joint: Option<Arc<Joint>>,
@@ -75,14 +73,13 @@ pub struct Options {
     pub settings: Option<PathBuf>,
 }
 
-/// Polling interval of the stop flag.
 const STOP_POLL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Serves as PlanSys2's planner until `stop` is set, and performs the actions that the settings
-/// offer.
+/// Serves as PlanSys2's planner until `stop` is set, and performs the actions that the settings offer.
 ///
 /// # Errors
-/// Fails if the mission, the settings or a parameter of the command line is wrong.
+/// Fails if the mission, the settings or a parameter of the command line is wrong, or a topic cannot be
+/// created.
 pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(), Errors> {
     let setup = options.mission.as_deref().map(Setup::read).transpose()?;
     for warning in setup.iter().flat_map(|setup| setup.mission.warnings()) {
@@ -104,7 +101,6 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
 }
 
 impl Planner {
-    /// Creates the three services.
     fn answer(self: &Arc<Self>, lifecycle: &Arc<Lifecycle>) -> Result<(), Message> {
         let (planner, phase) = (Arc::clone(self), Arc::clone(lifecycle));
         self.node.serve::<GetPlan>("planner/get_plan", move |request, answer| {
@@ -234,7 +230,6 @@ fn validate_domain_response(is_ready: bool, domain: &str) -> ValidateDomainRespo
     }
 }
 
-/// Guard that decrements the number of current requests when dropped.
 struct CountedRequest<'a>(&'a AtomicUsize);
 
 impl Drop for CountedRequest<'_> {

@@ -1,9 +1,9 @@
 //! Planning for PlanSys2: computes the best plan of a domain and a problem, or the reason why no plan exists.
 //!
-//! PlanSys2's problems have no metric, so the parameters can provide one. Durative actions may
-//! overlap, as in POPF, and the makespan is minimised if there is no metric. Plans are sequential
-//! if no overlapping plan is found in time or a knowledge base is used, because a function has only
-//! one design at a time.
+//! PlanSys2's problems have no metric, so the parameters can provide one. Durative actions may overlap, as in
+//! POPF, and the makespan is minimised if there is no metric. Plans are sequential if no overlapping plan is
+//! found in time. By default, they are also sequential if a knowledge base is used, because a function has
+//! only one design at a time.
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -131,9 +131,7 @@ impl NoPlan {
     }
 }
 
-/// Name of the domain in messages.
 pub(crate) const DOMAIN: &str = "domain";
-/// Name of the problem in messages.
 pub(crate) const PROBLEM: &str = "problem";
 
 /// Formats the errors among the messages, with their locations, on a single line.
@@ -153,7 +151,8 @@ fn one_line(messages: &[Message]) -> String {
 /// plans.
 const OVERLAPPING_SHARE: f64 = 0.7;
 
-/// Computes the best plan for a request. A panic of the planner is returned as [`NoPlan::Fault`].
+/// Computes a plan for a request; an optimal one, if the time limit permits. A panic of the planner is
+/// returned as [`NoPlan::Fault`].
 ///
 /// # Errors
 /// Fails with the reason why there is no plan.
@@ -220,7 +219,8 @@ impl FilledMission<'_> {
         Ok(Some(solution).filter(|solution| solution.status != Status::Unknown))
     }
 
-    /// Computes an optimal sequential plan and alternatives of the same cost.
+    /// Computes the best sequential plan within the limits, and alternatives of the same cost. A task whose
+    /// numbers exceed the range of the SAT encoding gets no alternatives.
     fn sequence(&self, limits: Limits) -> Result<(Solution, Vec<Plan>), NoPlan> {
         let config = Config::default().with_limits(limits);
         let task = match self.mission.ground(self.problem, &[], &config.limits) {
@@ -290,10 +290,6 @@ impl FilledMission<'_> {
     }
 }
 
-/// Checks that a source is a valid PDDL domain.
-///
-/// # Errors
-/// Fails with all errors of the domain.
 pub(crate) fn check_domain(domain: &Source) -> Result<(), Errors> {
     let (tree, mut diagnostics) = pddl::parse_domain(domain);
     if let Some(tree) = &tree {

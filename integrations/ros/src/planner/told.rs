@@ -9,7 +9,6 @@ use crate::interfaces::std_msgs::msg::String as Text;
 use crate::node::{Node, Publisher, Severity, latched};
 use crate::planner::{Found, NoPlan};
 
-/// Publisher of planning results in the log and on the topic `~/plan`.
 #[derive(Debug)]
 pub(crate) struct PlanPublisher {
     node: Arc<Node>,
@@ -17,10 +16,6 @@ pub(crate) struct PlanPublisher {
 }
 
 impl PlanPublisher {
-    /// Creates the publisher and its topic.
-    ///
-    /// # Errors
-    /// Fails if the topic cannot be created.
     pub(crate) fn new(node: &Arc<Node>) -> Result<Self, Errors> {
         let plans = node.publisher("~/plan", latched(1))?;
         Ok(Self { node: Arc::clone(node), plans })

@@ -21,18 +21,16 @@ use crate::interfaces::std_srvs::srv::{
 use crate::node::{Arrivals, CallError, Caller, Node, PrimaryState, fitting, parameter, raw};
 use crate::procedure::settings::{Condition, Operation, Procedure, ServiceCall};
 
-/// Period of repeated observations of a condition.
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Timeout of a single observation of a node.
 pub(super) const OBSERVATION_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Reason for the failure of an operation or a condition.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Failure {
     /// The robot has answered, and the operation has not succeeded.
     Refused(String),
-    /// The robot has not answered.
+    /// The robot has given no valid answer in time.
     Silent(String),
     /// A newer request replaces the procedure.
     Replaced,
@@ -53,7 +51,6 @@ impl From<CallError> for Failure {
     }
 }
 
-/// Service clients of a node.
 struct NodeClient {
     change_state: Caller<ChangeState>,
     get_state: Caller<GetState>,
@@ -61,14 +58,12 @@ struct NodeClient {
     get_parameters: Caller<GetParameters>,
 }
 
-/// Client of a service.
 enum ServiceClient {
     Empty(Caller<Empty>),
     Trigger(Caller<Trigger>),
     SetBool(Caller<SetBool>),
 }
 
-/// All clients, by the names in the settings.
 pub(super) struct Clients {
     nodes: BTreeMap<String, NodeClient>,
     services: BTreeMap<(String, &'static str), ServiceClient>,
@@ -183,7 +178,7 @@ impl Clients {
         }
     }
 
-    /// Returns the GUIDs of the servers that tell the state and the parameters of a node.
+    /// Returns the GUIDs of the servers that report the state or the parameters of a node. Empty for a topic.
     pub(super) fn servers(&self, condition: &Condition) -> BTreeSet<[u8; 16]> {
         let (Condition::State { node, .. } | Condition::Parameters { node, .. }) = condition else {
             return BTreeSet::new();
@@ -195,13 +190,13 @@ impl Clients {
         }
     }
 
-    /// Returns the state of a node.
     async fn state(&self, node: &str, within: Duration) -> Result<State, Failure> {
         let answer = self.node(node)?.get_state.call(GetStateRequest::default(), within).await?;
         Ok(answer.current_state)
     }
 
-    /// Returns the primary state of a node, once it is in no transition. A finalized node is a failure.
+    /// Returns the primary state of a node, once it is in no transition. Fails for a finalized node, and for
+    /// a transition that does not end before the deadline.
     async fn primary_state(&self, node: &str, deadline: Instant) -> Result<PrimaryState, Failure> {
         loop {
             let state = self.state(node, remaining(deadline)).await?;
@@ -221,7 +216,8 @@ impl Clients {
         }
     }
 
-    /// Brings a node to a state. Returns its state before.
+    /// Brings a node to a state by successive transitions. Passes its initial state to `before`. Fails if a
+    /// transition is refused or the deadline passes.
     pub(super) async fn bring(
         &self,
         node: &str,
@@ -245,7 +241,7 @@ impl Clients {
         Ok(())
     }
 
-    /// Returns the present values of parameters; a parameter that does not exist is not set.
+    /// Returns the present values of parameters, `NotSet` for a parameter that does not exist.
     pub(super) async fn parameters(
         &self,
         node: &str,
@@ -264,7 +260,8 @@ impl Clients {
         Ok(present)
     }
 
-    /// Sets parameters atomically and checks the values afterwards. Returns without a call if the node has the values.
+    /// Sets parameters atomically and checks the values afterwards. Passes the earlier values to `before`.
+    /// Sets nothing if the node already has the values.
     pub(super) async fn set(
         &self,
         node: &str,
@@ -305,7 +302,6 @@ impl Clients {
         }
     }
 
-    /// Calls a service.
     pub(super) async fn call(
         &self,
         service: &str,
@@ -331,7 +327,8 @@ impl Clients {
         if success { Ok(()) } else { Err(Failure::Refused(format!("{service} has refused: {message}"))) }
     }
 
-    /// Returns `true` if a node has a state or parameters. The arrival of messages is not tested here.
+    /// Returns `true` if a node has the required state or parameters, and always for a topic. Fails if the
+    /// node is silent or in a transition.
     pub(super) async fn holds(&self, condition: &Condition) -> Result<bool, Failure> {
         match condition {
             Condition::State { node, state } => {
@@ -350,7 +347,8 @@ impl Clients {
         }
     }
 
-    /// Waits until a condition holds.
+    /// Waits until a condition holds, at most until the deadline. A message on a topic counts if it arrives
+    /// from `since` on.
     pub(super) async fn until(
         &self,
         condition: &Condition,
@@ -378,7 +376,7 @@ impl Clients {
     }
 }
 
-/// Executes a program. Its output goes to standard error, and it is killed at the deadline.
+/// Executes a program. Its output goes to standard error. It is killed at the deadline.
 pub(super) async fn execute(words: &[String], deadline: Instant) -> Result<(), Failure> {
     let [program, arguments @ ..] = words else { return Ok(()) };
     let child = smol::process::Command::new(program)

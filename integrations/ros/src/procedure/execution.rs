@@ -12,7 +12,6 @@ use crate::node::{Node, Severity};
 use crate::procedure::clients::{Clients, Failure, OBSERVATION_TIMEOUT, execute};
 use crate::procedure::settings::{Condition, Operation, Procedure};
 
-/// Outcome of a procedure.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Outcome {
     /// All steps have succeeded and all conditions hold.
@@ -23,7 +22,6 @@ pub(crate) enum Outcome {
     Silent(String),
 }
 
-/// Design of a function as it is seen on the robot.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Seen {
     /// The conditions of this mode hold.
@@ -36,10 +34,8 @@ pub(crate) enum Seen {
     Ambiguous,
 }
 
-/// Receiver of events about steps.
 type Report = dyn Fn(&Value) + Send + Sync;
 
-/// Procedures of one function.
 struct FunctionProcedures {
     modes: BTreeMap<String, Procedure>,
     /// Held while a procedure runs, so that procedures of a function never overlap.
@@ -50,7 +46,6 @@ struct FunctionProcedures {
     silent: Mutex<BTreeSet<String>>,
 }
 
-/// Procedures of all functions that have some.
 pub(crate) struct Procedures {
     node: Arc<Node>,
     functions: BTreeMap<String, FunctionProcedures>,
@@ -58,7 +53,6 @@ pub(crate) struct Procedures {
     report: Box<Report>,
 }
 
-/// Operation that undoes a step.
 #[derive(Debug)]
 enum Undo {
     Operation(Operation),
@@ -89,12 +83,11 @@ impl Procedures {
         Ok(Self { node: Arc::clone(node), functions: functions.collect(), clients, report: Box::new(report) })
     }
 
-    /// Returns `true` if a function has procedures.
     pub(crate) fn contains(&self, function: &str) -> bool {
         self.functions.contains_key(function)
     }
 
-    /// Returns `true` if a function has procedures, and none of them sets a state or a parameter.
+    /// Returns `true` if a function has procedures, and none of them sets or verifies a state or a parameter.
     pub(crate) fn is_unobservable(&self, function: &str) -> bool {
         self.functions.get(function).is_some_and(|procedures| procedures.conditions().next().is_none())
     }
@@ -109,14 +102,16 @@ impl Procedures {
         conditions.filter_map(node).collect()
     }
 
-    /// Returns the servers of these nodes. A restarted or lost node changes them.
+    /// Returns the servers of the nodes that show the mode of a function. A restarted or lost node changes
+    /// them.
     pub(crate) fn servers(&self, function: &str) -> BTreeSet<[u8; 16]> {
         let conditions = self.functions.get(function).into_iter().flat_map(FunctionProcedures::conditions);
         conditions.flat_map(|condition| self.clients.servers(&condition)).collect()
     }
 
-    /// Waits until all services of at least one mode of a function exist. Returns the missing ones of the mode that
-    /// lacks the fewest. Services that are used after a command may be started by it and are not waited for.
+    /// Waits for the services of all modes of a function, at most for `within`. Returns the missing ones of
+    /// the mode that lacks the fewest. Services that are used after a command may be started by it and are
+    /// not waited for.
     pub(crate) async fn missing(&self, function: &str, within: Duration) -> Vec<String> {
         let Some(procedures) = self.functions.get(function) else { return Vec::new() };
         let of_mode = |procedure: &'_ Procedure| {
@@ -135,7 +130,9 @@ impl Procedures {
         missing.into_iter().min_by_key(Vec::len).unwrap_or_default()
     }
 
-    /// Returns the mode whose conditions hold: of several, the one with the most conditions.
+    /// Returns the mode whose conditions hold: of several, the one with the most conditions, or else the one
+    /// that was put into effect or seen last. While a mode without observable conditions is in effect, it is
+    /// returned. The result is [`Seen::Unknown`] while a procedure runs.
     pub(crate) async fn observe(&self, function: &str) -> Seen {
         let Some(procedures) = self.functions.get(function) else { return Seen::Ambiguous };
         // The modes in the middle of a procedure mean nothing.
@@ -179,7 +176,8 @@ impl Procedures {
         Seen::Mode(observed_mode)
     }
 
-    /// Returns whether a condition holds; `None` if its node is silent. A node that does not exist meets no condition.
+    /// Returns `Some(true)` if a condition holds, and `None` if its node is silent. A node that does not
+    /// exist meets no condition.
     async fn observed(&self, condition: &Condition) -> Option<bool> {
         if self.clients.servers(condition).is_empty() && !matches!(condition, Condition::Topic(_)) {
             return Some(false);
@@ -187,7 +185,7 @@ impl Procedures {
         self.clients.holds(condition).await.ok()
     }
 
-    /// Returns `true` if the nodes answer whose silence has ended a procedure.
+    /// Returns `true` if the nodes whose silence has ended a procedure answer again.
     pub(crate) async fn answers(&self, function: &str) -> bool {
         let Some(procedures) = self.functions.get(function) else { return false };
         let silent = procedures.silent.lock().unwrap_or_else(PoisonError::into_inner).clone();
@@ -203,8 +201,8 @@ impl Procedures {
         true
     }
 
-    /// Puts a mode of a function into effect. A procedure that still runs for the function is undone first; its caller
-    /// must have set its `is_replaced` before.
+    /// Puts a mode of a function into effect. A procedure that still runs for the function is undone first;
+    /// its caller must have set its `is_replaced` before.
     pub(crate) async fn apply(
         &self,
         function: &str,
@@ -255,7 +253,6 @@ impl FunctionProcedures {
     }
 }
 
-/// A running procedure.
 struct Run<'r> {
     procedures: &'r Procedures,
     function: &'r str,
@@ -264,7 +261,8 @@ struct Run<'r> {
 }
 
 impl Run<'_> {
-    /// Executes all steps, and waits for all conditions. Collects the operations that undo the steps.
+    /// Executes all steps, and waits for all conditions. Stops at the first failure, or if the procedure is
+    /// replaced. Collects the operations that undo the steps.
     async fn perform(
         &self,
         procedure: &Procedure,
@@ -352,8 +350,8 @@ impl Run<'_> {
         outcome
     }
 
-    /// Undoes steps in reverse order, with a timeout for the first undo and one for each other. A step that cannot be
-    /// undone does not stop the others.
+    /// Undoes steps in reverse order, with a timeout for the first undo and one for each other. A step that
+    /// cannot be undone does not stop the others.
     async fn roll_back(&self, undos: Vec<Undo>, first: Duration, other: Duration) {
         for (index, undo) in undos.into_iter().rev().enumerate() {
             let deadline = Instant::now() + if index == 0 { first } else { other };
@@ -376,7 +374,6 @@ impl Run<'_> {
         self.procedures.node.log(Severity::Warn, &text);
     }
 
-    /// Publishes the result of a step.
     fn report(&self, operation: &Operation, outcome: &str, failure: Option<&Failure>) {
         let mut event = json!({
             "answer": "step", "function": self.function, "mode": self.mode, "step": operation.to_string(),

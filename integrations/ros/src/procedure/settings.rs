@@ -21,7 +21,8 @@ pub(crate) struct Procedure {
     pub(crate) steps: Vec<Step>,
     /// Conditions that must hold after the last step, in addition to the results of the steps.
     pub(crate) conditions: Vec<Condition>,
-    /// Time for all steps and conditions. `None` selects the parameter `call_timeout`.
+    /// Time for all steps and conditions. `None` selects the timeout of the caller: the parameter
+    /// `call_timeout` of the manager, or the fixed timeout of the reasoner.
     pub(crate) timeout: Option<Duration>,
 }
 
@@ -33,20 +34,26 @@ pub(crate) struct Step {
     pub(crate) undo: Option<Operation>,
 }
 
-/// An operation on the robot.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Operation {
     /// Transitions of a lifecycle node until it has a state.
-    State { node: String, state: PrimaryState },
+    State {
+        node: String,
+        state: PrimaryState,
+    },
     /// Parameters of a node, set atomically.
-    Parameters { node: String, values: Vec<(String, ParameterValue)> },
-    /// A call of a service.
-    Service { service: String, call: ServiceCall },
+    Parameters {
+        node: String,
+        values: Vec<(String, ParameterValue)>,
+    },
+    Service {
+        service: String,
+        call: ServiceCall,
+    },
     /// A program with its arguments; no shell is involved.
     Command(Vec<String>),
 }
 
-/// Type and request of a service call.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ServiceCall {
     Empty,
@@ -54,13 +61,16 @@ pub(crate) enum ServiceCall {
     SetBool(bool),
 }
 
-/// A condition on the robot.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Condition {
-    /// A lifecycle node has a state.
-    State { node: String, state: PrimaryState },
-    /// A node has these values of parameters.
-    Parameters { node: String, values: Vec<(String, ParameterValue)> },
+    State {
+        node: String,
+        state: PrimaryState,
+    },
+    Parameters {
+        node: String,
+        values: Vec<(String, ParameterValue)>,
+    },
     /// A message arrives on a topic.
     Topic(String),
 }
@@ -93,13 +103,11 @@ impl TryFrom<ProcedureEntry> for Procedure {
     }
 }
 
-/// Converts a timeout, which must be positive.
 fn positive_seconds(seconds: f64) -> Result<Duration, &'static str> {
     let duration = Duration::try_from_secs_f64(seconds).ok().filter(|duration| !duration.is_zero());
     duration.ok_or("`timeout` must be a number of seconds greater than 0")
 }
 
-/// An entry of `steps`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct StepEntry {
@@ -113,7 +121,6 @@ struct StepEntry {
     undo: Option<UndoEntry>,
 }
 
-/// The value of `undo`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct UndoEntry {
@@ -174,7 +181,6 @@ impl TryFrom<StepEntry> for Step {
     }
 }
 
-/// An entry of `verify`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ConditionEntry {
@@ -211,7 +217,6 @@ impl TryFrom<ConditionEntry> for Condition {
     }
 }
 
-/// State or parameters of a node.
 enum Target {
     State(String, PrimaryState),
     Parameters(String, Vec<(String, ParameterValue)>),
@@ -296,8 +301,8 @@ impl Operation {
 }
 
 impl Procedure {
-    /// Returns all conditions that hold while the design is in effect and that can be observed at any time. A node that
-    /// occurs in several steps has only its last state.
+    /// Returns all conditions that hold while the design is in effect and that can be observed at any time. A
+    /// node that occurs in several steps has only its last state.
     pub(crate) fn lasting(&self) -> Vec<Condition> {
         let steps = self.steps.iter().filter_map(|step| step.operation.condition());
         let conditions = self.conditions.iter().filter(|condition| !matches!(condition, Condition::Topic(_)));
@@ -330,7 +335,6 @@ impl Procedure {
         self.steps.iter().flat_map(|step| std::iter::once(&step.operation).chain(&step.undo))
     }
 
-    /// Returns `true` if a step or an undo executes a command.
     pub(crate) fn has_command(&self) -> bool {
         self.operations().any(|operation| matches!(operation, Operation::Command(_)))
     }
@@ -360,7 +364,6 @@ impl fmt::Display for Condition {
     }
 }
 
-/// Names of parameters, joined with commas.
 fn names(values: &[(String, ParameterValue)]) -> String {
     values.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ")
 }

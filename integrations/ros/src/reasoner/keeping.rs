@@ -14,13 +14,12 @@ use crate::interfaces::mros2_msgs::msg::QoS;
 use crate::manager::Functions;
 use crate::reasoner::memory::{Memory, Remembered};
 
-/// Delay until a refused design is retried.
+/// Delay until a design is retried that was refused or whose steps failed.
 const REFUSED_DELAY: Duration = Duration::from_secs(60);
 
-/// Initial delay until a design without a reply is retried; doubled with each attempt.
+/// Initial delay until a design without a reply is retried; doubled with each attempt, up to 64 s.
 const SILENT_DELAY: Duration = Duration::from_secs(2);
 
-/// Output of the reasoner.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Output {
     /// Request the mode of a function.
@@ -29,13 +28,10 @@ pub(super) enum Output {
     Feedback(GoalId, QoS),
     /// Answer a cancel request. `true` if the goal has ended.
     Cancelled(GoalId, bool),
-    /// Publish an event.
     Event(Value),
-    /// Log a warning.
     Warn(String),
 }
 
-/// A requested mode.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Wanted {
     pub(super) function: String,
@@ -44,7 +40,6 @@ pub(super) struct Wanted {
     effect: Option<u64>,
 }
 
-/// Outcome of a request.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Outcome {
     Done,
@@ -55,13 +50,11 @@ pub(super) enum Outcome {
     StepFailed(String),
 }
 
-/// An objective of a client.
 #[derive(Debug)]
 struct Pursued {
     objective: String,
     function: String,
     always_improve: bool,
-    /// Confirmed design of the function.
     design: Option<String>,
     /// `true` while cancellation waits for the function.
     cancelling: bool,
@@ -69,7 +62,6 @@ struct Pursued {
     wanted: QoS,
 }
 
-/// State of the reasoner in addition to the knowledge base.
 #[derive(Debug)]
 pub(super) struct Keeping {
     keeper: Keeper,
@@ -79,7 +71,6 @@ pub(super) struct Keeping {
     pending: BTreeMap<String, (Wanted, Option<String>)>,
     /// Failed designs with the time of the next attempt and the number of missing replies.
     failed: BTreeMap<String, (Duration, u32)>,
-    /// Last measured values.
     measured: BTreeMap<String, String>,
     /// Last event by subject.
     reports: BTreeMap<String, String>,
@@ -105,22 +96,19 @@ impl Keeping {
         }
     }
 
-    /// Returns the functions that have designs.
     pub(super) fn functions(&self) -> Vec<String> {
         self.keeper.configurator().functions()
     }
 
-    /// Returns the name of a function on the robot.
     pub(super) fn system<'s>(&'s self, function: &'s str) -> &'s str {
         self.functions.system(function)
     }
 
-    /// Returns the outputs since the last call.
     pub(super) fn outputs(&mut self) -> Vec<Output> {
         std::mem::take(&mut self.outputs)
     }
 
-    /// Returns the state that must survive a restart.
+    /// Returns the state that must survive a restart, without goals that are being cancelled.
     pub(super) fn memory(&self) -> Memory {
         let goal = |(goal, pursued): (&GoalId, &Pursued)| Remembered {
             goal: goal.uuid.into_bytes(),
@@ -167,7 +155,6 @@ impl Keeping {
         Some(format!("the requirement {} is `{}`, which is not a number", invalid.key, invalid.value))
     }
 
-    /// Starts to pursue a goal that is not rejected.
     pub(super) fn pursue(&mut self, goal: GoalId, wanted: &QoS) {
         self.count += 1;
         let requested = wanted.objective_id.trim();
@@ -202,8 +189,8 @@ impl Keeping {
         self.publish_status(goal);
     }
 
-    /// Cancels a goal: requests the unground mode of its function, and ends the goal when the mode is
-    /// set. The cancellation of an unknown goal is rejected.
+    /// Cancels a goal: requests the unground mode of its function, and ends the goal when the mode is set.
+    /// Without such a mode, the goal ends at once. The cancellation of an unknown goal is rejected.
     pub(super) fn cancel(&mut self, goal: GoalId) {
         let Some(pursued) = self.goals.get_mut(&goal) else {
             self.outputs.push(Output::Cancelled(goal, false));
@@ -223,7 +210,6 @@ impl Keeping {
         self.outputs.push(Output::Configure(wanted));
     }
 
-    /// Handles a line of events in the format of the loop.
     pub(super) fn handle_line(&mut self, line: &str) {
         let observation = Observation::parse(line);
         for event in observation.events.iter().flatten() {
@@ -274,7 +260,6 @@ impl Keeping {
         }
     }
 
-    /// Handles the outcome of a request.
     pub(super) fn answered(&mut self, wanted: &Wanted, outcome: Outcome, now: Duration) {
         let is_awaited = self.pending.get(&wanted.function).is_some_and(|(pending, _)| pending == wanted);
         let Some((_, design)) = is_awaited.then(|| self.pending.remove(&wanted.function)).flatten() else {
@@ -306,7 +291,6 @@ impl Keeping {
         }
     }
 
-    /// Handles a confirmed design.
     fn has(&mut self, function: &str, design: &str, effect: Option<u64>) {
         self.failed.remove(design);
         if let Some(effect) = effect {

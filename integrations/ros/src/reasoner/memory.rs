@@ -13,10 +13,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::interfaces::mros2_msgs::msg::QoS;
 
-/// Version of the file format, as written to the file.
 const FORMAT: &str = "metaplan-reasoner/1";
 
-/// Contents of the state file.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Memory {
     format: String,

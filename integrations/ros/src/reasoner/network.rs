@@ -24,13 +24,10 @@ use crate::procedure::{self, Procedure, Procedures, Seen};
 use crate::reasoner::keeping::{Keeping, Outcome, Output, Wanted};
 use crate::reasoner::memory::{MemoryFile, Remembered};
 
-/// Timeout of a mode change.
 const CHANGE_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Timeout of a function's reply with its mode.
 const MODE_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Input of the reasoner.
 enum Input {
     Wanted(Offer, QoS),
     Cancel(GoalId, CancelRequest),
@@ -38,12 +35,10 @@ enum Input {
     Answered(Wanted, Outcome),
 }
 
-/// All topics, services and actions of the reasoner.
 pub(super) struct Network {
     node: Arc<Node>,
     keeping: Keeping,
     goals: Arc<Goals<ControlQos>>,
-    /// Cancel requests without an answer.
     cancels: BTreeMap<GoalId, CancelRequest>,
     bridge: Arc<Caller<MetacontrolFD>>,
     systems: BTreeMap<String, Arc<Caller<ChangeMode>>>,
@@ -157,7 +152,6 @@ impl Network {
         Ok(())
     }
 
-    /// Resumes the goals from before a restart.
     fn go_on(&mut self) {
         let Some(memory) = self.memory.as_ref().map(MemoryFile::read) else { return };
         if !memory.goals.is_empty() {
@@ -236,8 +230,8 @@ impl Network {
         }
     }
 
-    /// Executes the steps of a mode, if the settings have some. Otherwise requests the mode from MROS's bridge, or from the
-    /// function itself if there is no bridge.
+    /// Executes the steps of a mode, if the settings have some. Otherwise requests the mode from MROS's
+    /// bridge, or from the function itself if only its service has a server.
     fn configure(&mut self, wanted: Wanted) {
         if self.procedures.contains(&wanted.function) {
             self.execute(wanted);

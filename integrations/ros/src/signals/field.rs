@@ -3,19 +3,16 @@
 use metaplan::message::did_you_mean;
 use serde_json::Value;
 
-/// Part of a path.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Part {
     Field(String),
     Index(usize),
 }
 
-/// Path to a field of a message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct FieldPath(Vec<Part>);
 
 impl FieldPath {
-    /// Parses a path.
     pub(crate) fn parse(text: &str) -> Result<Self, String> {
         let wrong = || {
             format!(
@@ -74,7 +71,6 @@ impl FieldPath {
         }
     }
 
-    /// Returns the value of the field.
     pub(crate) fn find<'v>(&self, message: &'v Value) -> Option<&'v Value> {
         self.0.iter().try_fold(message, |value, part| match part {
             Part::Field(name) => value.get(name),

@@ -5,7 +5,7 @@
 //! | state of a lifecycle node | works in the stated state | |
 //! | presence of a node | works while the node exists | |
 //! | field of a message | works while the value meets a condition | the value, converted |
-//! | rate of a topic | works while the rate is high enough | messages per second |
+//! | rate of a topic | works while the rate meets a condition, by default while it is not 0 | messages per second |
 //!
 //! Each signal becomes a status of the loop, as if a monitor of MROS had published it.
 

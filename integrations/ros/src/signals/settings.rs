@@ -16,33 +16,42 @@ use crate::validated::validated;
 /// Default of the least time between two reports of a signal.
 const REPORT_INTERVAL: Duration = Duration::from_millis(100);
 
-/// Default of the time without a message after which a topic is silent.
+/// Default of the period in which the messages of a topic are counted for its rate.
 const SILENCE: Duration = Duration::from_secs(2);
 
-/// A signal with its target.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Signal {
     pub(crate) source: Source,
     pub(crate) target: Target,
-    /// Least time between two reports.
+    /// Least time between two reports of a field or a rate. Reports of silence, presence and states are not
+    /// limited.
     pub(crate) every: Duration,
     filter: Filter,
 }
 
-/// Origin of a signal.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Source {
-    /// State of a lifecycle node.
-    State { node: String, state: PrimaryState },
-    /// Presence of a node.
-    Presence { node: String },
+    State {
+        node: String,
+        state: PrimaryState,
+    },
+    Presence {
+        node: String,
+    },
     /// Field of the messages on a topic. Silence after `period` is a failure of a component.
-    Field { topic: String, kind: String, field: FieldPath, period: Option<Duration> },
+    Field {
+        topic: String,
+        kind: String,
+        field: FieldPath,
+        period: Option<Duration>,
+    },
     /// Messages per second on a topic, within the last `period`.
-    Rate { topic: String, period: Duration },
+    Rate {
+        topic: String,
+        period: Duration,
+    },
 }
 
-/// Target of a signal.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Target {
     /// The component works while the condition holds.
@@ -76,7 +85,8 @@ impl Condition {
     }
 }
 
-/// Returns the number of a JSON value. Truth values are 0 and 1.
+/// Converts a JSON value to a number. Truth values become 0 and 1. Returns `None` for texts, lists and
+/// objects.
 pub(crate) fn number(value: &Value) -> Option<f64> {
     match value {
         Value::Bool(truth) => Some(f64::from(u8::from(*truth))),
@@ -84,7 +94,6 @@ pub(crate) fn number(value: &Value) -> Option<f64> {
     }
 }
 
-/// Settings of the loop's filter of the target.
 #[derive(Debug, Clone, Default, PartialEq)]
 struct Filter {
     period: Option<Duration>,
@@ -95,7 +104,6 @@ struct Filter {
     heal_time: Option<Duration>,
 }
 
-/// Value of a silent attribute, as in the manifest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum StaleWord {
@@ -104,7 +112,6 @@ enum StaleWord {
     Unknown,
 }
 
-/// A table `[[signals]]`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Entry {
@@ -273,7 +280,6 @@ fn target(entry: &Entry, source: &Source) -> Result<Target, String> {
     }
 }
 
-/// Creates a message with default values, as JSON.
 struct DefaultMessage;
 
 impl MessageVisitor for DefaultMessage {
@@ -286,7 +292,7 @@ impl MessageVisitor for DefaultMessage {
 }
 
 impl Signal {
-    /// Returns the component or the attribute.
+    /// Returns the component or the attribute that the signal concerns. The other part of the pair is `None`.
     pub(crate) fn target(&self) -> (Option<&str>, Option<&str>) {
         match &self.target {
             Target::Component { component, .. } => (Some(component), None),
@@ -294,7 +300,8 @@ impl Signal {
         }
     }
 
-    /// Adds the filter of this signal to those of the loop. Values of the manifest are replaced.
+    /// Adds the filter of this signal to those of the loop. Of the filter in the manifest, only the values
+    /// that the signal gives are replaced.
     pub(crate) fn add_filter(&self, filters: &mut FilterSettings) {
         let Filter { period, stale, hysteresis, debounce, confirm_time, heal_time } = &self.filter;
         match &self.target {
@@ -328,7 +335,8 @@ impl Signal {
     }
 }
 
-/// Writes a number as an exact fraction of integers, so that 0.05 is 5/100 and not the nearest binary number.
+/// Formats a number as an exact fraction of integers, so that 0.05 is 5/100 and not the nearest binary
+/// number.
 fn decimal_fraction(number: f64) -> String {
     let text = number.to_string();
     let (whole, decimals) = text.split_once('.').unwrap_or((&text, ""));

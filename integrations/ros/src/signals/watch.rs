@@ -1,4 +1,4 @@
-//! Observation of signals: each change becomes a status of the loop.
+//! Observation of signals, reported to the loop as statuses.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -21,16 +21,16 @@ use crate::signals::settings::{Condition, Signal, Source, Target, number};
 /// Period of checks whether nodes exist and topics are silent.
 const CHECK_PERIOD: Duration = Duration::from_millis(250);
 
-/// Time after the start during which nodes and topics that were never seen do not count as missing: DDS may not have discovered them yet.
+/// Time after the start during which nodes and topics that were never seen do not count as missing: DDS may
+/// not have discovered them yet.
 const DISCOVERY_TIME: Duration = Duration::from_secs(3);
 
-/// Timeout of the state of a lifecycle node.
 const STATE_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Receiver of statuses for the loop.
 pub(crate) type Report = Arc<dyn Fn(DiagnosticStatus) + Send + Sync>;
 
-/// Observes signals until the returned tasks are dropped.
+/// Observes signals. Polling lasts until the returned tasks are dropped, subscriptions last as long as the
+/// node.
 ///
 /// # Errors
 /// A topic cannot be subscribed to.
@@ -73,7 +73,6 @@ pub(crate) fn watch(node: &Arc<Node>, signals: &[Signal], report: &Report) -> Re
     Ok(tasks)
 }
 
-/// Calls a closure periodically until the task is dropped.
 fn repeat(period: Duration, mut work: impl FnMut() + Send + 'static) -> Task<()> {
     smol::spawn(async move {
         loop {
@@ -83,7 +82,6 @@ fn repeat(period: Duration, mut work: impl FnMut() + Send + 'static) -> Task<()>
     })
 }
 
-/// Target of a signal, and the receiver of its reports.
 #[derive(Clone)]
 struct Reporter {
     target: Target,
@@ -127,7 +125,6 @@ impl Reporter {
 
 type Take = Box<dyn FnMut(&dyn Fn() -> Value) + Send>;
 
-/// Subscribes to a topic with a type that is known by its name.
 struct Subscribe<'n> {
     node: &'n Arc<Node>,
     topic: &'n str,
@@ -146,7 +143,8 @@ impl MessageVisitor for Subscribe<'_> {
     }
 }
 
-/// Reports a component as failed while no message arrives.
+/// Reports a component as failed while the last message is older than `period`. Messages themselves are
+/// reported by the subscription.
 fn watch_silence(
     clock: Arc<Clock>,
     started: Duration,
@@ -165,7 +163,8 @@ fn watch_silence(
     })
 }
 
-/// Reports the messages per second within the last period.
+/// Reports the messages per second within the last period. Without a condition, a component works if there
+/// was any message.
 fn watch_rate(
     node: &Arc<Node>,
     topic: &str,
@@ -208,7 +207,8 @@ fn watch_rate(
     }))
 }
 
-/// Reports a component as working while a node exists. A node exists while its parameter service does.
+/// Reports whether a node exists, that is, whether its parameter service does. Nothing is reported during the
+/// discovery time, unless the node was seen.
 fn watch_presence(node: &Arc<Node>, name: &str, reporter: Reporter) -> Task<()> {
     let service: Caller<GetParameters> = node.caller(&format!("{name}/get_parameters"));
     let started = Instant::now();
@@ -222,7 +222,8 @@ fn watch_presence(node: &Arc<Node>, name: &str, reporter: Reporter) -> Task<()> 
     })
 }
 
-/// Reports a component as working while a lifecycle node has a state.
+/// Reports whether a lifecycle node has a state: after each transition, and when its service appears or
+/// disappears.
 fn watch_state(
     node: &Arc<Node>,
     name: &str,

@@ -46,7 +46,6 @@ fn failed(component: &str) -> DiagnosticArray {
     DiagnosticArray { status, ..Default::default() }
 }
 
-/// Starts the controller on a thread, which returns its result.
 fn control(domain: u16, stop: &Arc<AtomicBool>) -> std::thread::JoinHandle<Result<(), String>> {
     let controller = node(domain, "metaplan", "");
     let (options, stop) =

@@ -17,7 +17,6 @@ use metaplan_ros::planner::{self, Found, Manner, NoPlan, Request};
 use crate::common::{domain, node, until};
 use crate::performers::{Cast, hear, serve};
 
-/// Path of a file of the example.
 pub fn file(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/nav2").join(name)
 }

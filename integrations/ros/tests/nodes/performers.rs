@@ -63,7 +63,6 @@ pub fn hear(running: &Running) -> (Vec<Progress>, End) {
     }
 }
 
-/// The performers that a settings file configures, by action name.
 pub struct Cast(BTreeMap<String, Box<dyn Perform>>);
 
 impl Cast {
@@ -86,8 +85,8 @@ fn cast(domain: u16, settings: &str) -> (Arc<Node>, Cast) {
     (manager, cast)
 }
 
-/// Serves an action: accepts each goal, sends one feedback message, and ends the goal with a given
-/// outcome. Goals are cancelled on request.
+/// Serves an action: accepts each goal, sends one feedback message, and ends the goal with the given outcome.
+/// Without an outcome, the goal runs until it is cancelled.
 pub fn serve<A: Action + 'static>(
     node: &Arc<Node>,
     name: &str,
@@ -278,7 +277,6 @@ fn what_the_settings_offer_is_done_for_plansys2() {
     assert!(matches!(&end, End::Failed(because) if because.contains("refused")), "{end:?}");
 }
 
-/// Performer whose outcome depends on the first argument, the name of the robot.
 struct Own {
     begun: Arc<Mutex<Vec<Call>>>,
 }

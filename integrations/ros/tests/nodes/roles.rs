@@ -31,7 +31,7 @@ const MODES: [(&str, &[&str]); 4] = [
     ("generate_recharge_path", &["normal", "inactive", "fd_unground"]),
 ];
 
-/// A robot with functions that execute all requests.
+/// A robot whose functions accept each request of an available mode.
 struct Robot {
     node: Arc<Node>,
     modes: Arc<Mutex<BTreeMap<String, String>>>,
@@ -93,7 +93,6 @@ impl Robot {
     }
 }
 
-/// Runs a role in a separate thread.
 struct Running {
     stop: Arc<AtomicBool>,
     thread: JoinHandle<Result<(), Errors>>,

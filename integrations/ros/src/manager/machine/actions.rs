@@ -8,8 +8,8 @@ use crate::manager::machine::Machine;
 use crate::manager::machine::io::{Ended, Output};
 
 impl Machine {
-    /// Starts the requested action once every function has the required design and no mode request
-    /// is pending.
+    /// Starts the requested action if its functions have the required designs, no mode request is pending,
+    /// and the action is neither suspended nor being cancelled.
     pub(super) fn begin(&mut self) {
         let beliefs = self.control.beliefs();
         let has = |(function, design): &(String, String)| {

@@ -11,37 +11,38 @@ use crate::manager::machine::io::{Change, Outcome, Output, State};
 /// Number of attempts of a call without a reply.
 const MAX_ATTEMPTS: u32 = 2;
 
-/// Initial delay before a function without a reply is probed; doubled with each failure.
+/// Half of the delay before the first probe of a function without a reply. The delay is doubled with each
+/// further missed reply.
 const INITIAL_PROBE_DELAY: Duration = Duration::from_secs(1);
 
-/// Maximum delay of a probe.
 const MAX_PROBE_DELAY: Duration = Duration::from_secs(60);
 
 /// Maximum delay until a function that did not reply to a probe is probed again.
 const SILENT_RETRY_DELAY: Duration = Duration::from_secs(2);
 
-/// Delay until a refused design is retried.
+/// Delay until a design is retried that was refused or whose steps failed.
 const REFUSED_RETRY_DELAY: Duration = Duration::from_secs(60);
 
 /// Time during which a granted mode is believed although the mode manager reports another one.
 ///
-/// `system_modes` answers `change_mode` before the node has changed, and `get_mode` returns the old mode until its observer
-/// has noticed the change. A manager that believes the old mode requests the new one again, which causes the next report.
+/// `system_modes` answers `change_mode` before the node has changed, and `get_mode` returns the old mode
+/// until its observer has noticed the change. A manager that believes the old mode requests the new one
+/// again, which causes the next report.
 const GRANT_PERIOD: Duration = Duration::from_secs(2);
 
-/// A mode that was granted recently.
 #[derive(Debug)]
 pub(super) struct Grant {
     /// End of the period in which reports of other modes are not believed.
     until: Duration,
-    /// Modes that were granted shortly before; reports of them may be late.
+    /// Modes that the function had shortly before; reports of them may be late.
     earlier: Vec<String>,
     /// `true` if another mode was reported.
     is_contradicted: bool,
 }
 
 impl Machine {
-    /// Requests the mode for a function that is not needed.
+    /// Requests the mode that the settings give a function that is not needed. Does nothing without such a
+    /// mode, or if the function has the mode or an unknown one.
     pub(super) fn unground(&mut self, function: &str) {
         let Some(mode) = self.settings.functions.unground(function).map(str::to_owned) else { return };
         let requested = self.pending.get(function).map(|change| &change.mode);
@@ -52,7 +53,7 @@ impl Machine {
         }
     }
 
-    /// Requests a mode. Steps have waited for their nodes and are undone when they fail, so that they are not repeated at once.
+    /// Requests a mode. Steps get a single attempt, because they wait for their nodes themselves.
     pub(super) fn change(&mut self, function: String, mode: String, effect: Option<u64>) {
         let attempt = if self.settings.functions.has_steps(&function) { MAX_ATTEMPTS } else { 1 };
         self.send(Change { function, mode, effect, attempt });
@@ -63,7 +64,6 @@ impl Machine {
         self.outputs.push(Output::Change(change));
     }
 
-    /// Handles the outcome of a call.
     pub(super) fn changed(&mut self, change: Change, outcome: Outcome) -> String {
         let Change { function, mode, effect, attempt } = change.clone();
         if self.pending.get(&function) != Some(&change) {
@@ -126,8 +126,8 @@ impl Machine {
         })));
     }
 
-    /// Handles a design that could not be set. It is retried at a given time, or when the function
-    /// replies.
+    /// Handles a design that could not be set. The design is retried at the time `again`, or when the
+    /// function replies if `again` is `None`.
     pub(super) fn failed(&mut self, function: &str, effect: Option<u64>, again: Option<Duration>) {
         self.pending.remove(function);
         let Some(effect) = effect else { return };
@@ -145,7 +145,6 @@ impl Machine {
         self.outputs.push(Output::Look(function.to_owned()));
     }
 
-    /// Records a granted mode.
     fn grant(&mut self, function: &str, mode: &str) {
         let before = self.modes.insert(function.to_owned(), mode.to_owned());
         let mut earlier = match self.grants.remove(function) {
@@ -157,8 +156,8 @@ impl Machine {
         self.grants.insert(function.to_owned(), grant);
     }
 
-    /// Handles a request for a mode that a mode manager has received. Unlike a reported mode, a request that this program
-    /// has not sent recently comes from another client. It therefore ends the [`GRANT_PERIOD`].
+    /// Handles a request for a mode that a mode manager has received. Unlike a reported mode, a request that
+    /// this program has not sent recently comes from another client. It therefore ends the [`GRANT_PERIOD`].
     pub(super) fn mode_requested(&mut self, function: &str, mode: &str) -> String {
         if self.modes.get(function).is_some_and(|current| current == mode) {
             return format!("{function} was requested to have the mode {mode}, which it has");
@@ -174,7 +173,6 @@ impl Machine {
         self.mode(function, mode)
     }
 
-    /// Handles a reported mode.
     pub(super) fn mode(&mut self, function: &str, mode: &str) -> String {
         let because = match mode {
             "" => format!("{function} was seen in none of its modes"),
@@ -213,7 +211,7 @@ impl Machine {
         }
     }
 
-    /// Reports a mode to the loop that it has not requested.
+    /// Reports the design of a mode to the loop, unless the loop believes that the function has this design.
     pub(super) fn observe(&mut self, function: &str, mode: &str) {
         let designs = self.control.beliefs().mission().designs_of(function);
         let design = self.settings.functions.design(function, mode, &designs);
@@ -245,7 +243,8 @@ impl Machine {
         format!("{function} answers again")
     }
 
-    /// Retries designs that were refused long ago, and checks contradicted grants.
+    /// Retries designs whose delay is over, and requests the modes of contradicted grants whose period is
+    /// over. Passes a due tick to the loop in the state EXECUTE.
     pub(super) fn tick(&mut self) -> String {
         let now = self.now;
         let mut back = Vec::new();

@@ -7,10 +7,9 @@ use serde_json::Value;
 
 use crate::perform::Call;
 
-/// Input of the state machine.
 #[derive(Debug)]
 pub(in crate::manager) enum Input {
-    /// The functions reply. Contains their modes, if known.
+    /// All functions are present. Contains their modes; `None` for a function that did not report its mode.
     Ready(Vec<(String, Option<String>)>),
     /// A diagnostic is pending; the driver converts it to a line.
     Diagnosed,
@@ -22,31 +21,26 @@ pub(in crate::manager) enum Input {
     Cancel(u64, String),
     /// A function has replied to a call, or the call has failed.
     Changed(Change, Outcome),
-    /// The current mode of a function, as its mode manager has answered or as its nodes show. Empty if the function is in
-    /// none of its modes.
+    /// The current mode of a function, as its mode manager has answered or as its nodes show. Empty if the
+    /// function is in none of its modes.
     Mode(String, String),
     /// The mode that a client has requested from a function's mode manager.
     ModeRequested(String, String),
     /// A function has changed, but its mode is unknown.
     Touched(String),
-    /// An action has ended.
     Performed(u64, Ended),
     /// Completed share of an action from 0 to 1.
     Progress(u64, f64),
     /// A function without a reply was probed: `true` if it replies.
     Probed(String, bool),
-    /// Mode of the autopilot.
     Autopilot(String),
-    /// Clock tick.
     Tick,
 }
 
 /// A call of `change_mode`, or the steps that have the same effect.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::manager) struct Change {
-    /// Name of the function.
     pub(in crate::manager) function: String,
-    /// Requested mode.
     pub(in crate::manager) mode: String,
     /// The effect of the loop that requires the change. `None` if the function is no longer needed.
     pub(in crate::manager) effect: Option<u64>,
@@ -54,12 +48,9 @@ pub(in crate::manager) struct Change {
     pub(in crate::manager) attempt: u32,
 }
 
-/// Outcome of a call.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::manager) enum Outcome {
-    /// The function has the mode.
     Done,
-    /// The function has refused.
     Refused,
     /// There was no valid reply, for this reason.
     Failed(String),
@@ -67,7 +58,6 @@ pub(in crate::manager) enum Outcome {
     StepFailed(String),
 }
 
-/// Outcome of an action.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::manager) enum Ended {
     Succeeded,
@@ -75,7 +65,6 @@ pub(in crate::manager) enum Ended {
     Failed(String),
 }
 
-/// Output of the state machine.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::manager) enum Output {
     /// Call `change_mode`, or execute the steps of the mode.
@@ -84,21 +73,14 @@ pub(in crate::manager) enum Output {
     Look(String),
     /// Check after a delay whether a function replies.
     Probe(String, Duration),
-    /// Reply to a request.
     Reply(u64, bool),
-    /// Start an action.
     Perform(u64, Call),
-    /// Cancel an action.
     Stop(u64),
-    /// Publish a plan.
     Plan(Value),
-    /// Publish an event.
     Event(Value),
-    /// Log a warning.
     Warn(String),
 }
 
-/// State of the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::manager) enum State {
     WaitGraph,

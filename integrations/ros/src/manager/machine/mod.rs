@@ -25,20 +25,17 @@ use functions::Grant;
 
 pub(super) use io::{Change, Ended, Input, Outcome, Output, State};
 
-/// Goal without a task.
+/// Goal of the loop while there is no task.
 const EMPTY_GOAL: &str = "(and)";
 
-/// An action that the loop has requested.
 #[derive(Debug, Clone)]
 struct Action {
     number: u64,
     call: Call,
     effect: u64,
-    /// `true` once a performer has started.
     begun: bool,
 }
 
-/// Reasons not to call a function.
 #[derive(Debug, Clone, Default)]
 struct CallFailures {
     /// Failed designs, with the time of the next attempt. `None` while the function does not reply.
@@ -50,15 +47,13 @@ struct CallFailures {
 /// Work after a restart that must wait until the state of the robot is known.
 #[derive(Debug)]
 struct Deferred {
-    /// Effects that the loop repeats.
+    /// Answers of the loop at the start, which repeat its outstanding effects.
     answers: Vec<Answer>,
-    /// Modes of the functions after the restart.
     modes: BTreeMap<String, String>,
     /// End of the wait for diagnostics.
     until: Duration,
 }
 
-/// The state machine.
 #[derive(Debug)]
 pub(super) struct Machine {
     control: Loop,
@@ -69,9 +64,7 @@ pub(super) struct Machine {
     task: Option<String>,
     /// Calls without a reply, by function.
     pending: BTreeMap<String, Change>,
-    /// Last known mode of each function.
     modes: BTreeMap<String, String>,
-    /// Modes that were granted recently, by function.
     grants: BTreeMap<String, Grant>,
     action: Option<Action>,
     /// Numbers of the unanswered requests to start and to end a task.
@@ -82,7 +75,6 @@ pub(super) struct Machine {
     without_plan: bool,
     autopilot_obeyed: bool,
     deferred: Option<Deferred>,
-    /// Transient states since the last stable one.
     transient_states: Vec<State>,
     outputs: Vec<Output>,
     lines: VecDeque<String>,
@@ -134,12 +126,11 @@ impl Machine {
         self.task.as_deref()
     }
 
-    /// Returns the functions that have designs.
     pub(super) fn functions(&self) -> &[String] {
         &self.functions
     }
 
-    /// Returns all modes of the designs of a function, and the mode without a design.
+    /// Returns the mode of each design of a function.
     pub(super) fn modes_of(&self, function: &str) -> Vec<String> {
         let designs = self.control.beliefs().mission().designs_of(function);
         designs.iter().map(|design| self.settings.functions.mode(function, design).to_owned()).collect()
@@ -190,7 +181,7 @@ impl Machine {
         Ok(std::mem::take(&mut self.outputs))
     }
 
-    /// Passes all pending lines to the loop.
+    /// Passes all pending lines to the loop, unless the machine still waits for the functions.
     fn settle(&mut self) -> Result<(), Message> {
         // The loop starts once the modes of the functions are known.
         if self.state == State::WaitGraph {
@@ -216,8 +207,8 @@ impl Machine {
         self.lines.push_back(event.to_json().to_string());
     }
 
-    /// Enters the state that follows from the running work. Each transition is noted in the
-    /// journal.
+    /// Enters the state that follows from the running work, and answers requests whose result is known. Each
+    /// transition is noted in the journal.
     fn enter(&mut self, because: &str) -> Result<(), Message> {
         if self.state == State::WaitGraph {
             return Ok(());
@@ -246,7 +237,6 @@ impl Machine {
         Ok(())
     }
 
-    /// Notes transitions in the journal and publishes them.
     fn note(&mut self, path: &[String], because: &str) -> Result<(), Message> {
         let text = format!("{}: {because}", path.join(" -> "));
         let answers = self.pass_line(&Event::Note { text }.to_json().to_string())?;
@@ -262,7 +252,6 @@ impl Machine {
         because
     }
 
-    /// Handles the answers of the loop.
     fn handle_answers(&mut self, answers: Vec<Answer>) {
         for answer in answers {
             self.outputs.push(Output::Event(answer.to_json()));
@@ -338,7 +327,6 @@ impl Machine {
     }
 }
 
-/// Converts a planned step for its performer.
 fn call(step: &PlannedStep) -> Call {
     let written = step.arguments.get(..step.written).unwrap_or(&step.arguments);
     Call {

@@ -15,9 +15,9 @@ use crate::manager::machine::{Action, Deferred, Machine, call, unwritten};
 const DIAGNOSTICS_WAIT: Duration = Duration::from_secs(3);
 
 impl Machine {
-    /// Handles the start: `modes` are the current modes of the robot's functions. After a restart,
-    /// the answers of the adaptation loop are deferred until diagnostics arrive, at most for
-    /// [`DIAGNOSTICS_WAIT`].
+    /// Handles the start: `modes` are the current modes of the robot's functions. After a restart, the
+    /// answers of the adaptation loop are deferred until diagnostics arrive or a task is requested, at most
+    /// for [`DIAGNOSTICS_WAIT`].
     pub(super) fn ready(&mut self, modes: Vec<(String, Option<String>)>) -> Result<String, Message> {
         self.state = State::Idle;
         let is_first = self.control.beliefs().lines() == 0;
@@ -63,7 +63,6 @@ impl Machine {
         }
     }
 
-    /// Restores the action that was running when the previous run of the program ended.
     pub(super) fn restore_action(&mut self) {
         let Some((number, step)) = self.control.beliefs().running() else { return };
         let call = call(step);

@@ -8,7 +8,6 @@ use crate::manager::machine::io::{Output, State};
 use crate::manager::machine::{EMPTY_GOAL, Machine};
 
 impl Machine {
-    /// Replies to requests whose result is known.
     pub(super) fn reply(&mut self) {
         if !self.pending.is_empty() {
             return;
@@ -89,7 +88,7 @@ impl Machine {
         format!("the task {task} ends")
     }
 
-    /// Handles the end of a task: no function is needed any more.
+    /// Ends the task because its goal is reached: no function is needed any more.
     pub(super) fn reached(&mut self) {
         self.without_plan = false;
         let was_active = self.action.take().is_some();

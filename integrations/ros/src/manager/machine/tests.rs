@@ -33,13 +33,11 @@ impl Robot {
         Self::found(journal, |_| "fd_unground")
     }
 
-    /// Creates a machine whose functions reply with these modes.
     fn found(journal: Option<&Path>, mode: impl Fn(&str) -> &'static str) -> Self {
         let (control, settings) = control();
         Self::with(control, settings, journal, mode)
     }
 
-    /// Creates a machine whose functions reply with these modes.
     fn with(
         mut control: Loop,
         settings: Settings,
@@ -64,7 +62,6 @@ impl Robot {
         outputs.into_iter().filter(|output| !matches!(output, Output::Event(_) | Output::Plan(_))).collect()
     }
 
-    /// Answers a change.
     fn answer(&mut self, output: &Output, outcome: Outcome) -> Vec<Output> {
         let Output::Change(change) = output else { panic!("{output:?} is not a change") };
         self.handle(Input::Changed(change.clone(), outcome))
@@ -91,7 +88,6 @@ impl Robot {
     }
 }
 
-/// Functions and modes of the changes among outputs, in alphabetical order.
 fn changes(outputs: &[Output]) -> Vec<(&str, &str)> {
     let mut changes = Vec::new();
     for output in outputs {
@@ -357,7 +353,7 @@ fn a_restart_repeats_no_fulfilled_request() {
     assert!(text.contains("IDLE -> PLAN -> RECONFIGURE: the task search_pipeline is requested"), "{text}");
 }
 
-/// Creates a machine whose spiral has steps for its designs, and none for the time when it is not needed.
+/// Creates a machine whose spiral has steps for its designs, but none for the time when it is not needed.
 fn with_steps() -> Robot {
     let mission = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/suave/suave.toml");
     let (control, _) = control();

@@ -68,7 +68,6 @@ struct Connection<A: Action> {
     goals: Mutex<BTreeMap<GoalId, Followed<A>>>,
 }
 
-/// Channels to the sender of a running goal.
 struct Followed<A: Action> {
     result: RmwRequestId,
     events: channel::Sender<Accepted<A>>,
@@ -195,7 +194,7 @@ impl<A: Action + 'static> Connection<A> {
         is_first
     }
 
-    /// Forwards the messages about all goals until no goal is running.
+    /// Forwards the messages about all goals until no goal is running. If the server is lost, all goals end.
     async fn run(&self, graph: &Graph, full: &str) {
         let topics = goal_topics(full);
         let mut absent = 0;
@@ -247,7 +246,6 @@ impl<A: Action + 'static> Connection<A> {
     }
 }
 
-/// Topics of the service `send_goal` of an action.
 fn goal_topics(action: &str) -> Topics {
     Topics::of(&format!("{action}/_action/send_goal"))
 }
