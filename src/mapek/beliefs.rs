@@ -6,11 +6,12 @@
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::sync::Arc;
 use std::time::Duration;
 
 use num_rational::BigRational;
 use pddl::ast::{Domain, Problem};
-use pddl::validate::{Options, Verdict, Violation, advance, validate};
+use pddl::validate::{Options, PlanText, Violation, advance, metric_of, validate};
 
 use crate::knowledge::Fault;
 use crate::mapek::answer::{Command, Effect};
@@ -286,16 +287,14 @@ impl Beliefs {
     }
 
     /// Returns the problem in its believed state, with the facts of the knowledge base added.
-    pub(super) fn filled(&self) -> Problem {
-        let mut problem = self.mission.problem().clone();
-        self.mission.fill(&mut problem);
-        problem
+    pub(super) fn filled(&self) -> Arc<Problem> {
+        self.mission.current()
     }
 
     /// Returns the domain and the filled problem of the remaining mission. If an action is under way, plans must begin
     /// with its remainder.
     fn remaining_mission(&self) -> (Cow<'_, Domain>, Problem) {
-        let (domain, mut problem) = (self.mission.domain(), self.filled());
+        let (domain, mut problem) = (self.mission.domain(), Arc::unwrap_or_clone(self.filled()));
         match &self.running {
             Some(running) => {
                 problem.goal = resumed_goal(&problem.goal);
@@ -305,11 +304,17 @@ impl Beliefs {
         }
     }
 
-    pub(super) fn verdict(&self) -> Verdict {
+    /// Returns the action under way and the remaining plan in the form of the validator.
+    fn remaining_plan(&self) -> PlanText {
         let running = self.running.iter().map(|running| &running.step);
-        let steps = running.chain(self.plan.iter().flatten());
+        plan_text(running.chain(self.plan.iter().flatten()))
+    }
+
+    /// Returns the metric value of the action under way with the remaining plan. `None` if they are not valid, or if
+    /// the metric is missing or undefined.
+    pub(super) fn metric(&self) -> Option<BigRational> {
         let (domain, problem) = self.remaining_mission();
-        validate(&domain, &problem, &plan_text(steps), &Options::default())
+        metric_of(&domain, &problem, &self.remaining_plan())
     }
 
     /// Returns the reason why the remainder of the action under way cannot be executed, or `None` if it can.
@@ -322,7 +327,9 @@ impl Beliefs {
     /// Returns the reason why the action under way and the remaining plan are not executable in the believed situation,
     /// or do not reach the goal. Returns `None` if they are valid.
     pub fn violation(&self) -> Option<String> {
-        self.verdict().violation.map(|violation| self.mission.spoken(&sentence(&violation)))
+        let (domain, problem) = self.remaining_mission();
+        let verdict = validate(&domain, &problem, &self.remaining_plan(), &Options::default());
+        verdict.violation.map(|violation| self.mission.spoken(&sentence(&violation)))
     }
 }
 

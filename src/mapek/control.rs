@@ -338,10 +338,8 @@ impl Loop {
     }
 
     fn compact_knowledge(&mut self) {
-        let Some(base) = self.beliefs.mission.knowledge_mut().filter(|base| base.growth() > MAX_GROWTH)
-        else {
-            return;
-        };
+        let growth = self.beliefs.mission.knowledge().map_or(0, Knowledge::growth);
+        let Some(base) = self.beliefs.mission.knowledge_mut().filter(|_| growth > MAX_GROWTH) else { return };
         let statements = base.statements();
         // The statements were consistent and within the budget before, so that restoring them succeeds.
         let _ = base.restore(&statements);

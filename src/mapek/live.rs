@@ -131,8 +131,8 @@ pub(super) fn first_steps(question: &Question<'_>) -> Option<Vec<(PlannedStep, F
     }
     let domain = resume(question.mission.domain(), &running.step, &running.progress);
     let plan_steps: Vec<_> = steps.iter().map(PlannedStep::to_plan_step).collect();
-    let before = question.metric()?;
-    let advances = advance_each(&domain, question.problem, &plan_steps);
+    let (metric, advances) = advance_each(&domain, question.problem, &plan_steps);
+    let before = if question.problem.metric.is_some() { metric? } else { BigRational::default() };
     let mut first = Vec::new();
     for (mut step, change) in steps.into_iter().zip(advances) {
         let Ok(mut change) = change else { continue };

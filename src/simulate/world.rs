@@ -6,8 +6,6 @@
 //! for the remaining part. It fails when it has stalled for the simulation's `patience`. The seed alone determines
 //! everything random, so all strategies face the same world.
 
-use std::cell::OnceCell;
-
 use num_rational::BigRational;
 use ontology::tomasys::change::Status;
 use pddl::ast::{Condition, Direction, Domain, Problem};
@@ -45,9 +43,6 @@ struct ComponentChange {
 #[derive(Debug, Clone)]
 pub struct World {
     truth: Mission,
-    /// The problem with the facts and values from the knowledge base; computed on first use after a
-    /// change.
-    filled: OnceCell<Problem>,
     settings: Simulation,
     watched: Watched,
     seed: u64,
@@ -115,7 +110,6 @@ impl World {
             .collect();
         Self {
             truth,
-            filled: OnceCell::new(),
             settings,
             watched,
             seed,
@@ -128,21 +122,6 @@ impl World {
             inspected: 0.0,
             found: None,
         }
-    }
-
-    fn filled(&self) -> &Problem {
-        self.filled.get_or_init(|| {
-            let mut problem = self.truth.problem().clone();
-            self.truth.fill(&mut problem);
-            problem
-        })
-    }
-
-    /// Returns the mission with the true state for modification, and invalidates the filled
-    /// problem.
-    fn change(&mut self) -> &mut Mission {
-        self.filled.take();
-        &mut self.truth
     }
 
     /// Executes a command of the controller. Returns the events that the robot reports immediately.
@@ -184,7 +163,7 @@ impl World {
             return None;
         }
         let domain = resume(self.truth.domain(), &job.step, &exact(job.progress));
-        let advance = advance(&domain, self.filled(), &job.step.to_plan_step(), false).ok()?;
+        let advance = advance(&domain, &self.truth.current(), &job.step.to_plan_step(), false).ok()?;
         Some(number::to_f64(&advance.duration) * self.slowness(&job.step))
     }
 
@@ -257,7 +236,8 @@ impl World {
     /// Applies the effects of a share of an action: numeric increases and decreases in proportion
     /// to the share, and, if `whole`, also assignments and changes of facts.
     fn use_up(&mut self, step: &PlannedStep, share: f64, whole: bool, events: &mut Vec<Event>) {
-        let Ok(mut advance) = advance(self.truth.domain(), self.filled(), &step.to_plan_step(), true) else {
+        let Ok(mut advance) = advance(self.truth.domain(), &self.truth.current(), &step.to_plan_step(), true)
+        else {
             return;
         };
         let share = exact(share);
@@ -272,7 +252,7 @@ impl World {
         }
         let mut init = self.truth.problem().init.clone();
         advance.apply(&mut init);
-        self.change().set_init(init);
+        self.truth.set_init(init);
         for change in &advance.values {
             let lifeline = self.watched.lifeline.as_ref();
             let is_lifeline = lifeline.is_some_and(|lifeline| lifeline.eq_ignore_ascii_case(&change.text));
@@ -304,7 +284,10 @@ impl World {
 
     fn holds(&self, condition: &Condition) -> bool {
         let goal = condition.clone();
-        is_valid(self.truth.domain(), &Problem { goal, constraints: Vec::new(), ..self.filled().clone() })
+        is_valid(
+            self.truth.domain(),
+            &Problem { goal, constraints: Vec::new(), ..(*self.truth.current()).clone() },
+        )
     }
 
     fn disturb(&mut self, events: &mut Vec<Event>) -> Result<(), Message> {
@@ -321,7 +304,7 @@ impl World {
                 }
             }
             for (name, value) in set {
-                self.change().set(&name, &value)?;
+                self.truth.set(&name, &value)?;
                 events.push(Event::Fact { name, value });
             }
         }
@@ -333,7 +316,7 @@ impl World {
     }
 
     fn report(&mut self, component: String, status: Status, events: &mut Vec<Event>) -> Result<(), Message> {
-        if let Some(knowledge) = self.change().knowledge_mut() {
+        if let Some(knowledge) = self.truth.knowledge_mut() {
             knowledge.report(&component, status)?;
         }
         events.push(Event::Component { component, status });
@@ -354,7 +337,6 @@ impl World {
     }
 
     fn swing(&mut self, events: &mut Vec<Event>) -> Result<(), Message> {
-        self.filled.take();
         for (signal, phase) in self.settings.signals.iter().zip(&self.phases) {
             let turn = std::f64::consts::TAU * (self.time / signal.period + phase);
             let value = signal.mean + signal.amplitude * turn.sin();
@@ -370,19 +352,19 @@ impl World {
 
     /// Returns `true` if the goal holds in the true state.
     pub fn reached(&self) -> bool {
-        is_valid(self.truth.domain(), self.filled())
+        is_valid(self.truth.domain(), &self.truth.current())
     }
 
     /// Returns the value of the mission's metric in the current state, or the elapsed time if the mission has no metric
     /// or the value is undefined.
     pub fn cost(&self) -> f64 {
-        let metric = metric_after(self.truth.domain(), self.filled(), &exact(self.time));
+        let metric = metric_after(self.truth.domain(), &self.truth.current(), &exact(self.time));
         metric.map_or(self.time, |metric| number::to_f64(&metric))
     }
 
     /// Returns `true` if the mission's metric is maximised.
     pub fn maximizes(&self) -> bool {
-        self.filled().metric.as_ref().is_some_and(|metric| metric.direction == Direction::Maximize)
+        self.truth.current().metric.as_ref().is_some_and(|metric| metric.direction == Direction::Maximize)
     }
 
     /// Returns the inspected length of the pipeline, in the unit of the mission's function for the length. `None` if

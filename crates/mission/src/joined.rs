@@ -1,6 +1,7 @@
 //! [`Mission`]: a knowledge base joined with a PDDL domain and problem.
 
 use std::collections::{BTreeSet, HashSet};
+use std::sync::{Arc, OnceLock};
 
 use pddl::ast::{Condition, Direction, Domain, Metric, Name, Problem, Term};
 use pddl::{self, Severity, Source};
@@ -25,6 +26,8 @@ pub struct Mission {
     pub(super) problem_source: Source,
     pub(super) domain: Domain,
     pub(super) problem: Problem,
+    /// The filled problem. Every method that changes the problem or the knowledge base empties it.
+    pub(super) current: OnceLock<Arc<Problem>>,
     pub(super) adaptation: Option<CoAdaptation>,
     /// Designs whose availability is stated by the problem, not inferred from the knowledge base.
     pub(super) own: BTreeSet<Name>,
@@ -112,6 +115,7 @@ impl Mission {
             problem_source,
             domain,
             problem,
+            current: OnceLock::new(),
             adaptation,
             own: problem_designs,
             never_named,
@@ -147,6 +151,7 @@ impl Mission {
     /// # Errors
     /// The knowledge base has no such component, or the mission has no knowledge base.
     pub fn fail(&mut self, component: &str) -> Result<(), Message> {
+        self.current.take();
         match &mut self.knowledge {
             Some(knowledge) => knowledge.fail(component),
             None => Err(Message::error(
@@ -159,6 +164,7 @@ impl Mission {
     /// Finds the first atom with this predicate in the conjunction of the goal and replaces its last argument
     /// by `object`. If there is no such atom, the goal is unchanged.
     pub fn aim(&mut self, predicate: &str, object: &str) {
+        self.current.take();
         let mut parts = vec![&mut self.problem.goal];
         // Popping from a stack with reversed pushes visits the atoms in their textual order.
         while let Some(part) = parts.pop() {

@@ -2,6 +2,7 @@
 //! reports.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use num_rational::BigRational;
 use ontology::tomasys::FunctionDesign;
@@ -30,6 +31,17 @@ impl Mission {
         })
     }
 
+    /// Returns the problem with the contributions of the knowledge base ([`Mission::fill`]), without checks. The
+    /// result is cached until the mission changes.
+    pub fn current(&self) -> Arc<Problem> {
+        let fill = || {
+            let mut problem = self.problem.clone();
+            self.fill(&mut problem);
+            Arc::new(problem)
+        };
+        Arc::clone(self.current.get_or_init(fill))
+    }
+
     /// Returns `true` if a numeric function of a plain domain (without a type of designs) is
     /// replaced by a sum over the chosen or the newly chosen designs.
     pub(crate) fn stands_for_designs(&self, function: &Name) -> bool {
@@ -38,6 +50,7 @@ impl Mission {
 
     /// Returns the knowledge base for modification, if the mission has one.
     pub fn knowledge_mut(&mut self) -> Option<&mut Knowledge> {
+        self.current.take();
         self.knowledge.as_mut()
     }
 
@@ -151,11 +164,13 @@ impl Mission {
 
     /// Replaces the initial state of the problem.
     pub fn set_init(&mut self, init: Vec<InitialElement>) {
+        self.current.take();
         self.problem.init = init;
     }
 
     /// Replaces the goal.
     pub fn set_goal(&mut self, goal: Condition) {
+        self.current.take();
         self.problem.goal = goal;
     }
 

@@ -22,6 +22,7 @@ impl Mission {
     /// No case matches, a value is not a decimal number, an attribute is only estimated, or the knowledge
     /// base decides on the availability of the design.
     pub fn set(&mut self, name: &str, value: &str) -> Result<(), Message> {
+        self.current.take();
         let value = value.trim();
         if let Some(knowledge) = &mut self.knowledge
             && knowledge.has_attribute(name.trim())
@@ -44,6 +45,7 @@ impl Mission {
     /// No symbol of the problem matches, a value is not a decimal number, or the knowledge base decides on
     /// the availability of the design.
     pub fn set_in_problem(&mut self, name: &str, value: &str) -> Result<(), Message> {
+        self.current.take();
         let value = value.trim();
         let words: Vec<&str> = name.split_whitespace().collect();
         let Some((symbol, arguments)) = words.split_first() else {

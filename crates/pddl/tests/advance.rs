@@ -6,9 +6,11 @@
 
 use std::path::{Path, PathBuf};
 
-use metaplan_pddl::ast::{Domain, Problem};
-use metaplan_pddl::validate::{PlanStep, PlanText, advance, advance_each};
-use metaplan_pddl::{Source, read};
+use metaplan_pddl::ast::{Condition, Domain, Problem};
+use metaplan_pddl::validate::{
+    Options, PlanStep, PlanText, advance, advance_each, metric_after, metric_of, validate,
+};
+use metaplan_pddl::{BigRational, Source, read};
 
 /// Number of random ground steps that are compared for each action schema in each state.
 const STEPS: u64 = 150;
@@ -88,7 +90,8 @@ fn a_step_changes_the_reduced_problem_as_it_changes_the_whole_one() {
                         PlanText::parse(&Source::new("plan", text)).expect("a step").steps.remove(0)
                     })
                     .collect();
-                let each = advance_each(&domain, &problem, &steps);
+                let (metric, each) = advance_each(&domain, &problem, &steps);
+                assert_eq!(metric, metric_after(&whole_domain, &whole_problem, &BigRational::default()));
                 for (step, of_each) in steps.iter().zip(each) {
                     for is_forced in [false, true] {
                         let reduced = advance(&domain, &problem, step, is_forced);
@@ -103,6 +106,7 @@ fn a_step_changes_the_reduced_problem_as_it_changes_the_whole_one() {
                         if !is_forced {
                             assert_eq!(of_each.is_ok(), reduced.is_ok(), "{folder:?} {step:?}");
                             *(if reduced.is_ok() { &mut possible } else { &mut impossible }) += 1;
+                            check_metric(step, (&domain, &problem), (&whole_domain, &whole_problem));
                             next = reduced.ok().or(next);
                         }
                     }
@@ -114,4 +118,15 @@ fn a_step_changes_the_reduced_problem_as_it_changes_the_whole_one() {
         }
     }
     assert!(possible > 200 && impossible > 200, "{possible} steps are possible, {impossible} are not");
+}
+
+/// Compares `metric_of` with the validator for the plan of one step, with the goal of the problem and without a goal.
+fn check_metric(step: &PlanStep, reduced: (&Domain, &Problem), whole: (&Domain, &Problem)) {
+    let mut plan = PlanText::default();
+    plan.steps.push(step.clone());
+    for goal in [&reduced.1.goal, &Condition::And(Vec::new())] {
+        let with_goal = |problem: &Problem| Problem { goal: goal.clone(), ..problem.clone() };
+        let expected = validate(whole.0, &with_goal(whole.1), &plan, &Options::default()).metric;
+        assert_eq!(metric_of(reduced.0, &with_goal(reduced.1), &plan), expected, "{step:?}");
+    }
 }

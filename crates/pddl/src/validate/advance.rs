@@ -63,26 +63,36 @@ pub fn advance(
     step: &PlanStep,
     forced: bool,
 ) -> Result<Advance, Box<Violation>> {
-    let reduced = relevant(domain, problem, std::slice::from_ref(step));
-    advance_in(&World::new(domain, reduced.as_ref().unwrap_or(problem), &|| false), step, forced)
+    let reduced = relevant(domain, problem, std::slice::from_ref(step), None);
+    let world = World::new(domain, reduced.as_ref().unwrap_or(problem), &|| false);
+    advance_from(&Execution::new(&world, &Options::default()), step, forced)
 }
 
-/// Executes each step separately in the initial state of a problem, like [`advance`] with `forced = false`.
+/// Executes each step separately in the initial state of a problem, like [`advance`] with `forced = false`. Also
+/// returns the metric value of the empty plan, like [`metric_after`] with the time 0.
 pub fn advance_each(
     domain: &Domain,
     problem: &Problem,
     steps: &[PlanStep],
-) -> Vec<Result<Advance, Box<Violation>>> {
-    let reduced = relevant(domain, problem, steps);
+) -> (Option<BigRational>, Vec<Result<Advance, Box<Violation>>>) {
+    let reduced = relevant(domain, problem, steps, None);
     let world = World::new(domain, reduced.as_ref().unwrap_or(problem), &|| false);
-    steps.iter().map(|step| advance_in(&world, step, false)).collect()
+    let options = Options::default();
+    let initial = Execution::new(&world, &options);
+    let metric = metric(&world, &initial.state, &BigRational::default());
+    (metric, steps.iter().map(|step| advance_from(&initial, step, false)).collect())
 }
 
-fn advance_in(world: &World<'_>, step: &PlanStep, forced: bool) -> Result<Advance, Box<Violation>> {
+/// Executes a step in the state of `initial`.
+fn advance_from(
+    initial: &Execution<'_, '_>,
+    step: &PlanStep,
+    forced: bool,
+) -> Result<Advance, Box<Violation>> {
+    let world = initial.world;
     let step = step::resolve(world, 1, step);
-    let options = Options::default();
-    let mut execution = Execution::new(world, &options);
-    let before = execution.state.clone();
+    let mut execution = initial.clone();
+    let before = &initial.state;
     let start = BigRational::default();
     let running =
         if forced { execution.begin_anyway(&step, &start) } else { execution.begin(&step, &start) }?;
@@ -115,7 +125,7 @@ fn advance_in(world: &World<'_>, step: &PlanStep, forced: bool) -> Result<Advanc
     });
     let mut values: Vec<ValueChange> = values.collect();
     values.sort_by(|left, right| left.text.cmp(&right.text));
-    let (added, deleted) = (facts_only_in(world, after, &before), facts_only_in(world, &before, after));
+    let (added, deleted) = (facts_only_in(world, after, before), facts_only_in(world, before, after));
     let metric = metric(world, after, &running.duration);
     Ok(Advance { added, deleted, values, duration: running.duration, metric })
 }
@@ -161,7 +171,7 @@ fn is_same(left: &Atom, right: &Atom) -> bool {
 /// Returns the metric value if the plan ended in the initial state of the problem after `total_time`, in the
 /// domain's time unit. `None` without a metric or if the value is undefined.
 pub fn metric_after(domain: &Domain, problem: &Problem, total_time: &BigRational) -> Option<BigRational> {
-    let reduced = relevant(domain, problem, &[]);
+    let reduced = relevant(domain, problem, &[], None);
     let world = World::new(domain, reduced.as_ref().unwrap_or(problem), &|| false);
     let options = Options::default();
     let execution = Execution::new(&world, &options);

@@ -18,7 +18,7 @@ use super::step::{Instance, Step, unresolved};
 use super::verdict::{Violation, ViolationKind};
 use super::world::{State, World};
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Execution<'e, 'p> {
     pub(super) world: &'e World<'p>,
     pub(super) options: &'e Options,

@@ -50,7 +50,7 @@ impl Pattern {
     }
 }
 
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Footprint {
     facts_read: Vec<Pattern>,
     values_read: Vec<Pattern>,

@@ -45,9 +45,11 @@ pub use options::Options;
 pub use plan::{PlanStep, PlanText};
 pub use verdict::{Unmet, Verdict, Violation, ViolationKind};
 
+use advance::metric;
 use evaluate::{Bindings, Evaluator};
 use execute::Execution;
 use explain::unmet;
+use relevant::relevant;
 use step::Step;
 use targets::changeable_values;
 use world::{State, World};
@@ -83,6 +85,14 @@ pub fn validate_within(
     let world = World::new(domain, problem, stop);
     let verdict = judge_readings(&world, plan, options);
     world.budget.check(verdict)
+}
+
+/// Returns the metric value of a plan, as [`validate`] computes it, but faster in a large initial state. Returns
+/// `None` if the plan is not valid, or if the metric is missing or undefined.
+pub fn metric_of(domain: &Domain, problem: &Problem, plan: &PlanText) -> Option<BigRational> {
+    let reduced = relevant(domain, problem, &plan.steps, Some(&problem.goal));
+    let world = World::new(domain, reduced.as_ref().unwrap_or(problem), &|| false);
+    judge_readings(&world, plan, &Options::default()).metric
 }
 
 /// Executes a plan with the first schema that can start for each step. If there are several readings, but not
@@ -164,8 +174,8 @@ fn metric_value(
     violated: &[Name],
     total_time: &BigRational,
 ) -> Option<BigRational> {
-    let metric = world.problem.metric.as_ref()?;
-    let final_state = world.with_violations(violated, state);
-    let evaluator = Evaluator { total_time: Some(total_time), ..Evaluator::new(world, &final_state) };
-    evaluator.value(&metric.expression, &Bindings::default()).ok()
+    if world.has_preferences() {
+        return metric(world, &world.with_violations(violated, state), total_time);
+    }
+    metric(world, state, total_time)
 }

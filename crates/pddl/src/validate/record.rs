@@ -7,7 +7,7 @@ use crate::ast::{Constraint, Name};
 
 use super::world::{State, World};
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Moment {
     pub(super) time: BigRational,
     pub(super) state: State,
@@ -15,7 +15,7 @@ pub(super) struct Moment {
     is_event: bool,
 }
 
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Record {
     /// States of the trajectory, in order. Empty if the domain and the problem have no constraints.
     pub(super) moments: Vec<Moment>,

@@ -12,10 +12,15 @@ use crate::visit::Node;
 
 use super::plan::PlanStep;
 
-/// Returns the problem without facts and values that neither the steps nor the metric can read. Some unread
-/// ones may remain. Returns `None` if the readable facts cannot be determined, for example with axioms,
+/// Returns the problem without facts and values that neither the steps nor the metric nor `goal` can read. Some
+/// unread ones may remain. Returns `None` if the readable facts cannot be determined, for example with axioms,
 /// constraints or quantifiers.
-pub(super) fn relevant(domain: &Domain, problem: &Problem, steps: &[PlanStep]) -> Option<Problem> {
+pub(super) fn relevant(
+    domain: &Domain,
+    problem: &Problem,
+    steps: &[PlanStep],
+    goal: Option<&Condition>,
+) -> Option<Problem> {
     // Axioms and constraints can read every fact.
     let is_plain =
         domain.derived.is_empty() && domain.constraints.is_empty() && problem.constraints.is_empty();
@@ -34,6 +39,16 @@ pub(super) fn relevant(domain: &Domain, problem: &Problem, steps: &[PlanStep]) -
     }
     let mut read = Vec::new();
     schemas().for_each(|action| fluents_of(action, &mut read));
+    let mut is_quantified = false;
+    if let Some(goal) = goal {
+        goal.walk(&mut |node| {
+            is_quantified |= matches!(node, Node::Condition(Condition::Exists(..) | Condition::ForAll(..)));
+            read.extend(node.fluent().or_else(|| node.atom()));
+        });
+    }
+    if is_quantified {
+        return None;
+    }
     let mentioned = Mentioned::by_domain(domain).objects;
     let arguments = steps.iter().flat_map(|step| &step.arguments).chain(&mentioned);
     let terms = read.iter().flat_map(|atom| &atom.arguments);

@@ -160,6 +160,10 @@ impl<'p> World<'p> {
         constraint_names.chain(action_preferences.map(|preference| &preference.name)).map(|name| &name.name)
     }
 
+    pub(super) fn has_preferences(&self) -> bool {
+        self.preferences().next().is_some()
+    }
+
     /// Returns a copy of a state with the values of `(is-violated NAME)`, for the metric.
     pub(super) fn with_violations(&self, violated: &[Name], state: &State) -> State {
         let mut state = state.clone();
