@@ -147,11 +147,11 @@ impl<'a> Expansion<'a> {
     }
 }
 
-/// Parses the document type declaration of an XML document. Returns `None` without a declaration, if it has no
-/// internal subset, or if it is malformed. External entities are ignored.
+/// Parses the document type declaration of an XML document. Returns `None` without a declaration, if the
+/// declaration has no internal subset (part in `[…]`), or if it is malformed. External entities are ignored.
 fn declarations(text: &[u8]) -> Option<Declarations<'_>> {
     let start = text.windows(9).position(|window| window == b"<!DOCTYPE")?;
-    // Only the XML declaration, comments and processing instructions may precede it.
+    // Only the XML declaration, comments and processing instructions may precede the document type declaration.
     let mut cursor = 0;
     while cursor < start {
         let next = cursor + text[cursor..].iter().position(|&byte| byte == b'<')?;

@@ -56,7 +56,8 @@ impl Prover {
             let Ok(extent) = run.extent(bounds, limit, best) else { return ProverOutcome::Over };
             self.horizon = self.horizon.max(extent.allowed.len());
             if extent.step_bound.is_none() && stage < Int::MAX {
-                // Without a step bound, an unsatisfiable formula of a stage would prove nothing.
+                // Without a step bound, an unsatisfiable formula does not raise the lower bound. So the limit is
+                // not raised in stages: the formula admits all plans that are cheaper than the best one.
                 self.stage = Some(Int::MAX);
                 continue;
             }
