@@ -1,5 +1,6 @@
-//! Causes that rule a design out, and minimal sets of alterations that make the design available. An alteration is a
-//! recovery of a component or a change of a measurement.
+//! Causes that rule a design out, and minimal sets of alterations that make the design available. For an available
+//! design: single alterations that make it unavailable. An alteration is a recovery or failure of a component, or a
+//! change of a measurement.
 //!
 //! Sets of alterations are tried in ascending order of size, up to a maximum number, by reasoning with a copy of the
 //! knowledge base. So each listed set is known to suffice, but some sets may be missing. These sets are the diagnoses

@@ -3,8 +3,8 @@
 //!
 //! If an action has lost a design, or its remainder is not executable, the action is reconfigured to available designs
 //! for which the validator accepts the remainder. If no such designs exist, if there are too many configurations to try,
-//! or if the settings say so, the action is suspended. This decision needs no search: each configuration of this one action is simulated
-//! once. Planning decides later about the whole mission.
+//! or if the settings say so, the action is suspended. This decision needs no search: each configuration of this one
+//! action is simulated once. Planning decides later about the whole mission.
 
 use num_rational::BigRational;
 use pddl::ast::Direction;

@@ -61,7 +61,7 @@ impl Inclusions {
     }
 
     /// Returns the pairs of different restrictions `[sub, sup]` with `sub ⊑ sup`, of which an axiom concludes
-    /// `sub` and has `sup` as a condition.
+    /// `sub`, and an axiom or rule has `sup` as a condition.
     pub(crate) fn pairs(&self) -> Vec<[ClassExpression; 2]> {
         let pairs =
             self.concluded.iter().flat_map(|(sub, including)| including.iter().map(move |sup| (sub, sup)));

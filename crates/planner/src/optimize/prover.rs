@@ -1,4 +1,5 @@
-//! Proves optimality with formulas, one for each stage of increasing cost limits.
+//! Proves optimality with formulas, one for each stage. A stage limits the cost to a part of the gap between the lower
+//! bound and the cost of the best plan; the parts grow.
 
 use std::time::Instant;
 

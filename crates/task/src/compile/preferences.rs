@@ -27,8 +27,8 @@ const GOING_ON: &str = "the plan goes on";
 
 pub(super) const VIOLATION: &str = " is violated";
 
-/// Auxiliary atom that is never true. Hidden actions that are never executed add it, so that they have an
-/// effect.
+/// Auxiliary atom that is never true. Hidden actions that are never executed add it, because actions without
+/// effects would be pruned.
 const VIOLATED: &str = "a preference is violated";
 
 pub(super) fn count(preference: &Name) -> Atom {
