@@ -120,7 +120,7 @@ impl Setup {
                 Mission::new(&sections.name, Some(knowledge), bindings, domain, problem)
                     .map(|mission| (mission, settings))
             }
-            // The mission cannot be checked, because faulty bindings leave its symbols undefined.
+            // With faulty settings or bindings, the mission is not built. Only the faults of its files are added.
             _ => {
                 Err(knowledge.err().into_iter().flatten().chain(domain.err()).chain(problem.err()).collect())
             }

@@ -90,7 +90,8 @@ impl Budget {
         }
     }
 
-    /// Charges steps to a rule. Returns `false` if evaluation has to stop.
+    /// Takes steps from the budget, which all rules share. Returns `false` if evaluation has to stop. If the
+    /// budget is exhausted, the error names `rule`.
     pub fn spend(&self, steps: u64, rule: u32) -> bool {
         let remaining = self.remaining_steps.get();
         if remaining < steps {
@@ -116,7 +117,7 @@ impl Budget {
     }
 
     /// Counts visited rows, and calls the interrupt function when it is due. Returns `false` if evaluation
-    /// has to stop.
+    /// has to stop. If the function stops it, the error names `rule`.
     pub fn visit(&self, rows: u64, rule: u32) -> bool {
         let remaining = self.rows_until_check.get().saturating_sub(rows);
         if remaining > 0 {

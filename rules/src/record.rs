@@ -25,7 +25,8 @@ impl Records {
         Self { rules: network.widths.iter().map(slots).collect() }
     }
 
-    /// Adapts the table to the rules of a revised network, and drops the bindings of removed rules.
+    /// Adapts the table to the rules of a revised network. Drops the bindings of removed rules, and of rules
+    /// whose number of variables has changed.
     pub fn revise(&mut self, network: &Network, is_removed: impl Fn(u32) -> bool) {
         let previous = std::mem::take(self);
         *self = Self::new(network);

@@ -1,9 +1,9 @@
-//! Explanations of absent facts: for each rule that could derive a fact, the binding of its body with the fewest
-//! unsatisfied atoms.
+//! Explanations of absent facts: for each rule that could derive a fact, the binding of its body that comes nearest
+//! to satisfying the body.
 //!
 //! A depth-first branch-and-bound search finds the binding with the lowest weight of unsatisfied atoms (a
 //! missing fact weighs more than a failed test). Ties are broken by the total gap of failed numeric
-//! comparisons. After a fixed number of nodes, the search ends with the best binding found.
+//! comparisons. After a fixed number of nodes, the search ends as soon as it has a binding.
 
 use std::fmt;
 
@@ -143,8 +143,8 @@ impl fmt::Display for DisplayObstacle<'_> {
 
 impl Engine {
     /// Returns the nearest miss of each rule head that unifies with the fact, in the order of rules: the
-    /// binding of the rule body with the fewest unsatisfied atoms that a limited search finds. Empty if the
-    /// fact holds, or if no rule could derive it.
+    /// binding of the rule body with the lowest weight of unsatisfied atoms that a limited search finds. Empty
+    /// if the fact holds, or if no rule could derive it.
     pub fn why_not(&self, fact: &Fact) -> Vec<NearMiss> {
         let relation = self.store.find(fact.predicate, fact.arguments.len());
         let Some(relation) = relation.filter(|_| !self.holds(fact)) else { return Vec::new() };

@@ -153,8 +153,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     so_far.end(common)
 }
 
-/// Returns the missions to compare, with their processes (Markov decision processes): the mission itself, or variants
-/// with other starts and goals.
+/// Returns the missions to compare, each with the data from which its process (Markov decision process) is built:
+/// the mission itself, or variants with other starts and goals. A variant has the names of its start and goal.
 fn missions(
     arguments: &Arguments,
     mission: &Mission,

@@ -13,7 +13,8 @@ use crate::comparison::planned::{NoResult, PlanTable};
 use crate::comparison::process::{Action, Process, Risk, Valuation};
 use crate::comparison::referee::Referee;
 
-/// Total times of a mission if a component is lost after a given number of moves and nothing else fails.
+/// Total times of a mission under four ways to react, if a component is lost after a given number of moves and
+/// nothing else fails.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct LossAt {

@@ -1,4 +1,4 @@
-//! Executes plans without any failure, and computes their end state and their time.
+//! Simulation without failures: the time of a plan, and the state after an action.
 
 use num_rational::BigRational;
 

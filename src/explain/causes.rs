@@ -1,5 +1,6 @@
-//! Causes that rule a design out, and minimal sets of alterations that make the design available. An alteration is a
-//! recovery of a component or a change of a measurement.
+//! Causes that rule a design out, and minimal sets of alterations that make the design available. For an available
+//! design: single alterations that make it unavailable. An alteration is a recovery or failure of a component, or a
+//! change of a measurement.
 //!
 //! Sets of alterations are tried in ascending order of size, up to a maximum number, by reasoning with a copy of the
 //! knowledge base. So each listed set is known to suffice, but some sets may be missing. These sets are the diagnoses
@@ -288,7 +289,7 @@ pub(super) fn singly(mission: &Mission, repairs: &[Repair], limits: &Limits) -> 
 
 /// Returns alterations that may change whether a design is available. They concern its components,
 /// and measurements that it depends on. New measurements are values at or just beyond the bounds in
-/// its requirements, or its estimations.
+/// its requirements, or around its estimation if no requirement concerns the attribute.
 fn candidates(knowledge: &Knowledge, design: &FunctionDesign) -> Vec<Alteration> {
     let is_own = |component: &str| design.components.iter().any(|needed| needed.iri == component);
     let mut alterations = components(knowledge, design.available, &is_own);
@@ -297,7 +298,8 @@ fn candidates(knowledge: &Knowledge, design: &FunctionDesign) -> Vec<Alteration>
         for to in targets(bounds, &from, design.available) {
             alterations.push(Alteration { name: attribute.clone(), from: Some(from.clone()), to });
         }
-        // Some vocabularies compare a measurement with a design's estimation.
+        // Without a requirement, the design's estimation can be the bound: some vocabularies compare measurements
+        // with it.
         let is_required = design.requirements.iter().any(|requirement| requirement.attribute == attribute);
         let estimated = design.estimations.get(&attribute).filter(|_| !is_required).cloned();
         for to in estimated.into_iter().flat_map(|bound| around(&bound, &from)) {

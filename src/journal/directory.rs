@@ -11,8 +11,9 @@ use serde_json::Value;
 use super::record::{FORMAT, Link, Record, opening};
 use crate::message::Message;
 
-/// First part of the file name of a segment in place of `journal`, after a failed write with which
-/// the loop continued. Both words have the same length, so that renaming needs no disk space.
+/// Replaces `journal` at the beginning of the name of the last segment's file if a write has failed
+/// and the loop has continued without the journal. Both words have the same length, so that renaming
+/// needs no disk space.
 pub(super) const INCOMPLETE: &str = "partial";
 
 #[derive(Debug)]
@@ -96,10 +97,11 @@ impl JournalFiles {
         name(if self.incomplete == Some(number) { INCOMPLETE } else { "journal" }, number)
     }
 
-    /// Checks that no segment is marked as incomplete, i.e. that no write has failed.
+    /// Checks that no segment is marked as incomplete, i.e. that the loop has not continued after a
+    /// failed write.
     ///
     /// # Errors
-    /// M324 if the loop continued after a failed write.
+    /// M324 if a segment is marked.
     pub(super) fn require_complete(&self, directory: &Path) -> Result<(), Message> {
         let Some(number) = self.incomplete else { return Ok(()) };
         let text = format!(

@@ -20,8 +20,9 @@
 //! operating system releases when the process ends. The file also stores the number of records, by
 //! which missing records are detected.
 //!
-//! If a write fails, no answer leaves the program. With [`Unrecorded::Continue`], the segment is then
-//! renamed, so that the journal cannot be resumed, and the loop continues without it.
+//! If a write fails, the loop stops, and no further answer leaves the program. With
+//! [`Unrecorded::Continue`], the segment is renamed instead, so that the journal cannot be resumed, and
+//! the loop continues without it.
 //!
 //! - \[1\] C. Mohan et al.: ARIES, a transaction recovery method, ACM TODS 17, 1992.
 
@@ -95,7 +96,7 @@ pub struct Journal {
     unfinished: Option<Unfinished>,
     digest: String,
     unrecorded: Unrecorded,
-    /// `true` after a failed write with which the loop continues; nothing more is written.
+    /// `true` if a write failed and the loop continued without the journal. Nothing more is written then.
     is_incomplete: bool,
     /// Message about the failed write, until it is added to the next answers.
     notice: Option<String>,

@@ -23,12 +23,13 @@ pub(super) enum Unfinished {
     Observation(String, u64),
 }
 
-/// Returns the number of the first segment to replay, and the segments from this number on. Replay starts at the newest
-/// sound snapshot, or at the beginning of the journal, such that all later segments are sound. Faults in files that are
-/// not needed are added to `warnings`.
+/// Returns the number of the first segment to replay, and the segments from this number on. Replay starts as late as
+/// possible: at the newest sound snapshot that only sound segments follow; without one, at the beginning of the
+/// journal. Faults in files that are not needed are added to `warnings`.
 ///
 /// # Errors
-/// Descriptions of all faults, if no snapshot can be used together with all later segments.
+/// Neither a snapshot nor the beginning of the journal can be used: descriptions of all faults, or only that the
+/// format is old.
 pub(super) fn usable<'a>(
     contents: &'a JournalFiles,
     warnings: &mut Vec<Message>,

@@ -38,8 +38,8 @@ impl Beliefs {
             return Receipt::Unknown;
         }
         self.waits.remove(&effect);
-        // A report of the action may have confirmed the effect before its acknowledgement came.
         self.receipts.by_number = true;
+        // A report of the action may have confirmed the effect before its acknowledgement came.
         if let Some(outstanding) = self.outstanding.remove(&effect) {
             if let Command::Reconfigure { function, to, .. } = outstanding.command {
                 return self.configured(effect, function, to);

@@ -1,9 +1,10 @@
-//! React: requests a safe effect for the action under way after changes, before planning.
+//! React: after changes and before planning, reconfigures or suspends the action under way if it cannot continue
+//! unchanged.
 //!
 //! If an action has lost a design, or its remainder is not executable, the action is reconfigured to available designs
-//! for which the validator accepts the remainder. If no such designs exist, or if there are too many configurations to
-//! try, the action is suspended. This decision needs no search: each configuration of this one action is simulated
-//! once. Planning decides later about the whole mission.
+//! for which the validator accepts the remainder. If no such designs exist, if there are too many configurations to try,
+//! or if the settings say so, the action is suspended. This decision needs no search: each configuration of this one
+//! action is simulated once. Planning decides later about the whole mission.
 
 use std::collections::BTreeSet;
 

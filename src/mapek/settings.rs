@@ -295,8 +295,8 @@ impl Default for Settings {
     }
 }
 
-/// Default of [`Settings::settle`]. A better plan is not urgent, and a driver that its supervisor restarts fails and
-/// recovers within seconds.
+/// Default of [`Settings::settle`]. A driver may fail and be restarted by its supervisor within seconds; without this
+/// time, each recovery would start a search at once. The wait is harmless, because a better plan is not urgent.
 const SETTLE: Duration = Duration::from_secs(5);
 
 const DEADLINE: Duration = Duration::from_secs(10);

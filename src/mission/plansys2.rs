@@ -137,8 +137,8 @@ mod tests {
         check("", true, &twice, spaced);
     }
 
-    /// A fact that is true only from time 5 to time 7 fixes the times of both actions, so that no
-    /// gap fits between them.
+    /// A fact that is true only from time 5 to time 7 leaves no room to delay `short`, so the given plan is returned
+    /// without a gap after `now`.
     #[test]
     fn plans_without_room_for_gaps_are_unchanged() {
         let steps = [("now", 5000, 0), ("short", 5000, 2000)];

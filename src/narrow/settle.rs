@@ -4,12 +4,15 @@
 //! A predicate is *open* if an action or a timed initial literal changes it, if it has an axiom
 //! that is not a clause, or if one of its clauses has an open atom in the body. Axioms about
 //! domains and ranges of properties make nearly every predicate open: for example,
-//! `(functionGrounding ?f ?fd)` implies that its arguments are a function and a function design.
-//! Such a conclusion is redundant if each action that adds the fact requires its arguments to be
-//! stated members of the class (a *guard*), and if the initial state complies. So clauses of an
-//! open predicate are unfolded \[1\]. A clause is dropped if its body contains its head, or an atom
-//! whose guard already implies the head. If no open atom remains, the predicate is *settled*. Each
-//! step preserves the least fixpoint in every reachable state.
+//! `(functionGrounding ?f ?fd)` implies that `?f` is a function and `?fd` is a function design.
+//! Such a clause derives nothing new if the class of the argument is known from the initial state
+//! anyway. This is so under two conditions. Every action that adds a `functionGrounding` requires,
+//! by a unary predicate that never changes, that the argument is in the class (a *guard*). And the
+//! initial facts comply.
+//!
+//! So clauses of an open predicate are unfolded \[1\]. A clause is dropped if its body contains its
+//! head, or an atom whose guard implies the head. If no open atom remains, the predicate is
+//! *settled*. Each step preserves the least fixpoint in every reachable state.
 //!
 //! \[1\] H. Tamaki, T. Sato: Unfold/fold transformation of logic programs, ICLP 1984.
 
@@ -23,8 +26,9 @@ const MAX_DEPTH: usize = 8;
 /// Maximum number of clauses that are examined while one predicate is unfolded.
 const MAX_CLAUSES: usize = 1000;
 
-/// Guards. A guard is a predicate, an argument position and a class: in every fact of the predicate
-/// that an action adds, the argument at this position is a stated member of the class.
+/// Guards. A guard is a predicate, an argument position and a class (unary predicate that never
+/// changes). In every fact of the predicate that an action adds, the argument at this position is in
+/// the class.
 pub(super) type Guards = BTreeSet<(Name, usize, Name)>;
 
 /// Returns the guards of a domain: the classes that all actions require of the arguments of facts
@@ -138,8 +142,8 @@ fn is_bound(term: &Term, bound: &[&Name]) -> bool {
 /// a clause).
 pub(super) type Parted = (BTreeMap<Name, Vec<Clause>>, BTreeMap<Name, Option<Vec<Clause>>>);
 
-/// Unfolds clauses until no further predicate becomes settled, i.e. free of atoms that actions or
-/// events can change. Returns the clauses of settled predicates and those of the other, open
+/// Unfolds clauses until no further predicate becomes settled, i.e. has only clauses without open
+/// atoms in the body (see the head of this file). Returns the clauses of settled predicates and those of the other, open
 /// predicates.
 pub(super) fn settle(
     mut clauses_by_head: BTreeMap<Name, Option<Vec<Clause>>>,
@@ -256,7 +260,7 @@ impl Unfold<'_> {
 }
 
 /// Returns `true` if the fact complies with the guard, which restricts an argument of a predicate to a class: the fact
-/// has another predicate, or its argument is a stated member of the class.
+/// has another predicate or fewer arguments, or `stated` contains the fact that its argument is in the class.
 pub(super) fn keeps(
     (predicate, arguments): &Fact,
     (guarded, position, class): &(Name, usize, Name),

@@ -26,7 +26,8 @@ pub(super) fn curves(scene: Scene<'_>, plan: &Plan, steps: &[Step], axis: Axis) 
         line: 0,
     });
     let text = PlanText { steps: text.collect() };
-    // The validator has executed the plan before, so executing it again does not fail.
+    // The validator has executed the plan before, so executing it again is expected to succeed. Otherwise, only
+    // the cost is drawn.
     let course = course(scene.domain, scene.problem, &text).unwrap_or_default();
     let points = metric(scene, plan, &course, axis).unwrap_or_else(|| spent(plan, steps, axis));
     let cost = Curve { name: "cost".to_owned(), points, bounds: Vec::new() };

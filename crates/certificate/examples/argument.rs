@@ -1,4 +1,5 @@
-//! Checks a lower bound on the cost of all plans of a ground task, without a planner.
+//! Checks claims about all plans of a ground task without a planner: lower bounds on their cost, and that there is
+//! no plan.
 //!
 //! `cargo run -p metaplan-certificate --example argument`
 #![expect(clippy::print_stdout, reason = "an example prints")]

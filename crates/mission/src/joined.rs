@@ -1,4 +1,4 @@
-//! [`Mission`]: a knowledge base joined with a PDDL domain and problem.
+//! [`Mission`]: a PDDL domain and problem, joined with a knowledge base if there is one.
 
 use std::collections::{BTreeSet, HashSet};
 use std::sync::{Arc, OnceLock};

@@ -212,7 +212,8 @@ impl<'s> Sink<'s> {
     }
 
     /// Returns the collected diagnostics, sorted by position and without successive duplicates. If some were
-    /// only counted, the last stored one becomes an error P119 with their number.
+    /// only counted, the last stored one is replaced by an error P119 with the number of diagnostics that are
+    /// not shown, including the replaced one.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(crate) fn finish(mut self) -> Vec<Diagnostic> {
         if let (Some(last), true) = (self.diagnostics.get_mut(MAX_DIAGNOSTICS), self.beyond_limit > 0) {

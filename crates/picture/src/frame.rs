@@ -9,7 +9,7 @@ use crate::scale::{Scale, number, px, range, width};
 
 /// Right margin, in pixels.
 pub(crate) const RIGHT: f64 = 16.0;
-/// Upper limit on the width of a drawing, in pixels.
+/// Upper limit on the width to which many steps extend a drawing area, in pixels.
 const WIDEST: f64 = 16_000.0;
 /// Height of a name above its row, in pixels.
 const NAME: f64 = 14.0;

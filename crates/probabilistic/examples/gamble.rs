@@ -1,4 +1,5 @@
-//! Computes the best policy of a small Markov decision process, with proved bounds on its value.
+//! Computes optimal values of a small Markov decision process (greatest probability, least and greatest expected
+//! energy), with proved bounds.
 //!
 //! `cargo run -p metaplan-probabilistic --example gamble`
 #![expect(clippy::print_stdout, reason = "an example prints")]

@@ -27,9 +27,10 @@ use crate::sat::Lit;
 /// encoded by binary addition.
 const AMOUNT_LIMIT: usize = 1_000;
 
-/// Cost limit of an encoding: only plans with a cost of at most `limit` are admitted (with
-/// `CostEncoding::Apart`, only single amounts above the limit are excluded). The goal distances in the first
-/// projection of `bounds` are the potential by which operator costs are reduced (see the head of this file).
+/// Cost limit of an encoding: only plans with a cost of at most `limit` are admitted. With
+/// `CostEncoding::Apart`, amounts are not summed, so only a single reduced cost above the gap between `limit`
+/// and the lower bound is excluded. Operator costs are reduced by the goal distances in the first projection
+/// of `bounds` (see the head of this file). Without a projection, neither costs nor the limit are encoded.
 pub struct CostLimit<'a> {
     pub limit: Int,
     pub bounds: &'a Bounds,
@@ -41,7 +42,7 @@ pub struct CostLimit<'a> {
 pub enum CostEncoding {
     /// The sum of the costs, bounded by the limit.
     Sum,
-    /// Weighted literals for core-guided search. Clauses exclude only single amounts above the gap
+    /// Weighted literals for core-guided search. Clauses exclude only single reduced costs above the gap
     /// between limit and lower bound.
     Apart,
 }
@@ -76,9 +77,10 @@ enum Spent {
 }
 
 impl Cost {
-    /// Encodes the costs of all steps. Excludes sums above the cost limit, or only single amounts in the
-    /// encoding `CostEncoding::Apart`. Without `interference` there is one operator per step. Returns `None`
-    /// if the deadline passes or the run is interrupted, or there are too many clauses.
+    /// Encodes the costs of all steps. Excludes sums above the cost limit, or with `CostEncoding::Apart` only
+    /// single reduced costs above the gap between the limit and the lower bound. Without `interference` there
+    /// is one operator per step. Returns `None` if the deadline passes or the run is interrupted, or there are
+    /// too many clauses.
     pub(super) fn new(
         builder: &mut Builder<'_>,
         cost: &CostLimit<'_>,

@@ -1,9 +1,9 @@
 //! Clauses for the selection of function designs, factored by slots.
 //!
-//! Let `g@t` be the group of the operators that admit the same designs D of a slot. Then `g@t →
-//! ⋁_{d ∈ D} slot=d@t`, at most one design of a slot is true, and `slot=d@t → ⋁ {g@t : d ∈ D}`, so
-//! an unused slot has no design. Forbidden combinations are excluded one by one: `¬g@t ∨ ¬slot=d@t
-//! ∨ ¬slot'=d'@t`.
+//! The operators that admit the same designs D of a slot form a group. Let `g@t` be true if an operator of the
+//! group is executed at step t. Then `g@t → ⋁_{d ∈ D} slot=d@t`, at most one design of a slot is true, and
+//! `slot=d@t → ⋁ {g@t : d ∈ D}`, so an unused slot has no design. Each forbidden combination is excluded for
+//! the group `h` of the operators that forbid it, e.g. `¬h@t ∨ ¬slot=d@t ∨ ¬slot'=d'@t` for two slots.
 
 use task::limits::Interrupted;
 

@@ -80,8 +80,8 @@ pub trait Solver {
     /// Returns the number of learnt clauses over all calls, one per conflict; 0 if the solver does
     /// not report them.
     fn conflicts(&self) -> u64;
-    /// Returns the reason for an interruption that was not caused by a limit, e.g. a crash of the
-    /// program.
+    /// Returns the reason for an interruption that was not caused by a limit, e.g. a crash of an
+    /// external solver. `None` if there was no such interruption.
     fn failure(&self) -> Option<&str> {
         None
     }

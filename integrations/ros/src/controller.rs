@@ -3,9 +3,10 @@
 //!
 //! ```text
 //! ASK --domain_expert/get_domain, problem_expert/get_problem--> PLAN --a plan--> EXECUTE (action execute_plan)
-//! EXECUTE --success--> end     EXECUTE --failure--> ASK
+//! EXECUTE --success--> end     EXECUTE --failure--> ASK, or error after 5 consecutive failures
 //! EXECUTE --a design of the plan becomes unavailable--> cancel --> ASK
-//! PLAN --no plan--> report, then ASK when the knowledge base has changed, or after some seconds
+//! PLAN --no plan--> report, then ASK when the available designs have changed, or after some seconds
+//! PLAN --the goal holds--> end
 //! ```
 //!
 //! Effects of completed actions persist between plans, because PlanSys2's problem expert records them.
@@ -32,7 +33,7 @@ use crate::planner::{
 
 const EXPERT_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Pause before the next planning attempt if no plan was found, unless the knowledge base changes.
+/// Pause before the next planning attempt if no plan was found, unless the available designs change.
 const RETRY_PAUSE: Duration = Duration::from_secs(5);
 
 const FAILURE_PAUSE: Duration = Duration::from_secs(1);

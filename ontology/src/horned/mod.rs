@@ -1,6 +1,7 @@
-//! Wraps horned-owl; no other module uses that crate. The RDF reader of horned-owl converts normalised
-//! triples to the axioms and rules of this crate. Its OWL/XML and functional-style readers convert
-//! documents to triples (`transcribe`).
+//! Wraps horned-owl; no other module uses that crate. Normalised triples are read by horned-owl's RDF
+//! reader, and its components are converted to the axioms and rules of this crate. Documents in OWL/XML or
+//! functional-style syntax are first converted to triples, by a reader and the RDF writer of horned-owl
+//! (`transcribe`). `owl_xml` converts functional-style documents to OWL/XML.
 //!
 //! horned-owl returns sets in hash order, so this module sorts the axioms, entities and annotations.
 //! Triples that horned-owl assigns to no axiom or rule become warnings.

@@ -60,7 +60,8 @@ impl Inclusions {
         restriction(class, true).filter(|restriction| self.concluded.contains_key(restriction))
     }
 
-    /// Returns the pairs of different restrictions `[sub, sup]` with `sub ⊑ sup`.
+    /// Returns the pairs of different restrictions `[sub, sup]` with `sub ⊑ sup`, of which an axiom concludes
+    /// `sub`, and an axiom or rule has `sup` as a condition.
     pub(crate) fn pairs(&self) -> Vec<[ClassExpression; 2]> {
         let pairs =
             self.concluded.iter().flat_map(|(sub, including)| including.iter().map(move |sup| (sub, sup)));
@@ -285,7 +286,8 @@ impl InclusionGraph {
         let is_universal = matches!(restriction, ClassExpression::AllValuesFrom(..));
         let related = if is_universal { &self.subproperties } else { &self.properties };
         let mut properties = reachable(property, related);
-        // Other properties cannot give a condition; this avoids the computation of the classes.
+        // Only properties that occur in a condition can contribute. Without one, the superclasses of the filler
+        // need not be computed.
         properties.retain(|property| self.condition_properties.contains(property));
         if properties.is_empty() {
             return BTreeSet::new();

@@ -147,21 +147,20 @@ impl<'a> Expansion<'a> {
     }
 }
 
-/// Parses the document type declaration of an XML document. Returns `None` without a declaration, if it has no
-/// internal subset, or if it is malformed. External entities are ignored.
+/// Parses the document type declaration of an XML document. Returns `None` without a declaration, if the
+/// declaration has no internal subset (part in `[…]`), or if it is malformed. External entities are ignored.
 fn declarations(text: &[u8]) -> Option<Declarations<'_>> {
-    let start = text.windows(9).position(|window| window == b"<!DOCTYPE")?;
-    // Only the XML declaration, comments and processing instructions may precede it.
-    let mut cursor = 0;
-    while cursor < start {
-        let next = cursor + text[cursor..].iter().position(|&byte| byte == b'<')?;
-        let end: &[u8] = match &text[next..] {
+    // Only the XML declaration, comments and processing instructions may precede the document type declaration.
+    let mut start = 0;
+    loop {
+        start += text[start..].iter().position(|&byte| byte == b'<')?;
+        let end: &[u8] = match &text[start..] {
             [b'<', b'!', b'-', b'-', ..] => b"-->",
             [b'<', b'?', ..] => b"?>",
-            _ if next == start => break,
+            tail if tail.starts_with(b"<!DOCTYPE") => break,
             _ => return None,
         };
-        cursor = next + text[next..].windows(end.len()).position(|window| window == end)? + end.len();
+        start += text[start..].windows(end.len()).position(|window| window == end)? + end.len();
     }
     let subset = text[start..].iter().position(|&byte| byte == b'[' || byte == b'>')? + start;
     if text[subset] == b'>' {
@@ -255,6 +254,20 @@ mod tests {
             Err((57, "`&b;` is not declared")),
         );
         check("<!DOCTYPE a [<!ENTITY b '&b;'>]><a>&b;</a>", Err((35, "contains itself")));
+    }
+
+    #[test]
+    fn declarations_in_comments_are_ignored() {
+        let comment = "<!-- <!DOCTYPE a [<!ENTITY b 'x'>]> -->";
+        check(&format!("{comment}<a>&b;</a>"), Ok(&format!("{comment}<a>&b;</a>")));
+        check(
+            &format!("<?xml version='1.0'?>{comment}<!DOCTYPE a [<!ENTITY b 'c'>]><a>&b;</a>"),
+            Ok(&format!("<?xml version='1.0'?>{comment}<a>c</a>")),
+        );
+        check(
+            "<a><!-- <!DOCTYPE a [<!ENTITY b 'x'>]> -->&b;</a>",
+            Ok("<a><!-- <!DOCTYPE a [<!ENTITY b 'x'>]> -->&b;</a>"),
+        );
     }
 
     #[test]

@@ -81,14 +81,15 @@ impl Moment {
     /// Returns the moment plus a duration, with the same time zone; the calculation is in local time. Months
     /// are added first; a day that does not exist in the new month becomes its last day. Then seconds are
     /// added. A time of day wraps around at midnight. A date is rounded down to whole days. Returns `None` if
-    /// months are added to a time, or if the year is out of range after the months are added.
+    /// months are added to a time of day, or if the year is out of range after the months are added.
     pub(crate) fn later(&self, duration: &Duration) -> Option<Self> {
         let local = self.local();
         let (day, _) = split_day(&local);
         let (year, month, date) = civil_from_days(day);
         let total_months = (year.checked_mul(12)?.checked_add(month - 1)?).checked_add(duration.months)?;
         let (year, month) = (total_months.div_euclid(12), total_months.rem_euclid(12) + 1);
-        // Keeps the calendar arithmetic far from the range of `i64`.
+        // The bound keeps the calendar arithmetic far from the limits of `i64`. Months cannot be added to a
+        // time of day.
         if year.abs() > 1_000_000_000 || (self.kind == MomentKind::Time && duration.months != 0) {
             return None;
         }

@@ -13,8 +13,8 @@ impl Engine {
     pub fn everything(&self) -> Derivation {
         let mut positions: FxHashMap<Fact, usize> = FxHashMap::default();
         let mut steps = Vec::new();
-        // A rule that compares two of its own names does not list their equality as a support, so all
-        // equalities come first.
+        // If a rule compares two names in its text (`sameAs(a, b)`), the equality is not among its supports,
+        // which are relation atoms only. So all equalities come first.
         let pairs = self.equality.as_ref().map_or_else(Vec::new, |equality| equality.pairs_in_order());
         for fact in pairs.into_iter().chain(self.facts()) {
             if !positions.contains_key(&fact)

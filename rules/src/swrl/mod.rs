@@ -8,10 +8,10 @@
 //! [idle] t:Objective(?o) ^ not t:o_status(?o, "IN_ERROR_NFR") -> t:idle(?o, true) .
 //! ```
 //!
-//! `^`, `∧` and `,` separate atoms. `->` or `→` separates body and head. The full stop is optional before
-//! another rule that does not start with an arrow, and required after an empty head. `sameAs`,
-//! `differentFrom` and the built-ins of `swrlb:` have their SWRL meaning. `[…]` is the label of a rule.
-//! Negation as failure (`not`) and aggregates (`?n = count { … }`) are extensions of SWRL.
+//! `^`, `∧` and `,` separate atoms. `->` or `→` separates body and head. The full stop is required after an
+//! empty head, except at the end of the text; otherwise it is optional. `sameAs`, `differentFrom` and the
+//! built-ins of `swrlb:` have their SWRL meaning. `[…]` is the label of a rule. Negation as failure (`not`)
+//! and aggregates (`?n = count { … }`) are extensions of SWRL.
 //!
 //! [1] W3C Member Submission: SWRL, 2004.
 

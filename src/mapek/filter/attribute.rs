@@ -99,8 +99,8 @@ pub(crate) struct AttributeState {
     crossing: Option<(Micros, BigRational)>,
     last_sample_time: Option<Micros>,
     silent: bool,
-    /// Number of samples held back since a crossing of a bound was last believed, or since silence last set the worst
-    /// value.
+    /// Number of samples held back. Set to 0 when a crossing of a bound is confirmed, and when silence sets the
+    /// believed value to the worst one.
     pub held: u64,
 }
 

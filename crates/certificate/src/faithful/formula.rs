@@ -260,7 +260,7 @@ fn limited(cases: usize) -> Result<(), Cause> {
 /// constants.
 fn implies(structure: &Structure, known: &(Linear, bool), wanted: &Linear, strict: bool) -> bool {
     let Some(ratio) = wanted.ratio_to(&known.0).filter(Signed::is_positive) else { return false };
-    // Lower bound on `wanted` without its constant.
+    // Lower bound on the variable part of `wanted` (without its constant term) that follows from `known`.
     let mut least = -(&known.0.constant * ratio);
     let mut is_strict = known.1;
     if let Some(unit) = unit(structure, wanted) {
@@ -273,8 +273,8 @@ fn implies(structure: &Structure, known: &(Linear, bool), wanted: &Linear, stric
     least.is_positive() || least.is_zero() && (is_strict || !strict)
 }
 
-/// Returns a number of which the expression without its constant is a multiple in every state.
-/// Returns `None` if a fluent is not known to be integral.
+/// Returns a number of which the variable part of the expression (without its constant term) is a
+/// multiple in every state. Returns `None` if a fluent has no known factor that makes it an integer.
 fn unit(structure: &Structure, linear: &Linear) -> Option<BigRational> {
     let mut unit: Option<BigRational> = None;
     for (key, factor) in &linear.factors {

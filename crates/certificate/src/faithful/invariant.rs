@@ -29,7 +29,7 @@ use crate::integer::MAX_DIGITS;
 
 pub(super) const WITNESS_FORMAT: &str = "metaplan-witness/1";
 
-/// Widening threshold: when an end of an interval moves for this number of times, it becomes
+/// Widening threshold: when an end of an interval has moved this number of times, it becomes
 /// unbounded.
 const WIDENING_THRESHOLD: u32 = 8;
 

@@ -35,9 +35,10 @@ pub(crate) struct Meeting {
     pub(crate) never_named: NeverNamed,
 }
 
-/// The IRI of the first design of the knowledge base that the problem does not name, and the text of the
-/// warning. `None` if the problem names no designs of its own, if it names all designs that solve its
-/// functions, or if it names designs that the knowledge base does not have (a different warning).
+/// Set if the problem declares designs, all of which the knowledge base has, but not every design of the
+/// knowledge base that solves a function of the problem: the IRI of the first missing one, and the text of the
+/// warning. Designs that the knowledge base lacks cause another warning instead, and required functions
+/// without a design an error.
 pub(crate) type NeverNamed = Option<(String, String)>;
 
 pub(crate) fn meet(
@@ -255,8 +256,8 @@ impl Comparison<'_> {
         let unknown: Vec<&Object> = role.objects.iter().filter(|object| !role.knows(&object.name)).collect();
         let unnamed = role.individuals.iter().filter(|individual| !role.has(&Name::new(&individual.name)));
         let unnamed: Vec<_> = match role.class.as_str() {
-            // A problem without designs of its own receives all designs from the knowledge base, so
-            // no design needs to be named.
+            // A problem that declares no designs itself receives all designs from the knowledge base,
+            // so no design needs to be named. Designs in the domain do not count.
             DESIGN if role.objects.iter().all(|object| object.in_domain) => Vec::new(),
             DESIGN => unnamed.filter(|design| self.is_of_named_function(&design.iri)).collect(),
             _ => unnamed.collect(),

@@ -1,5 +1,5 @@
-//! Names of the explicit form of a plain domain that the user's files do not contain: recognises them, and
-//! translates them for display.
+//! Names that co-adaptation adds to the user's domain: tells them apart from the user's names, and rewrites
+//! conditions with them for display.
 
 use pddl::ast::Name;
 

@@ -44,7 +44,9 @@ pub(super) fn literal(lexical: &str, datatype: Option<&str>) -> Name {
     Name::new(&format!("{}_{datatype}", spelled(lexical)))
 }
 
-/// Replaces characters that PDDL names do not admit by underscores.
+/// Replaces white space, control characters, brackets, quotation marks and the characters `;?:,|\` by
+/// underscores, and non-ASCII characters that are neither letters nor digits. Other ASCII symbols, such as `.` and
+/// `#`, are kept, although standard PDDL names do not admit them.
 fn spelled(text: &str) -> String {
     let allowed = |letter: char| {
         letter.is_ascii_graphic() && !"()[]{};\"'?:,|`\\".contains(letter) || letter.is_alphanumeric()

@@ -8,7 +8,8 @@ use crate::source::Source;
 
 use super::Checker;
 
-/// Requirement flags of PDDL 1.2 to 3.1, PDDL+ and HDDL, and further flags that planners accept.
+/// Known requirement flags: those of PDDL 1.2 (without `subgoal-through-axioms`, `expression-evaluation`,
+/// `true-negation` and `ucpop`) to 3.1, PDDL+ and HDDL, and further flags that planners accept.
 const REQUIREMENTS: [&str; 31] = [
     "strips",
     "typing",

@@ -37,7 +37,7 @@ pub struct Outputs<'o> {
 ///
 /// # Errors
 /// The formula does not support a construct of the task, there is no step bound, the formula is satisfiable,
-/// or a limit is reached.
+/// a limit is reached, or an output cannot be written or read again.
 #[expect(clippy::arithmetic_side_effects, reason = "two constants, divided by a number that is not 0")]
 pub fn refute(
     documents: (&str, &str),

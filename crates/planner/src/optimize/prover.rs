@@ -1,4 +1,5 @@
-//! Proves optimality with formulas, one for each stage of increasing cost limits.
+//! Proves optimality with formulas, one for each stage. A stage limits the cost to a part of the gap between the lower
+//! bound and the cost of the best plan; the parts grow.
 
 use std::time::Instant;
 
@@ -56,7 +57,8 @@ impl Prover {
             let Ok(extent) = run.extent(bounds, limit, best) else { return ProverOutcome::Over };
             self.horizon = self.horizon.max(extent.allowed.len());
             if extent.step_bound.is_none() && stage < Int::MAX {
-                // Without a step bound, an unsatisfiable formula of a stage would prove nothing.
+                // Without a step bound, an unsatisfiable formula does not raise the lower bound. So the limit is
+                // not raised in stages: the formula admits all plans that are cheaper than the best one.
                 self.stage = Some(Int::MAX);
                 continue;
             }

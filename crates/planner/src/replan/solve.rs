@@ -202,7 +202,8 @@ fn choose(
     let mut chosen = None;
     let mut max_changes = Some((usize::MAX, usize::MAX));
     for (start, plan) in winners {
-        // A later plan is selected only if it has fewer changes.
+        // A later plan is selected only if it has fewer changes. `None`: the chosen plan has no changes, so no
+        // plan has fewer.
         let Some(limit) = max_changes else { break };
         let beginning = plan_tiebreak::PlanPrefix { state: &start.state, designs: &start.designs, close_to };
         let (plan, changes) =

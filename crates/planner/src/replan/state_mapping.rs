@@ -4,7 +4,9 @@
 //! numbers that actions change, and in facts that actions change and for which the task has variables. These
 //! facts must be reachable in the relaxation of the task and must respect its mutex groups. Then every fact
 //! that is reachable in the new problem is also reachable in the grounded problem. Facts and values that
-//! nothing reads may differ arbitrarily.
+//! actions change but nothing reads may differ arbitrarily. Everything else must be equal: other facts and
+//! values (even if nothing reads them), objects, goal, constraints and metric. Timed initial literals are not
+//! supported.
 
 use num_rational::BigRational;
 use num_traits::ToPrimitive;

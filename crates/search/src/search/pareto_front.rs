@@ -20,7 +20,7 @@ pub(super) trait Criteria {
     /// further tie-breakers.
     fn dominates(&self, one: u32, other: u32) -> bool;
 
-    /// Replaces the contents of `to` by the number indices of a label, one for each criterion.
+    /// Replaces the contents of `to` by the indices of the numbers of a label, one for each criterion.
     fn numbers(&self, label: u32, to: &mut Vec<u32>);
 }
 

@@ -70,8 +70,8 @@ struct Choice {
 /// Combinations of designs of an operator, in ascending order; `None` if there are too many.
 type Choices = Option<Vec<Choice>>;
 
-/// Key of a Pareto front: values of the basic variables, last designs of the functions and, if more of a
-/// number may be worse (the task is not monotone), numbers.
+/// Key of a Pareto front: the values of the basic variables, the last design of each function, and the values
+/// of the numeric variables. The last are omitted if a higher value is never worse (the task is monotone).
 type Place = (Box<[u32]>, Vec<Option<ObjectId>>, Vec<Int>);
 
 #[derive(Default)]

@@ -27,8 +27,8 @@ const GOING_ON: &str = "the plan goes on";
 
 pub(super) const VIOLATION: &str = " is violated";
 
-/// Auxiliary atom that is never true. Hidden actions that are never executed add it, so that they have an
-/// effect.
+/// Auxiliary atom that is never true. Hidden actions that are never executed add it, because actions without
+/// effects would be pruned.
 const VIOLATED: &str = "a preference is violated";
 
 pub(super) fn count(preference: &Name) -> Atom {
@@ -102,7 +102,7 @@ fn look_up(domain: &mut Domain, span: Span, wanted: Vec<PreferenceInstance>) {
         declare(domain, VIOLATED);
     }
     for ((name, condition), number) in wanted.into_iter().zip(1_u64..) {
-        // Actions without effects would be pruned.
+        // The action adds a flag that is false before, because actions without effects would be pruned.
         let precondition = all([not(condition), not(holds(VIOLATED))]);
         let effect = Effect::And(vec![violate(&name), Effect::Add(flag(VIOLATED))]);
         let body = ActionBody::Instantaneous { precondition, effect };

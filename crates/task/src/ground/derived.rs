@@ -157,8 +157,9 @@ fn single_bodies(
     Ok(bodies)
 }
 
-/// Replaces atoms by the bodies of their single rules. An atom in a negative literal or clause is replaced
-/// only if the body is a single literal. Returns `false` if the condition then contradicts itself.
+/// Replaces atoms by the bodies of their single rules, which have no clauses (see [`GroundAxiom`]). An atom in
+/// a negative literal or clause is replaced only if the body is a single literal. Returns `false` if the
+/// condition then contradicts itself.
 fn inline(condition: &mut GroundCondition, bodies: &FxHashMap<AtomId, GroundCondition>) -> bool {
     let mut literals = Vec::with_capacity(condition.literals.len());
     for mut literal in std::mem::take(&mut condition.literals) {

@@ -133,8 +133,8 @@ impl Rational {
         !self.is_positive() && !self.is_zero()
     }
 
-    /// Returns an upper bound on the number of bits of the numerator and of the denominator; the bound is at
-    /// least 256.
+    /// Returns an upper bound on the number of bits of the numerator and of the denominator: the exact maximum
+    /// for big rationals, and 256 for all others.
     pub(crate) fn bits(&self) -> u64 {
         match &self.0 {
             Repr::Small(_) | Repr::Decimal(_) => 256,

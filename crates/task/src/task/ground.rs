@@ -129,7 +129,8 @@ pub enum Argument {
     Slot(u32),
 }
 
-/// A ground operator. Operators of the same schema share data that depends on designs.
+/// A ground operator. Operators of the same schema share the data that depend on designs if they have the same
+/// objects for the parameters that determine these data.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Operator<N = Int> {
     /// Index of the action schema in the domain.

@@ -171,9 +171,10 @@ impl<'a> Index<'a> {
     }
 
     /// Like [`Self::excludes`], and also `true` for the end of an action whose condition over all
-    /// contradicts the invariant. Both the condition and the invariant would have to hold right
-    /// before that end. The exception, an end at the same time as the start of `own`, is ruled out
-    /// separately.
+    /// contradicts the invariant: right before an end inside the run, both would have to hold. This
+    /// argument does not cover an end at the time of the start of `own`, so that end must also be
+    /// impossible. Either the end and the start must keep a distance, or the start requires the fact of
+    /// the invariant that the condition contradicts.
     pub(super) fn is_outside(&self, invariant: &Invariant, own: &Instance, id: OperatorId) -> bool {
         if self.excludes(invariant, own, id) {
             return true;

@@ -125,8 +125,9 @@ impl SimpleTemporalNetwork {
         self.opens.is_empty() && self.floor > self.latest()
     }
 
-    /// Returns `true` if timed initial literals at `time` keep the distances in `after` from all
-    /// earlier accesses, provided that all happenings take place as early as possible.
+    /// Returns `true` if timed initial literals at `time` are far enough behind earlier happenings that
+    /// take place as early as possible. `after` lists the access kinds that the literals must follow,
+    /// each with the required distance.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     pub(super) fn are_apart(&self, time: Int, after: &[(Key, Int)]) -> bool {
         after.iter().all(|(key, by)| self.entry(*key).is_none_or(|entry| entry.base + by <= time))
@@ -403,8 +404,8 @@ impl SimpleTemporalNetwork {
         self.propagate_upper_bounds()
     }
 
-    /// Removes time points that neither a running action nor the group refers to, and renumbers the
-    /// others in the order of the running actions.
+    /// Removes the time points that neither a running action nor `group` refers to. Renumbers the others
+    /// in the order of the running actions; the time point of `group` follows if no running action has it.
     fn compact(&mut self) {
         let mut order: Vec<TimePoint> = Vec::new();
         for float in self.opens.iter().map(|open| open.float).chain(self.group.map(|(float, _)| float)) {

@@ -1,5 +1,5 @@
-//! Topics that are subscribed to once they have a publisher, and topics of which only the arrival of messages
-//! is observed, because this program need not know their type.
+//! Subscriptions that begin once a topic has a publisher. If only the arrival of messages matters, the type is
+//! that of the publisher and need not be known to this program.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};

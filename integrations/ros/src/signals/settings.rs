@@ -13,7 +13,7 @@ use crate::node::{PrimaryState, valid_name};
 use crate::signals::field::FieldPath;
 use crate::validated::validated;
 
-/// Default of the least time between two reports of a signal.
+/// Default of the least time between two reports of a field or a rate.
 const REPORT_INTERVAL: Duration = Duration::from_millis(100);
 
 /// Default of the period in which the messages of a topic are counted for its rate.

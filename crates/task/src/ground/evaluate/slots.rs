@@ -1,5 +1,5 @@
-//! Evaluates expressions with unbound slot parameters to tables: one value for each combination of the
-//! remaining designs.
+//! Evaluates expressions with unbound slots (parameters whose designs are not grounded) to tables: one value
+//! for each combination of those designs that are still possible for the slots.
 
 use crate::error::Error;
 use crate::ground::evaluate::expression::ground;
@@ -11,7 +11,7 @@ use crate::lifted::{Expression, ObjectId, Rational};
 use crate::limits::{LimitPoll, Limits};
 use crate::task::quantity::{Linear, Quantity, SlotSet, Table};
 
-/// Unbound slot parameters of the current action schema, with the remaining designs of each slot.
+/// Unbound slot parameters of the current action schema, with the designs that are still possible for each.
 pub struct Slots<'a> {
     pub(crate) parameters: &'a [SlotParameter],
     pub(crate) designs: Vec<Vec<ObjectId>>,
@@ -52,7 +52,8 @@ pub fn open(
         Expression::Product(parts, place) => {
             let (mentioning, closed): (Vec<_>, Vec<_>) =
                 parts.iter().partition(|part| !slots_of_expression(part, slots.parameters).is_empty());
-            // Only a product with a single factor that mentions slots can be split into a sum of tables.
+            // If only one factor mentions slots, its tables are scaled by the other factors. Otherwise, the whole
+            // product becomes one table.
             let [part] = mentioning[..] else {
                 return table(world, expression, mentioned, binding, slots, undefined);
             };

@@ -48,12 +48,13 @@ pub(super) fn admit_some(
     Ok(true)
 }
 
-/// A constraint: the positions of its slots in their connected component (a group of [`joined`]), and the
-/// forbidden combinations.
+/// A constraint: its slots and the forbidden combinations of their designs. A slot is given by its position
+/// in the sorted slots of its connected component (see [`joined`]).
 type Rule<'f> = (Vec<usize>, FxHashSet<&'f SlotSet>);
 
 /// Returns `true` if the designs chosen for the first slots of a connected component can be extended to all
-/// its slots. `rules` is indexed by the last slot that a rule mentions.
+/// its slots. `sizes` is the number of designs of each slot. `rules` is indexed by the last slot that a rule
+/// mentions.
 fn extends(
     chosen: &mut Vec<u32>,
     sizes: &[usize],

@@ -49,7 +49,9 @@ pub(super) struct RunningAction {
     last: Option<Affine>,
 }
 
-/// A happening of the sequence, its time and its contribution to the plan.
+/// A happening of a partial plan, with its time, the duration of an action that it starts, and the
+/// metric after it as far as numbers contribute to it. The values are expressions over the columns
+/// of the linear program.
 #[derive(Debug, Clone)]
 pub(super) struct Passed {
     pub(super) operator: OperatorId,

@@ -1,4 +1,5 @@
-//! Tasks: requested, granted, and ended by their clients, by their goals, or by the autopilot.
+//! Tasks: their requests and the replies, and their end: cancelled by a client, by a reached goal, or because the
+//! autopilot leaves its mode.
 
 use metaplan::mapek::Event;
 use metaplan::message::did_you_mean;
