@@ -95,24 +95,24 @@ pub fn metric_of(domain: &Domain, problem: &Problem, plan: &PlanText) -> Option<
     judge_readings(&world, plan, &Options::default()).metric
 }
 
-/// Executes a plan with the first schema that can start for each step. If there are several readings, but not
-/// more than [`MAX_READINGS`], executes each of them as well. Returns the best verdict, which is meaningless
-/// after an interruption.
+/// Executes all readings of a plan, if there are several but not more than [`MAX_READINGS`], and returns the best verdict.
+/// If no reading is valid, or the readings are too many, executes the plan with the first schema that can start for each
+/// step. After an interruption, the verdict is meaningless.
 #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
 fn judge_readings(world: &World<'_>, plan: &PlanText, options: &Options) -> Verdict {
     let steps: Vec<_> =
         plan.steps.iter().enumerate().map(|(index, step)| step::resolve(world, index + 1, step)).collect();
-    let mut best = judge(world, &steps, options);
+    let mut best: Option<Verdict> = None;
     for steps in step::readings(&steps, MAX_READINGS) {
         if world.budget.poll() {
             break;
         }
         let verdict = judge(world, &steps, options);
-        if is_better(world.problem, &verdict, &best) {
-            best = verdict;
+        if verdict.valid && best.as_ref().is_none_or(|best| is_better(world.problem, &verdict, best)) {
+            best = Some(verdict);
         }
     }
-    best
+    best.unwrap_or_else(|| judge(world, &steps, options))
 }
 
 fn judge<'p>(world: &World<'p>, steps: &[Step<'p>], options: &Options) -> Verdict {
@@ -135,12 +135,9 @@ fn judge<'p>(world: &World<'p>, steps: &[Step<'p>], options: &Options) -> Verdic
     Verdict { valid: violation.is_none(), total_time, metric, values, violation }
 }
 
-/// Returns `true` if `candidate` is better than `incumbent`. Valid plans come first; then the metric decides,
-/// or the total time if there is no metric.
+/// Returns `true` if `candidate` is better than `incumbent`, another valid verdict, by the metric, or by the total time
+/// if there is no metric.
 fn is_better(problem: &Problem, candidate: &Verdict, incumbent: &Verdict) -> bool {
-    if !candidate.valid || !incumbent.valid {
-        return candidate.valid && !incumbent.valid;
-    }
     match (&problem.metric, &candidate.metric, &incumbent.metric) {
         (Some(metric), Some(candidate), Some(incumbent)) => match metric.direction {
             Direction::Minimize => candidate < incumbent,

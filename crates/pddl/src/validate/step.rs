@@ -3,10 +3,11 @@
 use diagnostics::nearest;
 use num_rational::BigRational;
 
-use crate::ast::{Action, Name};
+use crate::ast::{Action, Condition, ConditionTime, Name, Term};
 
 use super::evaluate::{Binding, Bindings};
 use super::plan::PlanStep;
+use super::running::conditions;
 use super::verdict::{Violation, ViolationKind};
 use super::world::{Symbol, World};
 
@@ -50,12 +51,34 @@ impl Step<'_> {
     }
 }
 
-/// Finds all schemas that fit the name and the objects of a step. `instances` is empty if no schema fits.
+/// Finds all schemas that fit the name and the objects of a step. Of several, those that require different objects at
+/// the start are omitted, unless all do. `instances` is empty if no schema fits.
 pub(super) fn resolve<'p>(world: &World<'p>, number: usize, text: &'p PlanStep) -> Step<'p> {
     let objects: Option<Vec<Symbol>> = text.arguments.iter().map(|name| world.object(name)).collect();
     let schemas = world.domain.actions.iter().filter(|action| action.identifier.name == text.action);
-    let instances = schemas.filter_map(|action| instantiate(world, action, objects.as_deref()?)).collect();
+    let mut instances: Vec<Instance<'p>> =
+        schemas.filter_map(|action| instantiate(world, action, objects.as_deref()?)).collect();
+    if instances.iter().any(|instance| !requires_other_objects(world, instance)) {
+        instances.retain(|instance| !requires_other_objects(world, instance));
+    }
     Step { number, text, instances }
+}
+
+/// Returns `true` if a conjunct of the condition at start is an equality between different objects.
+fn requires_other_objects(world: &World<'_>, instance: &Instance<'_>) -> bool {
+    let object = |term: &Term| match term {
+        Term::Variable(identifier) => instance.bindings.get(&identifier.name),
+        Term::Constant(identifier) => world.object(&identifier.name),
+    };
+    let mut conjuncts: Vec<&Condition> = conditions(instance, ConditionTime::AtStart).collect();
+    while let Some(condition) = conjuncts.pop() {
+        match condition {
+            Condition::And(parts) => conjuncts.extend(parts),
+            Condition::Equal(left, right, _) if object(left) != object(right) => return true,
+            _ => {}
+        }
+    }
+    false
 }
 
 /// Returns all readings of a plan: each chooses one instance for every ambiguous step. Empty if there is only
