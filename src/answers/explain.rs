@@ -53,7 +53,7 @@ pub struct DesignAnswer<'a> {
     alone: BestPart<'a>,
     /// Best plan without the design.
     without: BestPart<'a>,
-    /// Single changes that contribute to the availability of the design.
+    /// The changes of all sets in `repairs`, each once and with the best plan after this change alone.
     changes: Vec<ChangePart<'a>>,
     /// Failed components and measurements that contribute to ruling the design out.
     causes: Vec<CausePart<'a>>,

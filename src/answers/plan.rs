@@ -64,7 +64,7 @@ pub struct PlanAnswer {
     missing_values: Option<Vec<MissingValuePart>>,
 }
 
-/// A missing number.
+/// A numeric function without a value that actions need.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct MissingValuePart {
     /// The numeric function with its arguments; for a design, the attribute and the design.

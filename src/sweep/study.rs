@@ -62,7 +62,7 @@ enum Variation {
     Range(Range),
 }
 
-/// Whole numbers from one to another, both included.
+/// Whole numbers at equal distances: `from`, `from + step` and so on, up to at most `to`.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Range {

@@ -97,7 +97,7 @@ pub const SUBJECT: [&str; 4] = [DOMAIN, PROBLEM, crate::knowledge::DOCUMENT, cra
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Subject {
-    /// The extent of the verification: `files`, `knowledge` or `mission`.
+    /// The inputs against which the claim was checked: `files`, `knowledge` or `mission`.
     pub kind: SubjectKind,
     /// The name of the mission, if one was given.
     pub mission: Option<String>,
@@ -108,7 +108,7 @@ pub struct Subject {
     pub not_checked: Vec<Unchecked>,
 }
 
-/// The extent of a verification.
+/// Inputs against which a claim was checked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]

@@ -52,7 +52,7 @@ pub struct Knowledge {
     stated: Option<Arc<[Fact]>>,
 }
 
-/// Something that the knowledge contradicts.
+/// A violation of an axiom or rule by facts of the knowledge base.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Contradiction {

@@ -8,9 +8,8 @@ use crate::source::Source;
 
 use super::Checker;
 
-/// Known requirement flags: those of PDDL 1.2 (without `subgoal-through-axioms`, `expression-evaluation`,
-/// `true-negation` and `ucpop`) to 3.1, PDDL+ and HDDL, and further flags that planners accept.
-const REQUIREMENTS: [&str; 31] = [
+/// Known requirement flags: those of PDDL 1.2 to 3.1, PDDL+ and HDDL, and further flags that planners accept.
+const REQUIREMENTS: [&str; 35] = [
     "strips",
     "typing",
     "negative-preconditions",
@@ -40,6 +39,10 @@ const REQUIREMENTS: [&str; 31] = [
     "foreach-expansions",
     "dag-expansions",
     "safety-constraints",
+    "subgoal-through-axioms",
+    "expression-evaluation",
+    "true-negation",
+    "ucpop",
     "open-world",
     "goal-utilities",
 ];
