@@ -583,7 +583,7 @@ SCENARIOS = {
     "manager": lambda: manager(0.0),
     "manager_50ms": lambda: manager(0.05),
     "manager_500ms": lambda: manager(0.5),
-    "fresh_clients": lambda: fresh_clients(8),
+    "fresh_clients": lambda: fresh_clients(20),
     "parameters": parameters,
     "driver": driver,
     "waiting": waiting,
