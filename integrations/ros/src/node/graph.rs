@@ -13,6 +13,7 @@ use ros2_client::dds::rustdds::{
 
 use smol::{Task, Timer};
 
+use crate::node::preemptive::Preemptive;
 use crate::node::rmw::{Mapping, Rmw, Vendor};
 
 const POLL_INTERVAL: Duration = Duration::from_millis(10);
@@ -138,14 +139,22 @@ impl Graph {
         participant: &DomainParticipant,
         own_prefix: [u8; 12],
         rmw: Rmw,
+        preemptive: Arc<Preemptive>,
     ) -> (Arc<Self>, Task<()>) {
         // A given mapping is valid before the first participant is discovered.
         let state = GraphState { mapping: rmw.fixed(), ..GraphState::default() };
         let graph = Arc::new(Self { rmw, own_prefix, state: Mutex::new(state) });
         let (listener, watching) = (participant.status_listener(), Arc::clone(&graph));
+        let participant = participant.clone();
         let task = smol::spawn(async move {
             let mut events = listener.as_async_status_stream();
             while let Some(event) = events.next().await {
+                if let DomainParticipantStatusEvent::RemoteWriterMatched { local_reader, remote_writer } =
+                    event
+                    && watching.is_fast_dds(remote_writer)
+                {
+                    preemptive.request_heartbeat(&participant, bytes(local_reader), bytes(remote_writer));
+                }
                 watching.take(event);
             }
         });
@@ -154,6 +163,10 @@ impl Graph {
 
     fn state(&self) -> MutexGuard<'_, GraphState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn is_fast_dds(&self, endpoint: GUID) -> bool {
+        self.state().participants.get(&prefix(endpoint)) == Some(&Vendor::FastDds)
     }
 
     fn take(&self, event: DomainParticipantStatusEvent) {

@@ -16,6 +16,7 @@ mod log;
 mod names;
 mod network;
 mod parameters;
+mod preemptive;
 mod qos;
 mod reply_gate;
 mod rmw;
@@ -53,6 +54,7 @@ pub(crate) use graph::Endpoints;
 
 use graph::Graph;
 use names::FullName;
+use preemptive::Preemptive;
 
 pub use qos::{depth, keep_all, latched};
 
@@ -104,7 +106,9 @@ impl Node {
         // The prefix identifies the participant: the graph ignores its own endpoints.
         let mut prefix = [0; 12];
         prefix.copy_from_slice(&guid[..12]);
-        let (graph, watching) = Graph::watch(&participant, prefix, rmw);
+        let (preemptive, answering) =
+            Preemptive::open(&participant, network.loopback).map_err(|error| failed(&error))?;
+        let (graph, watching) = Graph::watch(&participant, prefix, rmw, preemptive);
         let context = Context::from_domain_participant(participant).map_err(|error| failed(&error))?;
         let node_name = NodeName::new(name.namespace(), name.name()).map_err(|error| {
             Message::error("N121", format!("`{name}` is not the name of a node: {error}"))
@@ -127,7 +131,7 @@ impl Node {
             graph,
             least,
             warned: Mutex::default(),
-            tasks: Mutex::new(vec![watching]),
+            tasks: Mutex::new(vec![watching, answering]),
             clock: Clock::new(),
         });
         node.report_complaints();

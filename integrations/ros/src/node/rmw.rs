@@ -70,8 +70,10 @@ impl Rmw {
 /// Vendor of a DDS participant (RTPS 2.5, section 8.3.3.1.3; the OMG assigns the ids).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Vendor {
-    /// RTI Connext, 01.01, or eProsima Fast DDS, 01.0F.
-    Enhanced,
+    /// eProsima Fast DDS, 01.0F.
+    FastDds,
+    /// RTI Connext, 01.01.
+    Connext,
     /// Eclipse Cyclone DDS, 01.10.
     Cyclone,
     /// `RustDDS`, 01.12, the DDS library of this program, which supports both mappings.
@@ -82,7 +84,8 @@ pub(crate) enum Vendor {
 impl Vendor {
     pub(crate) fn new(id: [u8; 2]) -> Self {
         match id {
-            [1, 0x01 | 0x0F] => Self::Enhanced,
+            [1, 0x0F] => Self::FastDds,
+            [1, 0x01] => Self::Connext,
             [1, 0x10] => Self::Cyclone,
             [1, 0x12] => Self::Own,
             _ => Self::Other,
@@ -93,7 +96,7 @@ impl Vendor {
     /// both.
     pub(crate) fn mapping(self) -> Option<Mapping> {
         match self {
-            Self::Enhanced => Some(Mapping::Enhanced),
+            Self::FastDds | Self::Connext => Some(Mapping::Enhanced),
             Self::Cyclone => Some(Mapping::Cyclone),
             Self::Own | Self::Other => None,
         }

@@ -6,6 +6,7 @@ Each scenario uses a ROS domain of its own and starts the program anew. Exits wi
 """
 
 import contextlib
+import itertools
 import json
 import os
 import pathlib
@@ -43,6 +44,8 @@ MISSION = EXAMPLES / "suave" / "suave.toml"
 SCOUT = EXAMPLES / "nav2" / "mission.toml"
 START = 30.0  # s until the program must be ready
 SETTLED = 3.0  # s without another request after which an adaptation is over
+AT_ONCE = 0.1  # s, upper limit on the first exchange with a new participant
+ATTEMPTS = 5
 
 PROGRAM = pathlib.Path(sys.argv[1]).resolve()
 
@@ -132,34 +135,86 @@ def manager(lag: float) -> None:
         check(found, ["fd_spiral_high", "fd_spiral_medium", "fd_spiral_high"], "requests after more visibility")
 
 
+@contextlib.contextmanager
+def fresh(name: str) -> Iterator[tuple[Node, SingleThreadedExecutor]]:
+    """A node of a new participant, with an executor that does not spin by itself."""
+    context = Context()
+    rclpy.init(context=context)
+    node = Node(name, context=context, start_parameter_services=False, enable_rosout=False)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    try:
+        yield node, executor
+    finally:
+        node.destroy_node()
+        rclpy.shutdown(context=context)
+
+
+def poll(is_so: Callable[[], bool], what: str, within: float) -> float:
+    """Waits for a condition with little delay; returns the time that it took, in s."""
+    started = time.monotonic()
+    while not is_so():
+        if time.monotonic() > started + within:
+            raise Failure(f"{what}: not within {within} s")
+        time.sleep(0.0005)
+    return time.monotonic() - started
+
+
+def check_latencies(what: str, measure: Callable[[], list[float]]) -> None:
+    """Fails if the longest of several latencies exceeds the limit in every attempt; other processes may delay some of them."""
+    for _ in range(ATTEMPTS):
+        latencies = measure()
+        median, longest = 1000 * statistics.median(latencies), 1000 * max(latencies)
+        print(f"  {len(latencies)} {what}: median {median:.1f} ms, longest {longest:.1f} ms", flush=True)
+        if longest <= 1000 * AT_ONCE:
+            return
+    raise Failure(f"{what}: longer than {1000 * AT_ONCE:.0f} ms in each of {ATTEMPTS} attempts")
+
+
 def fresh_clients(count: int) -> None:
-    """Each of many new participants gets an answer to a call made as soon as the service is discovered."""
-    latencies, lost = [], 0
-    with program("--as", "planner", "--mission", str(MISSION)):
+    """Each of many new participants gets an answer at once to a call made as soon as the service is discovered."""
+
+    def measure() -> list[float]:
+        latencies = []
         for index in range(count):
-            context = Context()
-            rclpy.init(context=context)
-            node = Node(f"client{index}", context=context, start_parameter_services=False, enable_rosout=False)
-            executor = SingleThreadedExecutor(context=context)
-            executor.add_node(node)
-            client = node.create_client(GetState, "/planner/get_state")
-            until = time.monotonic() + START
-            while not client.service_is_ready():
-                if time.monotonic() > until:
-                    raise Failure(f"/planner/get_state is not there after {START} s")
-                time.sleep(0.0005)
-            called = time.monotonic()
-            future = client.call_async(GetState.Request())
-            executor.spin_until_future_complete(future, 8.0)
-            if future.done():
+            with fresh(f"client{index}") as (node, executor):
+                client = node.create_client(GetState, "/planner/get_state")
+                poll(client.service_is_ready, "/planner/get_state is there", START)
+                called = time.monotonic()
+                future = client.call_async(GetState.Request())
+                executor.spin_until_future_complete(future, 8.0)
+                check(future.done(), True, "an answer within 8 s")
                 latencies.append(time.monotonic() - called)
-            else:
-                lost += 1
-            node.destroy_node()
-            rclpy.shutdown(context=context)
-    check(lost, 0, f"answers lost of {count}")
-    median, longest = statistics.median(latencies), max(latencies)
-    print(f"  {count} answers: median {1000 * median:.1f} ms, longest {1000 * longest:.1f} ms", flush=True)
+        return latencies
+
+    with program("--as", "planner", "--mission", str(MISSION)):
+        check_latencies("answers", measure)
+
+
+def fresh_publishers(count: int) -> None:
+    """The first diagnostic of a new participant is received at once, though it is published as soon as the reader is discovered."""
+    modes = ModeManager(0.0)
+
+    def measure() -> list[float]:
+        latencies = []
+        with program("--as", "manager", "--mission", str(MISSION)) as log:
+            output = pathlib.Path(log.name)
+            poll(lambda: "every function answers" in output.read_text(), "every function answers", START)
+            for index in range(count):
+                with fresh(f"driver{index}") as (node, _):
+                    publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+                    # Only the manager reads diagnostics.
+                    poll(lambda: publisher.get_subscription_count() == 1, "the reader is there", START)
+                    name = f"driver {index}"
+                    status = DiagnosticStatus(level=DiagnosticStatus.ERROR, name=name, message="No current")
+                    publisher.publish(DiagnosticArray(status=[status]))
+                    # A diagnostic without a rule is named in a warning.
+                    received = lambda: f"`{name}`" in output.read_text()
+                    latencies.append(poll(received, f"the diagnostic of `{name}` is received", 8.0))
+        return latencies
+
+    with nodes(modes):
+        check_latencies("diagnostics", measure)
 
 
 def driver() -> None:
@@ -591,7 +646,8 @@ SCENARIOS = {
     "manager": lambda: manager(0.0),
     "manager_50ms": lambda: manager(0.05),
     "manager_500ms": lambda: manager(0.5),
-    "fresh_clients": lambda: fresh_clients(8),
+    "fresh_clients": lambda: fresh_clients(20),
+    "fresh_publishers": lambda: fresh_publishers(20),
     "parameters": parameters,
     "driver": driver,
     "waiting": waiting,
