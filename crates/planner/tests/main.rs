@@ -31,3 +31,4 @@ mod timed;
 mod validate_peer;
 mod validate_peer_timed;
 mod vanishing;
+mod widths;
