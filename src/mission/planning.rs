@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use num_rational::BigRational;
 use pddl::ast::{Domain, Metric, Name, Problem};
 use pddl::{Diagnostic, Severity};
-use planner::{ExactTask, GroundConfig, Limits, Plan, Replanner, Task, ConcurrentTask};
+use planner::{ConcurrentTask, ExactTask, GroundConfig, Limits, Plan, Replanner, Task};
 
 use ::mission::Mission;
 

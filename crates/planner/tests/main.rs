@@ -25,6 +25,7 @@ mod partial;
 mod preferences;
 mod refutation;
 mod replan;
+mod state_metrics;
 mod statuses;
 mod tally;
 mod timed;
