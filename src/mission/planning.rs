@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use num_rational::BigRational;
 use pddl::ast::{Domain, Metric, Name, Problem};
 use pddl::{Diagnostic, Severity};
-use planner::{ExactTask, GroundConfig, Limits, Plan, Replanner, Task, TemporalTask};
+use planner::{ConcurrentTask, ExactTask, GroundConfig, Limits, Plan, Replanner, Task};
 
 use ::mission::Mission;
 
@@ -49,7 +49,7 @@ pub trait Planning {
         objectives: &[Metric],
         separation: &BigRational,
         limits: &Limits,
-    ) -> Result<TemporalTask, Errors>;
+    ) -> Result<ConcurrentTask, Errors>;
 
     /// Returns the plan with the arguments as in the domain's file, i.e. without the designs that
     /// the knowledge base has added to a plain domain. The configuration of each step contains
@@ -84,7 +84,7 @@ impl Planning for Mission {
         objectives: &[Metric],
         separation: &BigRational,
         limits: &Limits,
-    ) -> Result<TemporalTask, Errors> {
+    ) -> Result<ConcurrentTask, Errors> {
         let (domain, problem) = self.narrowed(problem);
         planner::ground_concurrent(&domain, &problem, &config(self, objectives, limits), separation)
             .map_err(|errors| messages(self, &errors))

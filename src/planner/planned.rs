@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use pddl::ast::Problem;
-use planner::{Alternatives, Exact, ExactTask, Front, Limits, Plan, Solution, Task};
+use planner::{Alternatives, Exact, ExactTask, Front, Limits, Plan, Solution, Status, Task};
 
 use crate::answers::{Objective, ParetoAnswer, PlanAnswer, Preparation};
 use crate::certificate::{self, Contents};
@@ -88,9 +88,13 @@ impl Planned<'_> {
         self.limits.reached()
     }
 
-    /// Returns the numeric fluents of the metric that actions change by state-dependent amounts, in PDDL. The search
-    /// did not minimise them. Always empty for overlapping actions, which have no certificates.
+    /// Returns the numeric fluents of the metric that the search did not minimise, in PDDL: actions change them by
+    /// state-dependent amounts, and may improve the metric. Always empty for overlapping actions.
     pub fn not_minimised(&self) -> Vec<String> {
+        // The search states a bound on the metric if it minimises the whole metric.
+        if self.solution.lower_bound.is_some() || self.solution.status != Status::Feasible {
+            return Vec::new();
+        }
         let (fluents, names) = match &self.task {
             Ground::Integers(task) => (&task.objective.rest, &task.number_names),
             Ground::Exact(ExactTask(task)) => (&task.objective.rest, &task.number_names),

@@ -204,6 +204,7 @@ fn a_metric_that_is_not_minimised_is_named() {
     let domain = "(define (domain market) (:requirements :strips :numeric-fluents)
         (:predicates (ready) (bought)) (:functions (amount) (price) (total-cost))
         (:action order :parameters () :effect (and (ready) (increase (amount) 5)))
+        (:action return :parameters () :effect (decrease (amount) 6))
         (:action buy :parameters () :precondition (ready)
           :effect (and (bought) (increase (total-cost) (* (amount) (price))))))";
     let problem =

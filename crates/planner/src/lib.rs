@@ -49,7 +49,7 @@ pub use task::task::Task;
 pub use task::thresholds::Thresholds;
 pub use task::words::UnknownWord;
 pub use task::{CODES, Error, Errors, File, Place};
-pub use temporal::{TemporalTask, ground_concurrent, optimize_concurrent};
+pub use temporal::{ConcurrentTask, ground_concurrent, optimize_concurrent};
 pub use {num_rational::BigRational, pddl};
 
 /// Compiles and runs the example of the README as a test.

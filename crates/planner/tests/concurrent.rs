@@ -14,6 +14,8 @@ use pddl::validate::{Options, PlanText, validate};
 use pddl::{Source, read};
 use testing::random::Random;
 
+use crate::widths;
+
 pub fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
     let read = read(&Source::new("domain", domain), &Source::new("problem", problem));
     let (domain, problem, _) = read.unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));
@@ -25,9 +27,7 @@ pub fn rational(numerator: i128, denominator: i128) -> BigRational {
 }
 
 pub fn solve(domain: &Domain, problem: &Problem, separation: &BigRational) -> Solution {
-    let task = ground_concurrent(domain, problem, &GroundConfig::default(), separation)
-        .unwrap_or_else(|errors| panic!("{errors:?}"));
-    optimize_concurrent(&task, &Limits::none(), &mut |_| {})
+    widths::solve(domain, problem, separation, &Limits::none())
 }
 
 pub fn written(plan: &Plan) -> String {
@@ -370,10 +370,11 @@ fn agree(seed: u64, is_locked: bool, thresholds: Thresholds) -> bool {
     let (domain, problem) = parse(&task.domain, &task.problem);
     let expected = brute_force(&task, &domain, &problem);
     let separation = rational(1, 1);
-    let ground = ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation)
-        .unwrap_or_else(|errors| panic!("{errors:?}"));
     // Numbers can grow without bound, so the time is limited.
     let limits = Limits::none().with_time(std::time::Duration::from_secs(2)).with_thresholds(thresholds);
+    let config = GroundConfig::default().with_limits(limits.clone());
+    let ground = ground_concurrent(&domain, &problem, &config, &separation)
+        .unwrap_or_else(|errors| panic!("{errors:?}"));
     let solution = optimize_concurrent(&ground, &limits, &mut |_| {});
     let context = || format!("seed {seed}\n{}\n{}", task.domain, task.problem);
     if !matches!(solution.status, Status::Optimal | Status::Unsolvable) {

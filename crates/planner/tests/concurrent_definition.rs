@@ -4,12 +4,14 @@
 use std::fs::read_to_string;
 use std::path::Path;
 
-use metaplan_planner::{GroundConfig, Limits, Status, ground_concurrent, optimize_concurrent};
+use metaplan_planner::{Limits, Status};
 use num_bigint::BigInt;
 use num_rational::BigRational;
 use pddl::validate::{Options, PlanText, validate};
 use pddl::{Source, read};
 use test_resources::data;
+
+use crate::widths;
 
 const NONE: &str = "none";
 
@@ -19,9 +21,7 @@ fn proved(domain: &str, problem: &str) -> String {
     let read = read(&Source::new("domain", domain), &Source::new("problem", problem));
     let (domain, problem, _) = read.unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));
     let separation = BigRational::new(BigInt::from(1), BigInt::from(1000));
-    let task = ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation)
-        .unwrap_or_else(|errors| panic!("{errors:?}"));
-    let solution = optimize_concurrent(&task, &Limits::none(), &mut |_| {});
+    let solution = widths::solve(&domain, &problem, &separation, &Limits::none());
     let Some(plan) = &solution.plan else {
         assert_eq!(solution.status, Status::Unsolvable);
         return NONE.to_owned();

@@ -26,8 +26,9 @@ pub fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
 
 /// Returns the best plan that the planner finds. The validator checks its claims.
 pub fn solve(domain: &Domain, problem: &Problem, separation: &BigRational, limits: &Limits) -> Solution {
-    let task = ground_concurrent(domain, problem, &GroundConfig::default(), separation)
-        .unwrap_or_else(|errors| panic!("{errors:?}"));
+    let config = GroundConfig::default().with_limits(limits.clone());
+    let task =
+        ground_concurrent(domain, problem, &config, separation).unwrap_or_else(|errors| panic!("{errors:?}"));
     let solution = optimize_concurrent(&task, limits, &mut |_| {});
     if let Some(plan) = &solution.plan {
         let text = written(plan);

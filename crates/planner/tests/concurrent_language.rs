@@ -7,6 +7,8 @@ use num_rational::BigRational;
 use pddl::validate::{Options, PlanText, validate};
 use pddl::{Source, read};
 
+use crate::widths;
+
 /// Checks the status and the metric of the plan that is found with a separation of 1/1000. The validator
 /// executes the plan.
 fn check(actions: &str, init: &str, goal: &str, expected: (Status, Option<&str>)) {
@@ -19,9 +21,7 @@ fn check(actions: &str, init: &str, goal: &str, expected: (Status, Option<&str>)
     let read = read(&Source::new("domain", domain.clone()), &Source::new("problem", problem.clone()));
     let (domain_read, problem_read, _) = read.unwrap_or_else(|errors| panic!("{errors:?}\n{domain}"));
     let separation = BigRational::new(BigInt::from(1), BigInt::from(1000));
-    let task = ground_concurrent(&domain_read, &problem_read, &GroundConfig::default(), &separation)
-        .unwrap_or_else(|errors| panic!("{errors:?}"));
-    let solution = optimize_concurrent(&task, &Limits::none(), &mut |_| {});
+    let solution = widths::solve(&domain_read, &problem_read, &separation, &Limits::none());
     let cost = solution.plan.as_ref().map(|plan| plan.cost.to_string());
     assert_eq!((solution.status, cost.as_deref()), expected, "{domain}\n{problem}");
     let Some(plan) = &solution.plan else { return };

@@ -157,7 +157,7 @@ fn the_least_number_of_the_type_is_too_large_as_well() {
 }
 
 #[test]
-fn a_metric_whose_offset_is_too_large_is_refused() {
+fn a_metric_whose_offset_is_too_large_for_128_bits_is_exact() {
     let domain = "(define (domain d) (:requirements :durative-actions :numeric-fluents) (:predicates (a))
         (:functions (total-cost))
         (:durative-action act :parameters () :duration (= ?duration 1) :condition (and)
@@ -168,8 +168,12 @@ fn a_metric_whose_offset_is_too_large_is_refused() {
     );
     let (domain, problem) = parse(domain, &problem);
     let separation = BigRational::from_integer(1.into());
-    match ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation) {
-        Ok(task) => panic!("{:?}", optimize_concurrent(&task, &Limits::none(), &mut |_| {}).status),
-        Err(errors) => assert!(errors.iter().all(|error| error.code() == "E304"), "{errors:?}"),
-    }
+    let task = ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation).expect("a task");
+    let solution = optimize_concurrent(&task, &Limits::none(), &mut |_| {});
+    let cost = solution.plan.as_ref().map(|plan| plan.cost.to_rational());
+    let offset: BigInt = LARGE.parse().expect("a number");
+    let expected =
+        BigRational::from_integer(offset + BigInt::from(20_000_000_000_000_000_000_000_000_000_000_000_i128))
+            + BigRational::new(2.into(), 1000.into());
+    assert_eq!((solution.status, cost), (Status::Optimal, Some(expected)));
 }

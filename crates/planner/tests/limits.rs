@@ -4,7 +4,11 @@
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
 
-use metaplan_planner::{Config, Engine, Error, GroundConfig, Limits, Status, alternatives, ground, optimize};
+use metaplan_planner::{
+    Config, Engine, Error, GroundConfig, Limits, Status, alternatives, ground, ground_concurrent, optimize,
+    optimize_concurrent,
+};
+use num_rational::BigRational;
 use pddl::ast::{Domain, Problem};
 use pddl::{Source, read};
 
@@ -110,6 +114,32 @@ fn check_overrun(name: &str, (domain, problem): &(Domain, Problem)) {
             assert_ne!(status, Some(Status::Unsolvable), "{name}");
         }
     }
+}
+
+/// The first node has as many successors as there are switches.
+#[test]
+fn expansion_of_a_temporal_node_with_many_successors_ends_at_the_limit() {
+    let names: Vec<String> = (0..12_000).map(|index| format!("k{index}")).collect();
+    let each = |text: &str| names.iter().map(|name| ["(", text, " ", name, ")"].concat()).collect::<String>();
+    let domain = "(define (domain d) (:requirements :durative-actions) (:predicates (on ?x) (off ?x))
+      (:durative-action switch :parameters (?x) :duration (= ?duration 2) :condition (at start (off ?x))
+        :effect (and (at start (not (off ?x))) (at end (on ?x)))))";
+    let problem = format!(
+        "(define (problem n) (:domain d) (:objects {}) (:init {}) (:goal (and {})))",
+        names.join(" "),
+        each("off"),
+        each("on")
+    );
+    let (domain, problem) = parse(domain, &problem);
+    let separation = BigRational::new(1.into(), 1000.into());
+    let task = ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation).expect("a task");
+    let started = Instant::now();
+    let limits = Limits::none().with_time(Duration::from_millis(300));
+    let solution = optimize_concurrent(&task, &limits, &mut |_| {});
+    let passed = started.elapsed();
+    println!("{passed:?}");
+    assert!([Status::Unknown, Status::Feasible].contains(&solution.status));
+    assert!(passed < Duration::from_millis(1_300), "{passed:?}");
 }
 
 #[test]

@@ -26,6 +26,9 @@ pub struct Thresholds {
     /// Number of nodes after which the greedy search and the search for sequential plans alternate with the
     /// exact temporal search.
     pub concurrent: usize,
+    /// Number of bits of the temporal unit up to which times are 128-bit integers. A larger unit, as other
+    /// reasons, leads to wider integers.
+    pub narrow_times: u64,
     /// Number of nodes in the first turn of the greedy search. The turns of the other searches are
     /// proportional.
     pub turn: usize,
@@ -45,6 +48,7 @@ impl Default for Thresholds {
             front: 24,
             alternatives: 50_000,
             concurrent: 10_000,
+            narrow_times: u64::MAX,
             turn: 5_000,
             chosen: 300,
         }
@@ -62,6 +66,7 @@ impl Thresholds {
         front: 0,
         alternatives: 0,
         concurrent: 0,
+        narrow_times: 0,
         turn: 0,
         chosen: 0,
     };

@@ -20,4 +20,4 @@
 
 mod concurrent;
 
-pub use concurrent::{TemporalTask, ground_concurrent, optimize_concurrent};
+pub use concurrent::{ConcurrentTask, ground_concurrent, optimize_concurrent};

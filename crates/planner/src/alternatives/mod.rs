@@ -29,9 +29,10 @@ pub use choices::{Alternatives, Forced};
 
 /// Searches for at most `most` cheapest plans other than the plan of an optimal solution. Graph search lists
 /// plans with fewer steps first; SAT search has no particular order. At a limit, returns the plans that were
-/// found before. Returns `None` if the solution is not optimal.
+/// found before. Returns `None` if the solution is not optimal, or if operator costs are only a part of the metric.
 pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Config) -> Option<Alternatives> {
-    let first = solution.ground.as_ref().filter(|_| solution.status == Status::Optimal)?;
+    let is_whole = task.objective.rest.is_empty();
+    let first = solution.ground.as_ref().filter(|_| solution.status == Status::Optimal && is_whole)?;
     let context = Context::new(task, &config.limits);
     let unknown = Alternatives { plans: Vec::new(), complete: false, forced: None };
     let Ok(bounds) = Bounds::new(context) else { return Some(unknown) };

@@ -4,6 +4,7 @@ use task::plan::solution::{Improvement, Proof, Solution, Status};
 use task::task::Task;
 use tracing::info_span;
 
+use crate::optimize::branch_and_bound::minimise;
 use crate::optimize::config::Config;
 use crate::optimize::optimizer_run::Run;
 use crate::optimize::solve::solve;
@@ -13,8 +14,8 @@ use crate::optimize::unbounded_metric::shortest_then_best;
 /// or lower bound. If actions can reduce the cost, the result is instead a plan with the fewest steps, and
 /// the cheapest of these; `report` is then not called.
 ///
-/// If the metric contains fluents with state-dependent changes, no plan is proved optimal, and `report` is
-/// not called.
+/// If the metric contains fluents with state-dependent changes, and an action may improve it, the remaining part
+/// of the metric is minimised. The result then has no lower bound, and `report` is not called.
 ///
 /// ```
 /// use metaplan_planner::{Config, Engine, GroundConfig, Status, ground, optimize};
@@ -40,6 +41,9 @@ use crate::optimize::unbounded_metric::shortest_then_best;
 pub fn optimize(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement)) -> Solution {
     if task.objective.rest.is_empty() {
         return cheapest(task, config, report);
+    }
+    if let Some(solution) = minimise(task, config, report) {
+        return solution;
     }
     let mut solution = cheapest(task, config, &mut |_| {});
     // The search considered only the part of the metric that operator costs represent.

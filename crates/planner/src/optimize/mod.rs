@@ -7,6 +7,7 @@
 //! search, which proves optimality. If there is no step bound, because of cycles without cost, exhaustive
 //! search can prove optimality; otherwise the plan is not proved optimal.
 
+mod branch_and_bound;
 mod cheapest;
 mod config;
 mod core_guided;
@@ -19,6 +20,7 @@ mod prover;
 mod sat_budget;
 mod sat_confirmation;
 mod solve;
+mod state_dependent_costs;
 #[cfg(test)]
 mod tests;
 mod unbounded_metric;

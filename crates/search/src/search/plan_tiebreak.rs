@@ -25,6 +25,7 @@ use task::number::Int;
 use task::plan::ground::{GroundPlan, GroundStep};
 use task::plan::resolve;
 use task::task::{OperatorId, State, Task};
+use tracing::info_span;
 
 use crate::bounds::{Bounds, Projection};
 use crate::search::design_combinations::pareto_optimal_combinations;
@@ -178,8 +179,12 @@ struct Ties<'a> {
 }
 
 /// Returns the canonical plan among all plans with the cost and the number of steps of `plan`. Returns `plan`
-/// if a limit on labels, comparisons or time is reached.
+/// if a limit on labels, comparisons or time is reached, or if operator costs are only a part of the metric.
 pub fn select_canonical_plan(context: Context<'_>, bounds: &Bounds, plan: GroundPlan) -> GroundPlan {
+    let _span = info_span!("canonical plan").entered();
+    if !context.task.objective.rest.is_empty() {
+        return plan;
+    }
     let close_to = FxHashSet::default();
     let beginning = PlanPrefix { state: &context.task.initial, designs: &[], close_to: &close_to };
     let Ok(prepared) = TieBreakContext::new(context, bounds) else { return plan };

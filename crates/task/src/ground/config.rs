@@ -63,4 +63,7 @@ pub struct Generality {
     /// If set, fluents that actions change so as to improve the metric are treated like fluents with
     /// state-dependent changes.
     pub measures_rewards: bool,
+    /// If set, the durations of all operators are 0 in the ground task, because the caller evaluates
+    /// them. Their common denominator then does not matter.
+    pub omits_durations: bool,
 }

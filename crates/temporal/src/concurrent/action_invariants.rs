@@ -7,15 +7,16 @@ use task::task::{Fact, NumericId, OperatorId, Task, VariableId};
 
 use crate::concurrent::happening::{Happening, Instance, Role};
 use crate::concurrent::simple_temporal_network::Key;
+use crate::concurrent::time_number::TimeNumber;
 
 /// Work limit of an analysis, in visits of operators. Actions that are not analysed before the
 /// limit get no bounds.
 pub(super) const MAX_PAIR_CHECKS: usize = 20_000_000;
 
-pub(super) struct Index<'a> {
+pub(super) struct Index<'a, T: TimeNumber = Int> {
     pub(super) task: &'a Task,
-    pub(super) happenings: &'a [Happening],
-    pub(super) instances: &'a [Instance],
+    pub(super) happenings: &'a [Happening<T>],
+    pub(super) instances: &'a [Instance<T>],
     pub(super) waiting: FxHashMap<Key, Vec<OperatorId>>,
     pub(super) marking: FxHashMap<Key, Vec<OperatorId>>,
     setting: Vec<Vec<OperatorId>>,
@@ -32,8 +33,8 @@ pub(super) struct Invariant {
     pub(super) over_all: Vec<Fact>,
 }
 
-impl<'a> Index<'a> {
-    pub(super) fn new(task: &'a Task, happenings: &'a [Happening], instances: &'a [Instance]) -> Self {
+impl<'a, T: TimeNumber> Index<'a, T> {
+    pub(super) fn new(task: &'a Task, happenings: &'a [Happening<T>], instances: &'a [Instance<T>]) -> Self {
         let (mut waiting, mut marking): (FxHashMap<Key, Vec<_>>, FxHashMap<Key, Vec<_>>) = Default::default();
         let mut setting = vec![Vec::new(); task.variables.len()];
         let mut changing: FxHashMap<NumericId, Vec<_>> = FxHashMap::default();
@@ -66,7 +67,7 @@ impl<'a> Index<'a> {
     /// Computes the facts that hold strictly between the start and the end of a run of `own`, as
     /// seen by all other happenings. `alone` assumes that no other run of the same action starts or
     /// ends in between. `left` is the remaining work. Returns `None` if it is used up.
-    pub(super) fn invariant(&self, own: &Instance, alone: bool, left: &mut usize) -> Option<Invariant> {
+    pub(super) fn invariant(&self, own: &Instance<T>, alone: bool, left: &mut usize) -> Option<Invariant> {
         let start = &self.task.operators[own.start.index()];
         let basic = |fact: &&Fact| fact.variable.index() < self.task.basic;
         let over_all = own.over_all.map(|id| &self.task.operators[id.index()].condition.facts);
@@ -101,7 +102,7 @@ impl<'a> Index<'a> {
         &self,
         fact: Fact,
         invariant: &Invariant,
-        (own, alone): (&Instance, bool),
+        (own, alone): (&Instance<T>, bool),
         left: &mut usize,
     ) -> Option<bool> {
         for id in &self.setting[fact.variable.index()] {
@@ -118,14 +119,18 @@ impl<'a> Index<'a> {
     }
 
     /// Happenings other than the start and end of `own` that set a variable.
-    pub(super) fn setting(&self, own: &Instance, variable: VariableId) -> impl Iterator<Item = OperatorId> {
+    pub(super) fn setting(
+        &self,
+        own: &Instance<T>,
+        variable: VariableId,
+    ) -> impl Iterator<Item = OperatorId> {
         let [start, end] = [own.start, own.end];
         let operators = self.setting[variable.index()].iter().copied();
         operators.filter(move |id| ![start, end].contains(id))
     }
 
     /// Happenings other than the start and end of `own` that change a number.
-    pub(super) fn changing(&self, own: &Instance, number: NumericId) -> impl Iterator<Item = OperatorId> {
+    pub(super) fn changing(&self, own: &Instance<T>, number: NumericId) -> impl Iterator<Item = OperatorId> {
         let [start, end] = [own.start, own.end];
         let operators = self.changing.get(&number).into_iter().flatten().copied();
         operators.filter(move |id| ![start, end].contains(id))
@@ -141,7 +146,7 @@ impl<'a> Index<'a> {
 
     /// Returns `true` if the happening `id` cannot take place strictly inside a run of `own` during
     /// which the invariant facts hold.
-    pub(super) fn excludes(&self, invariant: &Invariant, own: &Instance, id: OperatorId) -> bool {
+    pub(super) fn excludes(&self, invariant: &Invariant, own: &Instance<T>, id: OperatorId) -> bool {
         let (operator, happening) = (&self.task.operators[id.index()], &self.happenings[id.index()]);
         let invariant_fact =
             |fact: &Fact| invariant.facts.iter().find(|candidate| candidate.variable == fact.variable);
@@ -175,7 +180,7 @@ impl<'a> Index<'a> {
     /// argument does not cover an end at the time of the start of `own`, so that end must also be
     /// impossible. Either the end and the start must keep a distance, or the start requires the fact of
     /// the invariant that the condition contradicts.
-    pub(super) fn is_outside(&self, invariant: &Invariant, own: &Instance, id: OperatorId) -> bool {
+    pub(super) fn is_outside(&self, invariant: &Invariant, own: &Instance<T>, id: OperatorId) -> bool {
         if self.excludes(invariant, own, id) {
             return true;
         }
@@ -185,7 +190,7 @@ impl<'a> Index<'a> {
         let waits = |later: OperatorId, earlier: OperatorId| {
             let marks = &happenings[earlier.index()].accesses.marks;
             let mut after = happenings[later.index()].accesses.after.iter();
-            after.any(|(key, by)| *by > 0 && marks.binary_search(key).is_ok())
+            after.any(|(key, by)| *by > T::ZERO && marks.binary_search(key).is_ok())
         };
         let is_apart = waits(own.start, id) || waits(id, own.start);
         self.over_all(instance).iter().any(|fact| {
@@ -201,7 +206,7 @@ impl<'a> Index<'a> {
         over_all.map_or(&[], |id| &self.task.operators[id.index()].condition.facts)
     }
 
-    pub(super) fn duration(&self, instance: u32) -> Int {
+    pub(super) fn duration(&self, instance: u32) -> T {
         self.instances[instance as usize].duration
     }
 

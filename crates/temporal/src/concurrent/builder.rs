@@ -10,16 +10,17 @@ use task::ground::vocabulary::reached::RelaxedReachability;
 use task::ground::vocabulary::world::World;
 use task::lifted::{Change, Effect, Expression, ObjectId, Rational};
 use task::limits::Limits;
-use task::number::{Int, dense};
+use task::number::dense;
 use task::task::quantity::NumericId;
 use task::task::{Argument, Operator, OperatorId, Task};
 
-use crate::concurrent::duration_fluents::{DURATION_PREFIX, FLEXIBLE_DURATION_PREFIX};
+use crate::concurrent::duration_fluents::{DURATION_PREFIX, FLEXIBLE_DURATION_PREFIX, depends_on_state};
 use crate::concurrent::footprint::{Footprint, Footprints};
 use crate::concurrent::happening::{Happening, Instance, Role};
 use crate::concurrent::interference::{Designs, Keys, prune};
 use crate::concurrent::split::{Half, Split};
-use crate::concurrent::unit::{Divisors, Unit};
+use crate::concurrent::time_number::TimeNumber;
+use crate::concurrent::unit::{StaticDurations, Unit};
 
 /// Ground operators of one action instance. There are several starts and ends if its numeric
 /// effects are conditional.
@@ -55,8 +56,7 @@ type InstanceKey = (usize, Vec<ObjectId>);
 pub(super) struct Builder<'a> {
     footprints: Footprints<'a>,
     split: &'a Split,
-    /// Separation in internal time units; 0 until the unit is known.
-    pub(super) separation: Int,
+    /// Write set of each operator.
     written: Vec<Footprint>,
     /// Operators of duration 0 that combine a start and an end, with the write sets of start and
     /// end.
@@ -73,7 +73,6 @@ impl<'a> Builder<'a> {
         Self {
             footprints: Footprints::new(World::new(&split.lifted, reached, limits)),
             split,
-            separation: 0,
             written: Vec::new(),
             joined: Vec::new(),
             instances: FxHashMap::default(),
@@ -169,13 +168,13 @@ impl<'a> Builder<'a> {
     }
 
     /// Creates the executable instances, and sets the roles of their starts and ends in `roles`.
-    pub(super) fn instances(
+    pub(super) fn instances<T: TimeNumber>(
         &self,
         context: Context<'_>,
-        unit: Unit,
-        divisors: &Divisors,
+        (unit, separation): (&Unit, T),
+        fixed: &StaticDurations,
         roles: &mut [Role],
-    ) -> Result<Vec<Instance>, Error> {
+    ) -> Result<Vec<Instance<T>>, Error> {
         let Context { task, limits } = context;
         let mut instances = Vec::new();
         let pairs = self.order.iter().flat_map(|key| {
@@ -189,10 +188,10 @@ impl<'a> Builder<'a> {
                 continue;
             }
             let unit_divisor = Rational::from_integer(1);
-            let divisor = divisors.get(&start).unwrap_or(&unit_divisor);
+            let divisor = fixed.divisors.get(&start).unwrap_or(&unit_divisor);
             let schema = &self.split.schemas[key.0];
             let placed = |error: Error| error.within(&format!("`{}`", schema.name), Some(schema.place));
-            let factor = |timer| unit.factor(task, timer, divisor).map(|factor| (timer, factor));
+            let factor = |timer| unit.factor::<T>(task, timer, divisor).map(|factor| (timer, factor));
             let is_chosen = self.split.chosen[key.0];
             // The end always clears a chosen duration, whereas no happening sets a chosen duration.
             let timer = timer(task, if is_chosen { end } else { start });
@@ -200,10 +199,13 @@ impl<'a> Builder<'a> {
             // A duration that depends on the state is compared with the separation when the action
             // starts.
             let duration = match timer {
-                None if !is_chosen => unit.duration(task, start).map_err(placed)?,
-                _ => self.separation,
+                None if !is_chosen => {
+                    let duration = fixed.durations.get(&start).ok_or_else(|| Error::overflow("a duration"));
+                    duration.and_then(|duration| unit.of::<T>(duration)).map_err(placed)?
+                }
+                _ => separation,
             };
-            if duration < self.separation {
+            if duration < separation {
                 let construct =
                     format!("an instance of `{}` that takes less time than the separation", schema.name);
                 let instead = "a smaller `--epsilon`".into();
@@ -243,29 +245,45 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Static divisors of state-dependent durations, by start operator.
+    /// Durations that do not depend on the state, and divisors of those that do.
     ///
     /// # Errors
     /// Fails if a divisor is not positive.
-    pub(super) fn divisors(&mut self, Context { task, limits }: Context<'_>) -> Result<Divisors, Error> {
-        let mut divisors = Divisors::default();
+    pub(super) fn static_durations(
+        &mut self,
+        Context { task, limits }: Context<'_>,
+    ) -> Result<StaticDurations, Error> {
+        let mut fixed = StaticDurations::default();
+        let depends = |duration| depends_on_state(&self.split.lifted, duration);
+        let schemas = &self.split.schemas;
+        let is_static: Vec<bool> = schemas
+            .iter()
+            .map(|schema| schema.duration.as_ref().is_some_and(|duration| !depends(duration)))
+            .collect();
         for key in limits.watch(&self.order) {
             let key = key?;
             let schema = &self.split.schemas[key.0];
             let starts = &self.instances[key].starts;
-            let (Some(start), Some(divisor)) = (starts.first(), &self.split.divisors[key.0]) else {
-                continue;
-            };
+            let Some(start) = starts.first() else { continue };
             let binding = binding(&task.operators[start.index()], schema.variables);
+            let duration = match schema.duration.as_ref().filter(|_| is_static[key.0]) {
+                Some(Expression::Number(number)) => Some(number.clone()),
+                Some(duration) => self.footprints.constant(duration, &binding)?,
+                None => None,
+            };
+            if let Some(duration) = duration {
+                fixed.durations.extend(starts.iter().map(|start| (*start, duration.clone())));
+            }
+            let Some(divisor) = &self.split.divisors[key.0] else { continue };
             let divisor = self.footprints.constant(divisor, &binding)?.filter(Rational::is_positive);
             let divisor = divisor.ok_or_else(|| Error::Unsupported {
                 construct: format!("a duration of `{}` that is divided by no positive number", schema.name),
                 instead: "a positive divisor".into(),
                 place: schema.place,
             })?;
-            divisors.extend(starts.iter().map(|start| (*start, divisor.clone())));
+            fixed.divisors.extend(starts.iter().map(|start| (*start, divisor.clone())));
         }
-        Ok(divisors)
+        Ok(fixed)
     }
 
     /// Operators of duration 0 whose start and end interfere, although both are one happening.
@@ -304,17 +322,18 @@ impl<'a> Builder<'a> {
     }
 
     /// Returns the temporal properties of each operator, and the number of access keys.
-    pub(super) fn happenings(
+    pub(super) fn happenings<T: TimeNumber>(
         mut self,
         context: Context<'_>,
+        separation: T,
         roles: &[Role],
-        instances: &mut [Instance],
-    ) -> Result<(Vec<Happening>, usize), Error> {
+        instances: &mut [Instance<T>],
+    ) -> Result<(Vec<Happening<T>>, usize), Error> {
         let Context { task, limits } = context;
         let whole = (0..roles.len()).filter(|id| roles[*id] == Role::Whole);
         let whole = whole.flat_map(|id| designs(task, OperatorId::of(id)));
         let used = instances.iter().flat_map(|instance| instance.designs.iter().copied());
-        let mut keys = Keys::new(self.separation, used.chain(whole).collect());
+        let mut keys = Keys::new(separation, used.chain(whole).collect());
         let index = self.footprints.index();
         let mut happenings = Vec::new();
         let written = std::mem::take(&mut self.written);
@@ -374,11 +393,11 @@ fn timer(task: &Task, id: OperatorId) -> Option<NumericId> {
 
 /// Adds the interference constraints of conditions over all (with the reads `over_all`) and of
 /// designs to a happening. Also sets [`Instance::joint`].
-fn join(
-    happening: &mut Happening,
-    keys: &mut Keys,
+fn join<T: TimeNumber>(
+    happening: &mut Happening<T>,
+    keys: &mut Keys<T>,
     over_all: &(Vec<AtomId>, Vec<NumericId>),
-    instances: &mut [Instance],
+    instances: &mut [Instance<T>],
     (task, id): (&Task, OperatorId),
 ) {
     let accesses = &mut happening.accesses;

@@ -15,13 +15,14 @@ use task::task::Task;
 
 use crate::concurrent::action_invariants::{Index, MAX_PAIR_CHECKS};
 use crate::concurrent::happening::{Happening, Instance};
+use crate::concurrent::time_number::TimeNumber;
 
 /// Returns for each instance whether its end can directly follow its start without loss of
 /// completeness.
-pub(super) fn compression_safe_actions(
+pub(super) fn compression_safe_actions<T: TimeNumber>(
     task: &Task,
-    happenings: &[Happening],
-    instances: &[Instance],
+    happenings: &[Happening<T>],
+    instances: &[Instance<T>],
     limits: &Limits,
 ) -> Result<Vec<bool>, Interrupted> {
     let index = Index::new(task, happenings, instances);
@@ -32,8 +33,8 @@ pub(super) fn compression_safe_actions(
         .collect()
 }
 
-impl Index<'_> {
-    fn is_compressible(&self, own: &Instance, left: &mut usize) -> bool {
+impl<T: TimeNumber> Index<'_, T> {
+    fn is_compressible(&self, own: &Instance<T>, left: &mut usize) -> bool {
         let end = &self.happenings[own.end.index()];
         if !own.joint.is_empty() || end.writes.iter().any(|id| self.joint.binary_search(id).is_ok()) {
             return false;

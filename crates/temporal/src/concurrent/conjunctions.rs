@@ -187,8 +187,9 @@ mod tests {
         let (domain, problem, _) =
             read(&Source::new("domain", DOMAIN), &Source::new("problem", problem)).expect("PDDL");
         let separation = BigRational::new(1.into(), 1000.into());
-        let concurrent =
-            ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation).expect("a task");
+        let concurrent = ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation)
+            .expect("a task")
+            .narrow();
         let relaxed = TemporalRelaxation::new(&concurrent);
         let guide = RelaxedPlanHeuristic::new(&relaxed).guide(&Expansion::new(&concurrent).root())?;
         let schema = |id: &task::task::OperatorId| concurrent.task.operators[id.index()].schema;

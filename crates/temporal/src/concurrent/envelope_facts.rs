@@ -4,11 +4,12 @@
 use task::task::{Condition, Fact, Task, VariableId};
 
 use crate::concurrent::happening::Instance;
+use crate::concurrent::time_number::TimeNumber;
 
 /// Removes the variables that condition-over-all operators set. During grounding, these variables
 /// let an end require its condition over all; afterwards they have no use.
 #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
-pub(super) fn drop_links(task: &mut Task, instances: &[Instance]) {
+pub(super) fn drop_links<T: TimeNumber>(task: &mut Task, instances: &[Instance<T>]) {
     let mut is_link = vec![false; task.variables.len()];
     for id in instances.iter().filter_map(|instance| instance.over_all) {
         for fact in std::mem::take(&mut task.operators[id.index()].effects) {

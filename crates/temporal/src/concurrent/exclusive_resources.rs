@@ -31,20 +31,23 @@
 
 use std::collections::BTreeMap;
 
+use num_bigint::BigInt;
+use num_integer::Integer;
 use rustc_hash::FxHashSet;
 use search::bounds::landmark_cut_bound;
 use task::limits::Limits;
-use task::number::Int;
 use task::task::quantity::Quantity;
 use task::task::{Fact, Operator, OperatorId, Task, VariableId};
 
 use crate::concurrent::happening::Role;
 use crate::concurrent::temporal_task::TemporalTask;
+use crate::concurrent::time_number::TimeNumber;
 
 /// Upper limit on the number of groups of resources for which a bound is computed.
 const MAX_GROUPS: usize = 6;
-/// Costs are divided by a power of two until their maximum is below this limit of LM-cut.
-const COST_LIMIT: Int = 1 << 39;
+/// Costs are divided by a power of two until their maximum has this number of bits, a limit of
+/// LM-cut.
+const COST_BITS: u64 = 39;
 
 #[derive(Clone)]
 struct Resource {
@@ -52,7 +55,7 @@ struct Resource {
 }
 
 /// Lower bound on the makespan of every plan, in internal time units; 0 if there is no exclusive resource.
-pub(super) fn makespan_bound(concurrent: &TemporalTask, limits: &Limits) -> Int {
+pub(super) fn makespan_bound<T: TimeNumber>(concurrent: &TemporalTask<T>, limits: &Limits) -> T {
     let mut by_schemas: BTreeMap<Vec<u32>, Vec<Resource>> = BTreeMap::new();
     let mut by_size: BTreeMap<(Vec<u32>, usize), Vec<Resource>> = BTreeMap::new();
     // A resource for a single instance bounds no more than the duration of this instance.
@@ -82,10 +85,10 @@ pub(super) fn makespan_bound(concurrent: &TemporalTask, limits: &Limits) -> Int 
     });
     groups.truncate(MAX_GROUPS);
     if groups.is_empty() {
-        return 0;
+        return T::ZERO;
     }
     let mut task = without_costs(concurrent);
-    let mut best = 0;
+    let mut best = T::ZERO;
     for group in groups {
         if limits.reached() {
             break;
@@ -99,35 +102,36 @@ pub(super) fn makespan_bound(concurrent: &TemporalTask, limits: &Limits) -> Int 
 /// group.
 #[expect(
     clippy::arithmetic_side_effects,
-    reason = "durations and the separation are below 2^90, and an instance occupies fewer than 2^32 variables"
+    reason = "durations and the separation have at most `TIME_BITS` bits, and an instance occupies fewer than 2^32 variables"
 )]
-fn bound(concurrent: &TemporalTask, task: &mut Task, group: &[Resource], limits: &Limits) -> Int {
+fn bound<T: TimeNumber>(
+    concurrent: &TemporalTask<T>,
+    task: &mut Task,
+    group: &[Resource],
+    limits: &Limits,
+) -> T {
     // Some constraints of an inexact task may not be those of the definition.
-    let separation = if concurrent.is_exact { concurrent.separation } else { 0 };
-    let mut costs = vec![0; concurrent.instances.len()];
+    let separation = if concurrent.is_exact { concurrent.separation } else { T::ZERO };
+    let mut costs = vec![T::ZERO; concurrent.instances.len()];
     for instance in group.iter().flat_map(|resource| &resource.instances) {
         costs[*instance as usize] += concurrent.instances[*instance as usize].duration + separation;
     }
-    let max_cost = costs.iter().copied().max().unwrap_or(0);
-    let mut shift = 0;
-    while max_cost >> shift >= COST_LIMIT {
-        shift += 1;
-    }
+    let max_cost = costs.iter().copied().max().unwrap_or(T::ZERO);
+    let shift = max_cost.bits().saturating_sub(COST_BITS);
     for (instance, cost) in concurrent.instances.iter().zip(costs) {
         // Rounding down keeps the costs lower bounds.
-        task.operators[instance.start.index()].cost.constant = cost >> shift;
+        task.operators[instance.start.index()].cost.constant = cost.shifted_down(shift);
     }
-    let Some(work) = landmark_cut_bound(task, limits) else { return 0 };
-    let work = Int::from(work) << shift;
-    let count = Int::try_from(group.len()).unwrap_or(Int::MAX);
+    let Some(work) = landmark_cut_bound(task, limits) else { return T::ZERO };
+    let work = BigInt::from(work) << shift;
     // The makespan is an integer, so the quotient is rounded up.
-    let quotient = work / count + Int::from(work % count > 0);
-    (quotient - separation).max(0)
+    let quotient = T::from_big(&Integer::div_ceil(&work, &BigInt::from(group.len())));
+    quotient.map_or(T::ZERO, |quotient| (quotient - separation).max(T::ZERO))
 }
 
 /// Copy of the split task without costs, in which ends also require the conditions over all: these
 /// hold at some time before the end, because the duration is positive.
-fn without_costs(concurrent: &TemporalTask) -> Task {
+fn without_costs<T: TimeNumber>(concurrent: &TemporalTask<T>) -> Task {
     let mut task = concurrent.task.clone();
     for operator in &mut task.operators {
         operator.cost = Quantity { constant: 0, tables: Vec::new() };
@@ -142,7 +146,7 @@ fn without_costs(concurrent: &TemporalTask) -> Task {
     task
 }
 
-fn resources(concurrent: &TemporalTask) -> Vec<Resource> {
+fn resources<T: TimeNumber>(concurrent: &TemporalTask<T>) -> Vec<Resource> {
     let task = &concurrent.task;
     let mut setters: Vec<Vec<OperatorId>> = vec![Vec::new(); task.basic];
     for (operator, id) in task.operators.iter().zip((0..).map(OperatorId)) {
@@ -175,7 +179,11 @@ fn value_in(facts: &[Fact], variable: VariableId) -> Option<u32> {
 
 /// A variable as a resource, given the operators that set it. Returns `None` if no set of busy values
 /// satisfies the definition.
-fn resource(concurrent: &TemporalTask, variable: VariableId, setters: &[OperatorId]) -> Option<Resource> {
+fn resource<T: TimeNumber>(
+    concurrent: &TemporalTask<T>,
+    variable: VariableId,
+    setters: &[OperatorId],
+) -> Option<Resource> {
     let operators = &concurrent.task.operators;
     let role = |id: OperatorId| concurrent.happenings[id.index()].role;
     let required = |id: OperatorId| value_in(&operators[id.index()].condition.facts, variable);
@@ -228,6 +236,7 @@ mod tests {
     use num_rational::BigRational;
     use pddl::{Source, read};
     use task::ground::GroundConfig;
+    use task::number::Int;
 
     use super::*;
     use crate::concurrent::ground_concurrent;
@@ -238,8 +247,8 @@ mod tests {
         let (domain, problem, _) = read.expect("PDDL");
         let separation = BigRational::new(1.into(), 1000.into());
         let task = ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation);
-        let concurrent = task.expect("a task");
-        makespan_bound(&concurrent, &Limits::none()) * 1000 / concurrent.task.time_scale
+        let concurrent = task.expect("a task").narrow();
+        makespan_bound(&concurrent, &Limits::none()) * 1000 / concurrent.unit
     }
 
     /// Each switch changes a variable of its own, which must not count as a resource of the same kind

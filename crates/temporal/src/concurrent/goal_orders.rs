@@ -38,6 +38,7 @@ use crate::concurrent::search::Sequence;
 use crate::concurrent::successors::{Expansion, TemporalState};
 use crate::concurrent::temporal_relaxation::TemporalRelaxation;
 use crate::concurrent::temporal_task::TemporalTask;
+use crate::concurrent::time_number::TimeNumber;
 use crate::concurrent::timed_relaxed_plan::{TimedRelaxation, TimedRelaxedPlan};
 
 /// Upper limit on the number of relaxed plans per goal.
@@ -76,43 +77,46 @@ impl Random {
 /// A happening, and whether it takes place at the time of the previous one.
 type Link = (OperatorId, bool);
 
+/// State in which a goal holds, and the happenings that lead there.
+type Achieved<T> = (TemporalState<T>, Vec<Link>);
+
 /// State before a goal of an order, and number of happenings up to there.
 #[derive(Clone)]
-struct Stage {
-    situation: TemporalState,
+struct Stage<T: TimeNumber = Int> {
+    situation: TemporalState<T>,
     happenings: usize,
 }
 
 #[derive(Clone)]
-struct Decoded {
+struct Decoded<T: TimeNumber = Int> {
     /// Indices of goals.
     order: Vec<usize>,
-    stages: Vec<Stage>,
+    stages: Vec<Stage<T>>,
     links: Vec<Link>,
     /// Metric (scaled to an integer) and makespan (in internal time units).
-    value: (Int, Int),
+    value: (T, T),
 }
 
-enum Decoding {
-    Plan(Box<Decoded>, Sequence),
+enum Decoding<T: TimeNumber = Int> {
+    Plan(Box<Decoded<T>>, Sequence<T>),
     /// A goal was not achieved, or the plan is worse than required.
     Failed,
     Interrupted,
 }
 
-pub(super) struct GoalOrders<'a> {
-    concurrent: &'a TemporalTask,
-    expansion: &'a Expansion<'a>,
-    relaxation: TimedRelaxation<'a>,
+pub(super) struct GoalOrders<'a, T: TimeNumber = Int> {
+    concurrent: &'a TemporalTask<T>,
+    expansion: &'a Expansion<'a, T>,
+    relaxation: TimedRelaxation<'a, T>,
     relaxed: &'a TemporalRelaxation,
     goals: Vec<Fact>,
     /// Orders that are decoded before local search begins, last one first.
     initial: Vec<Vec<usize>>,
     /// Metric and makespan of the last plan whose order of goals was added to `initial`, or of the last plan
     /// that this search returned.
-    seen: Option<(Int, Int)>,
-    current: Option<Decoded>,
-    best: Option<Decoded>,
+    seen: Option<(T, T)>,
+    current: Option<Decoded<T>>,
+    best: Option<Decoded<T>>,
     /// Number of neighbours tried since the last perturbation or the last best plan.
     rejected: usize,
     failures: usize,
@@ -123,12 +127,12 @@ pub(super) struct GoalOrders<'a> {
     pub(super) figures: SearchStatistics,
 }
 
-impl<'a> GoalOrders<'a> {
+impl<'a, T: TimeNumber> GoalOrders<'a, T> {
     /// Returns `None` if there is no goal fact to order, a goal is unreachable, the metric does not depend on
     /// the makespan, the states would take too much memory, or a limit is reached.
     pub(super) fn new(
-        concurrent: &'a TemporalTask,
-        expansion: &'a Expansion<'a>,
+        concurrent: &'a TemporalTask<T>,
+        expansion: &'a Expansion<'a, T>,
         relaxed: &'a TemporalRelaxation,
         limits: &Limits,
     ) -> Option<Self> {
@@ -137,7 +141,7 @@ impl<'a> GoalOrders<'a> {
         let goals: Vec<Fact> = task.goal.facts.iter().filter(basic).copied().collect();
         let bytes = task.variables.len().saturating_mul(16).saturating_add(1_000);
         let is_small = bytes.saturating_mul(goals.len()).saturating_mul(3) < limits.room() / MEMORY_FRACTION;
-        if goals.is_empty() || concurrent.measure.time == 0 || !is_small {
+        if goals.is_empty() || concurrent.measure.time == T::ZERO || !is_small {
             return None;
         }
         let mut relaxation = TimedRelaxation::new(concurrent, relaxed);
@@ -190,10 +194,10 @@ impl<'a> GoalOrders<'a> {
     /// or the search has ended. Returns the better plan.
     pub(super) fn run(
         &mut self,
-        incumbent: Option<&Sequence>,
+        incumbent: Option<&Sequence<T>>,
         limits: &Limits,
         work: usize,
-    ) -> Option<Sequence> {
+    ) -> Option<Sequence<T>> {
         let end = self.work().saturating_add(work as u64);
         let mut pulse = limits.pulse();
         if let Some(incumbent) =
@@ -234,7 +238,7 @@ impl<'a> GoalOrders<'a> {
     }
 
     /// Order in which a plan finally achieves the goals; goals that it never changes come last.
-    fn order_of(&self, sequence: &Sequence) -> Vec<usize> {
+    fn order_of(&self, sequence: &Sequence<T>) -> Vec<usize> {
         let task = &self.concurrent.task;
         let mut state = task.initial.clone();
         let mut achieved = vec![usize::MAX; self.goals.len()];
@@ -254,7 +258,7 @@ impl<'a> GoalOrders<'a> {
 
     /// Next order, its first position that differs from the current order, and the worst acceptable value
     /// (`None` if any value is acceptable).
-    fn next_order(&mut self) -> (Vec<usize>, usize, Option<(Int, Int)>) {
+    fn next_order(&mut self) -> (Vec<usize>, usize, Option<(T, T)>) {
         if let Some(order) = self.initial.pop() {
             return (order, 0, None);
         }
@@ -285,10 +289,10 @@ impl<'a> GoalOrders<'a> {
     fn decode(
         &mut self,
         order: &[usize],
-        base: Option<(&Decoded, usize)>,
-        limit: Option<(Int, Int)>,
+        base: Option<(&Decoded<T>, usize)>,
+        limit: Option<(T, T)>,
         pulse: &mut LimitPoll<'_>,
-    ) -> Decoding {
+    ) -> Decoding<T> {
         let first = Stage { situation: self.expansion.root(), happenings: 0 };
         let (mut stages, mut links, from) = match base {
             Some((base, from)) if from < base.stages.len() => {
@@ -303,7 +307,7 @@ impl<'a> GoalOrders<'a> {
         stages.push(stage);
         let mut targets: Vec<Proposition> =
             order[..from].iter().map(|goal| proposition(self.relaxed, self.goals[*goal])).collect();
-        let is_too_late = |situation: &TemporalState| {
+        let is_too_late = |situation: &TemporalState<T>| {
             let value = self.concurrent.measure.total(situation.clocks.latest(), situation.cost);
             limit.is_some_and(|limit| value.is_none_or(|value| value > limit.0))
         };
@@ -314,7 +318,7 @@ impl<'a> GoalOrders<'a> {
             }
             facts.push(self.goals[*goal]);
             targets.push(proposition(self.relaxed, self.goals[*goal]));
-            let is_reached = |at: &TemporalState| facts.iter().all(|fact| fact.holds(&at.state.values));
+            let is_reached = |at: &TemporalState<T>| facts.iter().all(|fact| fact.holds(&at.state.values));
             match achieve(
                 &mut self.relaxation,
                 (self.concurrent, self.expansion),
@@ -331,7 +335,7 @@ impl<'a> GoalOrders<'a> {
         }
         // Numeric goals, disjunctions and derived facts come last.
         let (expansion, relaxed) = (self.expansion, self.relaxed);
-        let is_reached = |at: &TemporalState| expansion.is_goal(at);
+        let is_reached = |at: &TemporalState<T>| expansion.is_goal(at);
         let goal = Goal { targets: &relaxed.goal, is_reached: &is_reached };
         let achieved = achieve(
             &mut self.relaxation,
@@ -377,16 +381,16 @@ fn proposition(relaxed: &TemporalRelaxation, fact: Fact) -> Proposition {
 }
 
 #[derive(Clone, Copy)]
-struct Goal<'g> {
+struct Goal<'g, T: TimeNumber> {
     targets: &'g [Proposition],
-    is_reached: &'g dyn Fn(&TemporalState) -> bool,
+    is_reached: &'g dyn Fn(&TemporalState<T>) -> bool,
 }
 
 struct Stopped;
 
 /// Hash of a state and the timed initial literals that have taken place. A collision only loses a
 /// state.
-fn key(TemporalState { state, clocks, .. }: &TemporalState) -> u64 {
+fn key<T: TimeNumber>(TemporalState { state, clocks, .. }: &TemporalState<T>) -> u64 {
     let mut hasher = FxHasher::default();
     (&state.values, &state.numbers, clocks.floor()).hash(&mut hasher);
     hasher.finish()
@@ -394,15 +398,15 @@ fn key(TemporalState { state, clocks, .. }: &TemporalState) -> u64 {
 
 /// Extends a sequence of happenings until a goal is reached, by executable parts of relaxed plans. Returns
 /// `None` if the goal is unreachable or the limits on the number of relaxed plans are exceeded.
-fn achieve(
-    relaxation: &mut TimedRelaxation<'_>,
-    (concurrent, expansion): (&TemporalTask, &Expansion<'_>),
+fn achieve<T: TimeNumber>(
+    relaxation: &mut TimedRelaxation<'_, T>,
+    (concurrent, expansion): (&TemporalTask<T>, &Expansion<'_, T>),
     figures: &mut SearchStatistics,
-    goal: Goal<'_>,
-    mut situation: TemporalState,
+    goal: Goal<'_, T>,
+    mut situation: TemporalState<T>,
     links: &mut Vec<Link>,
     pulse: &mut LimitPoll<'_>,
-) -> Result<Option<TemporalState>, Stopped> {
+) -> Result<Option<TemporalState<T>>, Stopped> {
     let mut visited: FxHashSet<u64> = FxHashSet::default();
     let mut escapes = 0;
     for _ in 0..MAX_ROUNDS {
@@ -443,13 +447,13 @@ fn achieve(
 
 /// Executes the actions of a relaxed plan that can be executed, in its order. Returns `None` if no
 /// action can be executed.
-fn execute(
-    context: (&TemporalTask, &Expansion<'_>),
-    situation: &TemporalState,
+fn execute<T: TimeNumber>(
+    context: (&TemporalTask<T>, &Expansion<'_, T>),
+    situation: &TemporalState<T>,
     plan: &TimedRelaxedPlan,
     links: &mut Vec<Link>,
-) -> Option<TemporalState> {
-    let mut current: Option<TemporalState> = None;
+) -> Option<TemporalState<T>> {
+    let mut current: Option<TemporalState<T>> = None;
     let mut pending = plan.happenings.clone();
     loop {
         let before = pending.len();
@@ -470,11 +474,11 @@ fn execute(
     }
 }
 
-fn act(
-    (concurrent, expansion): (&TemporalTask, &Expansion<'_>),
-    situation: &TemporalState,
+fn act<T: TimeNumber>(
+    (concurrent, expansion): (&TemporalTask<T>, &Expansion<'_, T>),
+    situation: &TemporalState<T>,
     operator: OperatorId,
-) -> Option<(TemporalState, Links)> {
+) -> Option<(TemporalState<T>, Links)> {
     if !concurrent.task.operators[operator.index()].applicable(&situation.state, &[]) {
         return None;
     }
@@ -491,16 +495,16 @@ fn act(
 /// Best-first search for a state that reaches the goal, or whose relaxed plan has fewer happenings than
 /// `size`. Returns the state and the happenings that lead to it. Returns `None` after [`MAX_ESCAPE`]
 /// evaluations, or if no state is left.
-fn escape(
-    relaxation: &mut TimedRelaxation<'_>,
-    context: (&TemporalTask, &Expansion<'_>),
+fn escape<T: TimeNumber>(
+    relaxation: &mut TimedRelaxation<'_, T>,
+    context: (&TemporalTask<T>, &Expansion<'_, T>),
     figures: &mut SearchStatistics,
-    goal: Goal<'_>,
-    (situation, size): (&TemporalState, usize),
+    goal: Goal<'_, T>,
+    (situation, size): (&TemporalState<T>, usize),
     visited: &mut FxHashSet<u64>,
     pulse: &mut LimitPoll<'_>,
-) -> Result<Option<(TemporalState, Vec<Link>)>, Stopped> {
-    let mut nodes: Vec<(TemporalState, Vec<Link>)> = vec![(situation.clone(), Vec::new())];
+) -> Result<Option<Achieved<T>>, Stopped> {
+    let mut nodes: Vec<(TemporalState<T>, Vec<Link>)> = vec![(situation.clone(), Vec::new())];
     let mut queue = BinaryHeap::from([Reverse((size, 0_i64, 0_u32))]);
     let mut budget = MAX_ESCAPE;
     while let Some(Reverse((_, _, node))) = queue.pop() {

@@ -30,6 +30,7 @@ use crate::concurrent::search::Sequence;
 use crate::concurrent::store::{PackedNode, Packing};
 use crate::concurrent::successors::{DeadEnd, Expansion, TemporalState};
 use crate::concurrent::temporal_task::TemporalTask;
+use crate::concurrent::time_number::TimeNumber;
 
 /// Approximate memory use of a node without its packed state: the node, its queue entries and its
 /// hash.
@@ -57,15 +58,15 @@ impl Mode {
     /// Returns the successor by a happening, after applying timed initial literals that must precede it.
     /// Appends all applied happenings to `links`. Returns `None` if the happening is not applicable or,
     /// except in mode `Sooner`, leaves a condition over all violated.
-    pub(super) fn apply_happening(
+    pub(super) fn apply_happening<T: TimeNumber>(
         self,
-        concurrent: &TemporalTask,
-        expansion: &Expansion<'_>,
-        situation: &TemporalState,
+        concurrent: &TemporalTask<T>,
+        expansion: &Expansion<'_, T>,
+        situation: &TemporalState<T>,
         operator: OperatorId,
         links: &mut Links,
-    ) -> Option<TemporalState> {
-        let mut waited: Option<TemporalState> = None;
+    ) -> Option<TemporalState<T>> {
+        let mut waited: Option<TemporalState<T>> = None;
         loop {
             let before = waited.as_ref().unwrap_or(situation);
             let together = before.clocks.unsettled();
@@ -99,7 +100,7 @@ struct Node {
 
 /// Queue key: whether the state has no novel fact, heuristic value, and lower bound on the
 /// makespan. Smaller keys come first.
-type Value = (bool, u64, Int);
+type Value<T> = (bool, u64, T);
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Outcome {
@@ -110,22 +111,23 @@ pub(super) enum Outcome {
     Stopped,
 }
 
-pub(super) struct Greedy<'a> {
-    concurrent: &'a TemporalTask,
-    expansion: &'a Expansion<'a>,
-    estimate: &'a Estimate,
+pub(super) struct Greedy<'a, T: TimeNumber = Int> {
+    concurrent: &'a TemporalTask<T>,
+    expansion: &'a Expansion<'a, T>,
+    estimate: &'a Estimate<T>,
     bounds: Option<&'a Bounds>,
     guidance: RelaxedPlanHeuristic<'a>,
-    packing: Packing<'a>,
+    packing: Packing<'a, T>,
     nodes: Vec<Node>,
     /// Id and unpacked state of the node that was expanded last.
-    latest: Option<(u32, TemporalState)>,
+    latest: Option<(u32, TemporalState<T>)>,
     /// Least lower bound on the makespan of each visited state, by a hash of the state.
-    seen: FxHashMap<u64, Int>,
+    seen: FxHashMap<u64, T>,
+    /// Approximate memory use of the nodes in bytes.
     bytes: usize,
     /// Three queues: all happenings and preferred happenings by heuristic value, and all happenings
     /// with successors of novel states first.
-    open: AlternatingOpenList<Value>,
+    open: AlternatingOpenList<Value<T>>,
     /// Facts that held in some visited state, by the number of unsatisfied goals in that state.
     known: Vec<FxHashSet<(u32, u32)>>,
     pub(super) mode: Mode,
@@ -141,11 +143,11 @@ fn hash_of(key: &[u32]) -> u64 {
     hasher.finish()
 }
 
-impl<'a> Greedy<'a> {
+impl<'a, T: TimeNumber> Greedy<'a, T> {
     pub(super) fn new(
-        concurrent: &'a TemporalTask,
-        expansion: &'a Expansion<'a>,
-        estimate: &'a Estimate,
+        concurrent: &'a TemporalTask<T>,
+        expansion: &'a Expansion<'a, T>,
+        estimate: &'a Estimate<T>,
         bounds: Option<&'a Bounds>,
         guidance: RelaxedPlanHeuristic<'a>,
         mode: Mode,
@@ -177,7 +179,7 @@ impl<'a> Greedy<'a> {
     #[expect(clippy::arithmetic_side_effects, reason = "counted down from what was given")]
     pub(super) fn run(
         &mut self,
-        incumbent: &mut Option<Sequence>,
+        incumbent: &mut Option<Sequence<T>>,
         limits: &Limits,
         mut work: usize,
     ) -> Outcome {
@@ -207,7 +209,7 @@ impl<'a> Greedy<'a> {
 
     /// Returns the successor of a node by a happening or, in sequential mode, by a start and its end, and the
     /// list of applied happenings. Timed initial literals that must precede a happening are applied first.
-    fn follow(&mut self, parent: u32, operator: OperatorId) -> Option<(TemporalState, Links)> {
+    fn follow(&mut self, parent: u32, operator: OperatorId) -> Option<(TemporalState<T>, Links)> {
         let cached = self.latest.take().filter(|(id, _)| *id == parent);
         let unpack = || (parent, self.packing.unpack(&self.nodes[parent as usize].packed));
         let (_, situation) = self.latest.insert(cached.unwrap_or_else(unpack));
@@ -228,10 +230,10 @@ impl<'a> Greedy<'a> {
     /// then becomes the incumbent.
     fn take_up(
         &mut self,
-        situation: &TemporalState,
+        situation: &TemporalState<T>,
         parent: u32,
         links: Links,
-        incumbent: &mut Option<Sequence>,
+        incumbent: &mut Option<Sequence<T>>,
     ) -> Option<Outcome> {
         let value = self.value(situation)?;
         if incumbent.as_ref().is_some_and(|incumbent| value >= incumbent.value)
@@ -278,7 +280,7 @@ impl<'a> Greedy<'a> {
 
     /// Lower bounds on the metric and the makespan of plans through this state. Returns `None` if
     /// the state is a dead end or the metric overflows.
-    fn value(&self, situation: &TemporalState) -> Option<(Int, Int)> {
+    fn value(&self, situation: &TemporalState<T>) -> Option<(T, T)> {
         let TemporalState { state, clocks, cost } = situation;
         let makespan = self.estimate.left(state, clocks)?.makespan;
         let costs = self.bounds.map_or(Some(0), |bounds| bounds.estimate(state))?;
@@ -287,7 +289,7 @@ impl<'a> Greedy<'a> {
 
     /// Returns `true` if a fact holds that held in no earlier state with the same number of
     /// unsatisfied goals, and records the facts of this state.
-    fn has_news(&mut self, TemporalState { state, .. }: &TemporalState) -> bool {
+    fn has_news(&mut self, TemporalState { state, .. }: &TemporalState<T>) -> bool {
         let task = &self.concurrent.task;
         let to_go = task.goal.facts.iter().filter(|fact| !fact.holds(&state.values)).count();
         if self.known.len() <= to_go {
@@ -300,7 +302,7 @@ impl<'a> Greedy<'a> {
 
     /// Returns `true` if the state is not a duplicate or, in mode `Sooner`, has a smaller makespan
     /// bound than all earlier duplicates. Records the bound.
-    fn is_new(&mut self, situation: &TemporalState, makespan: Int) -> bool {
+    fn is_new(&mut self, situation: &TemporalState<T>, makespan: T) -> bool {
         let TemporalState { state, clocks, .. } = situation;
         let mut key = state.values[..self.concurrent.task.basic].to_vec();
         // Numbers that only the metric reads do not affect applicability.
@@ -327,7 +329,7 @@ impl<'a> Greedy<'a> {
 
     /// Plan that leads to a goal state. Returns `None` if the metric overflows or the plan violates
     /// a hard deadline.
-    fn sequence(&self, situation: &TemporalState, parent: u32, links: &Links) -> Option<Sequence> {
+    fn sequence(&self, situation: &TemporalState<T>, parent: u32, links: &Links) -> Option<Sequence<T>> {
         let value = self.concurrent.value(situation)?;
         let mut sequence_links: Vec<Link> = links.iter().rev().copied().collect();
         let mut at = parent as usize;
@@ -373,9 +375,11 @@ mod tests {
         let (domain, problem, _) =
             read(&Source::new("domain", DOMAIN), &Source::new("problem", PROBLEM)).expect("PDDL");
         let separation = BigRational::new(1.into(), 1000.into());
-        let concurrent =
-            ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation).expect("a task");
-        let (estimate, expansion) = (Estimate::new(&concurrent), Expansion::new(&concurrent));
+        let concurrent = ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation)
+            .expect("a task")
+            .narrow();
+        let (estimate, expansion) =
+            (Estimate::new(&concurrent, &Limits::none()), Expansion::new(&concurrent));
         let relaxed = TemporalRelaxation::new(&concurrent);
         let mut greedy =
             Greedy::new(&concurrent, &expansion, &estimate, None, RelaxedPlanHeuristic::new(&relaxed), mode);

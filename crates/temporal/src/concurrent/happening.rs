@@ -4,6 +4,7 @@ use task::number::Int;
 use task::task::{Fact, NumericId, OperatorId};
 
 use crate::concurrent::interference::{Designs, InterferenceConstraints};
+use crate::concurrent::time_number::TimeNumber;
 
 /// Role of an operator of the split task: the part of an action that the operator executes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -13,8 +14,8 @@ pub(super) enum Role {
     End(u32),
     /// A whole action: instantaneous or of duration 0.
     Whole,
-    /// Timed initial literals that take effect at this time, in internal time units.
-    Timed(Int),
+    /// Timed initial literals: index into the events of the task.
+    Timed(u32),
     /// Operator that never happens: a condition over all, or the start or end of an action that
     /// cannot be executed.
     #[default]
@@ -23,9 +24,9 @@ pub(super) enum Role {
 
 /// Role, interference constraints and write set of an operator.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Happening {
+pub(super) struct Happening<T: TimeNumber = Int> {
     pub(super) role: Role,
-    pub(super) accesses: InterferenceConstraints,
+    pub(super) accesses: InterferenceConstraints<T>,
     pub(super) designs: Designs,
     /// Atoms and numbers that the happening writes, ascending. Atom `a` has the id `2a`, number `n`
     /// the id `2n + 1`.
@@ -37,7 +38,7 @@ pub(super) struct Happening {
 
 /// A ground durative action: a pair of a start operator and an end operator.
 #[derive(Debug, Clone)]
-pub(super) struct Instance {
+pub(super) struct Instance<T: TimeNumber = Int> {
     pub(super) start: OperatorId,
     pub(super) end: OperatorId,
     /// Operator whose condition is the action's condition over all. `None` if there is no such
@@ -45,10 +46,10 @@ pub(super) struct Instance {
     pub(super) over_all: Option<OperatorId>,
     /// Duration in internal time units. Only a lower bound if the duration depends on the state or
     /// is chosen by the planner.
-    pub(super) duration: Int,
+    pub(super) duration: T,
     /// Number that holds the duration while the action runs, and the factor from this number to
     /// internal time units. `None` if the duration is constant.
-    pub(super) timer: Option<(NumericId, Int)>,
+    pub(super) timer: Option<(NumericId, T)>,
     /// Whether the planner chooses the duration.
     pub(super) is_chosen: bool,
     pub(super) designs: Designs,

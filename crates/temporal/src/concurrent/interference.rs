@@ -9,6 +9,7 @@ use task::task::quantity::NumericId;
 
 use crate::concurrent::footprint::{Footprint, Way};
 use crate::concurrent::simple_temporal_network::Key;
+use crate::concurrent::time_number::TimeNumber;
 
 /// Kind of access to an atom or number, or use of a design for a function. Each value has a
 /// [`Key`].
@@ -31,8 +32,8 @@ enum Access {
 /// Earlier accesses that constrain a happening (`after`), each with the least distance in time, and
 /// the accesses that the happening itself makes (`marks`).
 #[derive(Debug, Clone, Default)]
-pub(super) struct InterferenceConstraints {
-    pub(super) after: Vec<(Key, Int)>,
+pub(super) struct InterferenceConstraints<T: TimeNumber = Int> {
+    pub(super) after: Vec<(Key, T)>,
     pub(super) marks: Vec<Key>,
 }
 
@@ -41,16 +42,16 @@ pub(super) struct InterferenceConstraints {
 pub(super) type Designs = Vec<(ObjectId, ObjectId)>;
 
 /// Assigns dense numbers ([`Key`]s) to kinds of access.
-pub(super) struct Keys {
+pub(super) struct Keys<T: TimeNumber = Int> {
     known: IndexMap<Access, (), FxBuildHasher>,
     /// Least distance between interfering happenings, in internal time units.
-    separation: Int,
+    separation: T,
     /// All pairs of a function and a design that some action uses for the function.
     designs: FxHashSet<(ObjectId, ObjectId)>,
 }
 
-impl Keys {
-    pub(super) fn new(separation: Int, designs: FxHashSet<(ObjectId, ObjectId)>) -> Self {
+impl<T: TimeNumber> Keys<T> {
+    pub(super) fn new(separation: T, designs: FxHashSet<(ObjectId, ObjectId)>) -> Self {
         Self { known: IndexMap::default(), separation, designs }
     }
 
@@ -62,7 +63,7 @@ impl Keys {
         dense(self.known.insert_full(access, ()).0)
     }
 
-    pub(super) fn of(&mut self, footprint: &Footprint) -> InterferenceConstraints {
+    pub(super) fn of(&mut self, footprint: &Footprint) -> InterferenceConstraints<T> {
         use Access::{Added, Changed, Deleted, Held, HeldNumber, Read, ReadNumber};
         let mut collector = InterferenceCollector::default();
         for atom in &footprint.reads {
@@ -93,7 +94,7 @@ impl Keys {
 
     /// Constraints of a condition over all with the given reads. The start waits for the accesses
     /// in `after`; start and end make the accesses in `marks`.
-    pub(super) fn over_all(&mut self, reads: &(Vec<AtomId>, Vec<NumericId>)) -> InterferenceConstraints {
+    pub(super) fn over_all(&mut self, reads: &(Vec<AtomId>, Vec<NumericId>)) -> InterferenceConstraints<T> {
         let mut collector = InterferenceCollector::default();
         for atom in &reads.0 {
             collector.not_before.extend([Access::Added(*atom), Access::Deleted(*atom)]);
@@ -110,7 +111,7 @@ impl Keys {
 
     /// Constraints that prevent a function from having two designs at one time. Returns the earlier
     /// uses that an action with these designs waits for.
-    pub(super) fn designs(&mut self, designs: &Designs) -> Vec<(Key, Int)> {
+    pub(super) fn designs(&mut self, designs: &Designs) -> Vec<(Key, T)> {
         let mut collector = InterferenceCollector::default();
         for (function, design) in designs {
             let mut other_designs: Vec<_> =
@@ -133,11 +134,11 @@ impl Keys {
 
     /// Translates accesses to keys. Accesses in `apart` require the separation as distance, those
     /// in `not_before` distance 0.
-    fn resolve(&mut self, collector: &InterferenceCollector) -> InterferenceConstraints {
+    fn resolve(&mut self, collector: &InterferenceCollector) -> InterferenceConstraints<T> {
         let separation = self.separation;
         let apart: Vec<_> = collector.apart.iter().map(|access| (self.key(*access), separation)).collect();
-        let not_before = collector.not_before.iter().map(|access| (self.key(*access), 0));
-        let mut after: Vec<(Key, Int)> = not_before.collect();
+        let not_before = collector.not_before.iter().map(|access| (self.key(*access), T::ZERO));
+        let mut after: Vec<(Key, T)> = not_before.collect();
         after.extend(apart);
         let marks = collector.marks.iter().map(|access| self.key(*access)).collect();
         InterferenceConstraints { after, marks }
@@ -158,7 +159,7 @@ impl InterferenceCollector {
     }
 }
 
-impl InterferenceConstraints {
+impl<T: TimeNumber> InterferenceConstraints<T> {
     pub(super) fn join(&mut self, other: &Self) {
         self.after.extend(&other.after);
         self.marks.extend(&other.marks);
@@ -175,7 +176,9 @@ impl InterferenceConstraints {
 
 /// Sorts the constraints, and removes accesses that no happening waits for and waits for accesses
 /// that no happening makes.
-pub(super) fn prune<'a>(constraints: impl Iterator<Item = &'a mut InterferenceConstraints>) {
+pub(super) fn prune<'a, T: TimeNumber>(
+    constraints: impl Iterator<Item = &'a mut InterferenceConstraints<T>>,
+) {
     let mut constraints: Vec<_> = constraints.collect();
     let waited: FxHashSet<Key> =
         constraints.iter().flat_map(|happening| happening.after.iter().map(|(key, _)| *key)).collect();

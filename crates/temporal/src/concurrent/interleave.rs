@@ -5,7 +5,7 @@
 
 use search::bounds::Bounds;
 use task::limits::Limits;
-use task::number::{Int, Rational};
+
 use task::plan::solution::PlannerPart;
 use tracing::info_span;
 
@@ -20,6 +20,7 @@ use crate::concurrent::sequential_first::{SequentialPlanner, SequentialTask};
 use crate::concurrent::successors::Expansion;
 use crate::concurrent::temporal_relaxation::TemporalRelaxation;
 use crate::concurrent::temporal_task::TemporalTask;
+use crate::concurrent::time_number::TimeNumber;
 
 /// Expansions of the exact search per evaluation of the greedy search.
 const EXACT_BUDGET: usize = 4;
@@ -30,28 +31,28 @@ const WHOLE: usize = 2;
 /// Interleaves the searches until optimality is proved, no search can continue, a limit is reached, or
 /// `rounds` rounds are over. Returns the outcome and the best plan. Better plans and lower bounds are also
 /// reported to `record`.
-pub(super) fn interleave_searches(
-    concurrent: &TemporalTask,
+pub(super) fn interleave_searches<T: TimeNumber>(
+    concurrent: &TemporalTask<T>,
     bounds: Option<&Bounds>,
     limits: &Limits,
-    record: &mut Record<'_>,
+    record: &mut Record<'_, T>,
     rounds: usize,
-) -> (SearchEnd, Option<Sequence>) {
-    let estimate = Estimate::new(concurrent);
+) -> (SearchEnd<T>, Option<Sequence<T>>) {
+    let estimate = Estimate::new(concurrent, limits);
     let expansion = Expansion::new(concurrent);
     let mut exact = Search::new(concurrent, &expansion, &estimate, bounds);
-    let mut root = if concurrent.is_bounded { exact.lower() } else { 0 };
-    record.begin(Rational::from_integer(root));
+    let mut root = if concurrent.is_bounded { exact.lower() } else { T::ZERO };
+    record.begin(root.to_rational());
     let mut search_end =
         info_span!("search").in_scope(|| exact.run(limits, limits.thresholds().concurrent, record));
     if exact.is_over() || limits.reached() {
         return (claimed(search_end, (concurrent, &exact), root), exact.incumbent);
     }
-    if concurrent.is_bounded && concurrent.measure.time > 0 {
+    if concurrent.is_bounded && concurrent.measure.time > T::ZERO {
         let _span = info_span!("resources").entered();
         exact.raise_floor(makespan_bound(concurrent, limits));
-        root = root.max(concurrent.measure.total(exact.floor(), 0).unwrap_or(0));
-        record.begin(Rational::from_integer(root));
+        root = root.max(concurrent.measure.total(exact.floor(), 0).unwrap_or(T::ZERO));
+        record.begin(root.to_rational());
         search_end = SearchEnd::Stopped(exact.lower());
     }
     let relaxed = TemporalRelaxation::new(concurrent);
@@ -79,8 +80,9 @@ pub(super) fn interleave_searches(
             let _span = info_span!("satisfice").entered();
             let work = turn.saturating_mul(share);
             let plan = seeker.run((concurrent, &expansion), work, &mut record.statistics);
-            let is_better =
-                |sequence: &Sequence| exact.incumbent.as_ref().is_none_or(|best| sequence.value < best.value);
+            let is_better = |sequence: &Sequence<T>| {
+                exact.incumbent.as_ref().is_none_or(|best| sequence.value < best.value)
+            };
             if let Some(sequence) = plan.filter(is_better) {
                 sequence.tell(exact.lower(), PlannerPart::Satisficing, record);
                 exact.incumbent = Some(sequence);
@@ -112,12 +114,12 @@ pub(super) fn interleave_searches(
 }
 
 /// Resumes a greedy search, from each improved plan to the next.
-fn pursue(
-    greedy: &mut Greedy<'_>,
-    exact: &mut Search<'_>,
+fn pursue<T: TimeNumber>(
+    greedy: &mut Greedy<'_, T>,
+    exact: &mut Search<'_, T>,
     work: usize,
     limits: &Limits,
-    record: &mut Record<'_>,
+    record: &mut Record<'_, T>,
 ) -> Outcome {
     loop {
         let before = greedy.figures;
@@ -134,12 +136,12 @@ fn pursue(
 
 /// Resumes the search over goal orders, from each improved plan to the next. Removes it when it has
 /// ended.
-fn improve(
-    orders: &mut Option<GoalOrders<'_>>,
-    exact: &mut Search<'_>,
+fn improve<T: TimeNumber>(
+    orders: &mut Option<GoalOrders<'_, T>>,
+    exact: &mut Search<'_, T>,
     work: usize,
     limits: &Limits,
-    record: &mut Record<'_>,
+    record: &mut Record<'_, T>,
 ) {
     let Some(search) = orders else { return };
     let _span = info_span!("goal orders").entered();
@@ -159,11 +161,11 @@ fn improve(
 
 /// Claim of an ended search. If the search is incomplete, only the initial lower bound holds for
 /// all plans.
-fn claimed(
-    search_end: SearchEnd,
-    (concurrent, search): (&TemporalTask, &Search<'_>),
-    root: Int,
-) -> SearchEnd {
+fn claimed<T: TimeNumber>(
+    search_end: SearchEnd<T>,
+    (concurrent, search): (&TemporalTask<T>, &Search<'_, T>),
+    root: T,
+) -> SearchEnd<T> {
     match search_end {
         _ if is_best(concurrent, search, root) => SearchEnd::Exhausted,
         search_end if concurrent.is_exact => search_end,
@@ -172,7 +174,7 @@ fn claimed(
 }
 
 /// Returns `true` if an incomplete search has found a plan that reaches the initial lower bound.
-fn is_best(concurrent: &TemporalTask, search: &Search<'_>, root: Int) -> bool {
+fn is_best<T: TimeNumber>(concurrent: &TemporalTask<T>, search: &Search<'_, T>, root: T) -> bool {
     !concurrent.is_exact
         && concurrent.is_whole
         && search.incumbent.as_ref().is_some_and(|incumbent| incumbent.value.0 <= root)

@@ -8,60 +8,65 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
+use task::limits::Limits;
 use task::number::{Int, dense};
-use task::task::{Fact, State, VariableId};
+use task::task::{Fact, OperatorId, State, Task, VariableId};
 
 use crate::concurrent::happening::Role;
 use crate::concurrent::simple_temporal_network::SimpleTemporalNetwork;
 use crate::concurrent::temporal_task::TemporalTask;
+use crate::concurrent::time_number::TimeNumber;
 
 /// Least time from the last change of a variable to its goal value, by current value. `None` if the
 /// goal value is unreachable.
-struct Path {
+struct Path<T: TimeNumber = Int> {
     variable: usize,
-    left: Vec<Option<Int>>,
+    left: Vec<Option<T>>,
 }
 
-pub(super) struct Estimate {
-    paths: Vec<Path>,
-    separation: Int,
+pub(super) struct Estimate<T: TimeNumber = Int> {
+    paths: Vec<Path<T>>,
+    separation: T,
 }
 
 /// A change of a variable: source value (`None` for any), target value, and least time since the
 /// previous change.
-type Edge = (Option<u32>, u32, Int);
+type Edge<T> = (Option<u32>, u32, T);
 
 #[derive(Debug, Clone, Copy)]
-pub(super) struct RemainingTime {
+pub(super) struct RemainingTime<T: TimeNumber = Int> {
     /// Lower bound on the makespan.
-    pub(super) makespan: Int,
+    pub(super) makespan: T,
     /// Sum of the remaining times of the goal variables; not a lower bound.
-    pub(super) sum: Int,
+    pub(super) sum: T,
 }
 
-impl Estimate {
-    pub(super) fn new(concurrent: &TemporalTask) -> Self {
+impl<T: TimeNumber> Estimate<T> {
+    /// At a limit, the remaining goal variables are omitted, which keeps the estimates lower bounds.
+    pub(super) fn new(concurrent: &TemporalTask<T>, limits: &Limits) -> Self {
         let task = &concurrent.task;
         let goals = task.goal.facts.iter().filter(|fact| fact.variable.index() < task.basic);
-        let paths = goals.map(|goal| path(concurrent, *goal)).collect();
+        let setting = setting(task);
+        let path = |goal: &Fact| path(concurrent, *goal, &setting[goal.variable.index()]);
+        let paths = limits.watch(goals).map_while(Result::ok).map(path).collect();
         Self { paths, separation: concurrent.separation }
     }
 
     /// Evaluates a temporal state. Returns `None` if the goal is unreachable.
     #[expect(
         clippy::arithmetic_side_effects,
-        reason = "fewer than 2^32 happenings, less than 2^91 apart, and a variable has fewer than 2^32 values"
+        reason = "sums of fewer than 2^32 times fit, see `TimeNumber::TIME_BITS`, and a variable has fewer than 2^32 values"
     )]
-    pub(super) fn left(&self, state: &State, clocks: &SimpleTemporalNetwork) -> Option<RemainingTime> {
+    pub(super) fn left(&self, state: &State, clocks: &SimpleTemporalNetwork<T>) -> Option<RemainingTime<T>> {
         // A plan ends with an action, so pending timed literals alone do not delay its end.
-        let mut remaining = RemainingTime { makespan: clocks.latest().max(clocks.floor()), sum: 0 };
+        let mut remaining = RemainingTime { makespan: clocks.latest().max(clocks.floor()), sum: T::ZERO };
         for open in clocks.opens() {
             let end = clocks.start(open) + open.duration;
             remaining.makespan = remaining.makespan.max(end);
         }
         for path in &self.paths {
             let remaining_time = path.left[state.values[path.variable] as usize]?;
-            if remaining_time > 0 {
+            if remaining_time > T::ZERO {
                 let since = clocks.changed(dense(path.variable)).unwrap_or(-self.separation);
                 remaining.makespan = remaining.makespan.max(since + remaining_time);
                 remaining.sum += remaining_time;
@@ -74,18 +79,18 @@ impl Estimate {
 /// Least times to the goal value of a variable, by backward Dijkstra search from the goal value.
 #[expect(
     clippy::arithmetic_side_effects,
-    reason = "a path takes fewer steps than the variable has values, each less than 2^91"
+    reason = "a path takes fewer steps than the variable has values, each a time of at most `TIME_BITS` bits"
 )]
-fn path(concurrent: &TemporalTask, goal: Fact) -> Path {
+fn path<T: TimeNumber>(concurrent: &TemporalTask<T>, goal: Fact, setting: &[OperatorId]) -> Path<T> {
     let variable = goal.variable;
     let values = concurrent.task.variables[variable.index()].values.len();
-    let edges = edges(concurrent, variable);
+    let edges = edges(concurrent, variable, setting);
     let mut into: Vec<Vec<usize>> = vec![Vec::new(); values];
     for (index, (_, to, _)) in edges.iter().enumerate() {
         into[*to as usize].push(index);
     }
     let mut distances = vec![None; values];
-    let mut open = BinaryHeap::from([Reverse((0, goal.value))]);
+    let mut open = BinaryHeap::from([Reverse((T::ZERO, goal.value))]);
     while let Some(Reverse((distance, value))) = open.pop() {
         if distances[value as usize].is_some() {
             continue;
@@ -102,19 +107,40 @@ fn path(concurrent: &TemporalTask, goal: Fact) -> Path {
     Path { variable: variable.index(), left: distances }
 }
 
-/// All changes of a variable by happenings, with their least distances from the previous change.
+/// Operators that set each variable, in ascending order.
+fn setting(task: &Task) -> Vec<Vec<OperatorId>> {
+    let mut setting: Vec<Vec<OperatorId>> = vec![Vec::new(); task.variables.len()];
+    for (operator, id) in task.operators.iter().zip((0..).map(OperatorId)) {
+        let conditional = operator.conditional.iter().flat_map(|effect| &effect.effects);
+        for fact in operator.effects.iter().chain(conditional) {
+            let setters = &mut setting[fact.variable.index()];
+            if setters.last() != Some(&id) {
+                setters.push(id);
+            }
+        }
+    }
+    setting
+}
+
+/// All changes of a variable by the operators that set it, with their least distances from the previous
+/// change.
 #[expect(
     clippy::arithmetic_side_effects,
-    reason = "durations and the separation are below 2^90; setters are counted in memory"
+    reason = "durations and the separation have at most `TIME_BITS` bits; setters are counted in memory"
 )]
-fn edges(concurrent: &TemporalTask, variable: VariableId) -> Vec<Edge> {
+fn edges<T: TimeNumber>(
+    concurrent: &TemporalTask<T>,
+    variable: VariableId,
+    setting: &[OperatorId],
+) -> Vec<Edge<T>> {
     let task = &concurrent.task;
-    let operators = || task.operators.iter().zip(&concurrent.happenings);
+    let operators =
+        setting.iter().map(|id| (&task.operators[id.index()], &concurrent.happenings[id.index()]));
     let value_in =
         |facts: &[Fact]| facts.iter().find(|fact| fact.variable == variable).map(|fact| fact.value);
     let apart = concurrent.separation;
     let mut setters = vec![0_u32; task.variables[variable.index()].values.len()];
-    for operator in &task.operators {
+    for (operator, _) in operators.clone() {
         let conditional = operator.conditional.iter().flat_map(|effect| &effect.effects);
         let effects = operator.effects.iter().chain(conditional);
         for fact in effects.filter(|fact| fact.variable == variable) {
@@ -122,15 +148,15 @@ fn edges(concurrent: &TemporalTask, variable: VariableId) -> Vec<Edge> {
         }
     }
     let mut edges = Vec::new();
-    for (operator, happening) in operators().filter(|(_, happening)| happening.role != Role::Never) {
+    for (operator, happening) in operators.filter(|(_, happening)| happening.role != Role::Never) {
         let conditional = operator.conditional.iter().filter_map(|effect| value_in(&effect.effects));
-        edges.extend(conditional.map(|to| (None, to, 0)));
+        edges.extend(conditional.map(|to| (None, to, T::ZERO)));
         let Some(to) = value_in(&operator.effects) else { continue };
         let from = value_in(&operator.condition.facts);
         match happening.role {
             Role::Never => {}
-            Role::Timed(_) => edges.push((from, to, 0)),
-            Role::Start(_) | Role::Whole => edges.push((from, to, from.map_or(0, |_| apart))),
+            Role::Timed(_) => edges.push((from, to, T::ZERO)),
+            Role::Start(_) | Role::Whole => edges.push((from, to, from.map_or(T::ZERO, |_| apart))),
             Role::End(instance) => {
                 let instance = &concurrent.instances[instance as usize];
                 let start = &task.operators[instance.start.index()];
@@ -153,10 +179,10 @@ fn edges(concurrent: &TemporalTask, variable: VariableId) -> Vec<Edge> {
                             .filter(|required| required_value == Some(*required))
                         {
                             Some(value) => (Some(value), to, instance.duration + apart),
-                            None => (None, to, 0),
+                            None => (None, to, T::ZERO),
                         }
                     }
-                    (_, from) => (from, to, from.map_or(0, |_| apart)),
+                    (_, from) => (from, to, from.map_or(T::ZERO, |_| apart)),
                 });
             }
         }

@@ -1,61 +1,73 @@
 //! The metric of concurrent plans: a weight for the makespan plus the costs of actions.
 
+use num_bigint::BigInt;
+use num_integer::Integer as _;
+use num_rational::BigRational;
 use pddl::ast::Direction;
 use task::error::Error;
 use task::lifted::{Expression, Metric, Rational};
 use task::normalize::duration::time_factor;
-use task::number::{Int, LIMIT, checked_lcm};
+use task::number::Int;
 use task::plan::Exact;
 use task::task::Objective;
-use task::task::number::TaskNumber;
+
+use crate::concurrent::time_number::TimeNumber;
 
 /// The minimised metric as an integer: `time` per internal time unit plus `cost` per unit of the
 /// task's cost.
 #[derive(Debug, Clone)]
-pub(super) struct Measure {
-    pub(super) time: Int,
-    pub(super) cost: Int,
+pub(super) struct Measure<T: TimeNumber = Int> {
+    pub(super) time: T,
+    pub(super) cost: T,
     /// Integer value per unit of the PDDL metric.
-    scale: Int,
-    offset: Int,
+    scale: T,
+    offset: T,
     maximize: bool,
 }
 
-impl Measure {
+impl<T: TimeNumber> Measure<T> {
     /// Computes the integer weights of costs and times. `weight` is the metric per PDDL time unit,
-    /// `time_scale` the number of internal time units per PDDL time unit.
-    pub(super) fn new(objective: &Objective, weight: Rational, time_scale: Int) -> Result<Self, Error> {
+    /// `unit` the number of internal time units per PDDL time unit.
+    ///
+    /// # Errors
+    /// `Error::Overflow` if `T` is too narrow.
+    pub(super) fn new(objective: &Objective, weight: &Rational, unit: &BigInt) -> Result<Self, Error> {
         let overflow = || Error::overflow("the metric");
-        let by_time = weight / Rational::from_integer(time_scale);
-        let common = by_time.denominator().and_then(|denominator| checked_lcm(denominator, objective.scale));
-        let scale = common.filter(|scale| *scale < LIMIT).ok_or_else(overflow)?;
-        let time = (by_time * Rational::from_integer(scale)).to_int();
-        let cost = scale.checked_div(objective.scale).ok_or_else(overflow)?;
-        let offset = objective.offset.checked_mul(cost).filter(Int::is_moderate).ok_or_else(overflow)?;
+        let factor = |number: &BigRational| {
+            let integer = number.is_integer().then(|| number.to_integer())?;
+            T::from_big(&integer).filter(|_| integer.bits() <= T::FACTOR_BITS)
+        };
+        let integer = |number: Int| BigRational::from_integer(number.into());
+        let by_time = weight.to_big() / BigRational::from_integer(unit.clone());
+        let scale = BigRational::from_integer(by_time.denom().lcm(&objective.scale.into()));
+        let cost = &scale / integer(objective.scale);
+        let offset = integer(objective.offset) * &cost;
         Ok(Self {
-            time: time.filter(|time| *time < LIMIT).ok_or_else(overflow)?,
-            cost,
-            scale,
-            offset,
+            time: factor(&(by_time * &scale)).ok_or_else(overflow)?,
+            cost: factor(&cost).ok_or_else(overflow)?,
+            scale: factor(&scale).ok_or_else(overflow)?,
+            offset: T::from_big(&offset.to_integer())
+                .filter(|offset| offset.is_moderate())
+                .ok_or_else(overflow)?,
             maximize: objective.maximize,
         })
     }
 
     /// Integer metric of a plan with this makespan and cost. Returns `None` if the metric
     /// overflows.
-    pub(super) fn total(&self, makespan: Int, cost: Int) -> Option<Int> {
-        self.time.checked_mul(makespan)?.checked_add(self.cost.checked_mul(cost)?)
+    pub(super) fn total(&self, makespan: T, cost: Int) -> Option<T> {
+        self.time.checked_mul(makespan)?.checked_add(self.cost.checked_mul(cost.into())?)
     }
 
     /// Converts an integer value to the metric of the PDDL problem.
     pub(super) fn metric(&self, total: &Rational) -> Exact {
-        let sum = total.clone() + Rational::from_integer(self.offset);
-        Exact::scaled(&if self.maximize { -sum } else { sum }, self.scale)
+        let sum = (total.clone() + self.offset.to_rational()) / self.scale.to_rational();
+        Exact::scaled(&if self.maximize { -sum } else { sum }, 1)
     }
 
     pub(super) fn total_of(&self, metric: &Exact) -> Rational {
-        let scaled = Rational::from_big(metric.to_rational()) * Rational::from_integer(self.scale);
-        (if self.maximize { -scaled } else { scaled }) - &Rational::from_integer(self.offset)
+        let scaled = Rational::from_big(metric.to_rational()) * self.scale.to_rational();
+        (if self.maximize { -scaled } else { scaled }) - &self.offset.to_rational()
     }
 }
 

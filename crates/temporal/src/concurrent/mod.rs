@@ -43,6 +43,7 @@ mod successors;
 mod temporal_relaxation;
 mod temporal_task;
 mod time;
+mod time_number;
 mod timed_relaxed_plan;
 mod unit;
 
@@ -64,7 +65,7 @@ use task::normalize::{normalize, normalize_freely, undefined_fluents};
 use task::number::Int;
 use task::plan::solution::{Improvement, Proof, Solution, Status};
 
-pub use temporal_task::TemporalTask;
+pub use temporal_task::ConcurrentTask;
 
 use deadline::Deadline;
 use interleave::interleave_searches;
@@ -72,6 +73,8 @@ use search::SearchEnd;
 use search_log::Record;
 use solution::{ended, in_names};
 use source_task::SourceTask;
+use temporal_task::{Scale, TemporalTask, Width};
+use time_number::TimeNumber;
 
 /// If durations are chosen, a strict comparison requires a difference of at least 1 / `PRECISION`.
 const PRECISION: Int = 1_000_000;
@@ -87,7 +90,7 @@ pub fn ground_concurrent(
     problem: &Problem,
     config: &GroundConfig,
     separation: &BigRational,
-) -> Result<TemporalTask, Errors> {
+) -> Result<ConcurrentTask, Errors> {
     let overflow = || vec![Error::overflow("the separation")];
     if !separation.is_positive() {
         return Err(overflow().into());
@@ -99,22 +102,30 @@ pub fn ground_concurrent(
         info_span!("compile").in_scope(|| compile_away(domain, problem, objectives, semantics, limits))?;
     let source = SourceTask::new(domain, problem, config);
     let config = config.clone().with_objectives(plain.objectives.to_vec());
-    let mut task = ground_plain((&plain.domain, &plain.problem, &config, &separation))?;
-    let shortest = task.shortest.take().map(|shortest| {
-        let shortest = shortest.judged_by(&plain);
-        Box::new(TemporalTask { kept: source.clone(), ..shortest })
-    });
-    Ok(TemporalTask { shortest, kept: source, ..task.judged_by(&plain) })
+    let task = ground_plain((&plain.domain, &plain.problem, &config, &separation))?;
+    Ok(ConcurrentTask(match task.0 {
+        Width::Narrow(task) => Width::Narrow(Box::new(task.completed(&plain, source.as_ref()))),
+        Width::Wide(task) => Width::Wide(Box::new(task.completed(&plain, source.as_ref()))),
+    }))
 }
 
-impl TemporalTask {
-    /// Copies the deadlines and the exactness of compiled trajectory constraints.
+impl<T: TimeNumber> TemporalTask<T> {
+    /// Adds the source files, and the deadlines and the exactness of compiled trajectory
+    /// constraints.
+    fn completed(mut self, plain: &CompiledTask<'_>, source: Option<&SourceTask>) -> Self {
+        let shortest = self.shortest.take().map(|shortest| {
+            let shortest = shortest.judged_by(plain);
+            Box::new(Self { kept: source.cloned(), ..shortest })
+        });
+        Self { shortest, kept: source.cloned(), ..self.judged_by(plain) }
+    }
+
     fn judged_by(self, plain: &CompiledTask<'_>) -> Self {
         Self {
             deadlines: plain
                 .deadlines
                 .iter()
-                .map(|constraint| Deadline::new(&self.task, constraint))
+                .map(|constraint| Deadline::new(&self.task, constraint, self.unit))
                 .collect(),
             is_exact: self.is_exact && plain.is_exact,
             is_bounded: plain.is_exact,
@@ -126,18 +137,23 @@ impl TemporalTask {
 /// Grounds a task whose trajectory constraints were compiled away. If the planner can choose durations, the
 /// variant with the shortest durations is kept in `shortest`. With compiled constraints (hidden actions), or
 /// if chosen durations are not supported, only the shortest durations are possible.
-fn ground_plain(files: Files<'_>) -> Result<TemporalTask, Errors> {
+fn ground_plain(files: Files<'_>) -> Result<ConcurrentTask, Errors> {
     let shortest = ground_with(files, &normalize);
     let is_judged = files.0.actions.iter().any(|action| is_hidden(action.identifier.name.as_str()));
     if shortest.is_ok() && (is_fixed(files.0) || is_judged) {
         return shortest;
     }
     match (ground_with(files, &normalize_freely), shortest) {
-        (Ok(mut free), shortest) => {
+        (Ok(ConcurrentTask(Width::Narrow(mut free))), shortest) => {
             free.is_exact = free.is_exact && flexible_durations::is_exact(&free);
-            free.shortest = shortest.ok().map(Box::new);
-            Ok(free)
+            free.shortest = match shortest {
+                Ok(ConcurrentTask(Width::Narrow(shortest))) => Some(shortest),
+                _ => None,
+            };
+            Ok(ConcurrentTask(Width::Narrow(free)))
         }
+        // Linear programs for chosen durations support narrow numbers only.
+        (Ok(_), shortest) => shortest,
         (Err(_), Ok(shortest)) => Ok(shortest),
         (Err(errors), Err(_)) => Err(errors),
     }
@@ -152,12 +168,18 @@ type Normalize = dyn Fn(&Domain, &Problem, &[ast::Metric]) -> Result<Lifted, Err
 fn ground_with(
     (domain, problem, config, separation): Files<'_>,
     normalize: &Normalize,
-) -> Result<TemporalTask, Errors> {
+) -> Result<ConcurrentTask, Errors> {
     let lifted = || normalize(domain, problem, &config.objectives);
-    let ground = |lifted| {
+    let ground = |lifted| -> Result<ConcurrentTask, Errors> {
         let task = ground_normal(domain, lifted, config, separation)?;
-        let is_open = task.instances.iter().any(|instance| instance.is_chosen);
-        if is_open { flexible_durations::check(task) } else { Ok(task) }
+        match &task.0 {
+            Width::Narrow(narrow) if narrow.chooses_durations() => flexible_durations::check(narrow)?,
+            Width::Wide(wide) if wide.chooses_durations() => {
+                return Err(vec![Error::overflow("chosen durations")].into());
+            }
+            _ => {}
+        }
+        Ok(task)
     };
     match ground(lifted()?) {
         Err(errors) if errors.iter().any(Error::is_value_missing) => {
@@ -174,7 +196,7 @@ fn ground_normal(
     mut lifted: Lifted,
     config: &GroundConfig,
     separation: &Rational,
-) -> Result<TemporalTask, Errors> {
+) -> Result<ConcurrentTask, Errors> {
     let place = Place { file: File::Problem, span: Span::default() };
     let number = |number| Expression::Number(Rational::from_integer(number));
     let (weight, metric) = match lifted.metrics.first() {
@@ -199,11 +221,17 @@ fn ground_normal(
     let no_atoms = vec![Vec::new(); split.designs.len()];
     let (lifted, designs) = (&split.lifted, &split.designs);
     let precision = (is_chosen && is_strict).then_some(PRECISION);
-    let generality =
-        Generality { measures_ends: true, measures_rewards: true, precision, ..Generality::default() };
+    let generality = Generality {
+        measures_ends: true,
+        measures_rewards: true,
+        omits_durations: true,
+        precision,
+        ..Generality::default()
+    };
     let (task, reached) = ground_lifted(lifted, designs, &no_atoms, &generality, &config.limits)?;
     let _span = info_span!("happenings", operators = task.operators.len()).entered();
-    temporal_task::compile(task, &split, &reached, separation, weight, &config.limits)
+    let scale = Scale { separation, time_weight: &weight };
+    temporal_task::compile(task, &split, &reached, &scale, &config.limits)
 }
 
 /// Returns `true` if the duration of every action is fixed, by an equality or by two equal bounds that are
@@ -255,7 +283,23 @@ fn measures(effect: &ast::Effect) -> bool {
 /// returns one with the least makespan, if the search proves it and no duration is chosen. Calls `report` for
 /// every improvement.
 pub fn optimize_concurrent(
-    concurrent: &TemporalTask,
+    concurrent: &ConcurrentTask,
+    limits: &Limits,
+    report: &mut dyn FnMut(Improvement),
+) -> Solution {
+    match &concurrent.0 {
+        Width::Narrow(task) if task.chooses_durations() && task.task.unreachable.is_none() => {
+            let record = Record::new(task, Instant::now(), report);
+            flexible_durations::optimize(task, limits, record)
+        }
+        Width::Narrow(task) => optimize_fixed(task, limits, report),
+        Width::Wide(task) => optimize_fixed(task, limits, report),
+    }
+}
+
+/// Finds an optimal plan of a task in which the planner chooses no duration.
+fn optimize_fixed<T: TimeNumber>(
+    concurrent: &TemporalTask<T>,
     limits: &Limits,
     report: &mut dyn FnMut(Improvement),
 ) -> Solution {
@@ -263,9 +307,6 @@ pub fn optimize_concurrent(
     let mut record = Record::new(concurrent, Instant::now(), report);
     if let Some(reason) = &task.unreachable {
         return ended(Status::Unsolvable, Some(Proof::Relaxation(reason.clone())), record);
-    }
-    if concurrent.instances.iter().any(|instance| instance.is_chosen) {
-        return flexible_durations::optimize(concurrent, limits, record);
     }
     let costs = task.operators.iter().any(|operator| operator.cost.constant > 0);
     let bounds = (costs || !task.initial.numbers.is_empty())
@@ -283,7 +324,7 @@ pub fn optimize_concurrent(
         }
         (SearchEnd::Stopped(lower), None) => (Status::Unknown, Some(*lower)),
     };
-    let metric = |total| concurrent.measure.metric(&Rational::from_integer(total));
+    let metric = |total: T| concurrent.measure.metric(&total.to_rational());
     let proved = || if concurrent.is_exact { Proof::Search } else { Proof::Bound };
     let proof = matches!(search_end, SearchEnd::Exhausted).then(proved);
     let steps = plan.as_ref().filter(|_| proof.is_some()).map_or(0, |plan| plan.steps.len());

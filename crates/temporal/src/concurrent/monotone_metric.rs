@@ -6,10 +6,11 @@ use task::number::{Int, Rational};
 use task::task::{NumericId, Operator, Task};
 
 use crate::concurrent::happening::Instance;
+use crate::concurrent::time_number::TimeNumber;
 
 /// Returns `true` if no operator lowers the contribution of numbers to the minimised metric, for
 /// any durations. `instances` provides the numbers that hold durations.
-pub(super) fn only_grows(task: &Task, instances: &[Instance]) -> bool {
+pub(super) fn only_grows<T: TimeNumber>(task: &Task, instances: &[Instance<T>]) -> bool {
     let timers: FxHashSet<NumericId> =
         instances.iter().filter_map(|instance| Some(instance.timer?.0)).collect();
     let grows = |operator: &Operator, variable: NumericId, factor: &Rational| {

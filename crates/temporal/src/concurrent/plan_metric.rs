@@ -7,10 +7,11 @@ use crate::concurrent::schedule;
 use crate::concurrent::search::Sequence;
 use crate::concurrent::successors::TemporalState;
 use crate::concurrent::temporal_task::TemporalTask;
+use crate::concurrent::time_number::TimeNumber;
 
 pub(super) struct DeadlineMissed;
 
-impl TemporalTask {
+impl<T: TimeNumber> TemporalTask<T> {
     /// One detecting operator for each preference that is violated in a final state.
     pub(super) fn violated(&self, state: &State) -> impl Iterator<Item = OperatorId> {
         let is_violated = |id: &&OperatorId| self.task.operators[id.index()].applicable(state, &[]);
@@ -19,7 +20,7 @@ impl TemporalTask {
 
     /// Integer metric and makespan of a plan that ends in this temporal state. Returns `None` if
     /// the metric overflows.
-    pub(super) fn value(&self, TemporalState { state, clocks, cost }: &TemporalState) -> Option<(Int, Int)> {
+    pub(super) fn value(&self, TemporalState { state, clocks, cost }: &TemporalState<T>) -> Option<(T, T)> {
         let makespan = clocks.latest();
         Some((self.measure.total(makespan, cost.checked_add(self.penalty(state)?)?)?, makespan))
     }
@@ -51,7 +52,7 @@ impl TemporalTask {
         let times = schedule::schedule(self, happenings, together, &durations);
         let mut order: Vec<usize> = (0..happenings.len()).collect();
         order.sort_by_key(|position| times[*position]);
-        let mut trajectory = vec![(0, self.task.initial.clone())];
+        let mut trajectory = vec![(T::ZERO, self.task.initial.clone())];
         let mut state = self.task.initial.clone();
         for (index, position) in order.iter().enumerate() {
             state = next(&state, happenings[*position]);
@@ -76,7 +77,7 @@ impl TemporalTask {
     /// Updates the metric of a complete plan with the preferences and deadlines that it violates.
     /// `cost` is the cost of its actions. Returns the plan unchanged if the task has no deadlines,
     /// and `None` if the plan misses a hard deadline or the metric overflows.
-    pub(super) fn judge(&self, sequence: Sequence, cost: Int) -> Option<Sequence> {
+    pub(super) fn judge(&self, sequence: Sequence<T>, cost: Int) -> Option<Sequence<T>> {
         if self.deadlines.is_empty() {
             return Some(sequence);
         }

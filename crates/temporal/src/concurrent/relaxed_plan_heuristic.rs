@@ -18,6 +18,7 @@ use task::task::quantity::Linear;
 use crate::concurrent::rule::Proposition;
 use crate::concurrent::successors::TemporalState;
 use crate::concurrent::temporal_relaxation::TemporalRelaxation;
+use crate::concurrent::time_number::TimeNumber;
 
 const UNREACHABLE: u32 = u32::MAX;
 const MAX_COST: u32 = 1 << 30;
@@ -64,9 +65,9 @@ impl<'a> RelaxedPlanHeuristic<'a> {
     }
 
     /// Evaluates a state. Returns `None` if the goal or the end of a running action is unreachable.
-    pub(super) fn guide(
+    pub(super) fn guide<T: TimeNumber>(
         &mut self,
-        TemporalState { state, clocks, .. }: &TemporalState,
+        TemporalState { state, clocks, .. }: &TemporalState<T>,
     ) -> Option<HeuristicValue> {
         let value = |linear: &Linear<Int>| linear.value(&state.numbers, &[], &[]);
         self.guide_from(&state.values, clocks.opens().iter().map(|open| open.instance), &value)

@@ -6,13 +6,14 @@ use task::number::Int;
 use task::task::{Fact, NumericEffect, NumericId, Task};
 
 use crate::concurrent::happening::Instance;
+use crate::concurrent::time_number::TimeNumber;
 
 /// Input of the relevance analysis: which facts and number changes can be useful.
-pub(super) struct RelevanceContext<'k> {
+pub(super) struct RelevanceContext<'k, T: TimeNumber = Int> {
     /// Upper bound on the useful simultaneous runs of each instance; `u32::MAX` if no bound is
     /// known.
     pub(super) most: &'k [u32],
-    pub(super) separation: Int,
+    pub(super) separation: T,
     /// Per variable: whether a fact with a value other than 0 may be needed, i.e. the falsity of a
     /// single atom.
     pub(super) needed: &'k [bool],
@@ -39,7 +40,7 @@ pub(super) fn change(effect: &NumericEffect) -> Option<Change> {
     }
 }
 
-impl RelevanceContext<'_> {
+impl<T: TimeNumber> RelevanceContext<'_, T> {
     /// Returns the effects that may be needed. A plan without the other effects is no worse.
     pub(super) fn relevant_effects(&self, effects: &[Fact]) -> Vec<Fact> {
         let is_relevant = |fact: &&Fact| fact.value == 0 || self.needed[fact.variable.index()];
@@ -70,7 +71,7 @@ impl RelevanceContext<'_> {
 
 /// Polarity of each number. Empty if durations, the metric, preferences or trajectory constraints
 /// may read numbers, so that conditions alone do not determine the polarity.
-pub(super) fn asked(task: &Task, instances: &[Instance]) -> Vec<Polarity> {
+pub(super) fn asked<T: TimeNumber>(task: &Task, instances: &[Instance<T>]) -> Vec<Polarity> {
     let is_judged = task.schema_names.iter().any(|name| is_hidden(name));
     let is_timed = instances.iter().any(|instance| instance.is_chosen || instance.timer.is_some());
     if is_judged || is_timed || !task.objective.rest.is_empty() { Vec::new() } else { directions(task) }

@@ -3,34 +3,37 @@
 use std::collections::VecDeque;
 
 use rustc_hash::FxHashMap;
-use task::number::Int;
 use task::task::OperatorId;
 
 use crate::concurrent::happening::Role;
 use crate::concurrent::simple_temporal_network::Key;
 use crate::concurrent::temporal_task::TemporalTask;
+use crate::concurrent::time_number::TimeNumber;
 
 /// Constraint between two happenings: position of the first, position of the second, and least time
 /// from the first to the second.
-type Bound = (usize, usize, Int);
+type Bound<T> = (usize, usize, T);
 
 /// Computes the earliest times of a sequence by the Bellman-Ford algorithm. `together` marks the
 /// happenings that take place at the same time as the previous one. `durations` are as returned by
 /// [`durations`].
-#[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
-pub(super) fn schedule(
-    concurrent: &TemporalTask,
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "sums of fewer than 2^32 times fit, see `TimeNumber::TIME_BITS`"
+)]
+pub(super) fn schedule<T: TimeNumber>(
+    concurrent: &TemporalTask<T>,
     sequence: &[OperatorId],
     together: &[bool],
-    durations: &[Int],
-) -> Vec<Int> {
-    let mut times = vec![0; sequence.len()];
+    durations: &[T],
+) -> Vec<T> {
+    let mut times = vec![T::ZERO; sequence.len()];
     let bounds = bounds(concurrent, sequence, (together, durations), &mut times);
     // No chain of bounds is longer than the sequence.
     for _ in 0..=sequence.len() {
         let mut has_changed = false;
         for (from, to, by) in &bounds {
-            let least = times[*from] + by;
+            let least = times[*from] + *by;
             if times[*to] < least {
                 times[*to] = least;
                 has_changed = true;
@@ -45,7 +48,7 @@ pub(super) fn schedule(
 
 /// Durations of the actions that start in a sequence, by position; 0 for happenings other than
 /// starts.
-pub(super) fn durations(concurrent: &TemporalTask, sequence: &[OperatorId]) -> Vec<Int> {
+pub(super) fn durations<T: TimeNumber>(concurrent: &TemporalTask<T>, sequence: &[OperatorId]) -> Vec<T> {
     let mut state = concurrent.task.initial.clone();
     let mut durations = Vec::with_capacity(sequence.len());
     for id in sequence {
@@ -56,7 +59,7 @@ pub(super) fn durations(concurrent: &TemporalTask, sequence: &[OperatorId]) -> V
                 let duration = concurrent.duration(&concurrent.instances[instance as usize], &state);
                 duration.expect("invariant: the search has started it")
             }
-            _ => 0,
+            _ => T::ZERO,
         });
     }
     durations
@@ -64,14 +67,14 @@ pub(super) fn durations(concurrent: &TemporalTask, sequence: &[OperatorId]) -> V
 
 #[expect(
     clippy::arithmetic_side_effects,
-    reason = "the first happening is together with none; durations are below 2^90"
+    reason = "the first happening is together with none; durations have at most `TIME_BITS` bits"
 )]
-fn bounds(
-    concurrent: &TemporalTask,
+fn bounds<T: TimeNumber>(
+    concurrent: &TemporalTask<T>,
     sequence: &[OperatorId],
-    (together, durations): (&[bool], &[Int]),
-    times: &mut [Int],
-) -> Vec<Bound> {
+    (together, durations): (&[bool], &[T]),
+    times: &mut [T],
+) -> Vec<Bound<T>> {
     let mut bounds = Vec::new();
     let mut marked: FxHashMap<Key, Vec<usize>> = FxHashMap::default();
     // Runs of an instance end in the order of their starts.
@@ -79,11 +82,11 @@ fn bounds(
     // Running actions with a joint condition over all, each with the last happening that wrote an
     // atom or number in this condition.
     let mut joint: Vec<(u32, usize)> = Vec::new();
-    let mut floor = 0;
+    let mut floor = T::ZERO;
     for (index, id) in sequence.iter().enumerate() {
         let happening = &concurrent.happenings[id.index()];
-        if let Role::Timed(time) = happening.role {
-            floor = time;
+        if let Role::Timed(event) = happening.role {
+            floor = concurrent.events[event as usize].0;
         }
         times[index] = floor;
         for (key, by) in &happening.accesses.after {
@@ -93,7 +96,7 @@ fn bounds(
             marked.entry(*key).or_default().push(index);
         }
         if together[index] {
-            bounds.extend([(index - 1, index, 0), (index, index - 1, 0)]);
+            bounds.extend([(index - 1, index, T::ZERO), (index, index - 1, T::ZERO)]);
         }
         if let Role::End(instance) = happening.role {
             let first = joint.iter().position(|(candidate, _)| *candidate == instance);
@@ -101,7 +104,7 @@ fn bounds(
         }
         for (instance, last) in &mut joint {
             if concurrent.touches(*id, *instance) {
-                bounds.push((*last, index, 0));
+                bounds.push((*last, index, T::ZERO));
                 *last = index;
             }
         }

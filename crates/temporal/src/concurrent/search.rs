@@ -14,8 +14,8 @@ use std::collections::BinaryHeap;
 
 use search::bounds::Bounds;
 use search::search::{SearchStatistics, is_monotone};
-use task::limits::Limits;
-use task::number::{GROWTH_LIMIT, Int, Rational};
+use task::limits::{Interrupted, LimitPoll, Limits};
+use task::number::Int;
 use task::plan::solution::PlannerPart;
 use task::task::OperatorId;
 
@@ -24,61 +24,63 @@ use crate::concurrent::search_log::Record;
 use crate::concurrent::store::{Origin, Store};
 use crate::concurrent::successors::{DeadEnd, Expansion, TemporalState};
 use crate::concurrent::temporal_task::TemporalTask;
+use crate::concurrent::time_number::TimeNumber;
 
 /// Number of comparisons of nodes that count as one expanded node.
 const COMPARED: usize = 4;
 
 /// A plan as a sequence of happenings.
 #[derive(Debug, Clone)]
-pub(super) struct Sequence {
+pub(super) struct Sequence<T: TimeNumber = Int> {
     /// Metric (scaled to an integer) and makespan (in internal time units).
-    pub(super) value: (Int, Int),
+    pub(super) value: (T, T),
     pub(super) happenings: Vec<OperatorId>,
     /// Per happening: whether it takes place at the time of the previous one.
     pub(super) together: Vec<bool>,
 }
 
-impl Sequence {
+impl<T: TimeNumber> Sequence<T> {
     /// Reports this plan as an improvement. `lower` is a lower bound on the metric of plans not found yet.
-    pub(super) fn tell(&self, lower: Int, part: PlannerPart, record: &mut Record<'_>) {
-        let [value, lower] = [self.value.0, lower].map(Rational::from_integer);
+    pub(super) fn tell(&self, lower: T, part: PlannerPart, record: &mut Record<'_, T>) {
+        let [value, lower] = [self.value.0, lower].map(T::to_rational);
         record.improve(&value, self.happenings.len(), lower, part);
     }
 }
 
-pub(super) enum SearchEnd {
-    /// No further plan can be better than the incumbent.
+/// Outcome of a search.
+pub(super) enum SearchEnd<T: TimeNumber = Int> {
+    /// No open node can be better than the incumbent.
     Exhausted,
     /// Stopped at a limit, or nodes were dropped. The value is a lower bound on the metric of plans not found
     /// yet, scaled to an integer.
-    Stopped(Int),
+    Stopped(T),
 }
 
 /// Sort key of an open node: metric, makespan, remaining work estimate, depth, and node.
-type Priority = (Int, Int, Int, u32, u32);
+type Priority<T> = (T, T, T, u32, u32);
 
-pub(super) struct Search<'a> {
-    concurrent: &'a TemporalTask,
-    estimate: &'a Estimate,
+pub(super) struct Search<'a, T: TimeNumber = Int> {
+    concurrent: &'a TemporalTask<T>,
+    estimate: &'a Estimate<T>,
     /// Lower bounds on costs and resources. `None` if neither costs nor numbers occur.
     bounds: Option<&'a Bounds>,
-    expansion: &'a Expansion<'a>,
-    store: Store<'a>,
-    open: BinaryHeap<Reverse<Priority>>,
-    pub(super) incumbent: Option<Sequence>,
+    expansion: &'a Expansion<'a, T>,
+    store: Store<'a, T>,
+    open: BinaryHeap<Reverse<Priority<T>>>,
+    pub(super) incumbent: Option<Sequence<T>>,
     /// Lower bound on the metric of plans through nodes that were dropped: numbers overflowed, or a hard
     /// deadline was violated. `None` if no node was dropped.
-    left_out: Option<Int>,
+    left_out: Option<T>,
     /// Lower bound on the makespan of every plan.
-    floor: Int,
+    floor: T,
     figures: SearchStatistics,
 }
 
-impl<'a> Search<'a> {
+impl<'a, T: TimeNumber> Search<'a, T> {
     pub(super) fn new(
-        concurrent: &'a TemporalTask,
-        expansion: &'a Expansion<'a>,
-        estimate: &'a Estimate,
+        concurrent: &'a TemporalTask<T>,
+        expansion: &'a Expansion<'a, T>,
+        estimate: &'a Estimate<T>,
         bounds: Option<&'a Bounds>,
     ) -> Self {
         // A duration is not a resource, and for a number read by a preference less may be better.
@@ -94,33 +96,38 @@ impl<'a> Search<'a> {
             open: BinaryHeap::new(),
             incumbent: None,
             left_out: None,
-            floor: 0,
+            floor: T::ZERO,
             figures: SearchStatistics::default(),
         };
         // Costs and times are not negative, so 0 is a lower bound.
-        search.push(&expansion.root(), None, 0);
+        search.push(&expansion.root(), None, T::ZERO);
         search
     }
 
-    pub(super) fn raise_floor(&mut self, makespan: Int) {
+    pub(super) fn raise_floor(&mut self, makespan: T) {
         self.floor = self.floor.max(makespan);
     }
 
-    pub(super) fn floor(&self) -> Int {
+    pub(super) fn floor(&self) -> T {
         self.floor
     }
 
     /// Raises lower bounds on the metric and the makespan of plans through a node to the bounds that hold for
     /// all plans.
-    fn at_least(&self, (total, makespan): (Int, Int)) -> (Int, Int) {
+    fn at_least(&self, (total, makespan): (T, T)) -> (T, T) {
         // Costs are not negative.
-        let floor = self.concurrent.measure.total(self.floor, 0).unwrap_or(0);
+        let floor = self.concurrent.measure.total(self.floor, 0).unwrap_or(T::ZERO);
         (total.max(floor), makespan.max(self.floor))
     }
 
     /// Searches until the open list is exhausted, `max_nodes` nodes were expanded, or a limit is
     /// reached. The search can be resumed. Better plans and lower bounds are reported to `record`.
-    pub(super) fn run(&mut self, limits: &Limits, max_nodes: usize, record: &mut Record<'_>) -> SearchEnd {
+    pub(super) fn run(
+        &mut self,
+        limits: &Limits,
+        max_nodes: usize,
+        record: &mut Record<'_, T>,
+    ) -> SearchEnd<T> {
         let before = self.figures;
         let search_end = self.go_on(limits, max_nodes, record);
         self.figures.add_to(before, &mut record.statistics);
@@ -128,7 +135,7 @@ impl<'a> Search<'a> {
     }
 
     #[expect(clippy::arithmetic_side_effects, reason = "what was looked at is counted by 64 bits")]
-    fn go_on(&mut self, limits: &Limits, max_nodes: usize, record: &mut Record<'_>) -> SearchEnd {
+    fn go_on(&mut self, limits: &Limits, max_nodes: usize, record: &mut Record<'_, T>) -> SearchEnd<T> {
         let mut expanded = 0;
         let mut pulse = limits.pulse();
         while let Some(Reverse(priority)) = self.open.pop() {
@@ -157,11 +164,17 @@ impl<'a> Search<'a> {
                 self.open.push(Reverse(priority));
                 return SearchEnd::Stopped(self.lower());
             }
-            record.report_lower_bound(Rational::from_integer(self.known(value.0)));
-            expanded += self.expand(id, &situation, value.0);
+            record.report_lower_bound(self.known(value.0).to_rational());
+            let Ok(work) = self.expand((id, value.0), &situation, &mut pulse) else {
+                // The next run expands the node again. Successors that are stored already dominate
+                // their copies.
+                self.open.push(Reverse(priority));
+                return SearchEnd::Stopped(self.lower());
+            };
+            expanded += work;
         }
         self.left_out
-            .map(|lower| self.at_least((lower, 0)).0)
+            .map(|lower| self.at_least((lower, T::ZERO)).0)
             .filter(|lower| self.may_be_better(*lower))
             .map_or(SearchEnd::Exhausted, SearchEnd::Stopped)
     }
@@ -169,9 +182,10 @@ impl<'a> Search<'a> {
     /// Returns `true` if a dropped node with this lower bound may lead to a better plan than the
     /// incumbent: a lower metric, or the same metric and a lower makespan if the metric is not the
     /// makespan itself.
-    fn may_be_better(&self, lower: Int) -> bool {
+    fn may_be_better(&self, lower: T) -> bool {
         let TemporalTask { task, measure, .. } = self.concurrent;
-        let is_time = || measure.time > 0 && task.operators.iter().all(|operator| operator.cost.is_zero());
+        let is_time =
+            || measure.time > T::ZERO && task.operators.iter().all(|operator| operator.cost.is_zero());
         let value = self.incumbent.as_ref().map(|incumbent| incumbent.value.0);
         value.is_none_or(|value| lower < value || lower == value && !is_time())
     }
@@ -182,36 +196,44 @@ impl<'a> Search<'a> {
 
     /// Returns `true` if the search uses more than half of the memory limit.
     pub(super) fn is_full(&self, limits: &Limits) -> bool {
-        let open = self.open.len().saturating_mul(size_of::<Priority>());
+        let open = self.open.len().saturating_mul(size_of::<Priority<T>>());
         self.store.bytes().saturating_add(open) > limits.room() / 2
     }
 
     /// Lower bound on the metric of plans not found yet, in integers.
-    pub(super) fn lower(&self) -> Int {
-        self.known(self.open.peek().map_or(0, |Reverse(priority)| priority.0))
+    pub(super) fn lower(&self) -> T {
+        self.known(self.open.peek().map_or(T::ZERO, |Reverse(priority)| priority.0))
     }
 
     /// Lower bound on the metric of plans not found yet, given the bound `open` of the open nodes.
-    fn known(&self, open: Int) -> Int {
+    fn known(&self, open: T) -> T {
         let bound = self.left_out.map_or(open, |left_out| left_out.min(open));
-        self.at_least((bound, 0)).0
+        self.at_least((bound, T::ZERO)).0
     }
 
-    fn leave_out(&mut self, lower: Int) {
+    fn leave_out(&mut self, lower: T) {
         self.left_out = Some(self.left_out.map_or(lower, |bound| bound.min(lower)));
     }
 
-    fn is_better(&self, value: (Int, Int)) -> bool {
+    fn is_better(&self, value: (T, T)) -> bool {
         self.incumbent.as_ref().is_none_or(|incumbent| value < incumbent.value)
     }
 
-    /// Expands a node whose lower bound on the metric is `lower`. Returns the work done: 1 for the node, 1
-    /// for each candidate, and 1 for every [`COMPARED`] comparisons.
+    /// Expands a node with the given lower bound on the metric. Returns the work in nodes.
+    ///
+    /// # Errors
+    /// [`Interrupted`] if a limit was reached before the last successor. A node can have tens of
+    /// thousands of successors.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "a node is no deeper than twice as many as there are nodes; what is done is counted by 64 bits"
     )]
-    fn expand(&mut self, id: u32, situation: &TemporalState, lower: Int) -> usize {
+    fn expand(
+        &mut self,
+        (id, lower): (u32, T),
+        situation: &TemporalState<T>,
+        pulse: &mut LimitPoll<'_>,
+    ) -> Result<usize, Interrupted> {
         let candidates = self.expansion.candidates(situation);
         let count = candidates.len();
         let compared = self.store.compared;
@@ -219,6 +241,7 @@ impl<'a> Search<'a> {
         self.figures.generated += count as u64;
         let depth = self.store.origin(id).map_or(0, |origin| origin.depth);
         for operator in candidates {
+            pulse.beat()?;
             match self.expansion.after(situation, operator, true) {
                 Ok((next, compressed)) => {
                     let depth = depth + 1 + u32::from(compressed);
@@ -230,12 +253,12 @@ impl<'a> Search<'a> {
                 Err(DeadEnd::Unfit) => self.leave_out(lower),
             }
         }
-        count + 1 + (self.store.compared - compared) / COMPARED
+        Ok(count + 1 + (self.store.compared - compared) / COMPARED)
     }
 
     /// Adds a node, unless it is a dead end, dominated, or no better than the incumbent. If its metric
     /// overflows, the node is dropped, and the lower bound `lower` of its parent is recorded.
-    fn push(&mut self, situation: &TemporalState, origin: Option<Origin>, lower: Int) {
+    fn push(&mut self, situation: &TemporalState<T>, origin: Option<Origin>, lower: T) {
         let TemporalState { state, clocks, cost } = situation;
         self.figures.evaluated = self.figures.evaluated.saturating_add(1);
         let Some(remaining) = self.estimate.left(state, clocks) else { return };
@@ -248,7 +271,7 @@ impl<'a> Search<'a> {
         };
         let makespan = remaining.makespan.max(self.floor);
         let total = cost.checked_add(costs).and_then(|cost| self.concurrent.measure.total(makespan, cost));
-        let Some(total) = total.filter(|total| *total < GROWTH_LIMIT) else {
+        let Some(total) = total.filter(|total| total.is_moderate()) else {
             self.leave_out(lower);
             return;
         };
@@ -263,7 +286,7 @@ impl<'a> Search<'a> {
     }
 
     /// Plan that leads to a goal node. Returns `None` if its metric overflows or it violates a hard deadline.
-    fn sequence(&self, goal: u32, situation: &TemporalState) -> Option<Sequence> {
+    fn sequence(&self, goal: u32, situation: &TemporalState<T>) -> Option<Sequence<T>> {
         let value = self.concurrent.value(situation)?;
         let (mut happenings, mut together) = (Vec::new(), Vec::new());
         let mut at = goal;

@@ -7,13 +7,14 @@ use task::number::{Int, Rational};
 use task::plan::solution::{Improvement, Moment, PlannerPart, Statistics};
 
 use crate::concurrent::temporal_task::TemporalTask;
+use crate::concurrent::time_number::TimeNumber;
 
 /// Inverse of the smallest reported rise of the lower bound, relative to the last reported bound. A
 /// bound that reaches the cost of the incumbent is always reported.
 const REPORT_STEP: Int = 100;
 
-pub(super) struct Record<'r> {
-    concurrent: &'r TemporalTask,
+pub(super) struct Record<'r, T: TimeNumber = Int> {
+    concurrent: &'r TemporalTask<T>,
     report: &'r mut dyn FnMut(Improvement),
     started: Instant,
     /// Last reported integer metric of the best plan, and last reported integer lower bound.
@@ -25,9 +26,9 @@ pub(super) struct Record<'r> {
     pub(super) statistics: Statistics,
 }
 
-impl<'r> Record<'r> {
+impl<'r, T: TimeNumber> Record<'r, T> {
     pub(super) fn new(
-        concurrent: &'r TemporalTask,
+        concurrent: &'r TemporalTask<T>,
         started: Instant,
         report: &'r mut dyn FnMut(Improvement),
     ) -> Self {

@@ -16,17 +16,18 @@ use crate::concurrent::action_invariants::{Index, Invariant, MAX_PAIR_CHECKS};
 use crate::concurrent::happening::{Happening, Instance, Role};
 use crate::concurrent::relevant_effects::{Change, RelevanceContext, asked, change, needed};
 use crate::concurrent::split::UNDER_WAY;
+use crate::concurrent::time_number::TimeNumber;
 
 /// Maximum number of iterations of the analysis: a bound for one instance can improve the bounds of others.
 const FIXPOINT_ROUNDS: usize = 2;
 
 /// Sets `most`, `under_way` and `counts_by_end` of each instance: the bound on useful simultaneous
 /// runs, the fact that the action is running, and whether only ends count.
-pub(super) fn bound_self_overlap(
+pub(super) fn bound_self_overlap<T: TimeNumber>(
     task: &Task,
-    happenings: &[Happening],
-    instances: &mut [Instance],
-    separation: Int,
+    happenings: &[Happening<T>],
+    instances: &mut [Instance<T>],
+    separation: T,
     limits: &Limits,
 ) -> Result<(), Interrupted> {
     for instance in &mut *instances {
@@ -71,7 +72,7 @@ pub(super) fn bound_self_overlap(
 }
 
 /// Fact that marks the action as running: a condition of its end.
-fn under_way(task: &Task, own: &Instance) -> Option<Fact> {
+fn under_way<T: TimeNumber>(task: &Task, own: &Instance<T>) -> Option<Fact> {
     let name = |fact: &Fact| &task.variables[fact.variable.index()].values[fact.value as usize];
     let required = &task.operators[own.end.index()].condition.facts;
     required.iter().find(|fact| name(fact).starts_with(UNDER_WAY)).copied()
@@ -85,16 +86,16 @@ fn clashes(fact: Fact, others: &[Fact]) -> bool {
 /// Data for analysing the happenings during a run of `own`: facts that hold during the run, and the
 /// relevance of effects.
 #[derive(Clone, Copy)]
-struct Inside<'i> {
-    own: &'i Instance,
+struct Inside<'i, T: TimeNumber> {
+    own: &'i Instance<T>,
     invariant: &'i Invariant,
-    known: &'i RelevanceContext<'i>,
+    known: &'i RelevanceContext<'i, T>,
 }
 
-impl Index<'_> {
+impl<T: TimeNumber> Index<'_, T> {
     /// Returns `true` if no run of the action can start during another run. Returns `None` if the
     /// work limit `left` is used up.
-    fn excludes_itself(&self, own: &Instance, left: &mut usize) -> Option<bool> {
+    fn excludes_itself(&self, own: &Instance<T>, left: &mut usize) -> Option<bool> {
         let invariant = self.invariant(own, true, left)?;
         if self.excludes(&invariant, own, own.start) {
             return Some(true);
@@ -117,7 +118,7 @@ impl Index<'_> {
     /// which the start sets, to the value `to`. Returns `None` if the work limit is used up.
     fn is_reached(
         &self,
-        own: &Instance,
+        own: &Instance<T>,
         invariant: &Invariant,
         (from, to): (Fact, u32),
         left: &mut usize,
@@ -152,7 +153,7 @@ impl Index<'_> {
 
     /// Upper bound on the number of simultaneous runs that can be useful. Returns `None` if no
     /// bound is proved or the work limit is used up.
-    fn most(&self, own: &Instance, known: &RelevanceContext<'_>, left: &mut usize) -> Option<u32> {
+    fn most(&self, own: &Instance<T>, known: &RelevanceContext<'_, T>, left: &mut usize) -> Option<u32> {
         let [start, end] = [own.start, own.end].map(|id| &self.task.operators[id.index()]);
         if own.is_chosen || ![start, end].into_iter().all(is_plain) {
             return None;
@@ -207,7 +208,7 @@ impl Index<'_> {
     /// assignments during a run. Returns `None` if the work limit is used up.
     fn undoing(
         &self,
-        Inside { own, invariant, known }: Inside<'_>,
+        Inside { own, invariant, known }: Inside<'_, T>,
         (facts, assigned): (&[Fact], &[(NumericId, Int)]),
         left: &mut usize,
     ) -> Option<FxHashSet<OperatorId>> {
@@ -232,7 +233,7 @@ impl Index<'_> {
     /// only the first one is useful, and one more after each happening that undoes these facts.
     fn times_together(
         &self,
-        inside: Inside<'_>,
+        inside: Inside<'_, T>,
         happenings: FxHashSet<OperatorId>,
         left: &mut usize,
     ) -> Option<Int> {
@@ -269,7 +270,7 @@ impl Index<'_> {
 
     /// Facts that are the only useful effects of the run that the end `id` completes. Returns
     /// `None` if the run has other useful effects or `id` is not an end.
-    fn purpose(&self, id: OperatorId, known: &RelevanceContext<'_>) -> Option<Vec<Fact>> {
+    fn purpose(&self, id: OperatorId, known: &RelevanceContext<'_, T>) -> Option<Vec<Fact>> {
         let Role::End(instance) = self.happenings[id.index()].role else { return None };
         let instance = &self.instances[instance as usize];
         let [start, end] = [instance.start, instance.end].map(|id| &self.task.operators[id.index()]);
@@ -293,7 +294,7 @@ impl Index<'_> {
 
     /// Upper bound on the number of occurrences of a happening during a run of `own`. Returns
     /// `None` if there is no bound or the duration of `own` is not constant.
-    fn times(&self, id: OperatorId, own: &Instance, known: &RelevanceContext<'_>) -> Option<Int> {
+    fn times(&self, id: OperatorId, own: &Instance<T>, known: &RelevanceContext<'_, T>) -> Option<Int> {
         let happening = &self.happenings[id.index()];
         let apart = match happening.role {
             Role::Never => return Some(0),
@@ -302,16 +303,16 @@ impl Index<'_> {
             _ => {
                 let marks = &happening.accesses.marks;
                 let mut after = happening.accesses.after.iter();
-                let is_apart = after.any(|(key, by)| *by > 0 && marks.binary_search(key).is_ok());
+                let is_apart = after.any(|(key, by)| *by > T::ZERO && marks.binary_search(key).is_ok());
                 is_apart.then_some(known.separation)?
             }
         };
         let duration = own.timer.is_none().then_some(own.duration)?;
-        duration.checked_div(apart)?.checked_add(1)
+        duration.quotient(apart)?.checked_add(1)
     }
 
     /// Returns `true` if a run that starts during another run is certain to have the same duration.
-    fn lasts_as_long(&self, own: &Instance, start: &Operator, invariant: &Invariant) -> bool {
+    fn lasts_as_long(&self, own: &Instance<T>, start: &Operator, invariant: &Invariant) -> bool {
         start.numeric_effects.iter().all(|effect| {
             let mut numbers =
                 effect.value.coefficients.iter().flat_map(|(number, _)| self.changing(own, *number));
@@ -323,7 +324,7 @@ impl Index<'_> {
     /// variable.
     fn is_hidden(
         &self,
-        own: &Instance,
+        own: &Instance<T>,
         invariant: &Invariant,
         starts: &[Fact],
         variable: VariableId,
@@ -372,7 +373,12 @@ fn is_plain(operator: &Operator) -> bool {
 
 /// Returns `true` if only the end of a run has relevant effects, and ending another run has no
 /// further effect.
-fn counts_by_end(task: &Task, own: &Instance, under_way: Fact, known: &RelevanceContext<'_>) -> bool {
+fn counts_by_end<T: TimeNumber>(
+    task: &Task,
+    own: &Instance<T>,
+    under_way: Fact,
+    known: &RelevanceContext<'_, T>,
+) -> bool {
     let [start, end] = [own.start, own.end].map(|id| &task.operators[id.index()]);
     let starts = known.relevant_effects(&start.effects);
     !own.is_chosen
@@ -382,12 +388,12 @@ fn counts_by_end(task: &Task, own: &Instance, under_way: Fact, known: &Relevance
         && assigns_constants(own, end)
 }
 
-fn is_timer(own: &Instance, number: NumericId) -> bool {
+fn is_timer<T: TimeNumber>(own: &Instance<T>, number: NumericId) -> bool {
     own.timer.is_some_and(|(timer, _)| timer == number)
 }
 
 /// Returns `true` if the end sets numbers only to constants, so that a second end changes nothing.
-fn assigns_constants(own: &Instance, end: &Operator) -> bool {
+fn assigns_constants<T: TimeNumber>(own: &Instance<T>, end: &Operator) -> bool {
     let is_set = |effect: &NumericEffect| matches!(change(effect), Some(Change::Sets(_)));
     end.numeric_effects.iter().all(|effect| is_timer(own, effect.variable) || is_set(effect))
 }
@@ -418,8 +424,9 @@ mod tests {
         let (domain, problem, _) =
             read(&Source::new("domain", domain), &Source::new("problem", problem)).expect("PDDL");
         let separation = BigRational::new(1.into(), 1000.into());
-        let task =
-            ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation).expect("a task");
+        let task = ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation)
+            .expect("a task")
+            .narrow();
         let name = |instance: &super::Instance| {
             let schema = task.task.operators[instance.start.index()].schema;
             task.task.schema_names[schema as usize].as_str()

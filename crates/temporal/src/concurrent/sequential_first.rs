@@ -30,6 +30,7 @@ use crate::concurrent::happening::Role;
 use crate::concurrent::search::Sequence;
 use crate::concurrent::successors::{Expansion, TemporalState};
 use crate::concurrent::temporal_task::TemporalTask;
+use crate::concurrent::time_number::TimeNumber;
 
 /// Upper limit on the operators of the temporal task; for larger tasks, no sequential task is
 /// ground.
@@ -56,7 +57,7 @@ pub(super) struct SequentialTask {
 impl SequentialTask {
     /// Grounds the sequential task. Returns `None` if the source files are not kept, grounding
     /// fails or finds the goal unreachable, or the task is too large.
-    pub(super) fn new(concurrent: &TemporalTask, limits: &Limits) -> Option<Self> {
+    pub(super) fn new<T: TimeNumber>(concurrent: &TemporalTask<T>, limits: &Limits) -> Option<Self> {
         let split = &concurrent.task;
         if split.operators.len() > OPERATORS {
             return None;
@@ -84,20 +85,20 @@ impl SequentialTask {
 
     /// Translates a sequential plan into happenings of the temporal task at their earliest times. Returns
     /// `None` if they cannot be executed, miss the goal, violate a hard deadline, or the metric overflows.
-    fn sequence(
+    fn sequence<T: TimeNumber>(
         &self,
-        concurrent: &TemporalTask,
-        expansion: &Expansion<'_>,
+        concurrent: &TemporalTask<T>,
+        expansion: &Expansion<'_, T>,
         plan: &GroundPlan,
-    ) -> Option<Sequence> {
+    ) -> Option<Sequence<T>> {
         let mut situation = expansion.root();
         let mut links = Links::new();
         for step in &plan.steps {
             let operator = &self.task.operators[step.operator.index()];
             if let Some(until) = operator.wait {
-                let until = until.checked_mul(concurrent.task.time_scale)?;
+                let until = concurrent.unit.checked_mul(until.into())?;
                 while let Some((time, event)) = expansion.next_event(&situation.clocks)
-                    && time.checked_mul(self.task.time_scale)? <= until
+                    && time.checked_mul(self.task.time_scale.into())? <= until
                 {
                     let together = situation.clocks.unsettled();
                     situation = expansion.step(&situation, event).ok()?;
@@ -112,7 +113,7 @@ impl SequentialTask {
             let begins = self.begins.get(&call(&self.task, operator, &step.choice))?;
             let mut executed = begins.iter().filter_map(|begin| {
                 let mut action_links = Links::new();
-                let mut happen = |situation: &TemporalState, id| {
+                let mut happen = |situation: &TemporalState<T>, id| {
                     Mode::Sequential.apply_happening(concurrent, expansion, situation, id, &mut action_links)
                 };
                 let mut next = happen(&situation, *begin)?;
@@ -164,12 +165,12 @@ impl<'w> SequentialPlanner<'w> {
     /// Resumes both searches for the work that corresponds to `situations` evaluations of the
     /// greedy temporal search. Returns the better of the plans that are executable in the temporal
     /// task.
-    pub(super) fn run(
+    pub(super) fn run<T: TimeNumber>(
         &mut self,
-        of: (&TemporalTask, &Expansion<'_>),
+        of: (&TemporalTask<T>, &Expansion<'_, T>),
         situations: usize,
         statistics: &mut Statistics,
-    ) -> Option<Sequence> {
+    ) -> Option<Sequence<T>> {
         let satisficing_plan = self.estimate(of, situations, statistics);
         if self.limits.reached() {
             return satisficing_plan;
@@ -178,12 +179,12 @@ impl<'w> SequentialPlanner<'w> {
         satisficing_plan.into_iter().chain(best).min_by_key(|sequence| sequence.value)
     }
 
-    fn estimate(
+    fn estimate<T: TimeNumber>(
         &mut self,
-        (concurrent, expansion): (&TemporalTask, &Expansion<'_>),
+        (concurrent, expansion): (&TemporalTask<T>, &Expansion<'_, T>),
         situations: usize,
         statistics: &mut Statistics,
-    ) -> Option<Sequence> {
+    ) -> Option<Sequence<T>> {
         let satisficer = self.satisficer.as_mut()?;
         let before = satisficer.figures;
         let advance = satisficer.run(self.known.as_ref(), WORK.saturating_mul(situations as u64));
@@ -201,12 +202,12 @@ impl<'w> SequentialPlanner<'w> {
         }
     }
 
-    fn search(
+    fn search<T: TimeNumber>(
         &mut self,
-        (concurrent, expansion): (&TemporalTask, &Expansion<'_>),
+        (concurrent, expansion): (&TemporalTask<T>, &Expansion<'_, T>),
         situations: usize,
         statistics: &mut Statistics,
-    ) -> Option<Sequence> {
+    ) -> Option<Sequence<T>> {
         if matches!(self.exact, Exact::Later) {
             let space = self.whole.space(self.limits);
             let begin =

@@ -9,8 +9,9 @@
 //! fixes its time point at the earliest possible time. Happenings that do not interfere are not ordered by
 //! their position in the sequence \[2\].
 //!
-//! Times are sums over the happenings of a sequence: fewer than 2^32 terms, each below 2^91 (a
-//! duration plus the separation). Missing upper bounds (`Int::MAX`) take no part in arithmetic.
+//! Times are sums over the happenings of a sequence: fewer than 2^32 terms, each a duration plus the
+//! separation, which have at most [`TimeNumber::TIME_BITS`] bits. Missing upper bounds
+//! ([`TimeNumber::MAX`]) take no part in arithmetic.
 //!
 //! \[1\] R. Dechter, I. Meiri, J. Pearl: Temporal constraint networks, Artificial Intelligence 49, 1991.
 //! \[2\] A. Coles, A. Coles, M. Fox, D. Long: Forward-chaining partial-order planning, ICAPS 2010.
@@ -21,49 +22,50 @@ mod pack;
 use task::number::{Int, dense};
 
 use crate::concurrent::time::{TimeExpression, TimePoint, place};
+use crate::concurrent::time_number::TimeNumber;
 
 /// Id of an access kind: a way of accessing (such as read or delete) one atom, number or design.
 pub(super) type Key = u32;
 
 /// A running action. The action starts `offset` after its time point `float`.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct RunningAction {
+pub(super) struct RunningAction<T: TimeNumber = Int> {
     pub(super) instance: u32,
     pub(super) float: TimePoint,
-    pub(super) offset: Int,
-    pub(super) duration: Int,
+    pub(super) offset: T,
+    pub(super) duration: T,
     /// Time of the last happening that wrote an atom or number in the condition over all of the
     /// action, initially its start. `None` unless several happenings can maintain this condition
     /// jointly.
-    last: Option<TimeExpression>,
+    last: Option<TimeExpression<T>>,
 }
 
 #[derive(Debug, Clone)]
-struct Start {
-    lower: TimeExpression,
-    /// Upper bound on the time; `Int::MAX` if the time is unbounded.
-    upper: Int,
+struct Start<T: TimeNumber = Int> {
+    lower: TimeExpression<T>,
+    /// Upper bound on the time; `T::MAX` if the time is unbounded.
+    upper: T,
 }
 
 /// The simple temporal network of a search node: the times that constrain future happenings.
 #[derive(Debug, Clone)]
-pub(super) struct SimpleTemporalNetwork {
+pub(super) struct SimpleTemporalNetwork<T: TimeNumber = Int> {
     /// Time of the latest access of each kind, sorted by key.
-    entries: Vec<(Key, TimeExpression)>,
+    entries: Vec<(Key, TimeExpression<T>)>,
     /// Time of the latest change of each variable, sorted by variable. Variables that never changed
     /// have no entry.
-    changed: Vec<(u32, TimeExpression)>,
-    floats: Vec<Start>,
+    changed: Vec<(u32, TimeExpression<T>)>,
+    floats: Vec<Start<T>>,
     /// Running actions, sorted by instance. Runs of one instance are in the order of their starts,
     /// which is also the order of their ends.
-    opens: Vec<RunningAction>,
+    opens: Vec<RunningAction<T>>,
     /// Time point and offset at which all further happenings take place until every condition over
     /// all holds again. `None` if all these conditions hold.
-    group: Option<(TimePoint, Int)>,
+    group: Option<(TimePoint, T)>,
     /// Time of the last happening; negative before the first one.
-    latest: TimeExpression,
+    latest: TimeExpression<T>,
     /// Time of the last timed initial literals that were applied; negative before the first ones.
-    floor: Int,
+    floor: T,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -73,13 +75,13 @@ pub(super) enum Kind {
     Whole,
 }
 
-pub(super) struct Happening<'h> {
+pub(super) struct Happening<'h, T: TimeNumber = Int> {
     pub(super) kind: Kind,
     pub(super) instance: u32,
     /// Duration of the instance in internal time units, if the happening is a start.
-    pub(super) duration: Int,
+    pub(super) duration: T,
     /// Access kinds that the happening must follow, each with the required distance.
-    pub(super) after: &'h [(Key, Int)],
+    pub(super) after: &'h [(Key, T)],
     pub(super) marks: &'h [Key],
     /// Whether several happenings can jointly maintain the condition over all of the instance.
     pub(super) joint: bool,
@@ -91,17 +93,19 @@ pub(super) struct Happening<'h> {
     pub(super) settled: bool,
 }
 
-pub(super) struct Event<'h> {
-    pub(super) time: Int,
-    pub(super) after: &'h [(Key, Int)],
+/// Temporal constraints and accesses of timed initial literals.
+pub(super) struct Event<'h, T: TimeNumber = Int> {
+    pub(super) time: T,
+    /// Access kinds that the literals must follow, each with the required distance.
+    pub(super) after: &'h [(Key, T)],
     pub(super) marks: &'h [Key],
     pub(super) changes: &'h [u32],
     /// Whether every condition over all of a running action holds after the literals.
     pub(super) settled: bool,
 }
 
-impl SimpleTemporalNetwork {
-    pub(super) fn opens(&self) -> &[RunningAction] {
+impl<T: TimeNumber> SimpleTemporalNetwork<T> {
+    pub(super) fn opens(&self) -> &[RunningAction<T>] {
         &self.opens
     }
 
@@ -115,7 +119,7 @@ impl SimpleTemporalNetwork {
         dense(self.opens.iter().filter(|open| open.instance == instance).count())
     }
 
-    pub(super) fn floor(&self) -> Int {
+    pub(super) fn floor(&self) -> T {
         self.floor
     }
 
@@ -128,14 +132,17 @@ impl SimpleTemporalNetwork {
     /// Returns `true` if timed initial literals at `time` are far enough behind earlier happenings that
     /// take place as early as possible. `after` lists the access kinds that the literals must follow,
     /// each with the required distance.
-    #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
-    pub(super) fn are_apart(&self, time: Int, after: &[(Key, Int)]) -> bool {
-        after.iter().all(|(key, by)| self.entry(*key).is_none_or(|entry| entry.base + by <= time))
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "sums of fewer than 2^32 times fit, see `TimeNumber::TIME_BITS`"
+    )]
+    pub(super) fn are_apart(&self, time: T, after: &[(Key, T)]) -> bool {
+        after.iter().all(|(key, by)| self.entry(*key).is_none_or(|entry| entry.base + *by <= time))
     }
 
     /// Returns `true` if all happenings take place at or before `time` and no delay of a running
     /// action can delay them.
-    pub(super) fn finishes_by(&self, time: Int) -> bool {
+    pub(super) fn finishes_by(&self, time: T) -> bool {
         self.latest.lags.is_empty() && self.latest() <= time
     }
 
@@ -146,44 +153,50 @@ impl SimpleTemporalNetwork {
             floats: Vec::new(),
             opens: Vec::new(),
             group: None,
-            latest: TimeExpression::constant(-1),
-            floor: -1,
+            latest: TimeExpression::constant(T::from(-1)),
+            floor: T::from(-1),
         }
     }
 
     /// Earliest possible time of the last happening.
-    pub(super) fn latest(&self) -> Int {
-        self.latest.base.max(0)
+    pub(super) fn latest(&self) -> T {
+        self.latest.base.max(T::ZERO)
     }
 
     /// Earliest possible start of a running action.
-    #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
-    pub(super) fn start(&self, open: &RunningAction) -> Int {
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "sums of fewer than 2^32 times fit, see `TimeNumber::TIME_BITS`"
+    )]
+    pub(super) fn start(&self, open: &RunningAction<T>) -> T {
         self.floats[place(open.float)].lower.base + open.offset
     }
 
     /// Earliest possible time of the latest change of a variable. Returns `None` if the variable
     /// never changed.
-    pub(super) fn changed(&self, variable: u32) -> Option<Int> {
+    pub(super) fn changed(&self, variable: u32) -> Option<T> {
         self.change(variable).map(|time| time.base)
     }
 
-    fn change(&self, variable: u32) -> Option<&TimeExpression> {
+    fn change(&self, variable: u32) -> Option<&TimeExpression<T>> {
         let position = self.changed.binary_search_by_key(&variable, |(candidate, _)| *candidate).ok()?;
         Some(&self.changed[position].1)
     }
 
-    fn entry(&self, key: Key) -> Option<&TimeExpression> {
+    fn entry(&self, key: Key) -> Option<&TimeExpression<T>> {
         let position = self.entries.binary_search_by_key(&key, |(candidate, _)| *candidate).ok()?;
         Some(&self.entries[position].1)
     }
 
     /// Returns the network after a further happening, or `None` if the constraints are
     /// inconsistent.
-    #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
-    pub(super) fn after(&self, happening: &Happening<'_>) -> Option<Self> {
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "sums of fewer than 2^32 times fit, see `TimeNumber::TIME_BITS`"
+    )]
+    pub(super) fn after(&self, happening: &Happening<'_, T>) -> Option<Self> {
         let mut next = self.clone();
-        let mut lower = TimeExpression::constant(self.floor.max(0));
+        let mut lower = TimeExpression::constant(self.floor.max(T::ZERO));
         for (key, by) in happening.after {
             if let Some(time) = self.entry(*key) {
                 lower.delay_to(time, *by);
@@ -191,7 +204,7 @@ impl SimpleTemporalNetwork {
         }
         for open in &self.opens {
             if let Some(last) = open.last.as_ref().filter(|_| (happening.touches)(open.instance)) {
-                lower.delay_to(last, 0);
+                lower.delay_to(last, T::ZERO);
             }
         }
         let (float, offset) = match happening.kind {
@@ -225,25 +238,29 @@ impl SimpleTemporalNetwork {
 
     /// Constrains the end of the running action at `position` to keep the distances in `after` from
     /// earlier accesses. Returns `None` if the network becomes inconsistent.
-    #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
-    pub(super) fn expect_end(&mut self, position: usize, after: &[(Key, Int)]) -> Option<()> {
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "sums of fewer than 2^32 times fit, see `TimeNumber::TIME_BITS`"
+    )]
+    pub(super) fn expect_end(&mut self, position: usize, after: &[(Key, T)]) -> Option<()> {
         let RunningAction { float, offset, duration, .. } = self.opens[position];
         let end = offset + duration;
-        let mut lower = TimeExpression::constant(0);
+        let mut lower = TimeExpression::constant(T::ZERO);
         for (key, by) in after {
             let Some(time) = self.entry(*key) else { continue };
             let current = &self.floats[place(float)].lower;
-            let is_implied = time.base + by - end <= current.base
+            let is_implied = time.base + *by - end <= current.base
                 && time.lags.iter().all(|(source, lag)| {
-                    let by = lag + by - end;
-                    (*source == float && by <= 0) || current.lag(*source).is_some_and(|current| by <= current)
+                    let by = *lag + *by - end;
+                    (*source == float && by <= T::ZERO)
+                        || current.lag(*source).is_some_and(|current| by <= current)
                 });
             // Constraints that are already implied are skipped, because propagation is expensive.
             if !is_implied {
                 lower.delay_to(time, *by);
             }
         }
-        if lower == TimeExpression::constant(0) {
+        if lower == TimeExpression::constant(T::ZERO) {
             Some(())
         } else {
             self.tighten_lower_bound(float, &lower, end)
@@ -252,13 +269,13 @@ impl SimpleTemporalNetwork {
 
     /// Time point and offset for a happening not before `lower`. The pair is `group`, or a new time
     /// point and 0. Returns `None` if the network becomes inconsistent.
-    fn moment(&mut self, lower: TimeExpression, group: Option<(TimePoint, Int)>) -> Option<(TimePoint, Int)> {
+    fn moment(&mut self, lower: TimeExpression<T>, group: Option<(TimePoint, T)>) -> Option<(TimePoint, T)> {
         if let Some((float, offset)) = group {
             self.tighten_lower_bound(float, &lower, offset)?;
             return Some((float, offset));
         }
-        self.floats.push(Start { lower, upper: Int::MAX });
-        Some((self.last_float(), 0))
+        self.floats.push(Start { lower, upper: T::MAX });
+        Some((self.last_float(), T::ZERO))
     }
 
     #[expect(clippy::arithmetic_side_effects, reason = "a float was pushed before")]
@@ -266,21 +283,21 @@ impl SimpleTemporalNetwork {
         TimePoint::try_from(self.floats.len() - 1).expect("invariant: fewer actions under way than operators")
     }
 
-    fn open(&mut self, (instance, duration): (u32, Int), float: TimePoint, offset: Int) {
+    fn open(&mut self, (instance, duration): (u32, T), float: TimePoint, offset: T) {
         let position = self.opens.partition_point(|open| open.instance <= instance);
         self.opens.insert(position, RunningAction { instance, float, offset, duration, last: None });
     }
 
-    fn at(&self, float: TimePoint, offset: Int) -> TimeExpression {
+    fn at(&self, float: TimePoint, offset: T) -> TimeExpression<T> {
         let mut time = self.floats[place(float)].lower.shifted(offset);
         time.put_off_after(float, offset);
         time
     }
 
-    fn note(&mut self, happening: &Happening<'_>, time: &TimeExpression) {
+    fn note(&mut self, happening: &Happening<'_, T>, time: &TimeExpression<T>) {
         for key in happening.marks {
             match self.entries.binary_search_by_key(key, |(candidate, _)| *candidate) {
-                Ok(position) => self.entries[position].1.delay_to(time, 0),
+                Ok(position) => self.entries[position].1.delay_to(time, T::ZERO),
                 Err(position) => self.entries.insert(position, (*key, time.clone())),
             }
         }
@@ -297,10 +314,10 @@ impl SimpleTemporalNetwork {
             let running = newest_first.find(|open| open.instance == happening.instance);
             running.expect("invariant: it has just running").last = Some(time.clone());
         }
-        self.latest.delay_to(time, 0);
+        self.latest.delay_to(time, T::ZERO);
     }
 
-    fn set_changed(&mut self, variable: u32, time: TimeExpression) {
+    fn set_changed(&mut self, variable: u32, time: TimeExpression<T>) {
         match self.changed.binary_search_by_key(&variable, |(candidate, _)| *candidate) {
             Ok(position) => self.changed[position].1 = time,
             Err(position) => self.changed.insert(position, (variable, time)),
@@ -308,7 +325,7 @@ impl SimpleTemporalNetwork {
     }
 
     /// All time expressions of the network except the lower bounds of time points.
-    fn times(&mut self) -> impl Iterator<Item = &mut TimeExpression> {
+    fn times(&mut self) -> impl Iterator<Item = &mut TimeExpression<T>> {
         let entries = self.entries.iter_mut().map(|(_, time)| time);
         let changed = self.changed.iter_mut().map(|(_, time)| time);
         let lasts = self.opens.iter_mut().filter_map(|open| open.last.as_mut());
@@ -317,22 +334,25 @@ impl SimpleTemporalNetwork {
 
     /// Constrains `float + offset` to be at least `lower`, and propagates. Returns `None` if the
     /// network becomes inconsistent.
-    #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
-    fn tighten_lower_bound(&mut self, float: TimePoint, lower: &TimeExpression, offset: Int) -> Option<()> {
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "sums of fewer than 2^32 times fit, see `TimeNumber::TIME_BITS`"
+    )]
+    fn tighten_lower_bound(&mut self, float: TimePoint, lower: &TimeExpression<T>, offset: T) -> Option<()> {
         let mut bound = lower.shifted(-offset);
         // A positive lag of the time point after itself would be a positive cycle.
-        if bound.forget(float).is_some_and(|lag| lag > 0) {
+        if bound.forget(float).is_some_and(|lag| lag > T::ZERO) {
             return None;
         }
         let before = bound.clone();
         for (source, lag) in &before.lags {
             let mut further = self.floats[place(*source)].lower.shifted(*lag);
-            if further.forget(float).is_some_and(|lag| lag > 0) {
+            if further.forget(float).is_some_and(|lag| lag > T::ZERO) {
                 return None;
             }
-            bound.delay_to(&further, 0);
+            bound.delay_to(&further, T::ZERO);
         }
-        self.floats[place(float)].lower.delay_to(&bound, 0);
+        self.floats[place(float)].lower.delay_to(&bound, T::ZERO);
         let new_bound = self.floats[place(float)].lower.clone();
         for time in self.times() {
             if let Some(lag) = time.lag(float) {
@@ -343,10 +363,10 @@ impl SimpleTemporalNetwork {
             let dependent = &mut self.floats[index];
             if let Some(lag) = dependent.lower.lag(float) {
                 let mut further = new_bound.shifted(lag);
-                if further.forget(dense(index)).is_some_and(|lag| lag > 0) {
+                if further.forget(dense(index)).is_some_and(|lag| lag > T::ZERO) {
                     return None;
                 }
-                dependent.lower.delay_to(&further, 0);
+                dependent.lower.delay_to(&further, T::ZERO);
             }
         }
         self.propagate_upper_bounds()
@@ -354,14 +374,17 @@ impl SimpleTemporalNetwork {
 
     /// Propagates upper bounds of time points backwards along lower bounds. Returns `None` if an
     /// upper bound falls below a lower bound.
-    #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "sums of fewer than 2^32 times fit, see `TimeNumber::TIME_BITS`"
+    )]
     fn propagate_upper_bounds(&mut self) -> Option<()> {
         for _ in 0..self.floats.len() {
             for index in 0..self.floats.len() {
                 let Start { lower, upper } = self.floats[index].clone();
-                for (source, lag) in lower.lags.iter().filter(|_| upper < Int::MAX) {
+                for (source, lag) in lower.lags.iter().filter(|_| upper < T::MAX) {
                     let source_upper = &mut self.floats[place(*source)].upper;
-                    *source_upper = (*source_upper).min(upper - lag);
+                    *source_upper = (*source_upper).min(upper - *lag);
                 }
             }
         }
@@ -370,14 +393,17 @@ impl SimpleTemporalNetwork {
 
     /// Replaces the time point `float` by `other + by` everywhere. Returns `None` if the network
     /// becomes inconsistent.
-    #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
-    fn merge_time_points(&mut self, float: TimePoint, other: TimePoint, by: Int) -> Option<()> {
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "sums of fewer than 2^32 times fit, see `TimeNumber::TIME_BITS`"
+    )]
+    fn merge_time_points(&mut self, float: TimePoint, other: TimePoint, by: T) -> Option<()> {
         let Start { mut lower, upper } = self.floats[place(float)].clone();
         let target = &mut self.floats[place(other)];
-        if upper < Int::MAX {
+        if upper < T::MAX {
             target.upper = target.upper.min(upper - by);
         }
-        if target.lower.forget(float).is_some_and(|lag| lag + by > 0) {
+        if target.lower.forget(float).is_some_and(|lag| lag + by > T::ZERO) {
             return None;
         }
         lower.forget(float);
@@ -392,10 +418,10 @@ impl SimpleTemporalNetwork {
             let start = &mut self.floats[index];
             if let Some(lag) = start.lower.forget(float) {
                 let mut further = at.shifted(lag);
-                if further.forget(dense(index)).is_some_and(|lag| lag > 0) {
+                if further.forget(dense(index)).is_some_and(|lag| lag > T::ZERO) {
                     return None;
                 }
-                start.lower.delay_to(&further, 0);
+                start.lower.delay_to(&further, T::ZERO);
             }
         }
         for open in self.opens.iter_mut().filter(|open| open.float == float) {
@@ -420,7 +446,8 @@ impl SimpleTemporalNetwork {
         for time in self.times() {
             time.renumber(&numbers);
         }
-        let mut floats: Vec<Start> = order.iter().map(|float| self.floats[place(*float)].clone()).collect();
+        let mut floats: Vec<Start<T>> =
+            order.iter().map(|float| self.floats[place(*float)].clone()).collect();
         for start in &mut floats {
             start.lower.renumber(&numbers);
         }
@@ -435,13 +462,16 @@ impl SimpleTemporalNetwork {
     /// Returns the network after timed initial literals. Earlier happenings must take place no
     /// later than the literals, and later happenings no earlier. Returns `None` if the network
     /// becomes inconsistent.
-    #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
-    pub(super) fn timed(&self, event: &Event<'_>) -> Option<Self> {
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "sums of fewer than 2^32 times fit, see `TimeNumber::TIME_BITS`"
+    )]
+    pub(super) fn timed(&self, event: &Event<'_, T>) -> Option<Self> {
         let mut next = self.clone();
         next.bound(&self.latest, event.time)?;
         for (key, by) in event.after {
             if let Some(time) = self.entry(*key) {
-                next.bound(time, event.time - by)?;
+                next.bound(time, event.time - *by)?;
             }
         }
         let now = TimeExpression::constant(event.time);
@@ -461,7 +491,7 @@ impl SimpleTemporalNetwork {
             *upper = (*upper).min(event.time - offset);
         } else if !event.settled {
             next.floats.push(Start { lower: now, upper: event.time });
-            next.group = Some((next.last_float(), 0));
+            next.group = Some((next.last_float(), T::ZERO));
         }
         if event.settled {
             next.group = None;
@@ -473,11 +503,14 @@ impl SimpleTemporalNetwork {
 
     /// Constrains `time` to be at most `moment`. Returns `None` if the earliest value is already
     /// later.
-    #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
-    fn bound(&mut self, time: &TimeExpression, moment: Int) -> Option<()> {
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "sums of fewer than 2^32 times fit, see `TimeNumber::TIME_BITS`"
+    )]
+    fn bound(&mut self, time: &TimeExpression<T>, moment: T) -> Option<()> {
         for (float, lag) in &time.lags {
             let upper = &mut self.floats[place(*float)].upper;
-            *upper = (*upper).min(moment - lag);
+            *upper = (*upper).min(moment - *lag);
         }
         (time.base <= moment).then_some(())
     }

@@ -4,7 +4,6 @@ use std::collections::VecDeque;
 
 use rustc_hash::FxHashMap;
 use task::lifted::Rational;
-use task::number::Int;
 use task::plan::solution::{Proof, Solution, Status};
 use task::plan::{Exact, Plan, Step, measured};
 use task::task::OperatorId;
@@ -14,8 +13,9 @@ use crate::concurrent::schedule;
 use crate::concurrent::search::Sequence;
 use crate::concurrent::search_log::Record;
 use crate::concurrent::temporal_task::TemporalTask;
+use crate::concurrent::time_number::TimeNumber;
 
-pub(super) fn ended(status: Status, proof: Option<Proof>, record: Record<'_>) -> Solution {
+pub(super) fn ended<T: TimeNumber>(status: Status, proof: Option<Proof>, record: Record<'_, T>) -> Solution {
     Solution {
         status,
         plan: None,
@@ -29,10 +29,11 @@ pub(super) fn ended(status: Status, proof: Option<Proof>, record: Record<'_>) ->
 }
 
 /// Converts a sequence of happenings to a plan with PDDL names. The steps are sorted by start time.
-pub(super) fn in_names(concurrent: &TemporalTask, sequence: &Sequence) -> Plan {
+pub(super) fn in_names<T: TimeNumber>(concurrent: &TemporalTask<T>, sequence: &Sequence<T>) -> Plan {
     let durations = schedule::durations(concurrent, &sequence.happenings);
     let times = schedule::schedule(concurrent, &sequence.happenings, &sequence.together, &durations);
-    let mut steps: Vec<((Int, OperatorId), Step)> = Vec::new();
+    let unit = concurrent.unit.to_rational();
+    let mut steps: Vec<((T, OperatorId), Step)> = Vec::new();
     let last = concurrent.last_state(&sequence.happenings, &sequence.together);
     let violated: Vec<OperatorId> = last.iter().flat_map(|last| concurrent.violated(last)).collect();
     let happenings = sequence.happenings.iter().chain(&violated).map(|id| (*id, &[][..]));
@@ -61,7 +62,7 @@ pub(super) fn in_names(concurrent: &TemporalTask, sequence: &Sequence) -> Plan {
         let cost =
             Rational::from_integer(operator.cost.constant) + &Rational::from_integer(end) + &measured_cost;
         let cost = if concurrent.task.objective.maximize { -cost } else { cost };
-        let [start, duration] = [time, duration].map(Rational::from_integer);
+        let [start, duration] = [time, duration].map(|time| time.to_rational() / unit.clone());
         steps.push(((time, *id), Step::new(&concurrent.task, operator, &[], (start, duration, cost))));
     }
     steps.sort_by_key(|(place, _)| *place);
@@ -69,7 +70,7 @@ pub(super) fn in_names(concurrent: &TemporalTask, sequence: &Sequence) -> Plan {
     let objective = &concurrent.task.objective;
     let unassigned_cost =
         Exact::scaled(&if objective.maximize { -unassigned_cost } else { unassigned_cost }, objective.scale);
-    let cost = concurrent.measure.metric(&Rational::from_integer(sequence.value.0));
+    let cost = concurrent.measure.metric(&sequence.value.0.to_rational());
     let mut plan = Plan { steps, cost: cost.plus(&unassigned_cost) };
     plan.note_reconfigured();
     plan

@@ -14,6 +14,7 @@ use task::task::{OperatorId, State};
 use crate::concurrent::simple_temporal_network::SimpleTemporalNetwork;
 use crate::concurrent::successors::TemporalState;
 use crate::concurrent::temporal_task::TemporalTask;
+use crate::concurrent::time_number::TimeNumber;
 
 /// Position of a finite-domain variable in a packed key: word, and bits within the word.
 struct Field {
@@ -35,12 +36,12 @@ pub(super) struct Origin {
     pub(super) depth: u32,
 }
 
-struct Node {
+struct Node<T> {
     place: u32,
     origin: Option<Origin>,
     cost: Int,
     /// Earliest possible time of the last happening.
-    latest: Int,
+    latest: T,
     numbers: Box<[Int]>,
     clocks: Box<[u8]>,
     is_dominated: bool,
@@ -52,8 +53,8 @@ struct Place {
     front: Vec<u32>,
 }
 
-pub(super) struct Packing<'a> {
-    concurrent: &'a TemporalTask,
+pub(super) struct Packing<'a, T: TimeNumber = Int> {
+    concurrent: &'a TemporalTask<T>,
     fields: Vec<Field>,
     width: usize,
 }
@@ -72,14 +73,14 @@ impl PackedNode {
     }
 }
 
-pub(super) struct Store<'a> {
-    concurrent: &'a TemporalTask,
-    packing: Packing<'a>,
+pub(super) struct Store<'a, T: TimeNumber = Int> {
+    concurrent: &'a TemporalTask<T>,
+    packing: Packing<'a, T>,
     /// Whether a larger value of a number is never worse.
     monotone: bool,
     places: Vec<Place>,
     table: HashTable<u32>,
-    nodes: Vec<Node>,
+    nodes: Vec<Node<T>>,
     bytes: usize,
     /// Number of pairs of nodes that were compared for dominance.
     pub(super) compared: usize,
@@ -92,8 +93,8 @@ fn hash_of(key: &[u32]) -> u64 {
 }
 
 #[expect(clippy::arithmetic_side_effects, reason = "the bits of values that are held in memory")]
-impl<'a> Packing<'a> {
-    pub(super) fn new(concurrent: &'a TemporalTask) -> Self {
+impl<'a, T: TimeNumber> Packing<'a, T> {
+    pub(super) fn new(concurrent: &'a TemporalTask<T>) -> Self {
         let (mut word, mut used) = (0, 0);
         let mut fields = Vec::new();
         for variable in &concurrent.task.variables[..concurrent.task.basic] {
@@ -129,12 +130,15 @@ impl<'a> Packing<'a> {
         state
     }
 
-    pub(super) fn pack(&self, TemporalState { state, clocks, cost }: &TemporalState) -> PackedNode {
+    pub(super) fn pack(&self, TemporalState { state, clocks, cost }: &TemporalState<T>) -> PackedNode {
         let (values, numbers) = (self.values(state).into_boxed_slice(), state.numbers.clone());
         PackedNode { values, numbers: numbers.into_boxed_slice(), clocks: clocks.pack(), cost: *cost }
     }
 
-    pub(super) fn unpack(&self, PackedNode { values, numbers, clocks, cost }: &PackedNode) -> TemporalState {
+    pub(super) fn unpack(
+        &self,
+        PackedNode { values, numbers, clocks, cost }: &PackedNode,
+    ) -> TemporalState<T> {
         TemporalState {
             state: self.state(values, numbers),
             clocks: SimpleTemporalNetwork::unpack(clocks),
@@ -144,8 +148,8 @@ impl<'a> Packing<'a> {
 }
 
 #[expect(clippy::arithmetic_side_effects, reason = "counts of what is held in memory")]
-impl<'a> Store<'a> {
-    pub(super) fn new(concurrent: &'a TemporalTask, monotone: bool) -> Self {
+impl<'a, T: TimeNumber> Store<'a, T> {
+    pub(super) fn new(concurrent: &'a TemporalTask<T>, monotone: bool) -> Self {
         let (places, table, nodes) = (Vec::new(), HashTable::new(), Vec::new());
         Self {
             concurrent,
@@ -173,7 +177,7 @@ impl<'a> Store<'a> {
 
     /// Adds a temporal state, and returns its node id. Returns `None` if a stored node dominates
     /// the state. Stored nodes that the new state dominates are marked as dominated.
-    pub(super) fn add(&mut self, situation: &TemporalState, origin: Option<Origin>) -> Option<u32> {
+    pub(super) fn add(&mut self, situation: &TemporalState<T>, origin: Option<Origin>) -> Option<u32> {
         let key = self.key(situation);
         let hash = hash_of(&key);
         let id = dense(self.nodes.len());
@@ -215,7 +219,7 @@ impl<'a> Store<'a> {
         };
         let TemporalState { state, clocks, cost } = situation;
         let (numbers, packed) = (state.numbers.clone().into_boxed_slice(), clocks.pack());
-        self.bytes += size_of::<Node>() + size_of_val(&*numbers) + packed.len();
+        self.bytes += size_of::<Node<T>>() + size_of_val(&*numbers) + packed.len();
         let latest = clocks.latest();
         let is_dominated = false;
         self.nodes.push(Node { place, origin, cost: *cost, latest, numbers, clocks: packed, is_dominated });
@@ -224,14 +228,14 @@ impl<'a> Store<'a> {
 
     /// Unpacks the temporal state of a node. The node must not be dominated, because the networks
     /// of dominated nodes are discarded.
-    pub(super) fn situation(&self, id: u32) -> TemporalState {
+    pub(super) fn situation(&self, id: u32) -> TemporalState<T> {
         let node = &self.nodes[id as usize];
         let state = self.packing.state(&self.places[node.place as usize].key, &node.numbers);
         TemporalState { state, clocks: SimpleTemporalNetwork::unpack(&node.clocks), cost: node.cost }
     }
 
     /// Key of a place: the parts of a state that must be equal for dominance between two states.
-    fn key(&self, TemporalState { state, clocks, .. }: &TemporalState) -> Vec<u32> {
+    fn key(&self, TemporalState { state, clocks, .. }: &TemporalState<T>) -> Vec<u32> {
         let mut key = self.packing.values(state);
         clocks.signature(&mut key);
         if !self.monotone {
@@ -241,7 +245,7 @@ impl<'a> Store<'a> {
     }
 
     /// Returns `true` if a stored node dominates a new temporal state of the same place.
-    fn dominates(&self, node: &Node, TemporalState { state, clocks, cost }: &TemporalState) -> bool {
+    fn dominates(&self, node: &Node<T>, TemporalState { state, clocks, cost }: &TemporalState<T>) -> bool {
         let (guards, separation) = (&self.concurrent.guards, self.concurrent.separation);
         node.cost <= *cost
             && node.latest <= clocks.latest()
@@ -258,7 +262,7 @@ impl<'a> Store<'a> {
     }
 
     /// Returns `true` if a new temporal state dominates a stored node of the same place.
-    fn is_worse(&self, node: &Node, TemporalState { state, clocks, cost }: &TemporalState) -> bool {
+    fn is_worse(&self, node: &Node<T>, TemporalState { state, clocks, cost }: &TemporalState<T>) -> bool {
         let (guards, separation) = (&self.concurrent.guards, self.concurrent.separation);
         node.cost >= *cost
             && node.latest >= clocks.latest()

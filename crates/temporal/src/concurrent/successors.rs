@@ -9,6 +9,7 @@ use crate::concurrent::happening::{Happening, Role};
 use crate::concurrent::interference::InterferenceConstraints;
 use crate::concurrent::simple_temporal_network::{self, Kind, SimpleTemporalNetwork};
 use crate::concurrent::temporal_task::TemporalTask;
+use crate::concurrent::time_number::TimeNumber;
 
 /// Limit on searched simultaneous runs of an instance if the number of useful runs is bounded.
 const MAX_PARALLEL_RUNS: u32 = 16;
@@ -18,9 +19,9 @@ const UNBOUNDED_RUNS: u32 = 4;
 
 /// State after a sequence of happenings, with the temporal network of the sequence.
 #[derive(Debug, Clone)]
-pub(super) struct TemporalState {
+pub(super) struct TemporalState<T: TimeNumber = Int> {
     pub(super) state: State,
-    pub(super) clocks: SimpleTemporalNetwork,
+    pub(super) clocks: SimpleTemporalNetwork<T>,
     /// Sum of the costs of the happenings, in the task's cost unit.
     pub(super) cost: Int,
 }
@@ -37,13 +38,13 @@ pub(super) enum DeadEnd {
     Unfit,
 }
 
-pub(super) struct Expansion<'a> {
-    concurrent: &'a TemporalTask,
+pub(super) struct Expansion<'a, T: TimeNumber = Int> {
+    concurrent: &'a TemporalTask<T>,
     index: SuccessorGenerator,
 }
 
-impl<'a> Expansion<'a> {
-    pub(super) fn new(concurrent: &'a TemporalTask) -> Self {
+impl<'a, T: TimeNumber> Expansion<'a, T> {
+    pub(super) fn new(concurrent: &'a TemporalTask<T>) -> Self {
         let begins = |id: &OperatorId| {
             matches!(concurrent.happenings[id.index()].role, Role::Start(_) | Role::Whole | Role::Timed(_))
         };
@@ -51,7 +52,7 @@ impl<'a> Expansion<'a> {
         Self { concurrent, index: SuccessorGenerator::over(&concurrent.task, operators) }
     }
 
-    pub(super) fn root(&self) -> TemporalState {
+    pub(super) fn root(&self) -> TemporalState<T> {
         TemporalState {
             state: self.concurrent.task.initial.clone(),
             clocks: SimpleTemporalNetwork::new(),
@@ -61,7 +62,7 @@ impl<'a> Expansion<'a> {
 
     /// Candidate happenings: starts, instantaneous actions and timed initial literals whose
     /// propositional condition holds, and ends of running actions.
-    pub(super) fn candidates(&self, situation: &TemporalState) -> Vec<OperatorId> {
+    pub(super) fn candidates(&self, situation: &TemporalState<T>) -> Vec<OperatorId> {
         let mut next = self.starts(&situation.state);
         let mut opens: Vec<u32> = situation.clocks.opens().iter().map(|open| open.instance).collect();
         opens.dedup();
@@ -75,18 +76,18 @@ impl<'a> Expansion<'a> {
     }
 
     /// Time and operator of the next timed initial literals. Returns `None` if none are pending.
-    pub(super) fn next_event(&self, clocks: &SimpleTemporalNetwork) -> Option<(Int, OperatorId)> {
+    pub(super) fn next_event(&self, clocks: &SimpleTemporalNetwork<T>) -> Option<(T, OperatorId)> {
         let events = &self.concurrent.events;
         events.get(events.partition_point(|(time, _)| *time <= clocks.floor())).copied()
     }
 
     /// Returns `true` if a plan can end in this temporal state.
-    pub(super) fn is_goal(&self, TemporalState { state, clocks, .. }: &TemporalState) -> bool {
+    pub(super) fn is_goal(&self, TemporalState { state, clocks, .. }: &TemporalState<T>) -> bool {
         let concurrent = self.concurrent;
         // All timed initial literals up to the end of the plan have taken place, no later ones
         // have, and the later ones keep the separation.
         let mut to_come = concurrent.events.iter().filter(|(time, _)| *time > clocks.floor());
-        let is_apart = |(time, event): &(Int, OperatorId)| {
+        let is_apart = |(time, event): &(T, OperatorId)| {
             let after = &concurrent.happenings[event.index()].accesses.after;
             *time > clocks.latest() && clocks.are_apart(*time, after)
         };
@@ -104,10 +105,10 @@ impl<'a> Expansion<'a> {
     /// set.
     pub(super) fn after(
         &self,
-        situation: &TemporalState,
+        situation: &TemporalState<T>,
         operator: OperatorId,
         exact: bool,
-    ) -> Result<(TemporalState, bool), DeadEnd> {
+    ) -> Result<(TemporalState<T>, bool), DeadEnd> {
         let after_start = self.step(situation, operator)?;
         let Some(end) = self.compressed(situation, &after_start, operator) else {
             return Ok((after_start, false));
@@ -124,8 +125,8 @@ impl<'a> Expansion<'a> {
     /// first.
     fn compressed(
         &self,
-        before: &TemporalState,
-        started: &TemporalState,
+        before: &TemporalState<T>,
+        started: &TemporalState<T>,
         operator: OperatorId,
     ) -> Option<OperatorId> {
         let Role::Start(instance) = self.concurrent.happenings[operator.index()].role else { return None };
@@ -136,9 +137,9 @@ impl<'a> Expansion<'a> {
 
     pub(super) fn step(
         &self,
-        situation: &TemporalState,
+        situation: &TemporalState<T>,
         operator_id: OperatorId,
-    ) -> Result<TemporalState, DeadEnd> {
+    ) -> Result<TemporalState<T>, DeadEnd> {
         let concurrent = self.concurrent;
         let TemporalState { state, clocks, cost } = situation;
         let (operator, happening) =
@@ -181,12 +182,13 @@ impl<'a> Expansion<'a> {
         let changes: Vec<u32> = sets
             .filter(|variable| state.values[*variable as usize] != after.values[*variable as usize])
             .collect();
-        let clocks = if let Role::Timed(time) = happening.role {
+        let clocks = if let Role::Timed(event) = happening.role {
+            let time = concurrent.events[event as usize].0;
             let InterferenceConstraints { after, marks } = &happening.accesses;
             clocks.timed(&simple_temporal_network::Event { time, after, marks, changes: &changes, settled })
         } else {
             let starting = instance_data.filter(|_| kind == Kind::Start);
-            let duration = starting.map_or(Some(0), |instance| concurrent.duration(instance, &after));
+            let duration = starting.map_or(Some(T::ZERO), |instance| concurrent.duration(instance, &after));
             // The first run ends first only if all runs have the same duration.
             let mut runs = clocks.opens().iter().filter(|open| open.instance == instance);
             if starting.is_some() && runs.any(|open| Some(open.duration) != duration) {
@@ -221,7 +223,7 @@ impl<'a> Expansion<'a> {
     }
 
     /// Returns `true` if a running action uses a function of the happening with another design.
-    fn clashes(&self, clocks: &SimpleTemporalNetwork, happening: &Happening) -> bool {
+    fn clashes(&self, clocks: &SimpleTemporalNetwork<T>, happening: &Happening<T>) -> bool {
         happening.designs.iter().any(|(function, design)| {
             clocks.opens().iter().any(|open| {
                 let running_designs = &self.concurrent.instances[open.instance as usize].designs;

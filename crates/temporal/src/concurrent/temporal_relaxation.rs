@@ -20,6 +20,7 @@ use crate::concurrent::conjunctions::{Conjunction, Scope, add_conjunctions};
 use crate::concurrent::happening::Role;
 use crate::concurrent::rule::{NumericEffect, Proposition, Rule};
 use crate::concurrent::temporal_task::TemporalTask;
+use crate::concurrent::time_number::TimeNumber;
 
 /// A numeric condition: a linear expression that must be at least 0, and its proposition.
 #[derive(Debug, Clone)]
@@ -72,7 +73,7 @@ struct RelaxationBuilder<'a> {
 }
 
 impl TemporalRelaxation {
-    pub(super) fn new(concurrent: &TemporalTask) -> Self {
+    pub(super) fn new<T: TimeNumber>(concurrent: &TemporalTask<T>) -> Self {
         let task = &concurrent.task;
         let chosen = concurrent.instances.iter().filter(|instance| instance.is_chosen);
         let chosen = chosen.filter_map(|instance| instance.timer.map(|(number, _)| number)).collect();
@@ -198,7 +199,13 @@ impl<'a> RelaxationBuilder<'a> {
         proposition
     }
 
-    fn happening(&mut self, concurrent: &TemporalTask, id: OperatorId, operator: &Operator, role: Role) {
+    fn happening<T: TimeNumber>(
+        &mut self,
+        concurrent: &TemporalTask<T>,
+        id: OperatorId,
+        operator: &Operator,
+        role: Role,
+    ) {
         let mut needs = self.needs(&operator.condition);
         let weight = match role {
             Role::Never => return,
@@ -247,7 +254,11 @@ impl<'a> RelaxationBuilder<'a> {
 
     /// Adds a conjunction for each pair of facts selected by [`add_conjunctions`], and rewrites
     /// `goal` to use these conjunctions.
-    fn conjoin(&mut self, concurrent: &TemporalTask, goal: &mut Vec<Proposition>) -> Vec<Conjunction> {
+    fn conjoin<T: TimeNumber>(
+        &mut self,
+        concurrent: &TemporalTask<T>,
+        goal: &mut Vec<Proposition>,
+    ) -> Vec<Conjunction> {
         let ends =
             |first: Proposition, variable: &Variable| first.saturating_add(dense(variable.values.len()));
         let ranges = self

@@ -23,27 +23,49 @@ use crate::concurrent::monotone_metric::only_grows;
 use crate::concurrent::self_overlap::bound_self_overlap;
 use crate::concurrent::source_task::SourceTask;
 use crate::concurrent::split::{Half, Split};
-use crate::concurrent::unit::{LIMIT as TIME_LIMIT, Unit};
+use crate::concurrent::time_number::{TimeNumber, Wide};
+use crate::concurrent::unit::{StaticDurations, Unit};
 
 /// A ground task whose actions can overlap in time.
 #[derive(Debug, Clone)]
-pub struct TemporalTask {
-    pub(crate) task: Task,
+pub struct ConcurrentTask(pub(super) Width);
+
+#[cfg(test)]
+impl ConcurrentTask {
+    /// The task with times of 128 bits.
+    pub(super) fn narrow(self) -> TemporalTask {
+        let Width::Narrow(task) = self.0 else { panic!("the times are wide") };
+        *task
+    }
+}
+
+/// A temporal task with times of sufficient width.
+#[derive(Debug, Clone)]
+pub(super) enum Width {
+    Narrow(Box<TemporalTask>),
+    /// A common unit of all times needs more bits than the narrow type has.
+    Wide(Box<TemporalTask<Wide>>),
+}
+
+/// A ground temporal task with times of type `T`.
+#[derive(Debug, Clone)]
+pub(super) struct TemporalTask<T: TimeNumber = Int> {
+    pub(super) task: Task,
     /// Temporal properties of each operator, by operator id.
-    pub(super) happenings: Vec<Happening>,
-    pub(super) instances: Vec<Instance>,
+    pub(super) happenings: Vec<Happening<T>>,
+    pub(super) instances: Vec<Instance<T>>,
     /// Time (in internal units) and operator of each timed initial literal, in ascending order.
-    pub(super) events: Vec<(Int, OperatorId)>,
+    pub(super) events: Vec<(T, OperatorId)>,
     /// Per access key: a variable whose latest change shows that all earlier accesses of this kind
     /// are past. Every happening that waits for such an access, except timed initial literals,
     /// requires a value of this variable.
     pub(super) guards: Vec<Option<u32>>,
-    pub(super) measure: Measure,
+    pub(super) measure: Measure<T>,
     /// Per preference that can be violated: operators of which at least one is applicable in the
     /// final state if the preference is violated. These operators never occur in a plan.
     pub(super) violations: Vec<Vec<OperatorId>>,
     /// Deadlines of hard and soft trajectory constraints, checked on complete plans.
-    pub(super) deadlines: Vec<Deadline>,
+    pub(super) deadlines: Vec<Deadline<T>>,
     /// Whether the search covers every plan with all its possible times, so that exhausting the
     /// search is a proof.
     pub(super) is_exact: bool,
@@ -52,7 +74,9 @@ pub struct TemporalTask {
     /// Whether the search minimises the whole metric, not only a part.
     pub(super) is_whole: bool,
     /// Least distance between interfering happenings, in internal time units.
-    pub(super) separation: Int,
+    pub(super) separation: T,
+    /// Number of internal time units per PDDL time unit.
+    pub(super) unit: T,
     /// Variant of the task in which chosen durations are minimal. `None` if no duration is chosen
     /// or the variant is not supported.
     pub(super) shortest: Option<Box<Self>>,
@@ -60,84 +84,121 @@ pub struct TemporalTask {
     pub(super) kept: Option<SourceTask>,
 }
 
+/// Requirements on the times and the metric of a temporal task.
+pub(super) struct Scale<'s> {
+    pub(super) separation: &'s Rational,
+    /// Metric per PDDL time unit.
+    pub(super) time_weight: &'s Rational,
+}
+
+/// Builds the temporal task from a ground split task, with the narrowest number type that
+/// represents all constant times.
 pub(super) fn compile(
     mut task: Task,
     split: &Split,
     reached: &RelaxedReachability,
-    separation: &Rational,
-    time_weight: Rational,
+    scale: &Scale<'_>,
     limits: &Limits,
-) -> Result<TemporalTask, Errors> {
+) -> Result<ConcurrentTask, Errors> {
     let to_errors = |error| vec![error];
     // The loops below check for interruption, so the builder's own computations need no limits.
     let unlimited = Limits::none();
     let mut builder = Builder::new(split, reached, &unlimited);
-    let context = Context::new(&task, limits);
-    builder.collect(context)?;
+    builder.collect(Context::new(&task, limits))?;
     let has_cases = builder.pair(&mut task);
-    let context = Context::new(&task, limits);
-    let divisors = builder.divisors(context).map_err(to_errors)?;
-    let unit = Unit::new(&task, split, separation, &divisors).map_err(to_errors)?;
-    let separation = unit.of(separation).map_err(to_errors)?;
-    builder.separation = separation;
-    let measure = Measure::new(&task.objective, time_weight, unit.0).map_err(to_errors)?;
-    let mut roles = vec![Role::Never; task.operators.len()];
-    let mut instances = builder.instances(context, unit, &divisors, &mut roles).map_err(to_errors)?;
-    let contradictory = builder.contradictory(context).map_err(to_errors)?;
-    for ((operator, role), id) in task.operators.iter().zip(&mut roles).zip((0..).map(OperatorId)) {
-        match split.origins[operator.schema as usize].half {
-            Half::Whole if !contradictory.contains(&id) => *role = Role::Whole,
-            Half::Timed(event) => *role = Role::Timed(unit.of(&split.events[event].time).map_err(to_errors)?),
-            _ => {}
+    let fixed = builder.static_durations(Context::new(&task, limits)).map_err(to_errors)?;
+    let unit = Unit::new::<Wide>(&task, split, scale.separation, &fixed).map_err(to_errors)?;
+    let is_narrow = (unit.0.bits() <= limits.thresholds().narrow_times || split.chosen.contains(&true))
+        && unit.fits::<Int>(split, scale.separation, &fixed)
+        && Measure::<Int>::new(&task.objective, scale.time_weight, &unit.0).is_ok();
+    let parts = Parts { task, split, builder, fixed, unit, has_cases };
+    Ok(if is_narrow {
+        ConcurrentTask(Width::Narrow(Box::new(parts.build(scale, limits)?)))
+    } else {
+        ConcurrentTask(Width::Wide(Box::new(parts.build(scale, limits)?)))
+    })
+}
+
+/// Parts of a temporal task that do not depend on the number type of times.
+struct Parts<'p> {
+    task: Task,
+    split: &'p Split,
+    builder: Builder<'p>,
+    fixed: StaticDurations,
+    unit: Unit,
+    /// Whether an action has several starts or ends.
+    has_cases: bool,
+}
+
+impl Parts<'_> {
+    fn build<T: TimeNumber>(self, scale: &Scale<'_>, limits: &Limits) -> Result<TemporalTask<T>, Errors> {
+        let Self { mut task, split, builder, fixed, unit, has_cases } = self;
+        let to_errors = |error| vec![error];
+        let separation: T = unit.of(scale.separation).map_err(to_errors)?;
+        let measure = Measure::new(&task.objective, scale.time_weight, &unit.0).map_err(to_errors)?;
+        let context = Context::new(&task, limits);
+        let mut roles = vec![Role::Never; task.operators.len()];
+        let instances = builder.instances(context, (&unit, separation), &fixed, &mut roles);
+        let mut instances = instances.map_err(to_errors)?;
+        let contradictory = builder.contradictory(context).map_err(to_errors)?;
+        let mut events: Vec<(T, OperatorId)> = Vec::new();
+        for ((operator, role), id) in task.operators.iter().zip(&mut roles).zip((0..).map(OperatorId)) {
+            match split.origins[operator.schema as usize].half {
+                Half::Whole if !contradictory.contains(&id) => *role = Role::Whole,
+                Half::Timed(event) => {
+                    events.push((unit.of(&split.events[event].time).map_err(to_errors)?, id));
+                }
+                _ => {}
+            }
         }
+        events.sort_unstable();
+        for (event, (_, id)) in (0..).zip(&events) {
+            roles[id.index()] = Role::Timed(event);
+        }
+        let has_chosen_durations = instances.iter().any(|instance| instance.is_chosen);
+        let is_whole =
+            task.objective.rest.is_empty() || has_chosen_durations && only_grows(&task, &instances);
+        let is_exact = split.is_exact && !builder.assumes_conflicts() && !has_cases && is_whole;
+        let happenings = builder.happenings(context, separation, &roles, &mut instances);
+        let (mut happenings, keys) = happenings.map_err(to_errors)?;
+        let violations = violations(&task);
+        drop_links(&mut task, &instances);
+        bound_self_overlap(&task, &happenings, &mut instances, separation, limits)?;
+        let keys = keep_runs_apart(&mut task, &instances, &mut happenings, keys);
+        let compressible = compression_safe_actions(&task, &happenings, &instances, limits);
+        for (instance, compressible) in instances.iter_mut().zip(compressible?) {
+            instance.compressible = compressible;
+        }
+        let mut concurrent = TemporalTask {
+            task,
+            happenings,
+            instances,
+            events,
+            guards: vec![None; keys],
+            measure,
+            violations,
+            deadlines: Vec::new(),
+            is_exact,
+            is_bounded: true,
+            is_whole,
+            separation,
+            unit: unit.of(&Rational::from_integer(1)).map_err(to_errors)?,
+            shortest: None,
+            kept: None,
+        };
+        concurrent.guard(limits)?;
+        Ok(concurrent)
     }
-    let has_chosen_durations = instances.iter().any(|instance| instance.is_chosen);
-    let is_whole = task.objective.rest.is_empty() || has_chosen_durations && only_grows(&task, &instances);
-    let is_exact = split.is_exact && !builder.assumes_conflicts() && !has_cases && is_whole;
-    let (mut happenings, keys) = builder.happenings(context, &roles, &mut instances).map_err(to_errors)?;
-    let mut events: Vec<(Int, OperatorId)> = Vec::new();
-    for (role, id) in roles.iter().zip((0..).map(OperatorId)) {
-        events.extend(if let Role::Timed(time) = role { Some((*time, id)) } else { None });
-    }
-    events.sort_unstable();
-    let violations = violations(&task);
-    task.time_scale = unit.0;
-    drop_links(&mut task, &instances);
-    bound_self_overlap(&task, &happenings, &mut instances, separation, limits)?;
-    let keys = keep_runs_apart(&mut task, &instances, &mut happenings, keys);
-    let compressible = compression_safe_actions(&task, &happenings, &instances, limits);
-    for (instance, compressible) in instances.iter_mut().zip(compressible?) {
-        instance.compressible = compressible;
-    }
-    let guards = vec![None; keys];
-    let mut concurrent = TemporalTask {
-        task,
-        happenings,
-        instances,
-        events,
-        guards,
-        measure,
-        violations,
-        deadlines: Vec::new(),
-        is_exact,
-        is_bounded: true,
-        is_whole,
-        separation,
-        shortest: None,
-        kept: None,
-    };
-    concurrent.guard(limits)?;
-    Ok(concurrent)
 }
 
 /// Makes each run of an instance wait for the end of its previous run, unless simultaneous runs can
 /// be useful. For instances with useful simultaneous runs, removes the end effects that clear the
 /// running fact and the duration, because only the end of the last run clears them. Returns the new
 /// number of access keys.
-fn keep_runs_apart(
+fn keep_runs_apart<T: TimeNumber>(
     task: &mut Task,
-    instances: &[Instance],
-    happenings: &mut [Happening],
+    instances: &[Instance<T>],
+    happenings: &mut [Happening<T>],
     keys: usize,
 ) -> usize {
     let mut next = keys;
@@ -150,14 +211,19 @@ fn keep_runs_apart(
         } else {
             let ended = dense(next);
             next = next.saturating_add(1);
-            happenings[instance.start.index()].accesses.after.push((ended, 0));
+            happenings[instance.start.index()].accesses.after.push((ended, T::ZERO));
             happenings[instance.end.index()].accesses.marks.push(ended);
         }
     }
     next
 }
 
-impl TemporalTask {
+impl<T: TimeNumber> TemporalTask<T> {
+    /// Returns `true` if the planner chooses the duration of an action.
+    pub(super) fn chooses_durations(&self) -> bool {
+        self.instances.iter().any(|instance| instance.is_chosen)
+    }
+
     /// Computes `guards` and, for each happening, the variables that it sets (`sets`). Only guards
     /// and variables of the goal are kept in `sets`.
     fn guard(&mut self, limits: &Limits) -> Result<(), Interrupted> {
@@ -206,10 +272,10 @@ impl TemporalTask {
 
     /// Duration of an instance that has just started, in internal time units, read from the state
     /// after the start. Returns `None` if the duration is shorter than the separation or overflows.
-    pub(super) fn duration(&self, instance: &Instance, after: &State) -> Option<Int> {
+    pub(super) fn duration(&self, instance: &Instance<T>, after: &State) -> Option<T> {
         let Some((timer, factor)) = instance.timer else { return Some(instance.duration) };
-        let duration = after.numbers[timer.index()].checked_mul(factor)?;
-        (self.separation..TIME_LIMIT).contains(&duration).then_some(duration)
+        let duration = T::from(after.numbers[timer.index()]).checked_mul(factor)?;
+        (duration >= self.separation && duration.bits() <= T::TIME_BITS).then_some(duration)
     }
 
     /// Clears the running fact and the duration of an instance in `state`, after the last of its

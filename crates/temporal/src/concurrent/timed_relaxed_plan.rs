@@ -25,10 +25,14 @@ use crate::concurrent::rule::Proposition;
 use crate::concurrent::successors::TemporalState;
 use crate::concurrent::temporal_relaxation::TemporalRelaxation;
 use crate::concurrent::temporal_task::TemporalTask;
+use crate::concurrent::time_number::TimeNumber;
 
 /// A time of the relaxation. Times only guide the search, so larger ones saturate.
 type Time = i64;
 
+/// Durations are rounded to this number of bits, so that sums of thousands of them fit.
+const TIME_BITS: u64 = 48;
+/// Time of propositions and actions that are not reached.
 const NEVER: Time = Time::MAX;
 /// Upper limit on the number of repetitions of one action in a relaxed plan.
 const MAX_REPETITIONS: u32 = 8;
@@ -52,18 +56,20 @@ enum Timing {
 }
 
 /// Fixed duration of an instance, or the number from which it follows.
-enum Duration {
+enum Duration<T: TimeNumber> {
     Constant(Time),
     /// Value that the start assigns to the number holding the duration, and its factor.
-    Assigned(Linear<Int>, Int),
+    Assigned(Linear<Int>, T),
 }
 
-pub(super) struct TimedRelaxation<'a> {
-    concurrent: &'a TemporalTask,
+pub(super) struct TimedRelaxation<'a, T: TimeNumber = Int> {
+    concurrent: &'a TemporalTask<T>,
     relaxed: &'a TemporalRelaxation,
     timings: Vec<Timing>,
-    durations: Vec<Duration>,
+    durations: Vec<Duration<T>>,
     separation: Time,
+    /// Times are rounded to multiples of 2^`shift` internal time units.
+    shift: u64,
     /// Time and number of relaxed actions of each proposition.
     values: Vec<(Time, u32)>,
     /// Rule that adds each proposition, and the number of its repetitions.
@@ -84,22 +90,31 @@ pub(super) struct TimedRelaxation<'a> {
     queue: BinaryHeap<Reverse<(Time, u32, Proposition)>>,
 }
 
-fn time(time: Int) -> Time {
-    Time::try_from(time).unwrap_or(NEVER / 4)
+/// Converts a time to 2^`shift` internal time units.
+fn time<T: TimeNumber>(time: T, shift: u64) -> Time {
+    Time::try_from(time.shifted_down(shift)).unwrap_or(NEVER / 4)
 }
 
-fn assigned(concurrent: &TemporalTask, start: OperatorId, number: NumericId) -> Option<Linear<Int>> {
+fn assigned<T: TimeNumber>(
+    concurrent: &TemporalTask<T>,
+    start: OperatorId,
+    number: NumericId,
+) -> Option<Linear<Int>> {
     let effects = &concurrent.task.operators[start.index()].numeric_effects;
     effects.iter().find(|effect| effect.variable == number).map(|effect| effect.value.clone())
 }
 
-impl<'a> TimedRelaxation<'a> {
-    pub(super) fn new(concurrent: &'a TemporalTask, relaxed: &'a TemporalRelaxation) -> Self {
+impl<'a, T: TimeNumber> TimedRelaxation<'a, T> {
+    pub(super) fn new(concurrent: &'a TemporalTask<T>, relaxed: &'a TemporalRelaxation) -> Self {
+        let durations = concurrent.instances.iter().map(|instance| instance.duration);
+        let times = durations.chain(concurrent.events.iter().map(|(time, _)| *time));
+        let longest = times.max().unwrap_or(concurrent.separation);
+        let shift = longest.bits().saturating_sub(TIME_BITS);
         let timing = |origin: &Option<OperatorId>| match origin {
             Some(id) => match concurrent.happenings[id.index()].role {
                 Role::Start(instance) => Timing::Start(instance),
                 Role::End(instance) => Timing::End(instance),
-                Role::Timed(at) => Timing::At(time(at)),
+                Role::Timed(event) => Timing::At(time(concurrent.events[event as usize].0, shift)),
                 Role::Whole | Role::Never => Timing::Immediate,
             },
             None => Timing::Immediate,
@@ -108,7 +123,7 @@ impl<'a> TimedRelaxation<'a> {
             let assigned = instance.timer.and_then(|(number, factor)| {
                 Some(Duration::Assigned(assigned(concurrent, instance.start, number)?, factor))
             });
-            assigned.unwrap_or_else(|| Duration::Constant(time(instance.duration)))
+            assigned.unwrap_or_else(|| Duration::Constant(time(instance.duration, shift)))
         });
         let (propositions, rules) = (relaxed.propositions, relaxed.unmet.len());
         Self {
@@ -116,7 +131,8 @@ impl<'a> TimedRelaxation<'a> {
             relaxed,
             timings: relaxed.origins.iter().map(timing).collect(),
             durations: durations.collect(),
-            separation: time(concurrent.separation),
+            separation: time(concurrent.separation, shift),
+            shift,
             values: vec![(NEVER, 0); propositions],
             supporters: vec![None; propositions],
             is_settled: vec![false; propositions],
@@ -136,7 +152,7 @@ impl<'a> TimedRelaxation<'a> {
     /// unreachable.
     pub(super) fn plan(
         &mut self,
-        situation: &TemporalState,
+        situation: &TemporalState<T>,
         targets: &[Proposition],
     ) -> Option<TimedRelaxedPlan> {
         self.reach(situation, targets);
@@ -145,7 +161,7 @@ impl<'a> TimedRelaxation<'a> {
     }
 
     /// Dijkstra's algorithm over propositions, until all targets are settled.
-    fn reach(&mut self, TemporalState { state, clocks, .. }: &TemporalState, targets: &[Proposition]) {
+    fn reach(&mut self, TemporalState { state, clocks, .. }: &TemporalState<T>, targets: &[Proposition]) {
         let relaxed = self.relaxed;
         self.values.fill((NEVER, 0));
         self.supporters.fill(None);
@@ -158,10 +174,11 @@ impl<'a> TimedRelaxation<'a> {
         for (missing, numeric) in self.missing.iter_mut().zip(&relaxed.numeric) {
             *missing = numeric.linear.value(&state.numbers, &[], &[]).map(Int::saturating_neg);
         }
-        let now = time(clocks.floor()).max(0);
+        let now = time(clocks.floor(), self.shift).max(0);
         for ((variable, first), value) in (0..).zip(&relaxed.first).zip(&state.values) {
             let changed = clocks.changed(variable);
-            let since = changed.map_or(0, |changed| time(changed).saturating_add(self.separation));
+            let since =
+                changed.map_or(0, |changed| time(changed, self.shift).saturating_add(self.separation));
             self.improve(first.saturating_add(*value), (since.max(now), 0), None);
         }
         for default in &relaxed.defaults {
@@ -262,8 +279,8 @@ impl<'a> TimedRelaxation<'a> {
             Duration::Constant(duration) => *duration,
             Duration::Assigned(value, factor) => {
                 let value = value.value(&state.numbers, &[], &[]);
-                let duration = value.and_then(|value| value.checked_mul(*factor));
-                time(duration.unwrap_or_default().max(self.concurrent.separation))
+                let duration = value.and_then(|value| T::from(value).checked_mul(*factor));
+                time(duration.unwrap_or_default().max(self.concurrent.separation), self.shift)
             }
         }
     }

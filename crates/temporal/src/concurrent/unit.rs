@@ -1,74 +1,116 @@
 //! Internal unit of time: small enough that all times of a task are integers.
 
-use num_traits::ToPrimitive as _;
+use num_bigint::BigInt;
+use num_integer::Integer as _;
+use num_rational::BigRational;
+use num_traits::{One as _, ToPrimitive as _};
 use rustc_hash::FxHashMap;
 use task::error::Error;
 use task::lifted::Rational;
-use task::number::{Int, checked_lcm};
 use task::task::quantity::NumericId;
 use task::task::{OperatorId, Task};
 
 use crate::concurrent::split::Split;
+use crate::concurrent::time_number::TimeNumber;
 
-/// Upper limit on times and durations, in internal time units.
-pub(super) const LIMIT: Int = 1 << 90;
-
-/// Divisor of each state-dependent duration, by start operator: the duration is a number of the
-/// task divided by this constant.
-pub(super) type Divisors = FxHashMap<OperatorId, Rational>;
+/// Static parts of the durations of actions, by start operator.
+#[derive(Default)]
+pub(super) struct StaticDurations {
+    /// Durations that do not depend on the state, in PDDL time units.
+    pub(super) durations: FxHashMap<OperatorId, Rational>,
+    /// Divisors of state-dependent durations: the duration is a number of the task divided by this
+    /// constant.
+    pub(super) divisors: FxHashMap<OperatorId, Rational>,
+}
 
 /// Number of internal time units per PDDL time unit. All times are integers in internal units.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Unit(pub(super) Int);
+#[derive(Debug, Clone)]
+pub(super) struct Unit(pub(super) BigInt);
 
 impl Unit {
-    /// Computes a unit in which all durations, the separation and the times of timed initial
-    /// literals are integers.
-    pub(super) fn new(
+    /// Computes the greatest unit in which all durations, the separation and the times of timed
+    /// initial literals are integers.
+    ///
+    /// # Errors
+    /// `Error::Overflow` if the unit exceeds the widest integers.
+    pub(super) fn new<T: TimeNumber>(
         task: &Task,
         split: &Split,
         separation: &Rational,
-        divisors: &Divisors,
+        fixed: &StaticDurations,
     ) -> Result<Self, Error> {
-        let mut times = split.events.iter().map(|event| &event.time).chain([separation]);
-        // State-dependent durations are numbers of the task, with its scale.
-        let multiples =
-            task.number_multiples.iter().try_fold(1, |common, multiple| checked_lcm(common, *multiple));
-        let scale = multiples
-            .and_then(|multiple| multiple.checked_mul(task.number_scale))
-            .filter(|multiple| *multiple < LIMIT);
-        let scale = scale.ok_or_else(|| Error::overflow("durations"))?;
-        let numbers = if split.durations.is_empty() { 1 } else { scale };
-        let divided = divisors.values().map(|divisor| divisor.to_big().numer().to_i128());
-        let scale = divided.fold(checked_lcm(task.time_scale, numbers), |scale, divisor| {
-            checked_lcm(scale?, numbers.checked_mul(divisor?)?).filter(|scale| *scale < LIMIT)
-        });
-        let scale = scale.ok_or_else(|| Error::overflow("durations"))?;
-        let common = times.try_fold(scale, |scale, time| {
-            checked_lcm(scale, time.denominator()?).filter(|scale| *scale < LIMIT)
-        });
-        common.map(Self).ok_or_else(|| Error::overflow("durations and times"))
+        let mut common = BigInt::one();
+        let mut add = |denominator: &BigInt| {
+            if (&common % denominator).bits() > 0 {
+                common = common.lcm(denominator);
+            }
+            if common.bits() > T::TIME_BITS { Err(Error::overflow("durations and times")) } else { Ok(()) }
+        };
+        for time in split.events.iter().map(|event| &event.time).chain([separation]) {
+            add(time.to_big().denom())?;
+        }
+        for duration in fixed.durations.values().filter(|duration| !duration.is_integer()) {
+            add(duration.to_big().denom())?;
+        }
+        if !split.durations.is_empty() {
+            // State-dependent durations are numbers of the task, with its scale.
+            let multiples = task.number_multiples.iter().copied().map(BigInt::from);
+            let scale = multiples.fold(BigInt::one(), |common, multiple| common.lcm(&multiple));
+            let scale = scale * task.number_scale;
+            add(&scale)?;
+            for divisor in fixed.divisors.values() {
+                add(&(&scale * divisor.to_big().numer()))?;
+            }
+        }
+        Ok(Self(common))
     }
 
-    pub(super) fn of(self, time: &Rational) -> Result<Int, Error> {
-        let units = (time.clone() * &Rational::from_integer(self.0)).to_int();
-        units.filter(|units| (-LIMIT..LIMIT).contains(units)).ok_or_else(|| Error::overflow("a time"))
+    /// Returns `true` if all constant times are representable.
+    pub(super) fn fits<T: TimeNumber>(
+        &self,
+        split: &Split,
+        separation: &Rational,
+        fixed: &StaticDurations,
+    ) -> bool {
+        let times = split.events.iter().map(|event| &event.time).chain([separation]);
+        let longest = times.chain(fixed.durations.values()).max();
+        self.0.bits() <= T::TIME_BITS && longest.is_none_or(|longest| self.of::<T>(longest).is_ok())
+    }
+
+    /// Converts a time in PDDL time units to internal units.
+    ///
+    /// # Errors
+    /// `Error::Overflow` if `T` is too narrow.
+    pub(super) fn of<T: TimeNumber>(&self, time: &Rational) -> Result<T, Error> {
+        // Big integers are slow, and grounding converts many times.
+        if let Some(unit) = self.0.to_i128()
+            && let Some(units) = (time.clone() * &Rational::from_integer(unit)).to_int()
+            && TimeNumber::bits(units) <= T::TIME_BITS
+        {
+            return Ok(units.into());
+        }
+        let units = time.to_big() * BigRational::from_integer(self.0.clone());
+        let units = units.is_integer().then(|| units.to_integer());
+        let units = units.filter(|units| units.bits() <= T::TIME_BITS);
+        units.and_then(|units| T::from_big(&units)).ok_or_else(|| Error::overflow("a time"))
     }
 
     /// Factor from the value of the number `timer`, divided by `divisor`, to a duration in internal
     /// time units.
-    pub(super) fn factor(self, task: &Task, timer: NumericId, divisor: &Rational) -> Result<Int, Error> {
+    ///
+    /// # Errors
+    /// `Error::Overflow` if `T` is too narrow.
+    pub(super) fn factor<T: TimeNumber>(
+        &self,
+        task: &Task,
+        timer: NumericId,
+        divisor: &Rational,
+    ) -> Result<T, Error> {
         let multiple = task.number_multiples.get(timer.index()).copied().unwrap_or(1);
-        let scale = Rational::from_integer(task.number_scale) * Rational::from_integer(multiple);
-        let by = Rational::from_integer(self.0) / scale;
-        (by / divisor.clone()).to_int().ok_or_else(|| Error::overflow("a duration"))
-    }
-
-    pub(super) fn duration(self, task: &Task, operator: OperatorId) -> Result<Int, Error> {
-        let factor = self.0.checked_div(task.time_scale);
-        let task_duration = task.operators[operator.index()].duration.constant;
-        let duration = factor.and_then(|factor| task_duration.checked_mul(factor));
-        let duration = duration.filter(|duration| (-LIMIT..LIMIT).contains(duration));
-        duration.ok_or_else(|| Error::overflow("a duration"))
+        let scale = Rational::from_integer(task.number_scale) * Rational::from_integer(multiple) * divisor;
+        let factor = BigRational::from_integer(self.0.clone()) / scale.to_big();
+        let factor = factor.is_integer().then(|| factor.to_integer());
+        let factor = factor.filter(|factor| factor.bits() <= T::TIME_BITS);
+        factor.and_then(|factor| T::from_big(&factor)).ok_or_else(|| Error::overflow("a duration"))
     }
 }

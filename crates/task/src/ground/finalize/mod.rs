@@ -43,6 +43,9 @@ pub fn finish<N: TaskNumber>(
     let atoms = Atoms::new(&task)?;
     let mut numbers = Numbers::<N>::new(&task, generality)?;
     let (mut objectives, mut costs) = objectives::<N>(&task, &numbers)?;
+    if generality.omits_durations {
+        task.operators.iter_mut().for_each(|operator| operator.duration = Quantity::default());
+    }
     let mut durations = Denominator::new("durations");
     for operator in limits.watch(&task.operators) {
         let operator = operator?;

@@ -80,7 +80,7 @@ fn fix(program: &Program, durations: &[Affine]) -> Program {
 
 /// Returns `true` if a time, converted to PDDL time units, has a finite decimal expansion.
 fn is_decimal(concurrent: &TemporalTask, time: &Rational) -> bool {
-    let unit = Rational::from_integer(concurrent.task.time_scale);
+    let unit = Rational::from_integer(concurrent.unit);
     to_decimal(&(time.clone() / unit).to_big()).is_some()
 }
 
@@ -114,7 +114,7 @@ fn rounded(
 /// Granularity of rounded durations, in internal time units: the greatest 10^-n PDDL time units (n
 /// ≥ 0) that is at most a thousandth of the separation. `None` on overflow.
 fn grain(concurrent: &TemporalTask) -> Option<Rational> {
-    let unit = Rational::from_integer(concurrent.task.time_scale);
+    let unit = Rational::from_integer(concurrent.unit);
     let limit = Rational::from_integer(concurrent.separation) / Rational::from_integer(1000);
     let powers = std::iter::successors(Some(1_i128), |power| power.checked_mul(10));
     let mut grains = powers.map(|power| unit.clone() / Rational::from_integer(power));
@@ -128,6 +128,7 @@ fn in_names(
     at: &dyn Fn(&Affine) -> Rational,
 ) -> Plan {
     let task = &concurrent.task;
+    let unit = Rational::from_integer(concurrent.unit);
     let mut steps = Vec::new();
     let mut before = at(&Course::new(concurrent).measured(concurrent));
     // Running actions in the order of their starts: instance and index of the step.
@@ -157,6 +158,7 @@ fn in_names(
     steps.sort_by(|a, b| (&a.0, a.1).cmp(&(&b.0, b.1)));
     let steps = steps.into_iter().map(|(start, id, duration, cost)| {
         let cost = if task.objective.maximize { -cost } else { cost };
+        let [start, duration] = [start, duration].map(|time| time / unit.clone());
         Step::new(task, &task.operators[id.index()], &[], (start, duration, cost))
     });
     let mut plan = Plan { steps: steps.collect(), cost: concurrent.measure.metric(value) };

@@ -37,14 +37,14 @@ use answer::Answer;
 use partial_plan_lp::Course;
 use search::{Outcome, Search};
 
-/// Returns the task unchanged if its chosen durations are supported.
+/// Checks that the chosen durations of a task are supported.
 ///
 /// # Errors
 /// Fails if a derived predicate compares numbers, because its truth would depend on durations.
-pub(super) fn check(concurrent: TemporalTask) -> Result<TemporalTask, Errors> {
+pub(super) fn check(concurrent: &TemporalTask) -> Result<(), Errors> {
     let mut rules = concurrent.task.axioms.iter().flat_map(|layer| &layer.rules);
     if rules.all(|rule| rule.body.linears().next().is_none()) {
-        return Ok(concurrent);
+        return Ok(());
     }
     Err(vec![Error::Unsupported {
         construct: "a derived predicate over numbers, where durations are chosen".into(),

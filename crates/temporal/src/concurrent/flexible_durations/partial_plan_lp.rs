@@ -308,7 +308,7 @@ impl Course {
         let position = self.passed.len();
         let mut duration = Affine::default();
         let time = match role {
-            Role::Timed(time) => Affine::constant(rational(time)),
+            Role::Timed(event) => Affine::constant(rational(concurrent.events[event as usize].0)),
             Role::End(instance) => {
                 let open = self.position(instance, run)?;
                 self.opens.remove(open).end
@@ -333,7 +333,7 @@ impl Course {
             constraints.push(Affine::column(MAKESPAN).minus(&time));
         }
         let happening = &concurrent.happenings[operator.index()];
-        if let Role::Timed(at) = role {
+        if let Role::Timed(event) = role {
             // Earlier happenings are not after the event, and later ones not before it.
             for passed in &self.passed {
                 ask(time.minus(&passed.time), constraints)?;
@@ -341,7 +341,7 @@ impl Course {
             for open in &self.opens {
                 ask(open.end.minus(&time), constraints)?;
             }
-            self.floor = at;
+            self.floor = concurrent.events[event as usize].0;
         } else if self.floor > 0 {
             ask(time.shifted(&rational(self.floor.saturating_neg())), constraints)?;
         }

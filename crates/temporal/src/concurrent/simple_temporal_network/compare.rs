@@ -1,34 +1,33 @@
 //! Dominance between two simple temporal networks, and removal of accesses that no longer matter.
 
-use task::number::{Int, words};
-
 use crate::concurrent::simple_temporal_network::{Key, RunningAction, SimpleTemporalNetwork};
 use crate::concurrent::time::TimeExpression;
+use crate::concurrent::time_number::TimeNumber;
 
-impl SimpleTemporalNetwork {
+impl<T: TimeNumber> SimpleTemporalNetwork<T> {
     /// Appends to `out` the part that must be equal for two networks to be compared: running
     /// actions and group.
     pub(in crate::concurrent) fn signature(&self, out: &mut Vec<u32>) {
         for open in &self.opens {
             out.extend([open.instance, open.float]);
-            out.extend(words(open.offset));
-            out.extend(words(open.duration));
+            open.offset.append_words(out);
+            open.duration.append_words(out);
         }
         if let Some((float, offset)) = self.group {
             out.extend([u32::MAX, float]);
-            out.extend(words(offset));
+            offset.append_words(out);
         }
     }
 
     /// Removes accesses that can no longer delay a happening: those at least `separation` before
     /// the last timed initial literals or before the last change of their guard variable.
-    pub(in crate::concurrent) fn forget(&mut self, guards: &[Option<u32>], separation: Int) {
+    pub(in crate::concurrent) fn forget(&mut self, guards: &[Option<u32>], separation: T) {
         let mut entries = std::mem::take(&mut self.entries);
         entries.retain(|(key, time)| !self.is_past(*key, time, guards, separation));
         self.entries = entries;
     }
 
-    fn is_past(&self, key: Key, time: &TimeExpression, guards: &[Option<u32>], separation: Int) -> bool {
+    fn is_past(&self, key: Key, time: &TimeExpression<T>, guards: &[Option<u32>], separation: T) -> bool {
         if time.precedes(&TimeExpression::constant(self.floor), separation) {
             return true;
         }
@@ -41,15 +40,17 @@ impl SimpleTemporalNetwork {
     pub(in crate::concurrent) fn dominates_ignoring_accesses(&self, other: &Self) -> bool {
         let floats = || self.floats.iter().zip(&other.floats);
         let lasts = || self.opens.iter().zip(&other.opens);
-        let last = |(first, second): (&RunningAction, &RunningAction)| match (&first.last, &second.last) {
-            (Some(first), Some(second)) => first.precedes(second, 0),
+        let last = |(first, second): (&RunningAction<T>, &RunningAction<T>)| match (&first.last, &second.last)
+        {
+            (Some(first), Some(second)) => first.precedes(second, T::ZERO),
             _ => true,
         };
         self.floor <= other.floor
             && (!self.waits() || other.waits())
-            && self.latest.precedes(&other.latest, 0)
-            && floats()
-                .all(|(first, second)| first.lower.precedes(&second.lower, 0) && first.upper >= second.upper)
+            && self.latest.precedes(&other.latest, T::ZERO)
+            && floats().all(|(first, second)| {
+                first.lower.precedes(&second.lower, T::ZERO) && first.upper >= second.upper
+            })
             && lasts().all(last)
     }
 
@@ -59,13 +60,13 @@ impl SimpleTemporalNetwork {
         &self,
         other: &Self,
         guards: &[Option<u32>],
-        separation: Int,
+        separation: T,
     ) -> bool {
         let mut other_entries = other.entries.iter().peekable();
         self.entries.iter().all(|(key, time)| {
             while other_entries.next_if(|(candidate, _)| candidate < key).is_some() {}
             match other_entries.peek() {
-                Some((candidate, later)) if candidate == key && time.precedes(later, 0) => true,
+                Some((candidate, later)) if candidate == key && time.precedes(later, T::ZERO) => true,
                 _ => other.is_past(*key, time, guards, separation),
             }
         })

@@ -1,41 +1,31 @@
-//! Packs a simple temporal network into bytes and unpacks it. Each byte holds seven bits of a
-//! number.
+//! Packs a simple temporal network into bytes and unpacks it.
 
 use smallvec::SmallVec;
 use task::number::{Int, dense};
 
 use crate::concurrent::simple_temporal_network::{RunningAction, SimpleTemporalNetwork, Start};
 use crate::concurrent::time::TimeExpression;
+use crate::concurrent::time_number::TimeNumber;
 
 #[derive(Default)]
 struct Writer(Vec<u8>);
 
-struct Reader<'a>(std::slice::Iter<'a, u8>);
+struct Reader<'a>(std::iter::Copied<std::slice::Iter<'a, u8>>);
 
 impl Writer {
-    /// Writes a number in zigzag and variable-length encoding, so small magnitudes take few bytes.
-    fn number(&mut self, number: Int) {
-        let mut remaining_bits = ((number << 1) ^ (number >> (Int::BITS - 1))).cast_unsigned();
-        loop {
-            let byte = (remaining_bits & 0x7f) as u8;
-            remaining_bits >>= 7;
-            if remaining_bits == 0 {
-                self.0.push(byte);
-                return;
-            }
-            self.0.push(byte | 0x80);
-        }
+    fn number<T: TimeNumber>(&mut self, number: T) {
+        number.write(&mut self.0);
     }
 
     fn index(&mut self, index: u32) {
-        self.number(index.into());
+        self.number(Int::from(index));
     }
 
     fn length(&mut self, length: usize) {
         self.index(dense(length));
     }
 
-    fn time(&mut self, time: &TimeExpression) {
+    fn time<T: TimeNumber>(&mut self, time: &TimeExpression<T>) {
         self.number(time.base);
         self.length(time.lags.len());
         for (float, lag) in &time.lags {
@@ -44,7 +34,7 @@ impl Writer {
         }
     }
 
-    fn maybe<T>(&mut self, item: Option<T>, write: impl FnOnce(&mut Self, T)) {
+    fn maybe<I>(&mut self, item: Option<I>, write: impl FnOnce(&mut Self, I)) {
         self.length(usize::from(item.is_some()));
         if let Some(item) = item {
             write(self, item);
@@ -53,39 +43,30 @@ impl Writer {
 }
 
 impl Reader<'_> {
-    fn number(&mut self) -> Int {
-        let (mut number, mut shift) = (0_u128, 0_u32);
-        for byte in self.0.by_ref() {
-            number |= u128::from(byte & 0x7f) << shift;
-            if byte & 0x80 == 0 {
-                break;
-            }
-            shift = shift.saturating_add(7);
-        }
-        let half = (number >> 1).cast_signed();
-        if number & 1 == 0 { half } else { !half }
+    fn number<T: TimeNumber>(&mut self) -> T {
+        T::read(&mut self.0)
     }
 
     fn index(&mut self) -> u32 {
-        u32::try_from(self.number()).expect("invariant: an index was written")
+        u32::try_from(self.number::<Int>()).expect("invariant: an index was written")
     }
 
-    fn list<T>(&mut self, mut read: impl FnMut(&mut Self) -> T) -> Vec<T> {
+    fn list<I>(&mut self, mut read: impl FnMut(&mut Self) -> I) -> Vec<I> {
         (0..self.index()).map(|_| read(self)).collect()
     }
 
-    fn time(&mut self) -> TimeExpression {
+    fn time<T: TimeNumber>(&mut self) -> TimeExpression<T> {
         let base = self.number();
         let lags: SmallVec<_> = (0..self.index()).map(|_| (self.index(), self.number())).collect();
         TimeExpression { base, lags }
     }
 
-    fn maybe<T>(&mut self, read: impl FnOnce(&mut Self) -> T) -> Option<T> {
+    fn maybe<I>(&mut self, read: impl FnOnce(&mut Self) -> I) -> Option<I> {
         (self.index() > 0).then(|| read(self))
     }
 }
 
-impl SimpleTemporalNetwork {
+impl<T: TimeNumber> SimpleTemporalNetwork<T> {
     pub(in crate::concurrent) fn pack(&self) -> Box<[u8]> {
         let mut writer = Writer::default();
         writer.number(self.floor);
@@ -93,7 +74,7 @@ impl SimpleTemporalNetwork {
         writer.length(self.floats.len());
         for Start { lower, upper } in &self.floats {
             writer.time(lower);
-            writer.maybe(Some(*upper).filter(|upper| *upper < Int::MAX), Writer::number);
+            writer.maybe(Some(*upper).filter(|upper| *upper < T::MAX), Writer::number);
         }
         writer.length(self.opens.len());
         for open in &self.opens {
@@ -126,12 +107,12 @@ impl SimpleTemporalNetwork {
     /// Unpacks only the head: all parts except the times of accesses and changes.
     /// [`SimpleTemporalNetwork::dominates_ignoring_accesses`] reads only the head, which is small
     /// and decides most comparisons.
-    pub(in crate::concurrent) fn unpack_head(bytes: &[u8]) -> PackedStn<'_> {
-        let mut reader = Reader(bytes.iter());
+    pub(in crate::concurrent) fn unpack_head(bytes: &[u8]) -> PackedStn<'_, T> {
+        let mut reader = Reader(bytes.iter().copied());
         let (floor, latest) = (reader.number(), reader.time());
         let floats = reader.list(|reader| {
             let lower = reader.time();
-            Start { lower, upper: reader.maybe(Reader::number).unwrap_or(Int::MAX) }
+            Start { lower, upper: reader.maybe(Reader::number).unwrap_or(T::MAX) }
         });
         let opens = reader.list(|reader| {
             let (instance, float) = (reader.index(), reader.index());
@@ -144,12 +125,13 @@ impl SimpleTemporalNetwork {
     }
 }
 
-pub(in crate::concurrent) struct PackedStn<'a> {
-    pub(in crate::concurrent) clocks: SimpleTemporalNetwork,
+pub(in crate::concurrent) struct PackedStn<'a, T: TimeNumber = Int> {
+    pub(in crate::concurrent) clocks: SimpleTemporalNetwork<T>,
     rest: Reader<'a>,
 }
 
-impl PackedStn<'_> {
+impl<T: TimeNumber> PackedStn<'_, T> {
+    /// Unpacks the times of accesses and changes.
     pub(in crate::concurrent) fn finish(&mut self) {
         let reader = &mut self.rest;
         let mut times = || reader.list(|times| (times.index(), times.time()));
@@ -184,7 +166,7 @@ mod tests {
                 RunningAction { instance, float, offset, duration: offset ^ 5, last }
             });
             let clocks = SimpleTemporalNetwork { entries, changed, floats, opens: opens.collect(), group, latest, floor };
-            let unpacked = SimpleTemporalNetwork::unpack(&clocks.pack());
+            let unpacked = SimpleTemporalNetwork::<Int>::unpack(&clocks.pack());
             prop_assert_eq!(format!("{unpacked:?}"), format!("{clocks:?}"));
         }
     }

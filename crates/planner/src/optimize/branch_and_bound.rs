@@ -1,0 +1,373 @@
+//! Branch and bound for metrics that depend on the state, by A\* with exact costs of paths.
+//!
+//! A satisficing search for the task with lower bounds as costs runs in turns with A\*, and its plans are upper
+//! bounds. A path dominates another one if it costs no more and reaches a state that is as good: less (or more) of a
+//! number is no worse if no condition, cost or other number depends on it in the other direction.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::hash::BuildHasher;
+use std::time::Instant;
+
+use rustc_hash::{FxBuildHasher, FxHashMap};
+use search::bounds::Bounds;
+use search::satisfice::{Satisficer, StepResult};
+use search::search::successor_generator::SuccessorGenerator;
+use task::context::Context;
+use task::limits::{Interrupted, Limits};
+use task::number::{Int, dense};
+use task::plan::decode;
+use task::plan::ground::{GroundPlan, GroundStep, cost};
+use task::plan::solution::{Improvement, Moment, PlannerPart, Proof, Solution, Statistics, Status};
+use task::task::number::TaskNumber as _;
+use task::task::{State, Task};
+use tracing::info_span;
+
+use crate::optimize::config::{Config, Engine};
+use crate::optimize::state_dependent_costs::StateDependentCosts;
+
+/// Maximum number of nodes. Numbers can grow without bound, at no cost.
+const MAX_NODES: usize = 2_000_000;
+/// Maximum number of combinations of designs, over all operators.
+const MAX_COMBINATIONS: usize = 200_000;
+/// Nodes that A\* expands in its first turn.
+const TURN: usize = 5_000;
+/// Work units of the satisficing search per expanded node.
+const WORK: u64 = 1_000;
+/// Approximate memory use of a node, without its state.
+const OVERHEAD: usize = size_of::<Node>() + 80;
+
+/// Minimises a metric that depends on the state. Returns `None` if the method is not applicable: with a horizon or
+/// with the SAT solver only, if an operator may improve the metric, or if operators have too many combinations of
+/// designs.
+pub(super) fn minimise(
+    task: &Task,
+    config: &Config,
+    report: &mut dyn FnMut(Improvement),
+) -> Option<Solution> {
+    let is_open = task.unreachable.is_none() && config.horizon.is_none() && config.engine != Engine::Sat;
+    if !is_open || task.objective.rest.is_empty() {
+        return None;
+    }
+    let _span = info_span!("optimize", operators = task.operators.len()).entered();
+    let statistics = Statistics { operators: task.operators.len(), ..Statistics::default() };
+    let started = Instant::now();
+    let limits = &config.limits;
+    let costs = StateDependentCosts::new(task, limits).ok()??;
+    let choices = choices(task)?;
+    let bounds = Bounds::new(Context::new(&costs.priced, limits)).ok()?;
+    let mut search = Search::new(task, &costs, &bounds, choices);
+    let mut satisficer = Satisficer::new(Context::new(&costs.priced, limits)).ok().flatten();
+    let mut progress = Progress { started, statistics, report };
+    let (mut turn, mut priced_cost) = (TURN, None);
+    let end = loop {
+        let end = search.run(limits, turn, &mut progress.statistics);
+        progress.note(&search, PlannerPart::Search);
+        if let Some(end) = end {
+            break end;
+        }
+        if let Some(running) = &mut satisficer {
+            let _span = info_span!("satisfice").entered();
+            let figures = running.figures;
+            let step = running.run(priced_cost.as_ref(), WORK.saturating_mul(turn as u64));
+            running.figures.add_to(figures, &mut progress.statistics);
+            match step {
+                Ok(StepResult::Plan(plan)) => {
+                    priced_cost = Some(plan.cost);
+                    search.offer(plan.steps);
+                }
+                Ok(StepResult::Paused) => {}
+                // A\* proves unsolvability.
+                Ok(StepResult::Unsolvable | StepResult::Ended) | Err(Interrupted) => satisficer = None,
+            }
+            progress.note(&search, PlannerPart::Satisficing);
+        }
+        turn = turn.saturating_mul(2);
+    };
+    Some(progress.solution(search, end, limits))
+}
+
+/// All admitted combinations of designs of each operator, or `None` if there are too many.
+fn choices(task: &Task) -> Option<Vec<Vec<Vec<u32>>>> {
+    let mut left = MAX_COMBINATIONS;
+    let mut all = Vec::with_capacity(task.operators.len());
+    for operator in &task.operators {
+        let combinations: Vec<_> = operator.admitted_combinations().take(left.saturating_add(1)).collect();
+        left = left.checked_sub(combinations.len())?;
+        all.push(combinations);
+    }
+    Some(all)
+}
+
+/// Reports of better plans, and statistics.
+struct Progress<'p> {
+    started: Instant,
+    statistics: Statistics,
+    report: &'p mut dyn FnMut(Improvement),
+}
+
+impl Progress<'_> {
+    /// Reports the best plan if it is better than the one reported last.
+    fn note(&mut self, search: &Search<'_>, part: PlannerPart) {
+        let Some((total, plan)) = &search.best else { return };
+        let cost = search.costs.metric(search.task, *total);
+        let history = &mut self.statistics.history;
+        if history.last().is_some_and(|moment| moment.cost.as_ref() == Some(&cost)) {
+            return;
+        }
+        let lower_bound = search.costs.metric(search.task, search.lower().unwrap_or(*total));
+        let moment = Moment {
+            time: self.started.elapsed(),
+            cost: Some(cost.clone()),
+            lower_bound: lower_bound.clone(),
+        };
+        history.push(moment);
+        self.statistics.found_by = Some(part);
+        (self.report)(Improvement { cost, lower_bound, horizon: plan.steps.len() });
+    }
+
+    fn solution(mut self, search: Search<'_>, end: End, limits: &Limits) -> Solution {
+        self.statistics.search = self.started.elapsed();
+        let lower = search.lower().map(|lower| search.costs.metric(search.task, lower));
+        let plan = search.best.map(|(_, plan)| plan);
+        let (status, proof) = match (plan.is_some(), end) {
+            (true, End::Exhausted) => (Status::Optimal, Some(Proof::Search)),
+            (false, End::Exhausted) => (Status::Unsolvable, Some(Proof::Search)),
+            (true, End::Stopped) => (Status::Feasible, None),
+            (false, End::Stopped) => (Status::Unknown, None),
+        };
+        let horizon = plan.as_ref().filter(|_| proof.is_some()).map_or(0, |plan| plan.steps.len());
+        Solution {
+            status,
+            plan: plan.as_ref().map(|plan| decode(Context::new(search.task, limits), plan)),
+            ground: plan,
+            lower_bound: lower.filter(|_| status != Status::Unsolvable),
+            horizon,
+            proof,
+            unbounded: None,
+            statistics: self.statistics,
+        }
+    }
+}
+
+/// Reason why A\* has ended.
+#[derive(Clone, Copy)]
+enum End {
+    /// No open node can be better than the best plan.
+    Exhausted,
+    /// A limit was reached, or nodes were dropped because their numbers overflow.
+    Stopped,
+}
+
+struct Node {
+    state: State,
+    /// Sum of the operator costs of the path.
+    paid: Int,
+    /// Cost of the path, including the measured fluents.
+    total: Int,
+    /// Parent node and step; `None` for the initial state.
+    origin: Option<(u32, GroundStep)>,
+    /// Whether a cheaper path to the same state is known.
+    is_dominated: bool,
+}
+
+/// Sort key of an open node: lower bound on the cost of plans, estimate, and node.
+type Priority = (Int, Int, Reverse<u32>);
+
+struct Search<'a> {
+    task: &'a Task,
+    costs: &'a StateDependentCosts,
+    bounds: &'a Bounds,
+    choices: Vec<Vec<Vec<u32>>>,
+    generator: SuccessorGenerator,
+    nodes: Vec<Node>,
+    /// Nodes that no other node dominates, by the hash of the parts of their states that must be equal.
+    table: FxHashMap<u64, Vec<u32>>,
+    open: BinaryHeap<Reverse<Priority>>,
+    /// Best plan and its cost.
+    best: Option<(Int, GroundPlan)>,
+    /// Lower bound on the cost of plans below nodes that were dropped because numbers overflow.
+    left_out: Option<Int>,
+    bytes: usize,
+}
+
+impl<'a> Search<'a> {
+    fn new(
+        task: &'a Task,
+        costs: &'a StateDependentCosts,
+        bounds: &'a Bounds,
+        choices: Vec<Vec<Vec<u32>>>,
+    ) -> Self {
+        let mut search = Self {
+            task,
+            costs,
+            bounds,
+            choices,
+            generator: SuccessorGenerator::new(task),
+            nodes: Vec::new(),
+            table: FxHashMap::default(),
+            open: BinaryHeap::new(),
+            best: None,
+            left_out: None,
+            bytes: 0,
+        };
+        match costs.measured(&task.initial) {
+            Some(total) => search.add(task.initial.clone(), (0, total), None),
+            None => search.left_out = Some(Int::MIN),
+        }
+        search
+    }
+
+    /// Lower bound on the cost of every plan. `None` if no bound is known or no plan exists.
+    fn lower(&self) -> Option<Int> {
+        let open = self.open.peek().map(|Reverse(priority)| priority.0);
+        let best = self.best.as_ref().map(|(total, _)| *total);
+        let lower = open.into_iter().chain(self.left_out).chain(best).min();
+        lower.filter(|lower| *lower > Int::MIN)
+    }
+
+    /// Expands nodes until the search ends. Returns `None` after `max_nodes` nodes; the search can be resumed.
+    fn run(&mut self, limits: &Limits, max_nodes: usize, statistics: &mut Statistics) -> Option<End> {
+        let _span = info_span!("search").entered();
+        let mut pulse = limits.pulse();
+        for _ in 0..max_nodes {
+            let Some(Reverse(priority)) = self.open.pop() else {
+                return Some(if self.left_out.is_some() { End::Stopped } else { End::Exhausted });
+            };
+            let (bound, _, Reverse(id)) = priority;
+            if self.nodes[id as usize].is_dominated || !self.is_better(bound) {
+                continue;
+            }
+            statistics.expanded = statistics.expanded.saturating_add(1);
+            let state = self.nodes[id as usize].state.clone();
+            for operator in self.generator.applicable(self.task, &state) {
+                for position in 0..self.choices[operator.index()].len() {
+                    if pulse.beat().is_err() || self.is_full(limits) {
+                        // The next run expands the node again; known successors are duplicates.
+                        self.open.push(Reverse(priority));
+                        return Some(End::Stopped);
+                    }
+                    statistics.generated = statistics.generated.saturating_add(1);
+                    let choice = self.choices[operator.index()][position].clone();
+                    if self.task.operators[operator.index()].applicable(&state, &choice) {
+                        self.extend(id, &state, GroundStep { operator, choice });
+                    }
+                }
+            }
+        }
+        None
+    }
+
+    /// Adds the successor of a node by an applicable step.
+    fn extend(&mut self, id: u32, state: &State, step: GroundStep) {
+        let Node { paid, total, .. } = self.nodes[id as usize];
+        let operator = &self.task.operators[step.operator.index()];
+        let next = self.task.successor(operator, state, &step.choice);
+        let next = next.and_then(|next| {
+            let paid = self.costs.paid(operator, &step.choice)?.checked_add(paid)?;
+            let total = self.costs.measured(&next)?.checked_add(paid).filter(Int::is_moderate)?;
+            Some((next, (paid, total)))
+        });
+        match next {
+            Some((next, cost)) => self.add(next, cost, Some((id, step))),
+            // No step reduces the cost.
+            None => self.left_out = Some(self.left_out.map_or(total, |bound| bound.min(total))),
+        }
+    }
+
+    /// Adds a node, unless a path to the same state is as cheap or the node cannot lead to a better plan.
+    fn add(&mut self, state: State, (paid, total): (Int, Int), origin: Option<(u32, GroundStep)>) {
+        let Some(estimate) = self.bounds.estimate(&state) else { return };
+        let bound = total.saturating_add(estimate);
+        if !self.is_better(bound) {
+            return;
+        }
+        let id = dense(self.nodes.len());
+        let hash = self.hash(&state);
+        let mut front = self.table.remove(&hash).unwrap_or_default();
+        let is_dominated = front.iter().any(|id| self.dominates(&self.nodes[*id as usize], (&state, total)));
+        if !is_dominated {
+            let worse = front.extract_if(.., |id| self.is_worse(&self.nodes[*id as usize], (&state, total)));
+            let worse: Vec<u32> = worse.collect();
+            for id in worse {
+                self.nodes[id as usize].is_dominated = true;
+            }
+            front.push(id);
+        }
+        self.table.insert(hash, front);
+        if is_dominated {
+            return;
+        }
+        let size = size_of_val(&*state.values).saturating_add(size_of_val(&*state.numbers));
+        self.bytes = self.bytes.saturating_add(size).saturating_add(OVERHEAD);
+        let is_goal = self.task.is_goal(&state);
+        self.nodes.push(Node { state, paid, total, origin, is_dominated: false });
+        if is_goal {
+            // No continuation of the plan is cheaper.
+            self.adopt(id);
+        } else {
+            self.open.push(Reverse((bound, estimate, Reverse(id))));
+        }
+    }
+
+    fn is_full(&self, limits: &Limits) -> bool {
+        self.bytes.saturating_mul(4) / 3 > limits.room() || self.nodes.len() >= MAX_NODES
+    }
+
+    fn is_better(&self, bound: Int) -> bool {
+        self.best.as_ref().is_none_or(|(total, _)| bound < *total)
+    }
+
+    /// Makes the path to a goal node the best plan.
+    fn adopt(&mut self, goal: u32) {
+        let mut steps = Vec::new();
+        let mut at = goal;
+        while let Some((parent, step)) = &self.nodes[at as usize].origin {
+            steps.push(step.clone());
+            at = *parent;
+        }
+        steps.reverse();
+        self.offer(steps);
+    }
+
+    /// Makes a plan the best one if it is better.
+    fn offer(&mut self, steps: Vec<GroundStep>) {
+        let Some(cost) = cost(self.task, &steps) else { return };
+        let plan = GroundPlan { steps, cost };
+        if let Some(total) = self.costs.total(self.task, &plan).filter(|total| self.is_better(*total)) {
+            self.best = Some((total, plan));
+        }
+    }
+
+    /// Numbers of which neither less nor more is known to be no worse.
+    fn key_numbers<'s>(&self, state: &'s State) -> impl Iterator<Item = Int> + use<'s, '_> {
+        let numbers = state.numbers.iter().zip(&self.costs.preferences);
+        numbers.filter(|(_, preference)| !preference.less && !preference.more).map(|(number, _)| *number)
+    }
+
+    fn hash(&self, state: &State) -> u64 {
+        let numbers: Vec<Int> = self.key_numbers(state).collect();
+        FxBuildHasher.hash_one((&state.values, numbers))
+    }
+
+    /// Returns `true` if every continuation of a path of cost `total` to `state` is possible after the node, at no
+    /// higher cost.
+    fn dominates(&self, node: &Node, (state, total): (&State, Int)) -> bool {
+        let numbers = || node.state.numbers.iter().zip(&state.numbers).zip(&self.costs.preferences);
+        node.total <= total
+            && node.state.values == state.values
+            && numbers().all(|((first, second), preference)| {
+                first == second || preference.less && first <= second || preference.more && first >= second
+            })
+    }
+
+    /// Returns `true` if the new path dominates the node.
+    fn is_worse(&self, node: &Node, (state, total): (&State, Int)) -> bool {
+        let numbers = || node.state.numbers.iter().zip(&state.numbers).zip(&self.costs.preferences);
+        total <= node.total
+            && node.state.values == state.values
+            && numbers().all(|((first, second), preference)| {
+                first == second || preference.less && second <= first || preference.more && second >= first
+            })
+    }
+}

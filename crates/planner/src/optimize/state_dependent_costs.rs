@@ -1,0 +1,307 @@
+//! Minimises a metric whose fluents change by amounts that depend on the state: A\* with the exact cost of each
+//! path \[1\].
+//!
+//! The cost of a path is the sum of its operator costs plus the weighted values of the measured fluents in its
+//! last state. A lower bound on the increase of this cost by each operator, over the reachable intervals of all
+//! numbers, gives a task with constant costs. Its heuristics are admissible if no bound is negative.
+//!
+//! \[1\] Without the decomposition of costs of F. Geißer, T. Keller, R. Mattmüller: Delete relaxations for planning
+//! with state-dependent action costs, IJCAI 2015.
+//! \[2\] P. Cousot, R. Cousot: Abstract interpretation, POPL 1977.
+
+use num_bigint::BigInt;
+use num_integer::Integer;
+use num_traits::ToPrimitive as _;
+use task::limits::{Interrupted, Limits};
+use task::number::{GROWTH_LIMIT, Int, LIMIT, Rational};
+use task::plan::ground::{GroundPlan, cost, pass};
+use task::plan::{Exact, metric};
+use task::task::number::TaskNumber as _;
+use task::task::quantity::{Linear, Quantity};
+use task::task::{Condition, NumericId, Objective, Operator, State, Task};
+
+/// Number of rounds before bounds that still change are set to infinity.
+const ROUNDS: usize = 3;
+
+/// Range of a number. `None` represents an infinite bound.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Interval {
+    low: Option<Int>,
+    high: Option<Int>,
+}
+
+impl Interval {
+    /// Smallest interval that contains both.
+    fn hull(self, other: Self) -> Self {
+        // `zip` keeps an infinite bound (`None`) infinite.
+        let low = self.low.zip(other.low).map(|(a, b)| a.min(b));
+        Self { low, high: self.high.zip(other.high).map(|(a, b)| a.max(b)) }
+    }
+
+    /// The larger interval `other`, with infinite bounds where it differs from this one.
+    fn widened(self, other: Self) -> Self {
+        let low = other.low.filter(|low| self.low == Some(*low));
+        Self { low, high: other.high.filter(|high| self.high == Some(*high)) }
+    }
+}
+
+/// Exact costs of paths, in integers. One unit of the task's operator costs is `factor` units.
+pub(super) struct StateDependentCosts {
+    factor: Int,
+    /// Measured fluents with their cost per unit of the stored number.
+    weights: Vec<(NumericId, Int)>,
+    /// Preference of each number.
+    pub(super) preferences: Vec<Preference>,
+    /// The task with lower bounds on the increase of the cost as operator costs.
+    pub(super) priced: Task,
+}
+
+impl StateDependentCosts {
+    /// Returns `None` if an operator may reduce the cost, or numbers overflow.
+    ///
+    /// # Errors
+    /// Fails if the deadline has passed or the interrupt flag is set.
+    pub(super) fn new(task: &Task, limits: &Limits) -> Result<Option<Self>, Interrupted> {
+        let Some((factor, weights)) = weights(task) else { return Ok(None) };
+        let intervals = reachable(task, limits)?;
+        let mut priced = task.clone();
+        for operator in limits.watch(&mut priced.operators) {
+            let operator = operator?;
+            let least = least_increase(operator, &intervals, factor, &weights);
+            // A greater bound could overflow in the heuristics; a smaller one is a bound as well.
+            let Some(least) = least.filter(|least| *least >= 0).map(|least| least.min(LIMIT)) else {
+                return Ok(None);
+            };
+            operator.cost = Quantity::constant(least);
+        }
+        priced.objective = Objective { scale: 1, offset: 0, maximize: false, rest: Vec::new() };
+        let preferences = preferences(task, &weights);
+        Ok(Some(Self { factor, weights, preferences, priced }))
+    }
+
+    /// Cost of an operator with chosen designs, without its effect on measured fluents. `None` on overflow.
+    pub(super) fn paid(&self, operator: &Operator, choice: &[u32]) -> Option<Int> {
+        operator.cost_of(choice).checked_mul(self.factor)
+    }
+
+    /// Weighted sum of the measured fluents in a state. `None` on overflow.
+    pub(super) fn measured(&self, state: &State) -> Option<Int> {
+        let mut terms = self.weights.iter();
+        terms.try_fold(0, |sum: Int, (variable, weight)| {
+            sum.checked_add(state.numbers[variable.index()].checked_mul(*weight)?)
+        })
+    }
+
+    /// Cost of a complete plan. `None` if the plan is not executable or a number overflows.
+    pub(super) fn total(&self, task: &Task, plan: &GroundPlan) -> Option<Int> {
+        let states = pass(task, &task.initial, &plan.steps)?;
+        let paid = cost(task, &plan.steps)?.checked_mul(self.factor)?;
+        paid.checked_add(self.measured(states.last()?)?).filter(Int::is_moderate)
+    }
+
+    /// Converts a cost to the metric of the problem.
+    pub(super) fn metric(&self, task: &Task, total: Int) -> Exact {
+        metric(task, &(Rational::from_integer(total) / Rational::from_integer(self.factor)))
+    }
+}
+
+/// Common factor that makes all weights of measured fluents integers, and these weights.
+fn weights(task: &Task) -> Option<(Int, Vec<(NumericId, Int)>)> {
+    let unit = Rational::from_integer(task.objective.scale) / Rational::from_integer(task.number_scale);
+    let rest = &task.objective.rest;
+    let weights: Vec<Rational> = rest.iter().map(|(_, factor)| factor.clone() * &unit).collect();
+    let common = weights.iter().fold(BigInt::from(1), |common, weight| common.lcm(weight.to_big().denom()));
+    let factor = common.to_i128().filter(|factor| *factor <= GROWTH_LIMIT)?;
+    let scaled = weights.iter().map(|weight| (weight.clone() * Rational::from_integer(factor)).to_int());
+    let pairs = rest.iter().zip(scaled).map(|((variable, _), weight)| Some((*variable, weight?)));
+    Some((factor, pairs.collect::<Option<_>>()?))
+}
+
+/// Whether less, or more, of a number is never worse: with the changed number, every continuation stays possible, and
+/// its steps increase the cost by no more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Preference {
+    pub(super) less: bool,
+    pub(super) more: bool,
+}
+
+impl Preference {
+    /// Keeps only what a positive (or negative) influence of the number on something admits, of which less (or more)
+    /// is never worse.
+    fn restrict(&mut self, is_positive: bool, other: Self) {
+        let (less, more) = if is_positive { (other.less, other.more) } else { (other.more, other.less) };
+        *self = Self { less: self.less && less, more: self.more && more };
+    }
+}
+
+/// Preferences of all numbers, as a greatest fixpoint over the numbers that read each other.
+fn preferences(task: &Task, weights: &[(NumericId, Int)]) -> Vec<Preference> {
+    let mut preferences = vec![Preference { less: true, more: true }; task.initial.numbers.len()];
+    // More of a compared expression, and less of the cost, is never worse.
+    let (compared, cost) = (Preference { less: false, more: true }, Preference { less: true, more: false });
+    let conditions = task.operators.iter().map(|operator| &operator.condition).chain([&task.goal]);
+    for (variable, coefficient) in
+        conditions.flat_map(Condition::linears).flat_map(|linear| &linear.coefficients)
+    {
+        preferences[variable.index()].restrict(*coefficient > 0, compared);
+    }
+    // Rules can be read positively and negatively.
+    let bodies = task.axioms.iter().flat_map(|layer| &layer.rules).map(|rule| &rule.body);
+    for (variable, _) in bodies.flat_map(Condition::linears).flat_map(|linear| &linear.coefficients) {
+        preferences[variable.index()] = Preference { less: false, more: false };
+    }
+    let effects = || task.operators.iter().flat_map(|operator| &operator.numeric_effects);
+    for effect in effects() {
+        let Some((_, weight)) = weights.iter().find(|(variable, _)| *variable == effect.variable) else {
+            continue;
+        };
+        let own = effect.value.coefficients.iter().find(|(variable, _)| *variable == effect.variable);
+        let own = own.map_or(0, |(_, coefficient)| *coefficient);
+        // The cost increases by the weighted difference between the new and the old value.
+        if own != 1 {
+            preferences[effect.variable.index()].restrict((own > 1) == (*weight > 0), cost);
+        }
+        let others = effect.value.coefficients.iter().filter(|(variable, _)| *variable != effect.variable);
+        for (variable, coefficient) in others {
+            preferences[variable.index()].restrict((*coefficient > 0) == (*weight > 0), cost);
+        }
+    }
+    loop {
+        let before = preferences.clone();
+        for effect in effects() {
+            for (variable, coefficient) in &effect.value.coefficients {
+                let target = preferences[effect.variable.index()];
+                preferences[variable.index()].restrict(*coefficient > 0, target);
+            }
+        }
+        if preferences == before {
+            return preferences;
+        }
+    }
+}
+
+/// Lower bound on the increase of the cost by an operator, in every reachable state in which it is applicable.
+/// Returns `None` if no bound is known.
+fn least_increase(
+    operator: &Operator,
+    intervals: &[Interval],
+    factor: Int,
+    weights: &[(NumericId, Int)],
+) -> Option<Int> {
+    let guarded = Guarded::new(operator, intervals);
+    let mut coefficients: Vec<(NumericId, Int)> = Vec::new();
+    let mut add = |variable: NumericId, by: Int| {
+        match coefficients.iter_mut().find(|(present, _)| *present == variable) {
+            Some((_, sum)) => *sum = sum.checked_add(by)?,
+            None => coefficients.push((variable, by)),
+        }
+        Some(())
+    };
+    let mut least = operator.cost.minimum().checked_mul(factor)?;
+    for effect in &operator.numeric_effects {
+        let Some((_, weight)) = weights.iter().find(|(variable, _)| *variable == effect.variable) else {
+            continue;
+        };
+        let quantity = &effect.value.quantity;
+        let constant = if *weight > 0 { quantity.minimum() } else { quantity.maximum() };
+        least = least.checked_add(constant.checked_mul(*weight)?)?;
+        for (variable, coefficient) in &effect.value.coefficients {
+            add(*variable, coefficient.checked_mul(*weight)?)?;
+        }
+        add(effect.variable, weight.checked_neg()?)?;
+    }
+    for (variable, coefficient) in coefficients.into_iter().filter(|(_, coefficient)| *coefficient != 0) {
+        let Interval { low, high } = guarded.of(variable);
+        let extreme = if coefficient > 0 { low } else { high };
+        least = least.checked_add(extreme?.checked_mul(coefficient)?)?;
+    }
+    Some(least)
+}
+
+/// Intervals of the numbers in states in which an operator is applicable: conditions on single numbers restrict
+/// them.
+struct Guarded<'i> {
+    intervals: &'i [Interval],
+    restricted: Vec<(NumericId, Interval)>,
+}
+
+impl<'i> Guarded<'i> {
+    fn new(operator: &Operator, intervals: &'i [Interval]) -> Self {
+        let mut guarded = Self { intervals, restricted: Vec::new() };
+        for linear in &operator.condition.comparisons {
+            // coefficient * number + quantity >= 0
+            let [(variable, coefficient)] = linear.coefficients[..] else { continue };
+            let Some(least) = linear.quantity.maximum().checked_neg() else { continue };
+            let mut interval = guarded.of(variable);
+            if coefficient > 0 {
+                let bound = Integer::div_ceil(&least, &coefficient);
+                interval.low = Some(interval.low.map_or(bound, |low| low.max(bound)));
+            } else {
+                let bound = Integer::div_floor(&least, &coefficient);
+                interval.high = Some(interval.high.map_or(bound, |high| high.min(bound)));
+            }
+            guarded.restricted.retain(|(present, _)| *present != variable);
+            guarded.restricted.push((variable, interval));
+        }
+        guarded
+    }
+
+    fn of(&self, variable: NumericId) -> Interval {
+        let restricted = self.restricted.iter().find(|(present, _)| *present == variable);
+        restricted.map_or(self.intervals[variable.index()], |(_, interval)| *interval)
+    }
+
+    /// Bounds for the value of an expression. A bound that overflows is infinite.
+    fn range(&self, linear: &Linear<Int>) -> Interval {
+        let sum = |start: Int, is_low: bool| {
+            linear.coefficients.iter().try_fold(start, |sum, (variable, coefficient)| {
+                let interval = self.of(*variable);
+                let bound = if (*coefficient > 0) == is_low { interval.low } else { interval.high };
+                sum.checked_add(bound?.checked_mul(*coefficient)?)
+            })
+        };
+        Interval { low: sum(linear.quantity.minimum(), true), high: sum(linear.quantity.maximum(), false) }
+    }
+}
+
+/// Intervals that contain all values of each number in reachable states, by interval analysis with widening and
+/// narrowing \[2\].
+fn reachable(task: &Task, limits: &Limits) -> Result<Vec<Interval>, Interrupted> {
+    let initial =
+        task.initial.numbers.iter().map(|number| Interval { low: Some(*number), high: Some(*number) });
+    let initial: Vec<Interval> = initial.collect();
+    let changing: Vec<&Operator> =
+        task.operators.iter().filter(|operator| !operator.numeric_effects.is_empty()).collect();
+    // Initial values and the values that operators set if the numbers before are within `intervals`.
+    let step = |intervals: &[Interval]| {
+        let mut next = initial.clone();
+        for operator in limits.watch(&changing) {
+            let operator = operator?;
+            let guarded = Guarded::new(operator, intervals);
+            for effect in &operator.numeric_effects {
+                let range = guarded.range(&effect.value);
+                let interval = &mut next[effect.variable.index()];
+                *interval = interval.hull(range);
+            }
+        }
+        Ok(next)
+    };
+    let mut intervals = initial.clone();
+    for round in 0_usize.. {
+        let next = step(&intervals)?;
+        let widened = intervals.iter().zip(next).map(|(before, next)| {
+            let hull = before.hull(next);
+            if round < ROUNDS { hull } else { before.widened(hull) }
+        });
+        let widened: Vec<Interval> = widened.collect();
+        if widened == intervals {
+            break;
+        }
+        intervals = widened;
+    }
+    // Each further step keeps a superset of the reachable values.
+    for _ in 0..ROUNDS {
+        intervals = step(&intervals)?;
+    }
+    Ok(intervals)
+}

@@ -1,0 +1,188 @@
+//! Metrics over fluents with state-dependent changes are minimised: comparison with brute force.
+
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BinaryHeap};
+use std::fmt::Write as _;
+use std::time::Duration;
+
+use metaplan_planner::{Config, GroundConfig, Limits, Proof, Solution, Status, Thresholds, ground, optimize};
+use testing::random::Random;
+
+use crate::concurrent::parse;
+
+/// A market: the price of a purchase is linear in the amount that was ordered and in the rate.
+const DOMAIN: &str = "(define (domain market) (:requirements :typing :numeric-fluents) (:types place)
+  (:predicates (at ?p - place) (road ?a ?b - place) (bought ?p - place))
+  (:functions (amount) (rate) (spent) (far ?p - place) (price ?p - place) (share ?p - place) (need ?p - place)
+    (cap) (lot) (discount) (fee))
+  (:action order :parameters () :precondition (< (amount) (cap)) :effect (increase (amount) (lot)))
+  (:action haggle :parameters () :precondition (>= (rate) (discount))
+    :effect (and (decrease (rate) (discount)) (increase (spent) (fee))))
+  (:action drive :parameters (?a ?b - place) :precondition (and (at ?a) (road ?a ?b))
+    :effect (and (not (at ?a)) (at ?b) (increase (spent) (far ?b))))
+  (:action buy :parameters (?p - place) :precondition (and (at ?p) (>= (amount) (need ?p)))
+    :effect (and (bought ?p) (decrease (amount) (need ?p))
+      (increase (spent) (+ (* (price ?p) (amount)) (* (share ?p) (rate)))))))";
+
+struct Market {
+    roads: Vec<(usize, usize)>,
+    /// Per place: cost of driving there, price, share, and amount that a purchase needs.
+    places: Vec<[i64; 4]>,
+    goals: Vec<usize>,
+    rate: i64,
+    cap: i64,
+    lot: i64,
+    discount: i64,
+    fee: i64,
+}
+
+impl Market {
+    fn sample(random: &mut Random) -> Self {
+        let count = 2 + random.below(2) as usize;
+        let mut number = |limit| random.below(limit);
+        let places = (0..count).map(|_| [number(4), number(5), number(3), number(4)]).collect();
+        let (rate, cap, lot, discount, fee) = (number(6), number(8), 1 + number(3), 1 + number(2), number(3));
+        let mut roads: Vec<(usize, usize)> = Vec::new();
+        for a in 0..count {
+            roads.extend((0..count).filter(|b| *b != a && random.below(3) > 0).map(|b| (a, b)));
+        }
+        let goals = (0..count).filter(|_| random.below(2) > 0).collect();
+        Self { roads, places, goals, rate, cap, lot, discount, fee }
+    }
+
+    fn problem(&self) -> String {
+        let mut init = format!(
+            "(at p0) (= (amount) 0) (= (spent) 0) (= (rate) {}) (= (cap) {}) (= (lot) {}) (= (discount) {}) (= (fee) {})",
+            self.rate, self.cap, self.lot, self.discount, self.fee
+        );
+        for (a, b) in &self.roads {
+            let _ = write!(init, " (road p{a} p{b})");
+        }
+        let mut objects = String::new();
+        for (place, numbers) in self.places.iter().enumerate() {
+            let _ = write!(objects, " p{place}");
+            for (name, number) in ["far", "price", "share", "need"].iter().zip(numbers) {
+                let _ = write!(init, " (= ({name} p{place}) {number})");
+            }
+        }
+        let goals: String =
+            self.goals.iter().map(|place| ["(bought p", &place.to_string(), ")"].concat()).collect();
+        format!(
+            "(define (problem p) (:domain market) (:objects{objects} - place) (:init {init})
+              (:goal (and (at p0) {goals})) (:metric minimize (spent)))"
+        )
+    }
+
+    /// Least cost, by Dijkstra's algorithm over explicit states.
+    fn cheapest(&self) -> Option<i64> {
+        // Place, amount, rate and purchases.
+        type State = (usize, i64, i64, Vec<bool>);
+        let start: State = (0, 0, self.rate, vec![false; self.places.len()]);
+        let mut costs: BTreeMap<State, i64> = BTreeMap::new();
+        let mut open = BinaryHeap::from([Reverse((0, start))]);
+        while let Some(Reverse((cost, state))) = open.pop() {
+            if costs.contains_key(&state) {
+                continue;
+            }
+            costs.insert(state.clone(), cost);
+            let (at, amount, rate, bought) = state;
+            if at == 0 && self.goals.iter().all(|goal| bought[*goal]) {
+                return Some(cost);
+            }
+            let mut push = |more: i64, state: State| open.push(Reverse((cost + more, state)));
+            if amount < self.cap {
+                push(0, (at, amount + self.lot, rate, bought.clone()));
+            }
+            if rate >= self.discount {
+                push(self.fee, (at, amount, rate - self.discount, bought.clone()));
+            }
+            for (_, to) in self.roads.iter().filter(|(from, _)| *from == at) {
+                push(self.places[*to][0], (*to, amount, rate, bought.clone()));
+            }
+            let [_, price, share, need] = self.places[at];
+            if amount >= need {
+                let mut bought = bought;
+                bought[at] = true;
+                push(price * amount + share * rate, (at, amount - need, rate, bought));
+            }
+        }
+        None
+    }
+}
+
+fn solve(domain: &str, problem: &str, limits: Limits) -> Solution {
+    let (domain, problem) = parse(domain, problem);
+    let task =
+        ground(&domain, &problem, &GroundConfig::default()).unwrap_or_else(|errors| panic!("{errors:?}"));
+    optimize(&task, &Config::default().with_limits(limits), &mut |_| {})
+}
+
+#[test]
+fn state_dependent_costs_are_as_low_as_by_brute_force() {
+    let seeds = std::env::var("METAPLAN_SEEDS").map_or(300, |text| text.parse().expect("a number"));
+    let mut solved = 0;
+    for seed in 0..seeds {
+        let market = Market::sample(&mut Random(seed));
+        let (problem, expected) = (market.problem(), market.cheapest());
+        for thresholds in [Thresholds::default(), Thresholds::NONE] {
+            let limits = Limits::none().with_time(Duration::from_secs(10)).with_thresholds(thresholds);
+            let solution = solve(DOMAIN, &problem, limits);
+            let cost = solution.plan.as_ref().map(|plan| plan.cost.to_string());
+            assert_eq!(cost, expected.map(|cost| cost.to_string()), "seed {seed}\n{problem}");
+            let status = if expected.is_some() { Status::Optimal } else { Status::Unsolvable };
+            assert_eq!(solution.status, status, "seed {seed}\n{problem}");
+        }
+        solved += usize::from(expected.is_some());
+    }
+    assert!(solved * 3 > seeds as usize, "{solved} of {seeds} are solvable");
+}
+
+/// The purchase costs 5,000 at once, and 7 after a drive.
+#[test]
+fn a_price_that_depends_on_the_state_is_minimised() {
+    let domain = "(define (domain market) (:requirements :strips :typing :numeric-fluents) (:types place)
+      (:predicates (at ?p - place) (bought)) (:functions (far ?p - place) (price ?p - place) (amount) (total-cost))
+      (:action order :parameters () :precondition (< (amount) 5) :effect (increase (amount) 5))
+      (:action drive :parameters (?a ?b - place) :precondition (at ?a)
+        :effect (and (not (at ?a)) (at ?b) (increase (total-cost) (far ?b))))
+      (:action buy :parameters (?p - place) :precondition (and (at ?p) (>= (amount) 5))
+        :effect (and (bought) (increase (total-cost) (* (amount) (price ?p))))))";
+    let problem = "(define (problem two) (:domain market) (:objects home near distant - place)
+      (:init (at home) (= (amount) 0) (= (total-cost) 0) (= (far home) 1) (= (far near) 1) (= (far distant) 2)
+        (= (price home) 1000) (= (price near) 100) (= (price distant) 1))
+      (:goal (bought)) (:metric minimize (total-cost)))";
+    let solution = solve(domain, problem, Limits::none());
+    let cost = solution.plan.map(|plan| plan.cost.to_string());
+    assert_eq!((solution.status, cost.as_deref()), (Status::Optimal, Some("7")));
+    assert_eq!(solution.proof, Some(Proof::Search));
+    assert_eq!(solution.lower_bound.map(|bound| bound.to_string()).as_deref(), Some("7"));
+}
+
+/// The amount grows without bound and at no cost, but less of it is never worse.
+#[test]
+fn useless_growth_of_a_number_ends_the_search() {
+    let domain = "(define (domain market) (:requirements :strips :numeric-fluents)
+      (:predicates (ready) (bought)) (:functions (amount) (price) (total-cost))
+      (:action order :parameters () :effect (and (ready) (increase (amount) 5)))
+      (:action buy :parameters () :precondition (ready)
+        :effect (and (bought) (increase (total-cost) (* (amount) (price))))))";
+    let problem =
+        "(define (problem p) (:domain market) (:init (= (amount) 0) (= (price) 1000) (= (total-cost) 0))
+      (:goal (bought)) (:metric minimize (total-cost)))";
+    let solution = solve(domain, problem, Limits::none());
+    let cost = solution.plan.map(|plan| plan.cost.to_string());
+    assert_eq!((solution.status, cost.as_deref()), (Status::Optimal, Some("5000")));
+}
+
+/// The balance may become negative, and a purchase would then reduce the cost.
+#[test]
+fn a_metric_that_an_action_may_improve_is_not_called_optimal() {
+    let domain = "(define (domain market) (:requirements :strips :numeric-fluents)
+      (:predicates (bought)) (:functions (balance) (total-cost))
+      (:action lend :parameters () :precondition (> (balance) -3) :effect (decrease (balance) 2))
+      (:action buy :parameters () :effect (and (bought) (increase (total-cost) (balance)))))";
+    let problem = "(define (problem p) (:domain market) (:init (= (balance) 1) (= (total-cost) 0))
+      (:goal (bought)) (:metric minimize (total-cost)))";
+    let solution = solve(domain, problem, Limits::none());
+    assert_eq!((solution.status, solution.proof, solution.lower_bound), (Status::Feasible, None, None));
+}
