@@ -88,12 +88,12 @@ pub fn warnings<'a>(common: &Common, messages: impl IntoIterator<Item = &'a Mess
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     for message in messages.into_iter().filter(|message| message.is_error() || !common.quiet) {
         let count = counts.entry(&message.code).or_default();
-        *count += 1;
+        *count += usize::from(!message.is_error());
         if message.is_error() || *count <= KIND_LIMIT {
             let _ = stderr.write_all(shown(message, colors).as_bytes());
         }
     }
-    let omitted = counts.into_iter().filter(|(_, count)| !common.quiet && *count > KIND_LIMIT);
+    let omitted = counts.into_iter().filter(|(_, count)| *count > KIND_LIMIT);
     for (code, count) in omitted {
         let _ = writeln!(stderr, "… and {} more {code}; `--format json` lists all", count - KIND_LIMIT);
     }

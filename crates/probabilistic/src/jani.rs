@@ -84,21 +84,30 @@ fn is_taken(model: &Model, name: &str) -> bool {
     names.any(|existing| existing == name)
 }
 
-/// Returns the JANI variable name of a label: the label with the prefix `label_` if a variable or
-/// constant has the same name.
-fn label_name(model: &Model, name: &str) -> String {
-    if is_taken(model, name) { format!("label_{name}") } else { name.to_owned() }
+/// Returns the JANI variable name of a label: the label, with as many prefixes `label_` as are needed to differ from the
+/// names of variables, constants and other labels.
+fn label_name(model: &Model, label: &str) -> String {
+    let mut name = label.to_owned();
+    while is_taken(model, &name) || name != label && is_label(model, &name) {
+        name.insert_str(0, "label_");
+    }
+    name
 }
 
-/// Returns the JANI variable name of a reward structure: its name, with the prefix `reward_` if a
-/// variable, constant or label has the same name. A structure without a name is called `reward`.
-fn reward_name(model: &Model, name: &str) -> String {
-    let collides = is_taken(model, name) || model.labels.iter().any(|label| label.name == name);
-    match name {
-        "" => "reward".to_owned(),
-        _ if collides => format!("reward_{name}"),
-        _ => name.to_owned(),
+/// Returns the JANI variable name of a reward structure: its name (`reward` if it has none), with as many prefixes
+/// `reward_` as are needed to differ from the names of variables, constants, labels and other structures.
+fn reward_name(model: &Model, structure: &str) -> String {
+    let is_structure = |name: &str| model.rewards.iter().any(|rewards| rewards.name == name);
+    let is_label_name = |name: &str| model.labels.iter().any(|label| label_name(model, &label.name) == name);
+    let mut name = if structure.is_empty() { "reward".to_owned() } else { structure.to_owned() };
+    while is_taken(model, &name) || is_label_name(&name) || name != structure && is_structure(&name) {
+        name.insert_str(0, "reward_");
     }
+    name
+}
+
+fn is_label(model: &Model, name: &str) -> bool {
+    model.labels.iter().any(|label| label.name == name)
 }
 
 fn type_name(kind: Type) -> &'static str {

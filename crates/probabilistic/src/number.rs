@@ -208,6 +208,9 @@ pub fn enclosing(value: &BigRational) -> (f64, f64) {
     match BigRational::from_float(nearest) {
         Some(back) if back > *value => (nearest.next_down(), nearest),
         Some(back) if back < *value => (nearest, nearest.next_up()),
-        _ => (nearest, nearest),
+        // Beyond the range of doubles.
+        None if nearest > 0.0 => (f64::MAX, f64::INFINITY),
+        None => (f64::NEG_INFINITY, f64::MIN),
+        Some(_) => (nearest, nearest),
     }
 }

@@ -58,7 +58,8 @@ pub fn write(model: &Model) -> String {
         text.push_str("endmodule\n");
     }
     for rewards in &model.rewards {
-        let _ = writeln!(text, "\nrewards \"{}\"", rewards.name);
+        let name = if rewards.name.is_empty() { String::new() } else { format!(" \"{}\"", rewards.name) };
+        let _ = writeln!(text, "\nrewards{name}");
         for item in &rewards.items {
             text.push_str("  ");
             if let Some(action) = &item.action {

@@ -295,6 +295,7 @@ fn listed(names: Vec<String>, prefixes: &[String], depth: u64) -> msg::ListParam
     let names: Vec<String> = names.into_iter().filter(is_wanted).collect();
     let mut names_below: Vec<String> =
         names.iter().filter_map(|name| name.rsplit_once('.')).map(|(prefix, _)| prefix.to_owned()).collect();
+    names_below.sort_unstable();
     names_below.dedup();
     msg::ListParametersResult { names, prefixes: names_below }
 }

@@ -167,7 +167,7 @@ impl Keeping {
         let requirements: Vec<String> = wanted
             .qos
             .iter()
-            .map(|pair| format!("{}:{}", Value::from(pair.key.as_str()), pair.value.trim()))
+            .map(|pair| format!("{}:{}", Value::from(pair.key.as_str()), json_number(pair.value.trim())))
             .collect();
         let line = format!(
             r#"{{"event":"objective_added","objective":{},"function":{},"requirements":{{{}}},"always_improve":{}}}"#,
@@ -391,6 +391,14 @@ impl Keeping {
             qos: self.measured.iter().map(pair).collect(),
         };
         self.outputs.push(Output::Feedback(goal, status));
+    }
+}
+
+/// Returns a number as JSON text, with its digits if it is a JSON number, and otherwise (`+1`, `.5`) as the nearest double.
+fn json_number(text: &str) -> String {
+    match serde_json::from_str::<serde_json::Number>(text) {
+        Ok(_) => text.to_owned(),
+        Err(_) => Value::from(text.parse::<f64>().unwrap_or_default()).to_string(),
     }
 }
 
