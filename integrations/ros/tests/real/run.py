@@ -161,15 +161,15 @@ def poll(is_so: Callable[[], bool], what: str, within: float) -> float:
     return time.monotonic() - started
 
 
-def check_latencies(what: str, measure: Callable[[], list[float]]) -> None:
+def check_latencies(what: str, measure: Callable[[], list[float]], limit: float = AT_ONCE) -> None:
     """Fails if the longest of several latencies exceeds the limit in every attempt; other processes may delay some of them."""
     for _ in range(ATTEMPTS):
         latencies = measure()
         median, longest = 1000 * statistics.median(latencies), 1000 * max(latencies)
         print(f"  {len(latencies)} {what}: median {median:.1f} ms, longest {longest:.1f} ms", flush=True)
-        if longest <= 1000 * AT_ONCE:
+        if longest <= 1000 * limit:
             return
-    raise Failure(f"{what}: longer than {1000 * AT_ONCE:.0f} ms in each of {ATTEMPTS} attempts")
+    raise Failure(f"{what}: longer than {1000 * limit:.0f} ms in each of {ATTEMPTS} attempts")
 
 
 def fresh_clients(count: int) -> None:
@@ -215,7 +215,8 @@ def fresh_publishers(count: int) -> None:
         return latencies
 
     with nodes(modes):
-        check_latencies("diagnostics", measure)
+        # The mode manager and the polling of the log delay some of them on a busy machine. The defect takes 3 s.
+        check_latencies("diagnostics", measure, 5 * AT_ONCE)
 
 
 def departure() -> None:
