@@ -3,7 +3,8 @@
     python run.py METAPLAN_ROS [SCENARIO...]
     python run.py METAPLAN_ROS --cold-starts N
 
-The second form starts each role N times, with a new client each time; it is not part of CI. Each scenario uses a ROS domain of its own and starts the program anew. Exits with 1 if a scenario fails.
+The second form starts each role N times, with a new client each time; it is not part of CI. Each scenario uses a ROS domain
+of its own and starts the program anew. Exits with 1 if a scenario fails.
 """
 
 import contextlib
