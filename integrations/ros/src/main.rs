@@ -132,7 +132,7 @@ fn start() -> Result<(), Errors> {
         let text = "`--output` is for the discovery: no other role writes settings";
         return Err(vec![Message::error("N100", text)].into());
     }
-    match (role, mission) {
+    let ended = match (role, mission) {
         (Role::Discover, mission) => {
             let duration = Duration::from_secs_f64(seconds);
             discover::run(&node, &discover::Options { duration, output, mission }, &stop)
@@ -148,5 +148,7 @@ fn start() -> Result<(), Errors> {
             reasoner::run(&node, &reasoner::Options { mission, settings, journal, allow_commands }, &stop)
         }
         (_, None) => Err(vec![Message::error("N100", "`--mission` is missing")].into()),
-    }
+    };
+    node.close();
+    ended
 }

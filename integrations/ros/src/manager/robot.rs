@@ -285,10 +285,19 @@ impl Robot {
     pub(super) fn request_mode(&mut self, name: &str) {
         let Some(function) = self.functions.get_mut(name) else { return };
         let (inputs, name) = (self.inputs.clone(), name.to_owned());
+        // The previous request must have ended first: an observation that runs at the same time as another one is
+        // unknown, and the change that has caused this request would be missed.
+        let previous = function.mode_request.take();
+        let end_previous = async move {
+            if let Some(previous) = previous {
+                previous.cancel().await;
+            }
+        };
         function.mode_request = Some(match &function.means {
             Means::Modes { get_mode, .. } => {
                 let get_mode = Arc::clone(get_mode);
                 smol::spawn(async move {
+                    end_previous.await;
                     if let Ok(answer) = get_mode.call(GetModeRequest::default(), MODE_TIMEOUT).await {
                         let _ = inputs.send(Input::Mode(name, answer.current_mode));
                     }
@@ -297,6 +306,7 @@ impl Robot {
             Means::Steps => {
                 let procedures = Arc::clone(&self.procedures);
                 smol::spawn(async move {
+                    end_previous.await;
                     // No event announces that a silent node answers again or that a transition has ended unnoticed.
                     let mode = loop {
                         match procedures.observe(&name).await {

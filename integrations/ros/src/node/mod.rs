@@ -10,6 +10,7 @@ mod action;
 mod any_topic;
 mod arguments;
 mod clock;
+mod departure;
 mod graph;
 mod lifecycle;
 mod log;
@@ -29,6 +30,7 @@ use std::time::Duration;
 
 use metaplan::message::Message;
 use ros2_client::dds::Context;
+use ros2_client::dds::rustdds::DomainParticipant;
 use ros2_client::{NodeName, NodeOptions};
 use smol::{Task, Timer};
 
@@ -58,6 +60,9 @@ use preemptive::Preemptive;
 
 pub use qos::{depth, keep_all, latched};
 
+/// Upper limit on the time that [`Node::close`] takes.
+const CLOSING_TIMEOUT: Duration = Duration::from_secs(1);
+
 /// Options for creating a node.
 #[derive(Debug, Clone)]
 pub struct Opening {
@@ -81,6 +86,8 @@ pub struct Node {
     warned: Mutex<HashSet<String>>,
     tasks: Mutex<Vec<Task<()>>>,
     clock: Arc<Clock>,
+    participant: DomainParticipant,
+    network: Network,
 }
 
 impl std::fmt::Debug for Node {
@@ -109,7 +116,8 @@ impl Node {
         let (preemptive, answering) =
             Preemptive::open(&participant, network.loopback).map_err(|error| failed(&error))?;
         let (graph, watching) = Graph::watch(&participant, prefix, rmw, preemptive);
-        let context = Context::from_domain_participant(participant).map_err(|error| failed(&error))?;
+        let context =
+            Context::from_domain_participant(participant.clone()).map_err(|error| failed(&error))?;
         let node_name = NodeName::new(name.namespace(), name.name()).map_err(|error| {
             Message::error("N121", format!("`{name}` is not the name of a node: {error}"))
         })?;
@@ -133,9 +141,23 @@ impl Node {
             warned: Mutex::default(),
             tasks: Mutex::new(vec![watching, answering]),
             clock: Clock::new(),
+            participant,
+            network,
         });
         node.report_complaints();
         Ok(node)
+    }
+
+    /// Ends the background tasks and announces the departure to participants of Fast DDS. The library
+    /// announces it to the others when the node is dropped. Without this call the tasks may hold the
+    /// participant until the program ends, and the others wait for the lease.
+    pub fn close(&self) {
+        let tasks = std::mem::take(&mut *self.tasks.lock().unwrap_or_else(PoisonError::into_inner));
+        let canceled = futures::future::join_all(tasks.into_iter().map(Task::cancel));
+        // A task that does not end must not keep the program from ending.
+        let timeout = Timer::after(CLOSING_TIMEOUT);
+        smol::block_on(futures::future::select(canceled, timeout));
+        departure::announce(&self.participant, self.network.loopback);
     }
 
     /// Full name with namespace, such as `/uuv/metaplan`.

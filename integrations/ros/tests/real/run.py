@@ -1,12 +1,14 @@
 """Runs `metaplan-ros` against real ROS 2 nodes: rclpy on Fast DDS.
 
     python run.py METAPLAN_ROS [SCENARIO...]
+    python run.py METAPLAN_ROS --cold-starts N
 
-Each scenario uses a ROS domain of its own and starts the program anew. Exits with 1 if a scenario fails.
+The second form starts each role N times, with a new client each time; it is not part of CI. Each scenario uses a ROS domain
+of its own and starts the program anew. Exits with 1 if a scenario fails.
 """
 
 import contextlib
-import itertools
+import functools
 import json
 import os
 import pathlib
@@ -27,7 +29,7 @@ from builtin_interfaces.msg import Time  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
 from lifecycle_msgs.srv import GetState  # noqa: E402
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue  # noqa: E402
-from rcl_interfaces.srv import SetParameters  # noqa: E402
+from rcl_interfaces.srv import GetParameters, SetParameters  # noqa: E402
 from rclpy.context import Context  # noqa: E402
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor  # noqa: E402
 from rclpy.node import Node  # noqa: E402
@@ -160,15 +162,15 @@ def poll(is_so: Callable[[], bool], what: str, within: float) -> float:
     return time.monotonic() - started
 
 
-def check_latencies(what: str, measure: Callable[[], list[float]]) -> None:
+def check_latencies(what: str, measure: Callable[[], list[float]], limit: float = AT_ONCE) -> None:
     """Fails if the longest of several latencies exceeds the limit in every attempt; other processes may delay some of them."""
     for _ in range(ATTEMPTS):
         latencies = measure()
         median, longest = 1000 * statistics.median(latencies), 1000 * max(latencies)
         print(f"  {len(latencies)} {what}: median {median:.1f} ms, longest {longest:.1f} ms", flush=True)
-        if longest <= 1000 * AT_ONCE:
+        if longest <= 1000 * limit:
             return
-    raise Failure(f"{what}: longer than {1000 * AT_ONCE:.0f} ms in each of {ATTEMPTS} attempts")
+    raise Failure(f"{what}: longer than {1000 * limit:.0f} ms in each of {ATTEMPTS} attempts")
 
 
 def fresh_clients(count: int) -> None:
@@ -214,7 +216,48 @@ def fresh_publishers(count: int) -> None:
         return latencies
 
     with nodes(modes):
-        check_latencies("diagnostics", measure)
+        # The mode manager and the polling of the log delay some of them on a busy machine. The defect takes 3 s.
+        check_latencies("diagnostics", measure, 5 * AT_ONCE)
+
+
+def departure() -> None:
+    """The endpoints of a program that ends disappear at once, not only when its lease expires."""
+    monitors = Monitors()
+    count = monitors.publisher.get_subscription_count
+    with nodes(monitors):
+        with program("--as", "manager", "--mission", str(MISSION)):
+            poll(lambda: count() == 1, "the reader is there", START)
+            # Discovery of the other endpoints may still be in progress.
+            time.sleep(1.0)
+        poll(lambda: count() == 0, "the reader is gone", 1.0)
+
+
+ROLES = {
+    "planner": ("planner", MISSION),
+    "manager": ("metaplan", MISSION),
+    "reasoner": ("metaplan", MISSION),
+    "controller": ("metaplan", MISSION),
+}
+
+
+def cold_starts(role: str, count: int) -> None:
+    """A client that starts together with the program gets an answer at once when the service is discovered."""
+    name, mission = ROLES[role]
+
+    def measure() -> list[float]:
+        latencies = []
+        for index in range(count):
+            with program("--as", role, "--mission", str(mission)), fresh(f"client{index}") as (node, executor):
+                client = node.create_client(GetParameters, f"/{name}/get_parameters")
+                poll(client.service_is_ready, f"/{name}/get_parameters is there", START)
+                called = time.monotonic()
+                future = client.call_async(GetParameters.Request(names=["use_sim_time"]))
+                executor.spin_until_future_complete(future, 8.0)
+                check(future.done(), True, f"an answer within 8 s, start {index}")
+                latencies.append(time.monotonic() - called)
+        return latencies
+
+    check_latencies(f"cold starts of the {role}", measure)
 
 
 def driver() -> None:
@@ -648,6 +691,7 @@ SCENARIOS = {
     "manager_500ms": lambda: manager(0.5),
     "fresh_clients": lambda: fresh_clients(20),
     "fresh_publishers": lambda: fresh_publishers(20),
+    "departure": departure,
     "parameters": parameters,
     "driver": driver,
     "waiting": waiting,
@@ -670,11 +714,16 @@ SCENARIOS = {
 def main() -> None:
     """Runs the scenarios that the command line names, or all."""
     rclpy.init()
+    scenarios = SCENARIOS
+    if sys.argv[2:3] == ["--cold-starts"]:
+        count = int(sys.argv.pop())
+        sys.argv.pop()
+        scenarios = {f"cold_starts_{role}": functools.partial(cold_starts, role, count) for role in ROLES}
     failed = 0
-    for name in sys.argv[2:] or SCENARIOS:
+    for name in sys.argv[2:] or scenarios:
         started = time.monotonic()
         try:
-            SCENARIOS[name]()
+            scenarios[name]()
             result = "ok"
         except Failure as failure:
             failed += 1
