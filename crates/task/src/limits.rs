@@ -126,6 +126,11 @@ impl Limits {
         LimitPoll { limits: self, left: 0, stride: 1, last: None }
     }
 
+    /// Returns `true` if the computation has a time limit.
+    pub fn has_deadline(&self) -> bool {
+        self.deadline.is_some()
+    }
+
     /// Returns `true` if the deadline has passed or the interrupt flag is set.
     pub fn reached(&self) -> bool {
         self.interrupt.load(Ordering::Relaxed)
