@@ -89,11 +89,12 @@ pub(super) fn minimise(
 
 /// All admitted combinations of designs of each operator, or `None` if there are too many.
 fn choices(task: &Task) -> Option<Vec<Vec<Vec<u32>>>> {
-    let mut left = MAX_COMBINATIONS;
+    let mut remaining = MAX_COMBINATIONS;
     let mut all = Vec::with_capacity(task.operators.len());
     for operator in &task.operators {
-        let combinations: Vec<_> = operator.admitted_combinations().take(left.saturating_add(1)).collect();
-        left = left.checked_sub(combinations.len())?;
+        let combinations: Vec<_> =
+            operator.admitted_combinations().take(remaining.saturating_add(1)).collect();
+        remaining = remaining.checked_sub(combinations.len())?;
         all.push(combinations);
     }
     Some(all)

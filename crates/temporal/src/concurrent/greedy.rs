@@ -290,8 +290,8 @@ impl<'a, T: TimeNumber> Greedy<'a, T> {
         let is_preferred = |operator: &u32| preferred.binary_search(&OperatorId(*operator)).is_ok();
         let preferred: Vec<u32> = candidates.iter().copied().filter(is_preferred).collect();
         let noise = self.noise.as_mut().map_or(0, |noise| noise.below(NOISE_LEVELS) as u64);
-        let left = left.saturating_add(left.saturating_mul(noise) / NOISE_DIVISOR);
-        let values = [false, false, is_old].map(|is_old| (is_old, left, value.1));
+        let key = left.saturating_add(left.saturating_mul(noise) / NOISE_DIVISOR);
+        let values = [false, false, is_old].map(|is_old| (is_old, key, value.1));
         self.open.push(id, values, &candidates, &preferred);
         let packed = self.packing.pack(situation);
         self.bytes = self.bytes.saturating_add(OVERHEAD).saturating_add(packed.bytes());
