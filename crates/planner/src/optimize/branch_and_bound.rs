@@ -118,14 +118,14 @@ fn first_plan(task: &Task, config: &Config) -> Option<Solution> {
 /// All admitted combinations of designs of each operator, or `None` if there are too many.
 fn choices(task: &Task) -> Option<Vec<Vec<Vec<u32>>>> {
     let mut remaining = MAX_COMBINATIONS;
-    let mut all = Vec::with_capacity(task.operators.len());
+    let mut choices = Vec::with_capacity(task.operators.len());
     for operator in &task.operators {
         let combinations: Vec<_> =
             operator.admitted_combinations().take(remaining.saturating_add(1)).collect();
         remaining = remaining.checked_sub(combinations.len())?;
-        all.push(combinations);
+        choices.push(combinations);
     }
-    Some(all)
+    Some(choices)
 }
 
 /// Reports of better plans, and statistics.

@@ -161,8 +161,8 @@ fn preferences(task: &Task, weights: &[(NumericId, Int)]) -> Vec<Preference> {
         if itself != 1 {
             preferences[effect.variable.index()].restrict((itself > 1) == (*weight > 0), cost);
         }
-        let others = effect.value.coefficients.iter().filter(|(variable, _)| *variable != effect.variable);
-        for (variable, coefficient) in others {
+        let terms = effect.value.coefficients.iter().filter(|(variable, _)| *variable != effect.variable);
+        for (variable, coefficient) in terms {
             preferences[variable.index()].restrict((*coefficient > 0) == (*weight > 0), cost);
         }
     }
