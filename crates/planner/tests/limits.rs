@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use std::time::{Duration, Instant};
 
 use metaplan_planner::{
-    Config, Engine, Error, GroundConfig, Limits, Status, alternatives, ground, ground_concurrent, optimize,
-    optimize_concurrent,
+    Config, Engine, Error, GroundConfig, Limits, Status, Thresholds, alternatives, ground, ground_concurrent,
+    optimize, optimize_concurrent,
 };
 use num_rational::BigRational;
 use pddl::ast::{Domain, Problem};
@@ -140,6 +140,53 @@ fn expansion_of_a_temporal_node_with_many_successors_ends_at_the_limit() {
     println!("{passed:?}");
     assert!([Status::Unknown, Status::Feasible].contains(&solution.status));
     assert!(passed < Duration::from_millis(1_300), "{passed:?}");
+}
+
+/// Robots that can do any of the jobs, for which no search can prove a makespan with little memory.
+fn jobs() -> (Domain, Problem) {
+    let domain = "(define (domain jobs) (:requirements :typing :durative-actions :numeric-fluents)
+      (:types robot place) (:predicates (at ?r - robot ?p - place) (free ?r - robot) (done ?p - place))
+      (:functions (length ?p - place))
+      (:durative-action drive :parameters (?r - robot ?a ?b - place) :duration (= ?duration 5)
+        :condition (and (at start (at ?r ?a)) (at start (free ?r)))
+        :effect (and (at start (not (at ?r ?a))) (at start (not (free ?r))) (at end (at ?r ?b)) (at end (free ?r))))
+      (:durative-action work :parameters (?r - robot ?p - place) :duration (= ?duration (length ?p))
+        :condition (and (at start (free ?r)) (over all (at ?r ?p)))
+        :effect (and (at start (not (free ?r))) (at end (free ?r)) (at end (done ?p)))))";
+    let (mut places, mut init, mut goal) = (String::new(), String::new(), String::new());
+    for place in 0..9 {
+        let _ = write!(places, " p{place}");
+        let _ = write!(init, " (= (length p{place}) {})", 10 + place * place % 7);
+        let _ = write!(goal, " (done p{place})");
+    }
+    let problem = format!(
+        "(define (problem p) (:domain jobs) (:objects r q s - robot base{places} - place)
+          (:init (at r base) (at q base) (at s base) (free r) (free q) (free s) (= (length base) 1){init})
+          (:goal (and{goal})) (:metric minimize (total-time)))"
+    );
+    parse(domain, &problem)
+}
+
+#[test]
+fn searches_begin_again_until_the_deadline_when_memory_is_full() {
+    let (domain, problem) = jobs();
+    let separation = BigRational::new(1.into(), 1000.into());
+    let task = ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation).expect("a task");
+    let thresholds = Thresholds::NONE;
+    let time = Duration::from_secs(2);
+    let run = |limits: Limits| {
+        let started = Instant::now();
+        let solution = optimize_concurrent(&task, &limits.with_thresholds(thresholds), &mut |_| {});
+        (solution, started.elapsed())
+    };
+    let (solution, passed) = run(Limits::none().with_room(1 << 18).with_time(time));
+    println!("{passed:?} {:?}", solution.statistics.restarts);
+    assert!(solution.status == Status::Feasible && passed >= time, "{passed:?}");
+    let cost = solution.plan.expect("a plan").cost;
+    // Without a deadline, the search ends.
+    let (solution, _) = run(Limits::none().with_room(1 << 18));
+    assert_eq!(solution.status, Status::Feasible);
+    assert!(solution.plan.expect("a plan").cost >= cost);
 }
 
 #[test]

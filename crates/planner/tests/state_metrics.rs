@@ -137,6 +137,42 @@ fn state_dependent_costs_are_as_low_as_by_brute_force() {
     assert!(solved * 3 > seeds as usize, "{solved} of {seeds} are solvable");
 }
 
+/// The purchaser problem of IPC 2006: the cost of a purchase is a price times what is on sale, or what is needed.
+#[test]
+fn conditions_on_sums_bound_the_costs_of_purchases() {
+    let domain = "(define (domain tpp) (:requirements :typing :numeric-fluents) (:types place goods)
+      (:predicates (at ?p - place))
+      (:functions (sale ?g - goods ?p - place) (way ?a ?b - place) (price ?g - goods ?p - place) (bought ?g - goods)
+        (request ?g - goods) (total-cost))
+      (:action drive :parameters (?a ?b - place) :precondition (at ?a)
+        :effect (and (not (at ?a)) (at ?b) (increase (total-cost) (way ?a ?b))))
+      (:action some :parameters (?g - goods ?p - place)
+        :precondition (and (at ?p) (> (sale ?g ?p) 0) (> (sale ?g ?p) (- (request ?g) (bought ?g))))
+        :effect (and (decrease (sale ?g ?p) (- (request ?g) (bought ?g)))
+          (increase (total-cost) (* (- (request ?g) (bought ?g)) (price ?g ?p))) (assign (bought ?g) (request ?g))))
+      (:action all :parameters (?g - goods ?p - place)
+        :precondition (and (at ?p) (> (sale ?g ?p) 0) (<= (sale ?g ?p) (- (request ?g) (bought ?g))))
+        :effect (and (assign (sale ?g ?p) 0) (increase (total-cost) (* (sale ?g ?p) (price ?g ?p)))
+          (increase (bought ?g) (sale ?g ?p)))))";
+    // Two of m at 3 and one of m at 5, with ways of 4: 4 + 6 + 4 + 5 + 4. At n alone: 4 + 15 + 4.
+    let problem = |price: u32| {
+        format!(
+            "(define (problem p) (:domain tpp) (:objects h m n - place g - goods)
+              (:init (at h) (= (sale g h) 0) (= (sale g m) 2) (= (sale g n) 9) (= (price g h) 0) (= (price g m) 3)
+                (= (price g n) {price}) (= (way h m) 4) (= (way m h) 4) (= (way h n) 4) (= (way n h) 4) (= (way m n) 4)
+                (= (way n m) 4) (= (way h h) 0) (= (way m m) 0) (= (way n n) 0) (= (bought g) 0) (= (request g) 3)
+                (= (total-cost) 0))
+              (:goal (and (at h) (>= (bought g) (request g)))) (:metric minimize (total-cost)))"
+        )
+    };
+    for (price, expected) in [(5, "23"), (6, "24"), (3, "17")] {
+        let solution = solve(domain, &problem(price), Limits::none());
+        let cost = solution.plan.map(|plan| plan.cost.to_string());
+        // With a price of 6: 4 + 6 + 4 + 6 + 4.
+        assert_eq!((solution.status, cost.as_deref()), (Status::Optimal, Some(expected)), "{price}");
+    }
+}
+
 /// The purchase costs 5,000 at once, and 7 after a drive.
 #[test]
 fn a_price_that_depends_on_the_state_is_minimised() {

@@ -19,6 +19,8 @@ pub struct Limits {
     deadline: Option<Instant>,
     time: Duration,
     interrupt: Arc<AtomicBool>,
+    /// Interrupt flag of the limits from which limits with a flag of their own were derived.
+    outer: Option<Arc<AtomicBool>>,
     room: Option<usize>,
     thresholds: Thresholds,
 }
@@ -100,6 +102,18 @@ impl Limits {
         self.room.unwrap_or(DEFAULT_MEMORY)
     }
 
+    /// Returns limits with an interrupt flag of their own, which ends a part of a computation. The present flag
+    /// also ends this part.
+    #[must_use]
+    pub fn with_own_interrupt(&self) -> Self {
+        Self { interrupt: Arc::default(), outer: Some(Arc::clone(&self.interrupt)), ..self.clone() }
+    }
+
+    fn is_interrupted(&self) -> bool {
+        let outer = self.outer.as_ref();
+        self.interrupt.load(Ordering::Relaxed) || outer.is_some_and(|flag| flag.load(Ordering::Relaxed))
+    }
+
     /// Returns the interrupt flag of the run.
     pub fn interrupt(&self) -> Arc<AtomicBool> {
         Arc::clone(&self.interrupt)
@@ -124,10 +138,14 @@ impl Limits {
         LimitPoll { limits: self, left: 0, stride: 1, last: None }
     }
 
+    /// Returns `true` if the computation has a time limit.
+    pub fn has_deadline(&self) -> bool {
+        self.deadline.is_some()
+    }
+
     /// Returns `true` if the deadline has passed or the interrupt flag is set.
     pub fn reached(&self) -> bool {
-        self.interrupt.load(Ordering::Relaxed)
-            || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
+        self.is_interrupted() || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
     }
 }
 
@@ -170,7 +188,7 @@ impl LimitPoll<'_> {
             self.left -= 1;
             return Ok(());
         }
-        if self.limits.interrupt.load(Ordering::Relaxed) {
+        if self.limits.is_interrupted() {
             return Err(Interrupted);
         }
         let now = Instant::now();
@@ -228,6 +246,18 @@ mod tests {
         assert_eq!(results.last(), Some(&Err(Interrupted)));
         let late = Limits::none().with_time(Duration::ZERO);
         assert_eq!(late.watch(0..3).collect::<Vec<_>>(), [Err(Interrupted)]);
+    }
+
+    #[test]
+    fn an_own_interrupt_flag_ends_a_part() {
+        let whole = Limits::none();
+        let part = whole.with_own_interrupt();
+        part.interrupt().store(true, Ordering::Relaxed);
+        assert!(part.reached() && !whole.reached());
+        let other_part = whole.with_own_interrupt();
+        assert!(!other_part.reached());
+        whole.interrupt().store(true, Ordering::Relaxed);
+        assert!(other_part.reached() && other_part.pulse().beat().is_err());
     }
 
     #[test]

@@ -95,8 +95,8 @@ fn plan(mission: &Mission, mode: &Mode, thresholds: Thresholds) -> Result<Answer
     let limits = match mode {
         Mode::Sequential => limits.with_time(Duration::from_secs(2)),
         // Some of these tasks are never decided. The memory limit ends their search at the same point on
-        // every machine.
-        Mode::Concurrent(_) => limits.with_time(Duration::from_secs(2)).with_room(1 << 20),
+        // every machine. With a time limit, searches would begin again when memory is full.
+        Mode::Concurrent(_) => limits.with_room(1 << 20),
     };
     let codes = |messages: metaplan::Errors| {
         let mut codes: Vec<String> = messages.iter().map(|message| message.code.clone()).collect();
@@ -111,8 +111,7 @@ fn plan(mission: &Mission, mode: &Mode, thresholds: Thresholds) -> Result<Answer
             planner::lexicographic(&task, &config, &mut |_| {}).solution
         }
         Mode::Concurrent(separation) => {
-            let task =
-                mission.ground_concurrent(&problem, &[], separation, &Limits::none()).map_err(codes)?;
+            let task = mission.ground_concurrent(&problem, &[], separation, &limits).map_err(codes)?;
             planner::optimize_concurrent(&task, &limits, &mut |_| {})
         }
     };

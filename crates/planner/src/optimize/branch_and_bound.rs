@@ -1,12 +1,13 @@
 //! Branch and bound for metrics that depend on the state, by A\* with exact costs of paths.
 //!
-//! A satisficing search for the task with lower bounds as costs runs in turns with A\*, and its plans are upper
-//! bounds. A path dominates another one if it costs no more and reaches a state that is as good: less (or more) of a
+//! The portfolio for constant costs finds a first plan. Then a satisficing search for the task with lower bounds as
+//! costs runs in turns with A\*, and its plans are upper bounds. A path dominates another one if it costs no more and reaches a state that is as good: less (or more) of a
 //! number is no worse if no condition, cost or other number depends on it in the other direction.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::hash::BuildHasher;
+use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use rustc_hash::{FxBuildHasher, FxHashMap};
@@ -24,6 +25,8 @@ use task::task::{State, Task};
 use tracing::info_span;
 
 use crate::optimize::config::{Config, Engine};
+use crate::optimize::optimizer_run::Run;
+use crate::optimize::solve::solve;
 use crate::optimize::state_dependent_costs::StateDependentCosts;
 
 /// Maximum number of nodes. Numbers can grow without bound, at no cost.
@@ -57,9 +60,22 @@ pub(super) fn minimise(
     let choices = choices(task)?;
     let bounds = Bounds::new(Context::new(&costs.priced, limits)).ok()?;
     let mut search = Search::new(task, &costs, &bounds, choices);
+    let (mut statistics, mut priced_cost) = (statistics, None);
+    if let Some(first) = first_plan(task, config) {
+        if first.status == Status::Unsolvable {
+            return Some(first);
+        }
+        statistics = Statistics { history: Vec::new(), ..first.statistics };
+        if let Some(plan) = first.ground {
+            priced_cost = cost(&costs.priced, &plan.steps);
+            search.offer(plan.steps);
+        }
+    }
+    let part = statistics.found_by.unwrap_or(PlannerPart::Search);
     let mut satisficer = Satisficer::new(Context::new(&costs.priced, limits)).ok().flatten();
     let mut progress = Progress { started, statistics, report };
-    let (mut turn, mut priced_cost) = (TURN, None);
+    progress.note(&search, part);
+    let mut turn = TURN;
     let end = loop {
         let end = search.run(limits, turn, &mut progress.statistics);
         progress.note(&search, PlannerPart::Search);
@@ -87,16 +103,29 @@ pub(super) fn minimise(
     Some(progress.solution(search, end, limits))
 }
 
+/// Searches for a first plan by the portfolio for the part of the metric that operator costs represent. Returns
+/// `None` if an operator may reduce this part.
+fn first_plan(task: &Task, config: &Config) -> Option<Solution> {
+    if task.operators.iter().any(|operator| operator.cost.minimum() < 0) {
+        return None;
+    }
+    let config = config.clone().with_limits(config.limits.with_own_interrupt());
+    let interrupt = config.limits.interrupt();
+    let mut stop = |_: Improvement| interrupt.store(true, Ordering::Relaxed);
+    Some(solve(Run::new(task, &config, &mut stop)))
+}
+
 /// All admitted combinations of designs of each operator, or `None` if there are too many.
 fn choices(task: &Task) -> Option<Vec<Vec<Vec<u32>>>> {
-    let mut left = MAX_COMBINATIONS;
-    let mut all = Vec::with_capacity(task.operators.len());
+    let mut remaining = MAX_COMBINATIONS;
+    let mut choices = Vec::with_capacity(task.operators.len());
     for operator in &task.operators {
-        let combinations: Vec<_> = operator.admitted_combinations().take(left.saturating_add(1)).collect();
-        left = left.checked_sub(combinations.len())?;
-        all.push(combinations);
+        let combinations: Vec<_> =
+            operator.admitted_combinations().take(remaining.saturating_add(1)).collect();
+        remaining = remaining.checked_sub(combinations.len())?;
+        choices.push(combinations);
     }
-    Some(all)
+    Some(choices)
 }
 
 /// Reports of better plans, and statistics.

@@ -108,12 +108,12 @@ impl StateDependentCosts {
 /// Common factor that makes all weights of measured fluents integers, and these weights.
 fn weights(task: &Task) -> Option<(Int, Vec<(NumericId, Int)>)> {
     let unit = Rational::from_integer(task.objective.scale) / Rational::from_integer(task.number_scale);
-    let rest = &task.objective.rest;
-    let weights: Vec<Rational> = rest.iter().map(|(_, factor)| factor.clone() * &unit).collect();
+    let measured = &task.objective.rest;
+    let weights: Vec<Rational> = measured.iter().map(|(_, factor)| factor.clone() * &unit).collect();
     let common = weights.iter().fold(BigInt::from(1), |common, weight| common.lcm(weight.to_big().denom()));
     let factor = common.to_i128().filter(|factor| *factor <= GROWTH_LIMIT)?;
     let scaled = weights.iter().map(|weight| (weight.clone() * Rational::from_integer(factor)).to_int());
-    let pairs = rest.iter().zip(scaled).map(|((variable, _), weight)| Some((*variable, weight?)));
+    let pairs = measured.iter().zip(scaled).map(|((variable, _), weight)| Some((*variable, weight?)));
     Some((factor, pairs.collect::<Option<_>>()?))
 }
 
@@ -155,14 +155,14 @@ fn preferences(task: &Task, weights: &[(NumericId, Int)]) -> Vec<Preference> {
         let Some((_, weight)) = weights.iter().find(|(variable, _)| *variable == effect.variable) else {
             continue;
         };
-        let own = effect.value.coefficients.iter().find(|(variable, _)| *variable == effect.variable);
-        let own = own.map_or(0, |(_, coefficient)| *coefficient);
+        let itself = effect.value.coefficients.iter().find(|(variable, _)| *variable == effect.variable);
+        let itself = itself.map_or(0, |(_, coefficient)| *coefficient);
         // The cost increases by the weighted difference between the new and the old value.
-        if own != 1 {
-            preferences[effect.variable.index()].restrict((own > 1) == (*weight > 0), cost);
+        if itself != 1 {
+            preferences[effect.variable.index()].restrict((itself > 1) == (*weight > 0), cost);
         }
-        let others = effect.value.coefficients.iter().filter(|(variable, _)| *variable != effect.variable);
-        for (variable, coefficient) in others {
+        let terms = effect.value.coefficients.iter().filter(|(variable, _)| *variable != effect.variable);
+        for (variable, coefficient) in terms {
             preferences[variable.index()].restrict((*coefficient > 0) == (*weight > 0), cost);
         }
     }
@@ -210,24 +210,23 @@ fn least_increase(
         }
         add(effect.variable, weight.checked_neg()?)?;
     }
-    for (variable, coefficient) in coefficients.into_iter().filter(|(_, coefficient)| *coefficient != 0) {
-        let Interval { low, high } = guarded.of(variable);
-        let extreme = if coefficient > 0 { low } else { high };
-        least = least.checked_add(extreme?.checked_mul(coefficient)?)?;
-    }
+    coefficients.retain(|(_, coefficient)| *coefficient != 0);
+    coefficients.sort_unstable();
+    least = least.checked_add(guarded.extreme(&coefficients, true)?)?;
     Some(least)
 }
 
 /// Intervals of the numbers in states in which an operator is applicable: conditions on single numbers restrict
 /// them.
 struct Guarded<'i> {
+    operator: &'i Operator,
     intervals: &'i [Interval],
     restricted: Vec<(NumericId, Interval)>,
 }
 
 impl<'i> Guarded<'i> {
-    fn new(operator: &Operator, intervals: &'i [Interval]) -> Self {
-        let mut guarded = Self { intervals, restricted: Vec::new() };
+    fn new(operator: &'i Operator, intervals: &'i [Interval]) -> Self {
+        let mut guarded = Self { operator, intervals, restricted: Vec::new() };
         for linear in &operator.condition.comparisons {
             // coefficient * number + quantity >= 0
             let [(variable, coefficient)] = linear.coefficients[..] else { continue };
@@ -251,17 +250,42 @@ impl<'i> Guarded<'i> {
         restricted.map_or(self.intervals[variable.index()], |(_, interval)| *interval)
     }
 
+    /// Lower or upper bound on a weighted sum of numbers. `None` if no bound is known. Conditions on the same sum,
+    /// up to a factor, restrict it.
+    fn extreme(&self, coefficients: &[(NumericId, Int)], is_low: bool) -> Option<Int> {
+        let mut sums = coefficients.iter();
+        let by_intervals = sums.try_fold(0, |sum: Int, (variable, coefficient)| {
+            let interval = self.of(*variable);
+            let bound = if (*coefficient > 0) == is_low { interval.low } else { interval.high };
+            sum.checked_add(bound?.checked_mul(*coefficient)?)
+        });
+        let by_conditions = self.operator.condition.comparisons.iter().filter_map(|linear| {
+            let factor = multiple(coefficients, &linear.coefficients)?;
+            // sum = factor * (condition - quantity), and the condition is at least 0.
+            let is_bound = (factor > 0) == is_low;
+            is_bound.then(|| linear.quantity.maximum().checked_neg()?.checked_mul(factor)).flatten()
+        });
+        let bounds = by_intervals.into_iter().chain(by_conditions);
+        if is_low { bounds.max() } else { bounds.min() }
+    }
+
     /// Bounds for the value of an expression. A bound that overflows is infinite.
     fn range(&self, linear: &Linear<Int>) -> Interval {
-        let sum = |start: Int, is_low: bool| {
-            linear.coefficients.iter().try_fold(start, |sum, (variable, coefficient)| {
-                let interval = self.of(*variable);
-                let bound = if (*coefficient > 0) == is_low { interval.low } else { interval.high };
-                sum.checked_add(bound?.checked_mul(*coefficient)?)
-            })
-        };
-        Interval { low: sum(linear.quantity.minimum(), true), high: sum(linear.quantity.maximum(), false) }
+        let Linear { coefficients, quantity } = linear;
+        let low = self.extreme(coefficients, true).and_then(|sum| sum.checked_add(quantity.minimum()));
+        let high = self.extreme(coefficients, false).and_then(|sum| sum.checked_add(quantity.maximum()));
+        Interval { low, high }
     }
+}
+
+/// Factor by which the second list must be multiplied to yield the first one, if it is an integer other than 0.
+fn multiple(first: &[(NumericId, Int)], second: &[(NumericId, Int)]) -> Option<Int> {
+    let ((_, a), (_, b)) = (first.first()?, second.first()?);
+    let factor = a.checked_div(*b).filter(|factor| *factor != 0 && first.len() == second.len())?;
+    let is_multiple = |((v, a), (w, b)): (&(NumericId, Int), &(NumericId, Int))| {
+        v == w && b.checked_mul(factor) == Some(*a)
+    };
+    first.iter().zip(second).all(is_multiple).then_some(factor)
 }
 
 /// Intervals that contain all values of each number in reachable states, by interval analysis with widening and

@@ -33,6 +33,7 @@ use task::number::{Int, dense};
 use task::task::{Fact, OperatorId};
 
 use crate::concurrent::greedy::{Links, Mode};
+use crate::concurrent::random::Random;
 use crate::concurrent::rule::Proposition;
 use crate::concurrent::search::Sequence;
 use crate::concurrent::successors::{Expansion, TemporalState};
@@ -58,21 +59,6 @@ const NEIGHBOURS: usize = 12;
 const KICK: usize = 3;
 /// The states of an order may take at most 1/`MEMORY_FRACTION` of the memory limit.
 const MEMORY_FRACTION: usize = 8;
-
-/// Deterministic pseudo-random numbers (`SplitMix64`).
-struct Random(u64);
-
-impl Random {
-    /// Number from 0 to `limit - 1`; `limit` is at least 1.
-    fn below(&mut self, limit: usize) -> usize {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        let limit = limit.max(1) as u64;
-        usize::try_from((z ^ (z >> 31)).checked_rem(limit).unwrap_or(0)).unwrap_or(0)
-    }
-}
 
 /// A happening, and whether it takes place at the time of the previous one.
 type Link = (OperatorId, bool);
@@ -128,12 +114,13 @@ pub(super) struct GoalOrders<'a, T: TimeNumber = Int> {
 }
 
 impl<'a, T: TimeNumber> GoalOrders<'a, T> {
-    /// Returns `None` if there is no goal fact to order, a goal is unreachable, the metric does not depend on
-    /// the makespan, the states would take too much memory, or a limit is reached.
+    /// Returns `None` if there is nothing to order, or the metric does not depend on the makespan. `seed`
+    /// selects the perturbations.
     pub(super) fn new(
         concurrent: &'a TemporalTask<T>,
         expansion: &'a Expansion<'a, T>,
         relaxed: &'a TemporalRelaxation,
+        seed: u64,
         limits: &Limits,
     ) -> Option<Self> {
         let task = &concurrent.task;
@@ -172,7 +159,7 @@ impl<'a, T: TimeNumber> GoalOrders<'a, T> {
             failures: 0,
             improved_at: 0,
             decoded: 0,
-            random: Random(0),
+            random: Random(seed),
             figures: SearchStatistics::default(),
         })
     }

@@ -11,6 +11,8 @@
 //!
 //! \[1\] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010.
 //! \[2\] N. Lipovetzky, H. Geffner: Best-first width search, AAAI 2017.
+//! \[3\] R. Valenzano, N. Sturtevant, J. Schaeffer, F. Xie: A comparison of knowledge-based GBFS
+//! enhancements and knowledge-free exploration, ICAPS 2014.
 
 use std::collections::hash_map::Entry;
 use std::hash::{Hash, Hasher};
@@ -25,6 +27,7 @@ use task::number::{Int, dense, words};
 use task::task::OperatorId;
 
 use crate::concurrent::makespan_heuristic::Estimate;
+use crate::concurrent::random::Random;
 use crate::concurrent::relaxed_plan_heuristic::{HeuristicValue, RelaxedPlanHeuristic};
 use crate::concurrent::search::Sequence;
 use crate::concurrent::store::{PackedNode, Packing};
@@ -35,6 +38,10 @@ use crate::concurrent::time_number::TimeNumber;
 /// Approximate memory use of a node without its packed state: the node, its queue entries and its
 /// hash.
 const OVERHEAD: usize = size_of::<Node>() + 80;
+
+/// Noise raises a heuristic value by up to `(NOISE_LEVELS - 1) / NOISE_DIVISOR` of it.
+const NOISE_LEVELS: usize = 8;
+const NOISE_DIVISOR: u64 = 20;
 
 /// A happening, and whether it takes place at the same time as the previous one.
 type Link = (OperatorId, bool);
@@ -131,6 +138,8 @@ pub(super) struct Greedy<'a, T: TimeNumber = Int> {
     /// Facts that held in some visited state, by the number of unsatisfied goals in that state.
     known: Vec<FxHashSet<(u32, u32)>>,
     pub(super) mode: Mode,
+    /// Source of noise in the heuristic values; `None` for no noise.
+    noise: Option<Random>,
     nearest: u64,
     pub(super) figures: SearchStatistics,
 }
@@ -170,9 +179,17 @@ impl<'a, T: TimeNumber> Greedy<'a, T> {
             open,
             known: Vec::new(),
             mode,
+            noise: None,
             nearest: u64::MAX,
             figures: SearchStatistics::default(),
         }
+    }
+
+    /// Makes the search different from an earlier one: heuristic values grow by random amounts \[3\].
+    /// No noise if `seed` is 0.
+    #[must_use]
+    pub(super) fn with_noise(self, seed: u64) -> Self {
+        Self { noise: (seed > 0).then_some(Random(seed)), ..self }
     }
 
     /// Searches for a plan that is better than the incumbent, within `work` evaluations.
@@ -270,7 +287,9 @@ impl<'a, T: TimeNumber> Greedy<'a, T> {
         self.figures = self.figures.plus(counts);
         let is_preferred = |operator: &u32| preferred.binary_search(&OperatorId(*operator)).is_ok();
         let preferred: Vec<u32> = candidates.iter().copied().filter(is_preferred).collect();
-        let values = [false, false, is_old].map(|is_old| (is_old, left, value.1));
+        let noise = self.noise.as_mut().map_or(0, |noise| noise.below(NOISE_LEVELS) as u64);
+        let key = left.saturating_add(left.saturating_mul(noise) / NOISE_DIVISOR);
+        let values = [false, false, is_old].map(|is_old| (is_old, key, value.1));
         self.open.push(id, values, &candidates, &preferred);
         let packed = self.packing.pack(situation);
         self.bytes = self.bytes.saturating_add(OVERHEAD).saturating_add(packed.bytes());

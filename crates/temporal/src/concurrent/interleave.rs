@@ -65,15 +65,27 @@ pub(super) fn interleave_searches<T: TimeNumber>(
     let mut greedy = vec![begin(Mode::Overlapping)];
     greedy.extend(differs.then(|| begin(Mode::Sequential)));
     let (mut share, turn) = (1_usize, limits.thresholds().turn.max(1));
-    let mut orders = GoalOrders::new(concurrent, &expansion, &relaxed, limits);
+    let mut orders = GoalOrders::new(concurrent, &expansion, &relaxed, 0, limits);
     // A first plan comes before the sequential task is ground.
     improve(&mut orders, &mut exact, turn, limits, record);
     let whole = SequentialTask::new(concurrent, limits);
     let mut seeker = whole.as_ref().map(|task| SequentialPlanner::new(task, limits));
+    let mut seed = 0;
     for round in 0..rounds {
         let is_over = exact.is_over() || is_best(concurrent, &exact, root);
-        if is_over || limits.reached() || (greedy.is_empty() && orders.is_none() && exact.is_full(limits)) {
+        let is_stuck = greedy.is_empty() && orders.is_none() && exact.is_full(limits);
+        if is_over || limits.reached() || is_stuck && !limits.has_deadline() {
             break;
+        }
+        if is_stuck {
+            // No search has memory left. Until the deadline, the searches that need little begin
+            // again, in other orders and with the incumbent as upper bound.
+            let restarts = &mut record.statistics.restarts;
+            *restarts = restarts.saturating_add(1);
+            seed = *restarts as u64;
+            greedy.push(begin(Mode::Overlapping).with_noise(seed));
+            orders = GoalOrders::new(concurrent, &expansion, &relaxed, seed, limits);
+            share = 1;
         }
         seeker = seeker.filter(|_| exact.incumbent.is_none() || round < WHOLE);
         if let Some(seeker) = &mut seeker {
@@ -95,7 +107,7 @@ pub(super) fn interleave_searches<T: TimeNumber>(
                 let mode = greedy.remove(position).mode;
                 // Pruned successors may have reached a state earlier, so a complete restart may
                 // find better plans.
-                greedy.extend((mode == Mode::Overlapping).then(|| begin(Mode::Sooner)));
+                greedy.extend((mode == Mode::Overlapping).then(|| begin(Mode::Sooner).with_noise(seed)));
                 let restarts = &mut record.statistics.restarts;
                 *restarts = restarts.saturating_add(1);
             }

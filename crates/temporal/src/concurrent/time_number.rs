@@ -274,10 +274,10 @@ impl TimeNumber for Wide {
     const FACTOR_BITS: u64 = 500;
 
     fn from_big(number: &BigInt) -> Option<Self> {
-        let given = number.to_signed_bytes_le();
+        let significant = number.to_signed_bytes_le();
         let extension = if number.sign() == num_bigint::Sign::Minus { u8::MAX } else { 0 };
         let mut bytes = [extension; BYTES];
-        bytes.get_mut(..given.len())?.copy_from_slice(&given);
+        bytes.get_mut(..significant.len())?.copy_from_slice(&significant);
         Some(Self::from_bytes(&bytes))
     }
 
@@ -341,31 +341,31 @@ impl TimeNumber for Wide {
     /// The number of bytes, then the least significant bytes without those that only extend the
     /// sign.
     fn write(self, bytes: &mut Vec<u8>) {
-        let all = self.to_bytes();
+        let buffer = self.to_bytes();
         let extension = if self.is_negative() { u8::MAX } else { 0 };
-        let redundant = all.iter().rev().take_while(|byte| **byte == extension).count();
+        let redundant = buffer.iter().rev().take_while(|byte| **byte == extension).count();
         let mut length = BYTES.saturating_sub(redundant);
         // The sign is that of the last byte.
         let is_ambiguous = length
             .checked_sub(1)
-            .map_or(self.is_negative(), |last| (all[last] & 0x80 > 0) != self.is_negative());
+            .map_or(self.is_negative(), |last| (buffer[last] & 0x80 > 0) != self.is_negative());
         length = length.saturating_add(is_ambiguous.into());
         bytes.push(u8::try_from(length).unwrap_or(u8::MAX));
-        bytes.extend(&all[..length]);
+        bytes.extend(&buffer[..length]);
     }
 
     fn read(bytes: &mut impl Iterator<Item = u8>) -> Self {
         let length = bytes.next().map_or(0, usize::from);
-        let mut all = [0; BYTES];
+        let mut buffer = [0; BYTES];
         let mut last = 0;
-        for (byte, read) in all.iter_mut().zip(bytes.take(length)) {
+        for (byte, read) in buffer.iter_mut().zip(bytes.take(length)) {
             *byte = read;
             last = read;
         }
         if last & 0x80 > 0 {
-            all[length..].fill(u8::MAX);
+            buffer[length..].fill(u8::MAX);
         }
-        Self::from_bytes(&all)
+        Self::from_bytes(&buffer)
     }
 }
 
