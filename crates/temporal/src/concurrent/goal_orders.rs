@@ -114,8 +114,9 @@ pub(super) struct GoalOrders<'a, T: TimeNumber = Int> {
 }
 
 impl<'a, T: TimeNumber> GoalOrders<'a, T> {
-    /// Returns `None` if there is nothing to order, or the metric does not depend on the makespan. `seed`
-    /// selects the perturbations.
+    /// Returns `None` if there is no goal fact to order, a goal is unreachable, the metric does not depend on
+    /// the makespan, the states would take too much memory, or a limit is reached. `seed` selects the
+    /// perturbations.
     pub(super) fn new(
         concurrent: &'a TemporalTask<T>,
         expansion: &'a Expansion<'a, T>,
