@@ -167,7 +167,9 @@ const BRIGHT: &str = r#"{"event":"measured","attribute":"ambient_light","value":
 #[ignore = "measures; only a release build is of interest"]
 fn lines_a_second() {
     let pristine = control("ugv");
-    for rate in &RATES {
+    // For profiles of one row.
+    let subject = std::env::var("METAPLAN_RATE").unwrap_or_default();
+    for rate in RATES.iter().filter(|rate| rate.subject.contains(&subject)) {
         for (place, with_journal) in [false, true].into_iter().enumerate() {
             let rate_measured = rate.measure(&pristine, with_journal);
             println!("{}, journal: {with_journal}: {rate_measured} a second of one core", rate.subject);

@@ -229,7 +229,8 @@ def departure() -> None:
             poll(lambda: count() == 1, "the reader is there", START)
             # Discovery of the other endpoints may still be in progress.
             time.sleep(1.0)
-        poll(lambda: count() == 0, "the reader is gone", 1.0)
+        # The lease lasts for more than 20 s.
+        poll(lambda: count() == 0, "the reader is gone", 8.0)
 
 
 ROLES = {
