@@ -19,7 +19,7 @@ use crate::concurrent::{metric, parse, rational, written};
 
 const DRIVE: i64 = 5;
 
-const DOMAIN: &str = "(define (domain jobs) (:requirements :typing :durative-actions :numeric-fluents)
+pub(crate) const DOMAIN: &str = "(define (domain jobs) (:requirements :typing :durative-actions :numeric-fluents)
   (:types robot place) (:predicates (at ?r - robot ?p - place) (free ?r - robot) (done ?p - place))
   (:functions (length ?p - place))
   (:durative-action drive :parameters (?r - robot ?a ?b - place) :duration (= ?duration 5)
@@ -29,7 +29,7 @@ const DOMAIN: &str = "(define (domain jobs) (:requirements :typing :durative-act
     :condition (and (at start (free ?r)) (over all (at ?r ?p)))
     :effect (and (at start (not (free ?r))) (at end (free ?r)) (at end (done ?p)))))";
 
-fn problem(robots: usize, lengths: &[i64]) -> String {
+pub(crate) fn problem(robots: usize, lengths: &[i64]) -> String {
     let mut text = String::from("(define (problem p) (:domain jobs) (:objects");
     for robot in 0..robots {
         let _ = write!(text, " r{robot}");

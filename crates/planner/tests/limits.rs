@@ -12,6 +12,8 @@ use num_rational::BigRational;
 use pddl::ast::{Domain, Problem};
 use pddl::{Source, read};
 
+use crate::concurrent_jobs;
+
 fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
     let (domain, problem, _) =
         read(&Source::new("domain", domain), &Source::new("problem", problem)).expect("PDDL");
@@ -142,29 +144,10 @@ fn expansion_of_a_temporal_node_with_many_successors_ends_at_the_limit() {
     assert!(passed < Duration::from_millis(1_300), "{passed:?}");
 }
 
-/// Robots that can do any of the jobs, for which no search can prove a makespan with little memory.
+/// Three robots that can do any of nine jobs, for which no search can prove a makespan with little memory.
 fn jobs() -> (Domain, Problem) {
-    let domain = "(define (domain jobs) (:requirements :typing :durative-actions :numeric-fluents)
-      (:types robot place) (:predicates (at ?r - robot ?p - place) (free ?r - robot) (done ?p - place))
-      (:functions (length ?p - place))
-      (:durative-action drive :parameters (?r - robot ?a ?b - place) :duration (= ?duration 5)
-        :condition (and (at start (at ?r ?a)) (at start (free ?r)))
-        :effect (and (at start (not (at ?r ?a))) (at start (not (free ?r))) (at end (at ?r ?b)) (at end (free ?r))))
-      (:durative-action work :parameters (?r - robot ?p - place) :duration (= ?duration (length ?p))
-        :condition (and (at start (free ?r)) (over all (at ?r ?p)))
-        :effect (and (at start (not (free ?r))) (at end (free ?r)) (at end (done ?p)))))";
-    let (mut places, mut init, mut goal) = (String::new(), String::new(), String::new());
-    for place in 0..9 {
-        let _ = write!(places, " p{place}");
-        let _ = write!(init, " (= (length p{place}) {})", 10 + place * place % 7);
-        let _ = write!(goal, " (done p{place})");
-    }
-    let problem = format!(
-        "(define (problem p) (:domain jobs) (:objects r q s - robot base{places} - place)
-          (:init (at r base) (at q base) (at s base) (free r) (free q) (free s) (= (length base) 1){init})
-          (:goal (and{goal})) (:metric minimize (total-time)))"
-    );
-    parse(domain, &problem)
+    let lengths: Vec<i64> = (0..9).map(|place| 10 + place * place % 7).collect();
+    parse(concurrent_jobs::DOMAIN, &concurrent_jobs::problem(3, &lengths))
 }
 
 #[test]

@@ -30,7 +30,7 @@ mod lines;
 struct Arguments {
     #[command(subcommand)]
     command: Command,
-    /// How much is said on standard error: `error`, `warn`, `info`, `debug` or `off`.
+    /// Set the least severity of messages on standard error: `error`, `warn`, `info`, `debug` or `off`.
     #[arg(long, global = true, default_value = "warn", value_name = "LEVEL")]
     log: LevelFilter,
 }
@@ -65,7 +65,7 @@ enum Command {
     Send {
         #[command(flatten)]
         server: Server,
-        /// What message ids begin with; who sends the same lines with the same word again stores them once.
+        /// Set the prefix of message ids. Lines that are sent again with the same prefix are stored once.
         #[arg(long, value_name = "WORD")]
         session: Option<String>,
     },
@@ -80,7 +80,7 @@ enum Command {
         #[arg(long, value_name = "DECISION")]
         after: Option<u64>,
     },
-    /// Who has which partitions, how far they are, and how busy workers are.
+    /// Print the owner and the progress of each partition, and the load of the workers.
     Status {
         #[command(flatten)]
         server: Server,
@@ -90,7 +90,7 @@ enum Command {
     },
 }
 
-/// Which missions, and how much at a time.
+/// Options of the missions and of the amount of work at a time.
 #[derive(Debug, Args)]
 struct Work {
     /// A directory of manifests; a robot is enrolled with the name of one, without `.toml`.
@@ -105,12 +105,12 @@ struct Work {
     /// Save a robot after so many decisions.
     #[arg(long, value_name = "N", default_value_t = Settings::default().save_every as u64, value_parser = clap::value_parser!(u64).range(1..))]
     save_every: u64,
-    /// Where Prometheus reads metrics, as `HOST:PORT`.
+    /// Serve metrics for Prometheus at this address, as `HOST:PORT`.
     #[arg(long, value_name = "ADDRESS")]
     metrics: Option<SocketAddr>,
 }
 
-/// Where the servers are.
+/// Options of the connection to the servers.
 #[derive(Debug, Args)]
 struct Server {
     /// One or several by comma: `nats://HOST:PORT`, or `tls://HOST:PORT`.

@@ -13,8 +13,8 @@ use super::explain::{undefined_text, unmet};
 use super::interference::Footprint;
 use super::options::Options;
 use super::record::Record;
-use super::running::{Running, conditions, effects, is_durative};
-use super::step::{Instance, Step, unresolved};
+use super::running::{Running, is_durative};
+use super::step::{Instance, Step, conditions, effects, unresolved};
 use super::verdict::{Violation, ViolationKind};
 use super::world::{State, World};
 

@@ -11,7 +11,8 @@ use crate::ast::{
 
 use super::effects::{Change, Changes, Ground};
 use super::evaluate::Bindings;
-use super::running::{Running, conditions, effects};
+use super::running::Running;
+use super::step::{conditions, effects};
 use super::world::{Symbol, World};
 
 /// Atom or numeric function that a happening reads. Quantified arguments match several objects.

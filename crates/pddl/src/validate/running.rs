@@ -1,8 +1,8 @@
-//! Running actions, and the conditions and effects of an action at a given time.
+//! Running actions.
 
 use num_rational::BigRational;
 
-use crate::ast::{ActionBody, Condition, ConditionTime, Effect, EffectTime};
+use crate::ast::ActionBody;
 
 use super::step::{Instance, Step};
 
@@ -20,35 +20,4 @@ pub(super) struct Running<'e, 'p> {
 
 pub(super) fn is_durative(instance: &Instance<'_>) -> bool {
     matches!(instance.action.body, ActionBody::Durative { .. })
-}
-
-/// Conditions that an action has at the given time. A precondition counts as a condition at start.
-pub(super) fn conditions<'p>(
-    instance: &Instance<'p>,
-    when: ConditionTime,
-) -> impl Iterator<Item = &'p Condition> + use<'p> {
-    let (single, several) = match &instance.action.body {
-        ActionBody::Instantaneous { precondition, .. } => {
-            ((when == ConditionTime::AtStart).then_some(precondition), [].as_slice())
-        }
-        ActionBody::Durative { conditions, .. } => (None, conditions.as_slice()),
-    };
-    let several = several.iter().filter(move |(time, _)| *time == when).map(|(_, condition)| condition);
-    single.into_iter().chain(several)
-}
-
-/// Effects that an action has at the given time. Effects of an instantaneous action count as effects at
-/// start.
-pub(super) fn effects<'p>(
-    instance: &Instance<'p>,
-    when: EffectTime,
-) -> impl Iterator<Item = &'p Effect> + use<'p> {
-    let (single, several) = match &instance.action.body {
-        ActionBody::Instantaneous { effect, .. } => {
-            ((when == EffectTime::AtStart).then_some(effect), [].as_slice())
-        }
-        ActionBody::Durative { effects, .. } => (None, effects.as_slice()),
-    };
-    let several = several.iter().filter(move |(time, _)| *time == when).map(|(_, effect)| effect);
-    single.into_iter().chain(several)
 }

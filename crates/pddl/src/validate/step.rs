@@ -1,13 +1,12 @@
-//! Resolves the steps of a plan to instances of action schemas.
+//! Resolves the steps of a plan to instances of action schemas, with their conditions and effects at a given time.
 
 use diagnostics::nearest;
 use num_rational::BigRational;
 
-use crate::ast::{Action, Condition, ConditionTime, Name, Term};
+use crate::ast::{Action, ActionBody, Condition, ConditionTime, Effect, EffectTime, Name, Term};
 
 use super::evaluate::{Binding, Bindings};
 use super::plan::PlanStep;
-use super::running::conditions;
 use super::verdict::{Violation, ViolationKind};
 use super::world::{Symbol, World};
 
@@ -112,6 +111,37 @@ fn instantiate<'p>(world: &World<'p>, action: &'p Action, objects: &[Symbol]) ->
     let bindings = Bindings(action.parameters.iter().zip(objects).map(bind).collect());
     // `zip` would hide a wrong number of objects, which `fits` excludes.
     fits.then_some(Instance { action, bindings })
+}
+
+/// Conditions that an action has at the given time. A precondition counts as a condition at start.
+pub(super) fn conditions<'p>(
+    instance: &Instance<'p>,
+    when: ConditionTime,
+) -> impl Iterator<Item = &'p Condition> + use<'p> {
+    let (single, several) = match &instance.action.body {
+        ActionBody::Instantaneous { precondition, .. } => {
+            ((when == ConditionTime::AtStart).then_some(precondition), [].as_slice())
+        }
+        ActionBody::Durative { conditions, .. } => (None, conditions.as_slice()),
+    };
+    let several = several.iter().filter(move |(time, _)| *time == when).map(|(_, condition)| condition);
+    single.into_iter().chain(several)
+}
+
+/// Effects that an action has at the given time. Effects of an instantaneous action count as effects at
+/// start.
+pub(super) fn effects<'p>(
+    instance: &Instance<'p>,
+    when: EffectTime,
+) -> impl Iterator<Item = &'p Effect> + use<'p> {
+    let (single, several) = match &instance.action.body {
+        ActionBody::Instantaneous { effect, .. } => {
+            ((when == EffectTime::AtStart).then_some(effect), [].as_slice())
+        }
+        ActionBody::Durative { effects, .. } => (None, effects.as_slice()),
+    };
+    let several = several.iter().filter(move |(time, _)| *time == when).map(|(_, effect)| effect);
+    single.into_iter().chain(several)
 }
 
 /// Returns the violation of a step that is not an instance of any schema, with the reason.

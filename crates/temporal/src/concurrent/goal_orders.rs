@@ -482,7 +482,7 @@ fn act<T: TimeNumber>(
 
 /// Best-first search for a state that reaches the goal, or whose relaxed plan has fewer happenings than
 /// `size`. Returns the state and the happenings that lead to it. Returns `None` after [`MAX_ESCAPE`]
-/// evaluations, or if no state is left.
+/// evaluations, or if the open list is empty.
 fn escape<T: TimeNumber>(
     relaxation: &mut TimedRelaxation<'_, T>,
     context: (&TemporalTask<T>, &Expansion<'_, T>),

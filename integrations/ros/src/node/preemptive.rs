@@ -205,10 +205,10 @@ fn empty_heartbeat(Match { reader, writer }: Match, reply_to: SocketAddrV4) -> V
     // One locator of the kind UDPv4: kind, port, address. The library reads a byte after the list,
     // also if the flag for a second list is not set; the padding is that byte.
     let port = u32::from(reply_to.port()).to_le_bytes();
-    let one = 1_u32.to_le_bytes();
-    append(kind::INFO_REPLY, &[&one, &one, &port, &[0; 12], &reply_to.ip().octets(), &[0; 4]]);
+    let number_one = 1_u32.to_le_bytes();
+    append(kind::INFO_REPLY, &[&number_one, &number_one, &port, &[0; 12], &reply_to.ip().octets(), &[0; 4]]);
     // Readers and writers, first sequence number 1, last one 0, count 1.
-    append(kind::HEARTBEAT, &[&reader[12..], &writer[12..], &[0; 4], &one, &[0; 8], &one]);
+    append(kind::HEARTBEAT, &[&reader[12..], &writer[12..], &[0; 4], &number_one, &[0; 8], &number_one]);
     message
 }
 
