@@ -265,7 +265,7 @@ impl Adaptation<'_> {
     /// forbidden.
     fn interrupt(&mut self, reason: &str, need: Need, going_on: &Outcome, answers: &mut Vec<Answer>) -> bool {
         let Some(running) = self.beliefs.running.clone() else { return false };
-        let can_go_on = self.goes_on_with(&running, going_on) || self.can_go_on(&running);
+        let can_go_on = goes_on_with(&running, going_on) || self.can_go_on(&running);
         if need != Need::Interrupted && can_go_on && (going_on.steps.is_some() || !going_on.proved) {
             return false;
         }
@@ -286,13 +286,6 @@ impl Adaptation<'_> {
                 true
             }
         }
-    }
-
-    /// Returns `true` if a plan begins with the remainder of the action under way, with its present designs. The
-    /// remainder is then executable, because the planner has simulated it.
-    fn goes_on_with(&self, running: &Running, going_on: &Outcome) -> bool {
-        let first = going_on.steps.as_ref().and_then(|steps| steps.first());
-        first.is_some_and(|first| first.configuration == running.step.configuration)
     }
 
     /// Returns `true` if all designs of an action under way are available, and its remainder is executable.
@@ -392,6 +385,13 @@ impl Adaptation<'_> {
             self.beliefs.stuck = true;
         }
     }
+}
+
+/// Returns `true` if a plan begins with the remainder of the action under way, with its present designs. The remainder
+/// is then executable, because the planner has simulated it.
+fn goes_on_with(running: &Running, going_on: &Outcome) -> bool {
+    let first = going_on.steps.as_ref().and_then(|steps| steps.first());
+    first.is_some_and(|first| first.configuration == running.step.configuration)
 }
 
 /// Returns the improvement from the metric value `metric` to the value `other`; negative if `other` is worse.
