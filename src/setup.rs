@@ -99,7 +99,7 @@ impl Setup {
     /// `directory`. Messages use `name` as the file name of the manifest.
     ///
     /// # Errors
-    /// Those of [`Setup::read`].
+    /// The errors of [`Setup::read`].
     pub fn parse(name: &str, text: &str, directory: &Path) -> Result<Self, Errors> {
         let (sections, origin) = manifest::parse(name, text, directory)?;
         Self::of(sections, origin)

@@ -10,7 +10,7 @@
 //! by a unary predicate that never changes, that the argument is in the class (a *guard*). And the
 //! initial facts comply.
 //!
-//! So clauses of an open predicate are unfolded \[1\]. A clause is dropped if its body contains its
+//! Clauses of an open predicate are therefore unfolded \[1\]. A clause is dropped if its body contains its
 //! head, or an atom whose guard implies the head. If no open atom remains, the predicate is
 //! *settled*. Each step preserves the least fixpoint in every reachable state.
 //!

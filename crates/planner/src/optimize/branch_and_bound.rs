@@ -1,8 +1,9 @@
 //! Branch and bound for metrics that depend on the state, by A\* with exact costs of paths.
 //!
 //! The portfolio for constant costs finds a first plan. Then a satisficing search for the task with lower bounds as
-//! costs runs in turns with A\*, and its plans are upper bounds. A path dominates another one if it costs no more and reaches a state that is as good: less (or more) of a
-//! number is no worse if no condition, cost or other number depends on it in the other direction.
+//! costs runs in turns with A\*, and its plans are upper bounds. A path dominates another one if it costs no more and
+//! reaches a state that is as good: less (or more) of a number is no worse if no condition, cost or other number
+//! depends on it in the other direction.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -200,6 +201,13 @@ struct Node {
     is_dominated: bool,
 }
 
+impl Node {
+    /// Returns the state and the cost of the path.
+    fn path(&self) -> (&State, Int) {
+        (&self.state, self.total)
+    }
+}
+
 /// Sort key of an open node: lower bound on the cost of plans, estimate, and node.
 type Priority = (Int, Int, Reverse<u32>);
 
@@ -314,9 +322,10 @@ impl<'a> Search<'a> {
         let id = dense(self.nodes.len());
         let hash = self.hash(&state);
         let mut front = self.table.remove(&hash).unwrap_or_default();
-        let is_dominated = front.iter().any(|id| self.dominates(&self.nodes[*id as usize], (&state, total)));
+        let path = (&state, total);
+        let is_dominated = front.iter().any(|id| self.dominates(self.nodes[*id as usize].path(), path));
         if !is_dominated {
-            let worse = front.extract_if(.., |id| self.is_worse(&self.nodes[*id as usize], (&state, total)));
+            let worse = front.extract_if(.., |id| self.dominates(path, self.nodes[*id as usize].path()));
             let worse: Vec<u32> = worse.collect();
             for id in worse {
                 self.nodes[id as usize].is_dominated = true;
@@ -379,24 +388,14 @@ impl<'a> Search<'a> {
         FxBuildHasher.hash_one((&state.values, numbers))
     }
 
-    /// Returns `true` if every continuation of a path of cost `total` to `state` is possible after the node, at no
-    /// higher cost.
-    fn dominates(&self, node: &Node, (state, total): (&State, Int)) -> bool {
-        let numbers = || node.state.numbers.iter().zip(&state.numbers).zip(&self.costs.preferences);
-        node.total <= total
-            && node.state.values == state.values
-            && numbers().all(|((first, second), preference)| {
+    /// Returns `true` if every continuation of a path of cost `other.1` to `other.0` is possible after a path of cost
+    /// `path.1` to `path.0`, at no higher cost.
+    fn dominates(&self, path: (&State, Int), other: (&State, Int)) -> bool {
+        let mut numbers = path.0.numbers.iter().zip(&other.0.numbers).zip(&self.costs.preferences);
+        path.1 <= other.1
+            && path.0.values == other.0.values
+            && numbers.all(|((first, second), preference)| {
                 first == second || preference.less && first <= second || preference.more && first >= second
-            })
-    }
-
-    /// Returns `true` if the new path dominates the node.
-    fn is_worse(&self, node: &Node, (state, total): (&State, Int)) -> bool {
-        let numbers = || node.state.numbers.iter().zip(&state.numbers).zip(&self.costs.preferences);
-        total <= node.total
-            && node.state.values == state.values
-            && numbers().all(|((first, second), preference)| {
-                first == second || preference.less && second <= first || preference.more && second >= first
             })
     }
 }
