@@ -9,8 +9,8 @@
 use std::collections::BTreeSet;
 
 use num_rational::BigRational;
-use pddl::ast::{Condition, Direction, Effect, Name, Term};
-use pddl::visit::Node;
+use pddl::ast::{Direction, Name};
+use pddl::validate::may_read;
 
 use crate::mapek::analyze::Findings;
 use crate::mapek::answer::{Answer, Command};
@@ -32,7 +32,10 @@ pub(super) fn react(
 ) {
     let running = beliefs.running.clone().filter(|action| !action.cancelling && !action.suspended);
     let Some(mut running) = running else { return };
-    let facts = changes.facts || may_read(beliefs, &running.step, &findings.lost);
+    let (domain, problem) = (beliefs.mission.domain(), beliefs.mission.problem());
+    let lost: BTreeSet<Name> = findings.lost.iter().map(|design| Name::new(design)).collect();
+    let facts =
+        changes.facts || !lost.is_empty() && may_read(domain, problem, &running.step.to_plan_step(), &lost);
     let Some(reason) = trouble(beliefs, &running, facts) else { return };
     let reconfigured = match settings.safe_reaction {
         SafeReaction::Reconfigure => other_designs(beliefs, &running),
@@ -61,37 +64,6 @@ pub(super) fn trouble(beliefs: &Beliefs, running: &Running, facts: bool) -> Opti
         return None;
     }
     beliefs.obstacle(running).map(|obstacle| format!("action {}: {obstacle}", running.action))
-}
-
-/// Returns `true` if the availability of one of `designs` may be a condition of an action, as a design of its
-/// configuration or as another argument. Never returns `false` if it is one, but may return `true` if none is.
-fn may_read(beliefs: &Beliefs, step: &PlannedStep, designs: &BTreeSet<String>) -> bool {
-    if designs.is_empty() {
-        return false;
-    }
-    let (domain, problem) = (beliefs.mission.domain(), beliefs.mission.problem());
-    if !domain.derived.is_empty() || !domain.constraints.is_empty() || !problem.constraints.is_empty() {
-        return true;
-    }
-    let designs: BTreeSet<Name> = designs.iter().map(|design| Name::new(design)).collect();
-    if step.arguments.iter().any(|argument| designs.contains(&Name::new(argument))) {
-        return true;
-    }
-    let is_design =
-        |term: &Term| matches!(term, Term::Constant(constant) if designs.contains(&constant.name));
-    let mut may_read = false;
-    let name = Name::new(&step.action);
-    for schema in domain.actions.iter().filter(|schema| schema.identifier.name == name) {
-        schema.body.walk(&mut |node| {
-            may_read |= match node {
-                Node::Condition(Condition::Exists(..) | Condition::ForAll(..))
-                | Node::Effect(Effect::ForAll(..)) => true,
-                Node::Condition(Condition::Atom(atom)) => atom.arguments.iter().any(is_design),
-                _ => false,
-            };
-        });
-    }
-    may_read
 }
 
 /// Returns the action under way with the available designs that make its remainder executable with the best metric.

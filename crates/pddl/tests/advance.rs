@@ -4,11 +4,12 @@
 //! Problems of domains with derived predicates are never reduced. The oracle is therefore the same domain
 //! with one additional derived predicate.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use metaplan_pddl::ast::{Condition, Domain, Problem};
+use metaplan_pddl::ast::{Condition, Domain, InitialElement, Name, Problem, Term};
 use metaplan_pddl::validate::{
-    Options, PlanStep, PlanText, advance, advance_each, metric_after, metric_of, validate,
+    Options, PlanStep, PlanText, advance, advance_each, may_read, metric_after, metric_of, validate,
 };
 use metaplan_pddl::{BigRational, Source, read};
 
@@ -106,6 +107,7 @@ fn a_step_changes_the_reduced_problem_as_it_changes_the_whole_one() {
                         if !is_forced {
                             assert_eq!(of_each.is_ok(), reduced.is_ok(), "{folder:?} {step:?}");
                             *(if reduced.is_ok() { &mut possible } else { &mut impossible }) += 1;
+                            check_read(step, (&domain, &problem), &objects[sequence.below(objects.len())]);
                             check_metric(step, (&domain, &problem), (&whole_domain, &whole_problem));
                             next = reduced.ok().or(next);
                         }
@@ -129,4 +131,22 @@ fn check_metric(step: &PlanStep, reduced: (&Domain, &Problem), whole: (&Domain, 
         let expected = validate(whole.0, &with_goal(whole.1), &plan, &Options::default()).metric;
         assert_eq!(metric_of(reduced.0, &with_goal(reduced.1), &plan), expected, "{step:?}");
     }
+}
+
+/// Checks that a step that may not read facts about an object is executed in the same way without these facts.
+fn check_read(step: &PlanStep, (domain, problem): (&Domain, &Problem), object: &str) {
+    let object = Name::new(object);
+    if may_read(domain, problem, step, &BTreeSet::from([object.clone()])) {
+        return;
+    }
+    let is_object = |term: &Term| matches!(term, Term::Constant(identifier) if identifier.name == object);
+    let mut without = problem.clone();
+    without.init.retain(
+        |element| !matches!(element, InitialElement::Fact(atom) if atom.arguments.iter().any(is_object)),
+    );
+    let text = |problem: &Problem| match advance(domain, problem, step, false) {
+        Ok(change) => format!("{change:?}"),
+        Err(violation) => violation.message.clone(),
+    };
+    assert_eq!(text(&without), text(problem), "{step:?} without {object}");
 }

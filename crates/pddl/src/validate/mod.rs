@@ -43,6 +43,7 @@ pub use budget::Interrupted;
 pub use course::{Course, CourseMoment, NumberBound, course};
 pub use options::Options;
 pub use plan::{PlanStep, PlanText};
+pub use relevant::may_read;
 pub use verdict::{Unmet, Verdict, Violation, ViolationKind};
 
 use advance::metric;

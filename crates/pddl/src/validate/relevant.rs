@@ -4,6 +4,8 @@
 //! over objects, an action reads only atoms about its own arguments and the constants of the domain. On a map
 //! with 100 arcs and 18 designs, for example, an action reads one value in a thousand.
 
+use std::collections::BTreeSet;
+
 use rustc_hash::FxHashSet;
 
 use crate::ast::{Action, Atom, Condition, Domain, Effect, InitialElement, Name, Problem, Term};
@@ -21,12 +23,9 @@ pub(super) fn relevant(
     steps: &[PlanStep],
     goal: Option<&Condition>,
 ) -> Option<Problem> {
-    // Axioms and constraints can read every fact.
-    let is_plain =
-        domain.derived.is_empty() && domain.constraints.is_empty() && problem.constraints.is_empty();
     let names: FxHashSet<&Name> = steps.iter().map(|step| &step.action).collect();
     let schemas = || domain.actions.iter().filter(|action| names.contains(&action.identifier.name));
-    if !is_plain || schemas().any(reads_all_objects) {
+    if reads_all_facts(domain, problem) || schemas().any(reads_all_objects) {
         return None;
     }
     let mut metric = Vec::new();
@@ -73,6 +72,28 @@ pub(super) fn relevant(
         constraints: Vec::new(),
         metric: problem.metric.clone(),
     })
+}
+
+/// Returns `true` if executing a step may read facts about one of `objects`. Never returns `false` if it reads one, but
+/// may return `true` if it reads none.
+pub fn may_read(domain: &Domain, problem: &Problem, step: &PlanStep, objects: &BTreeSet<Name>) -> bool {
+    let mentions = |action: &Action| {
+        let mut is_mentioned = false;
+        action.body.walk(&mut |node| {
+            let mut terms = node.atom().into_iter().flat_map(|atom| &atom.arguments);
+            is_mentioned |= terms.any(|term| objects.contains(name(term)));
+        });
+        is_mentioned
+    };
+    let mut schemas = domain.actions.iter().filter(|action| action.identifier.name == step.action);
+    reads_all_facts(domain, problem)
+        || step.arguments.iter().any(|argument| objects.contains(argument))
+        || schemas.any(|action| reads_all_objects(action) || mentions(action))
+}
+
+/// Returns `true` if there are axioms or constraints, which can read every fact.
+fn reads_all_facts(domain: &Domain, problem: &Problem) -> bool {
+    !domain.derived.is_empty() || !domain.constraints.is_empty() || !problem.constraints.is_empty()
 }
 
 fn name(term: &Term) -> &Name {
