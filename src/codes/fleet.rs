@@ -30,7 +30,7 @@ pub const CODES: &[[&str; 4]] = &[
         "N311",
         "NATS cannot be used.",
         "No server responds, the user is refused, JetStream is disabled, or there are fewer servers than replicas.",
-        "Start `nats-server -js`. `--replicas 3` requires a cluster of three servers.",
+        "Start `nats-server -js`. `--replicas 3` requires a cluster of three servers. `--wait` sets how long to wait for servers that are starting.",
     ],
     [
         "N312",

@@ -140,10 +140,13 @@ struct Server {
     /// Seconds after which a worker that is not heard of has lost its partitions, in a fleet that is made.
     #[arg(long, value_name = "S", default_value_t = 10, value_parser = clap::value_parser!(u64).range(2..=3600))]
     lease: u64,
+    /// Wait this many seconds for servers that are starting. [default: 60 for `worker`, 10 otherwise]
+    #[arg(long, value_name = "S", value_parser = clap::value_parser!(u64).range(..=86_400))]
+    wait: Option<u64>,
 }
 
 impl Server {
-    async fn open(&self) -> Result<Nats, Message> {
+    async fn open(&self, default_wait: u64) -> Result<Nats, Message> {
         let certificate = match self.tls_cert.as_slice() {
             [certificate, key] => Some((certificate.clone(), key.clone())),
             _ => None,
@@ -158,7 +161,8 @@ impl Server {
         };
         let lease = Duration::from_secs(self.lease);
         let (fleet, partitions, replicas) = (self.fleet.clone(), self.partitions, self.replicas);
-        Nats::open(&access, &Layout { fleet, partitions, replicas, lease }).await
+        let patience = Duration::from_secs(self.wait.unwrap_or(default_wait));
+        Nats::open(&access, &Layout { fleet, partitions, replicas, lease }, patience).await
     }
 }
 
@@ -207,7 +211,7 @@ async fn main() -> ExitCode {
 async fn run(command: Command) -> Result<(), Errors> {
     match command {
         Command::Worker { server, work, name } => {
-            let store = server.open().await.map_err(|message| vec![message])?;
+            let store = server.open(60).await.map_err(|message| vec![message])?;
             let name = name.unwrap_or_else(own_name);
             let shared = work.shared(store, name)?;
             worker::run(shared, signals()?).await;
@@ -219,12 +223,12 @@ async fn run(command: Command) -> Result<(), Errors> {
             lines::up(shared, after, signals()?).await.map_err(|message| vec![message])?;
         }
         Command::Send { server, session } => {
-            let store = server.open().await.map_err(|message| vec![message])?;
+            let store = server.open(10).await.map_err(|message| vec![message])?;
             let session = session.unwrap_or_else(|| format!("{:016x}.", fastrand::u64(..)));
             lines::send(store, &session).await.map_err(|message| vec![message])?;
         }
         Command::Follow { server, robot, after } => {
-            let store = server.open().await.map_err(|message| vec![message])?;
+            let store = server.open(10).await.map_err(|message| vec![message])?;
             let mut stop = signals()?;
             tokio::select! {
                 done = lines::follow(store, robot.as_deref(), after) => done.map_err(|message| vec![message])?,
@@ -232,7 +236,7 @@ async fn run(command: Command) -> Result<(), Errors> {
             }
         }
         Command::Status { server, format } => {
-            let store = server.open().await.map_err(|message| vec![message])?;
+            let store = server.open(10).await.map_err(|message| vec![message])?;
             let status = status(&store).await.map_err(|fault| {
                 vec![Message::error("N312", format!("the fleet cannot be read: {fault}"))]
             })?;

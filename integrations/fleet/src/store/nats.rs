@@ -7,7 +7,7 @@
 //! lag behind, too, so a caller passes the sequence number up to which a consumer has to read.
 
 use std::path::PathBuf;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use async_nats::jetstream::consumer::{AckPolicy, DeliverPolicy, pull};
 use async_nats::jetstream::context::{Context, PublishError, PublishErrorKind};
@@ -15,7 +15,7 @@ use async_nats::jetstream::kv::{self, CreateErrorKind, Operation, UpdateErrorKin
 use async_nats::jetstream::message::{PublishMessage, StreamMessage};
 use async_nats::jetstream::stream::{self, LastRawMessageErrorKind};
 use async_nats::jetstream::{self};
-use async_nats::{Client, ConnectOptions};
+use async_nats::{Client, ConnectErrorKind, ConnectOptions};
 use futures::stream::BoxStream;
 use futures::{StreamExt as _, TryStreamExt as _};
 use metaplan::message::Message as Diagnostic;
@@ -56,6 +56,9 @@ const BATCH: usize = 500;
 /// Timeout of a request to the server.
 const PATIENCE: Duration = Duration::from_secs(5);
 
+/// Pause before the servers are asked again while they start.
+const PAUSE: Duration = Duration::from_millis(500);
+
 /// Period during which a further message with the same id is discarded.
 const WINDOW: Duration = Duration::from_secs(600);
 
@@ -75,39 +78,92 @@ fn failed(error: impl std::fmt::Display) -> Fault {
     Fault::Unreachable(error.to_string())
 }
 
+enum OpenError {
+    /// A stream with this name exists and was created by another program.
+    ForeignStream(String),
+    Store(Fault),
+}
+
+impl From<Fault> for OpenError {
+    fn from(fault: Fault) -> Self {
+        Self::Store(fault)
+    }
+}
+
+/// Returns whether servers that have not finished starting can cause an error of this kind.
+fn is_transient(kind: ConnectErrorKind) -> bool {
+    match kind {
+        ConnectErrorKind::Dns
+        | ConnectErrorKind::TimedOut
+        | ConnectErrorKind::Io
+        | ConnectErrorKind::MaxReconnects => true,
+        ConnectErrorKind::ServerParse
+        | ConnectErrorKind::Authentication
+        | ConnectErrorKind::AuthorizationViolation
+        | ConnectErrorKind::Tls => false,
+    }
+}
+
+async fn options(access: &Access) -> std::io::Result<ConnectOptions> {
+    let mut options = ConnectOptions::new()
+        .name("metaplan-fleet")
+        .request_timeout(Some(PATIENCE))
+        .connection_timeout(PATIENCE);
+    if let Some(file) = &access.credentials {
+        options = options.credentials_file(file).await?;
+    }
+    if let Some((user, password)) = access.user.clone() {
+        options = options.user_and_password(user, password);
+    }
+    if let Some(file) = access.authorities.clone() {
+        options = options.add_root_certificates(file);
+    }
+    if let Some((certificate, key)) = access.certificate.clone() {
+        options = options.add_client_certificate(certificate, key);
+    }
+    Ok(options)
+}
+
 impl Nats {
     /// Connects to the servers, and creates missing streams and buckets.
     ///
+    /// Servers that are started together with this program may still refuse connections or have no
+    /// JetStream leader, so failures are retried for the duration `patience`, each with a warning.
+    ///
     /// # Errors
-    /// A file of `access` cannot be read, no server can be reached, the server has no JetStream, it
-    /// refuses access, or a stream of this name does not belong to a fleet.
-    pub async fn open(access: &Access, layout: &Layout) -> Result<Self, Diagnostic> {
+    /// A file of `access` cannot be read, the servers refuse access, or a stream of this name does
+    /// not belong to a fleet. After `patience`: no server can be reached, or it has no JetStream.
+    pub async fn open(access: &Access, layout: &Layout, patience: Duration) -> Result<Self, Diagnostic> {
         let wrong =
             |error: &dyn std::fmt::Display| Diagnostic::error("N311", format!("{}: {error}", access.url));
-        let mut options = ConnectOptions::new()
-            .name("metaplan-fleet")
-            .request_timeout(Some(PATIENCE))
-            .connection_timeout(PATIENCE);
-        if let Some(file) = &access.credentials {
-            options = options.credentials_file(file).await.map_err(|error| wrong(&error))?;
-        }
-        if let Some((user, password)) = access.user.clone() {
-            options = options.user_and_password(user, password);
-        }
-        if let Some(file) = access.authorities.clone() {
-            options = options.add_root_certificates(file);
-        }
-        if let Some((certificate, key)) = access.certificate.clone() {
-            options = options.add_client_certificate(certificate, key);
-        }
+        let options = options(access).await.map_err(|error| wrong(&error))?;
         let urls: Vec<&str> = access.url.split(',').map(str::trim).collect();
-        let client = async_nats::connect_with_options(urls, options).await.map_err(|error| wrong(&error))?;
-        let mut context = jetstream::new(client.clone());
-        context.set_timeout(PATIENCE);
-        Self::with(client, context, layout).await.map_err(|fault| wrong(&fault))
+        let deadline = Instant::now() + patience;
+        loop {
+            let failure = match async_nats::connect_with_options(urls.as_slice(), options.clone()).await {
+                Ok(client) => {
+                    let mut context = jetstream::new(client.clone());
+                    context.set_timeout(PATIENCE);
+                    match Self::with(client, context, layout).await {
+                        Ok(store) => return Ok(store),
+                        Err(OpenError::ForeignStream(name)) => {
+                            return Err(wrong(&format_args!("the stream {name} is not one of a fleet")));
+                        }
+                        Err(OpenError::Store(fault)) => wrong(&fault),
+                    }
+                }
+                Err(error) if is_transient(error.kind()) => wrong(&error),
+                Err(error) => return Err(wrong(&error)),
+            };
+            if Instant::now() + PAUSE > deadline {
+                return Err(failure);
+            }
+            tracing::warn!("the servers are not ready: {}", failure.message);
+            tokio::time::sleep(PAUSE).await;
+        }
     }
 
-    async fn with(client: Client, context: Context, layout: &Layout) -> Result<Self, Fault> {
+    async fn with(client: Client, context: Context, layout: &Layout) -> Result<Self, OpenError> {
         let config = |kind: Stream| stream::Config {
             name: stream_name(&layout.fleet, kind),
             subjects: vec![format!("{}.*.*", kind.prefix())],
@@ -124,9 +180,7 @@ impl Nats {
             let created = context.get_or_create_stream(config(kind)).await.map_err(failed)?;
             let known = created.cached_info().config.description.as_deref();
             let known = known.and_then(|text| text.strip_prefix("partitions=")?.parse().ok());
-            partitions = known.ok_or_else(|| {
-                failed(format!("the stream {} is not one of a fleet", stream_name(&layout.fleet, kind)))
-            })?;
+            partitions = known.ok_or_else(|| OpenError::ForeignStream(stream_name(&layout.fleet, kind)))?;
         }
         let mut buckets = Vec::new();
         for kind in Bucket::ALL {

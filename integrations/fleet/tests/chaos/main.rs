@@ -59,13 +59,10 @@ async fn open(cluster: &Cluster, lease: u64) -> Nats {
     let access = Access { url: cluster.url(), ..Access::default() };
     let lease = Duration::from_secs(lease);
     let layout = Layout { fleet: "fleet".to_owned(), partitions: PARTITIONS, replicas: 3, lease };
-    for _ in 0..60 {
-        match Nats::open(&access, &layout).await {
-            Ok(store) => return store,
-            Err(_) => tokio::time::sleep(Duration::from_millis(500)).await,
-        }
+    match Nats::open(&access, &layout, Duration::from_secs(60)).await {
+        Ok(store) => store,
+        Err(error) => panic!("the servers do not answer: {}: {}", error.message, cluster.logs()),
     }
-    panic!("the servers do not answer: {}", cluster.logs());
 }
 
 async fn read(store: &Nats, stream: Stream, partition: u32) -> Vec<Stored> {

@@ -188,3 +188,38 @@ def test_workers_of_both_files_work_on_them(cluster):
         process = cluster.processes.pop(worker)
         process.send_signal(signal.SIGTERM)
         assert process.wait(30) == 0, cluster.log(worker)
+
+
+def test_a_worker_waits_for_a_server_that_starts_later(tmp_path):
+    image(tmp_path)
+    own = Cluster(tmp_path)
+    address = f"127.0.0.1:{own.port('server', 4222)}"
+    try:
+        words = ["--nats", f"nats://{address}", "--missions", f"{tmp_path}/image/missions"]
+        own.start("worker", [PROGRAM, "worker", *words])
+        own.wait("a warning", lambda: "the servers are not ready" in own.log("worker"))
+        own.start("server", [NATS, "--js", "--sd", f"{tmp_path}/server", "--addr", "127.0.0.1", "--port", address.partition(":")[2]])
+
+        def is_owned():
+            words = ["status", "--nats", f"nats://{address}", "--format", "json"]
+            out = subprocess.run([PROGRAM, *words], capture_output=True, text=True, timeout=SECONDS, check=False)
+            return out.returncode == 0 and any(partition["worker"] for partition in json.loads(out.stdout)["partitions"])
+
+        own.wait("an owner of a partition", is_owned)
+    finally:
+        own.stop()
+
+
+def test_a_refused_user_is_an_error_at_once(tmp_path):
+    own = Cluster(tmp_path)
+    port = own.port("server", 4222)
+    own.start("server", [NATS, "--addr", "127.0.0.1", "--port", str(port), "--user", "robot", "--pass", "right"])
+    try:
+        url = f"nats://127.0.0.1:{port}"
+        begun = time.monotonic()
+        words = [PROGRAM, "status", "--nats", url, "--user", "robot", "--wait", "50"]
+        out = subprocess.run(words, env={**os.environ, "NATS_PASSWORD": "wrong"}, capture_output=True, text=True, timeout=SECONDS, check=False)
+        assert out.returncode == 2 and "error[N311]" in out.stderr and "authorization violation" in out.stderr, out.stderr
+        assert time.monotonic() - begun < 40
+    finally:
+        own.stop()
