@@ -2,21 +2,22 @@
 //! plans.
 //!
 //! The tuples of the program contain block numbers, so evaluation is set-at-a-time: crepe's bookkeeping
-//! costs nothing per match, and the store is never copied. `Delta` is a seed of a plan, usually a range
-//! of changed rows. `Match` is a block of partial matches with the number of plan steps that the block
-//! has passed. A block is extended by the next atom through a look-up in the persistent store, to which
-//! the program has a reference. `Head` is a block of complete matches.
+//! costs nothing per match, and the store is never copied. `Match` is a block of partial matches with
+//! the number of plan steps that the block has passed. A block is extended by the next atom through a
+//! look-up in the persistent store, to which the program has a reference. `Head` is a block of complete
+//! matches.
 //!
 //! A block has one owner: the rule that extends a block consumes it. A small block passes the following
 //! steps of its plan within one rule application, until the block is large or complete. A typical update
-//! starts plans on one or two matches each; bookkeeping for each step would then take longer than the
-//! steps.
+//! starts plans on one or two matches each, which pass all steps before the program starts; its
+//! bookkeeping would take longer than the steps.
 
 use std::cell::RefCell;
 use std::hash::{BuildHasherDefault, Hash, Hasher};
 use std::sync::Arc;
 
 use rustc_hash::FxHasher;
+use smallvec::{SmallVec, smallvec};
 
 use crate::aggregate::Function;
 use crate::fact::Arguments;
@@ -80,11 +81,36 @@ pub(crate) struct Round<'a> {
     pub retracting: bool,
     pub budget: &'a Budget,
     pub blocks: RefCell<Vec<Vec<Symbol>>>,
+    pub buffers: &'a Buffers,
     /// Matches deferred to bound memory, for later runs.
     pub deferred: RefCell<Vec<Seed>>,
 }
 
 type BlockId = u32;
+
+/// Buffers of processed blocks, which further blocks use again.
+#[derive(Debug, Default)]
+pub(crate) struct Buffers(RefCell<Vec<Vec<Symbol>>>);
+
+/// Maximum capacity of a buffer that is used again, and maximum number of such buffers.
+const BUFFER_SYMBOLS: usize = 1 << 10;
+const MAX_BUFFERS: usize = 16;
+
+impl Buffers {
+    fn take(&self, capacity: usize) -> Vec<Symbol> {
+        let mut buffer = self.0.borrow_mut().pop().unwrap_or_default();
+        buffer.reserve(capacity);
+        buffer
+    }
+
+    pub fn put(&self, mut buffer: Vec<Symbol>) {
+        let mut buffers = self.0.borrow_mut();
+        if buffer.capacity() <= BUFFER_SYMBOLS && buffers.len() < MAX_BUFFERS {
+            buffer.clear();
+            buffers.push(buffer);
+        }
+    }
+}
 
 mod program {
     //! The crepe program.
@@ -96,14 +122,14 @@ mod program {
         @input
         pub struct Reads<'a>(pub Handle<'a>);
         @input
-        pub struct Delta(pub u32, pub PlanId);
+        pub struct Start(pub PlanId, pub u32, pub BlockId);
 
         struct Match(PlanId, u32, BlockId);
 
         @output
         pub struct Head(pub PlanId, pub BlockId);
 
-        Match(plan, step, block) <- Delta(seed, plan), Reads(round), let Some((step, block)) = round.seed(seed);
+        Match(plan, step, block) <- Start(plan, step, block);
         Match(plan, next, extended) <-
             Match(plan, step, block), Reads(round), let Some((next, extended)) = round.extend(plan, step, block);
         Head(plan, block) <- Match(plan, step, block), Reads(round), (round.is_complete(plan, step));
@@ -115,11 +141,9 @@ mod program {
 #[derive(Clone, Copy)]
 pub(crate) struct Handle<'a>(&'a dyn Evaluate);
 
-/// Operations of a round that the crepe program calls. `seed` and `extend` return the next step and the
-/// number of the extended block, or `None` if no match remains, the plan is complete, or the budget is
-/// exhausted.
+/// Operations of a round that the crepe program calls. `extend` returns the next step and the number of the
+/// extended block, or `None` if no match remains, the plan is complete, or the budget is exhausted.
 trait Evaluate {
-    fn seed(&self, seed: u32) -> Option<(u32, BlockId)>;
     fn extend(&self, plan: PlanId, step: u32, block: BlockId) -> Option<(u32, BlockId)>;
     fn is_complete(&self, plan: PlanId, step: u32) -> bool;
 }
@@ -127,10 +151,6 @@ trait Evaluate {
 impl Handle<'_> {
     fn address(&self) -> *const () {
         std::ptr::from_ref(self.0).cast()
-    }
-
-    fn seed(&self, seed: u32) -> Option<(u32, BlockId)> {
-        self.0.seed(seed)
     }
 
     fn extend(&self, plan: PlanId, step: u32, block: BlockId) -> Option<(u32, BlockId)> {
@@ -160,40 +180,40 @@ impl Hash for Handle<'_> {
 /// Partial matches that are postponed to bound the memory are added to [`Round::deferred`]. If the budget is
 /// exhausted, matches are missing.
 pub(crate) fn run(round: &Round, seeds: &[Seed]) -> Vec<Matches> {
-    let seeded = Seeded { round, seeds };
-    let mut runtime = program::Crepe::new();
-    runtime.extend([program::Reads(Handle(&seeded))]);
-    runtime.extend((0..).zip(seeds).map(|(number, seed)| program::Delta(number, seed.plan)));
-    let (heads,) = runtime.run_with_hasher::<BuildHasherDefault<FxHasher>>();
-    let mut heads: Vec<(PlanId, BlockId)> = heads.into_iter().map(|head| (head.0, head.1)).collect();
+    let (mut heads, mut partial) = (Vec::new(), Vec::new());
+    for seed in seeds {
+        let first = if let Start::Matches { step, .. } = seed.start { step } else { 0 };
+        let Some((step, block)) = round.pass(seed.plan, first, round.seed(seed)) else { continue };
+        if round.is_complete(seed.plan, step) {
+            heads.push((seed.plan, block));
+        } else {
+            partial.push(program::Start(seed.plan, step, block));
+        }
+    }
+    if !partial.is_empty() {
+        let mut runtime = program::Crepe::new();
+        runtime.extend([program::Reads(Handle(round))]);
+        runtime.extend(partial);
+        let (complete,) = runtime.run_with_hasher::<BuildHasherDefault<FxHasher>>();
+        heads.extend(complete.into_iter().map(|head| (head.0, head.1)));
+    }
     // crepe's output has no defined order.
     heads.sort_unstable();
     let matches = |(plan, block)| Matches { plan, bindings: round.take(block) };
     heads.into_iter().map(matches).collect()
 }
 
-struct Seeded<'r, 'a> {
-    round: &'r Round<'a>,
-    seeds: &'r [Seed],
-}
-
-impl Evaluate for Seeded<'_, '_> {
-    fn seed(&self, seed: u32) -> Option<(u32, BlockId)> {
-        let seed = &self.seeds[seed as usize];
-        let first = if let Start::Matches { step, .. } = seed.start { step } else { 0 };
-        self.round.pass(seed.plan, first, self.round.seed(seed))
-    }
-
+impl Evaluate for Round<'_> {
     fn extend(&self, plan: PlanId, step: u32, block: BlockId) -> Option<(u32, BlockId)> {
         if self.is_complete(plan, step) {
             return None;
         }
-        let block = self.round.take(block);
-        self.round.pass(plan, step + 1, self.round.extend(plan, step, block)?)
+        let block = self.take(block);
+        self.pass(plan, step + 1, self.extend_block(plan, step, block)?)
     }
 
     fn is_complete(&self, plan: PlanId, step: u32) -> bool {
-        self.round.plans[plan as usize].steps.len() == step as usize
+        self.plans[plan as usize].steps.len() == step as usize
     }
 }
 
@@ -208,10 +228,11 @@ impl Round<'_> {
     fn pass(&self, plan: PlanId, mut step: u32, mut block: Vec<Symbol>) -> Option<(u32, BlockId)> {
         let (steps, width) = (self.plans[plan as usize].steps.len(), self.width(&self.plans[plan as usize]));
         while (step as usize) < steps && !block.is_empty() && block.len() <= SMALL_MATCHES * width {
-            block = self.extend(plan, step, block)?;
+            block = self.extend_block(plan, step, block)?;
             step += 1;
         }
         if block.is_empty() {
+            self.buffers.put(block);
             return None;
         }
         let mut blocks = self.blocks.borrow_mut();
@@ -225,13 +246,13 @@ impl Round<'_> {
 
     fn seed(&self, seed: &Seed) -> Vec<Symbol> {
         let plan = &self.plans[seed.plan as usize];
-        let empty = vec![Symbol(0); self.width(plan)];
+        let empty: SmallVec<[Symbol; 16]> = smallvec![Symbol(0); self.width(plan)];
         match &seed.start {
-            Start::Nothing => empty,
+            Start::Nothing => empty.into_vec(),
             Start::Matches { bindings, .. } => bindings.clone(),
             Start::Rows { relation, from, to } => {
                 let relation = self.store.get(*relation);
-                let mut block = Vec::with_capacity(self.width(plan) * (to - from) as usize);
+                let mut block = self.buffers.take(self.width(plan) * (to - from) as usize);
                 for &row in &self.rows[*from as usize..*to as usize] {
                     if plan.seed_is_link && relation.record(row).rule == plan.rule {
                         continue;
@@ -246,7 +267,7 @@ impl Round<'_> {
     /// Applies a step of a plan to a block, and returns the matches that pass, extended by their new
     /// bindings. A join with too many results defers the remaining matches of the block. Returns `None` if
     /// the plan has no such step, or if the budget is exhausted.
-    fn extend(&self, plan: PlanId, step: u32, block: Vec<Symbol>) -> Option<Vec<Symbol>> {
+    fn extend_block(&self, plan: PlanId, step: u32, block: Vec<Symbol>) -> Option<Vec<Symbol>> {
         let (id, number) = (plan, step);
         let plan = &self.plans[id as usize];
         let step = plan.steps.get(number as usize)?;
@@ -263,6 +284,7 @@ impl Round<'_> {
                     let start = Start::Matches { step: number, bindings: block[done..].to_vec() };
                     self.deferred.borrow_mut().push(Seed { plan: id, start });
                 }
+                self.buffers.put(block);
                 extended
             }
             Step::Contains { relation, skip, key, is_link } => {
@@ -326,7 +348,7 @@ impl Round<'_> {
     /// exhausted, returns no match, and the whole block counts as processed.
     fn join(&self, lookup: &Lookup, block: &[Symbol], width: usize, rule: u32) -> (Vec<Symbol>, usize) {
         let (relation, skip) = (lookup.relation, self.visibility(lookup.skip));
-        let mut extended = Vec::with_capacity(block.len());
+        let mut extended = self.buffers.take(block.len());
         let mut key = [Symbol(0); 32];
         for (position, bound) in block.chunks_exact(width).enumerate() {
             if extended.len() > BLOCK_MATCHES * width {
@@ -481,7 +503,11 @@ fn find(relation: &Relation, key: &[Source], bound: &[Symbol]) -> Option<Row> {
     relation.find(&arguments[..key.len()])
 }
 
-fn literals<'s>(symbols: &'s Symbols, sources: &[Source], bound: &[Symbol]) -> Option<Vec<&'s Literal>> {
+fn literals<'s>(
+    symbols: &'s Symbols,
+    sources: &[Source],
+    bound: &[Symbol],
+) -> Option<SmallVec<[&'s Literal; 4]>> {
     sources.iter().map(|&source| symbols.as_literal(resolve(source, bound))).collect()
 }
 

@@ -14,7 +14,7 @@ use smallvec::SmallVec;
 use crate::engine::{Delta, Engine};
 use crate::error::Error;
 use crate::fact::{Arguments, Fact};
-use crate::fixpoint::{Matches, PlanId, Round, Seed, Start, resolve, run};
+use crate::fixpoint::{Buffers, Matches, PlanId, Round, Seed, Start, resolve, run};
 use crate::forest::Forest;
 use crate::limits::Budget;
 use crate::network::{Network, Stratum};
@@ -95,6 +95,7 @@ pub(crate) struct Maintenance<'a> {
     /// `owl:sameAs` pairs of a class, only the pairs of a spanning tree are stored.
     joined: Forest,
     budget: Budget,
+    buffers: Buffers,
 }
 
 impl<'a> Maintenance<'a> {
@@ -103,7 +104,8 @@ impl<'a> Maintenance<'a> {
         let touched = vec![false; network.strata.len()];
         let budget = Budget::new(&engine.limits);
         let (added, doomed, pending) = (Vec::new(), Vec::new(), Vec::new());
-        Self { engine, network, added, doomed, pending, touched, joined: Forest::default(), budget }
+        let (joined, buffers) = (Forest::default(), Buffers::default());
+        Self { engine, network, added, doomed, pending, touched, joined, budget, buffers }
     }
 
     /// Derives all facts from the stated facts of an engine without derived facts.
@@ -330,7 +332,7 @@ impl<'a> Maintenance<'a> {
         plans: impl Fn(RelationId) -> Option<&'p [PlanId]>,
         retracting: bool,
     ) -> Result<(), Error> {
-        let mut starts: Vec<(PlanId, RelationId, Row)> = Vec::new();
+        let mut starts: SmallVec<[(PlanId, RelationId, Row); 16]> = SmallVec::new();
         for &(relation, row) in rows {
             let values = self.engine.store.get(relation).row(row);
             let plan_ids = plans(relation).unwrap_or(&[]).iter().copied();
@@ -340,8 +342,8 @@ impl<'a> Maintenance<'a> {
         // Starts of one plan become adjacent, and form one seed per chunk.
         starts.sort_by_key(|&(plan, ..)| plan);
         for chunk in starts.chunks(CHUNK) {
-            let rows: Vec<Row> = chunk.iter().map(|&(.., row)| row).collect();
-            let mut seeds: Vec<Seed> = Vec::new();
+            let rows: SmallVec<[Row; 16]> = chunk.iter().map(|&(.., row)| row).collect();
+            let mut seeds: SmallVec<[Seed; 8]> = SmallVec::new();
             for (position, &(plan, relation, _)) in chunk.iter().enumerate() {
                 let position = position as u32;
                 match seeds.last_mut() {
@@ -380,6 +382,7 @@ impl<'a> Maintenance<'a> {
             retracting,
             budget: &self.budget,
             blocks: RefCell::default(),
+            buffers: &self.buffers,
             deferred: RefCell::default(),
         };
         let matches = run(&round, seeds);
@@ -390,7 +393,12 @@ impl<'a> Maintenance<'a> {
             return Err(error);
         }
         for matches in matches {
-            if retracting { self.retract(&matches) } else { self.conclude(&matches) }
+            if retracting {
+                self.retract(&matches)
+            } else {
+                self.conclude(&matches)
+            }
+            self.buffers.put(matches.bindings);
         }
         Ok(deferred)
     }

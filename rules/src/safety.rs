@@ -134,10 +134,14 @@ fn context(rule: &Rule, variables: &[u16], bound: &Bound, earlier: &[Scope]) -> 
     }
 }
 
-/// Returns a flag for each variable: `true` if the body binds it. Variables local to aggregates are not
-/// bound.
+/// Returns a flag for each variable of a checked rule: `true` if the body binds it. Variables local to
+/// aggregates are not bound.
 pub(crate) fn bound_variables(rule: &Rule) -> Vec<bool> {
-    binding(rule).bound.0
+    let may_be_local = |atom: &Atom| matches!(atom, Atom::Aggregate { .. } | Atom::Not { .. });
+    if rule.body.iter().any(may_be_local) {
+        return binding(rule).bound.0;
+    }
+    vec![true; rule.variable_count()]
 }
 
 /// Returns the errors of one rule: arities of atoms, forbidden head atoms and nested aggregates; if there are

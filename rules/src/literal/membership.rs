@@ -78,6 +78,10 @@ impl Literal {
     }
 
     fn is_in_known(&self, datatype_iri: &str) -> bool {
+        // The most frequent case, without a comparison of lexical forms.
+        if matches!(self, Self::Decimal(_)) && datatype_iri.strip_prefix(XSD) == Some("decimal") {
+            return true;
+        }
         match (self, datatype_iri.strip_prefix(RDF)) {
             // The zero duration lies in both derived types, although its canonical form belongs to one of
             // them.

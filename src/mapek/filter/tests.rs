@@ -336,3 +336,18 @@ fn a_restored_filter_has_the_same_state() {
     }
     assert_eq!(super::micros(Duration::from_secs(2)), 2_000_000);
 }
+
+#[test]
+fn comparison_agrees_with_that_of_rationals() {
+    let mut random = Rng::with_seed(11);
+    let number = |random: &mut Rng| {
+        // Integers below and beyond 64 bits.
+        let wide = 1_i128 << random.u32(0..100);
+        BigRational::new(random.i128(-wide..=wide).into(), random.i128(1..=wide).into())
+    };
+    for _ in 0..20_000 {
+        let left = number(&mut random);
+        let right = if random.u8(0..4) == 0 { left.clone() } else { number(&mut random) };
+        assert_eq!(super::attribute::compare(&left, &right), left.cmp(&right), "{left} {right}");
+    }
+}
