@@ -82,3 +82,84 @@ Proof.
   intro s. apply G. lia.
 Qed.
 End Closed.
+
+(* All rules of an accepted task are satisfied by its derived variables. *)
+Lemma put_heads : forall (rules : list (fact * condition)) (m : M.t Z) v,
+  M.find v (fold_left (fun m r => M.add (fst (fst r)) (snd (fst r)) m) rules m) = None ->
+  M.find v m = None /\ forall r, In r rules -> fst (fst r) <> v.
+Proof.
+  induction rules as [|r rules IH]; intros m v H; [split; [exact H|intros r []]|].
+  cbn [fold_left] in H. destruct (IH _ _ H) as [A B]. destruct (Pos.eq_dec (fst (fst r)) v) as [e|e].
+  - subst v. rewrite M.gss in A. discriminate.
+  - rewrite M.gso in A by (intro Q; apply e; symmetry; exact Q). split; [exact A|]. intros q [<-|Q]; [exact e|apply B, Q].
+Qed.
+Lemma evaluate_keeps : forall fuel rules s v, (forall r, In r rules -> fst (fst r) <> v) ->
+  var_value (evaluate_layer fuel rules s) v = var_value s v.
+Proof.
+  induction fuel; intros rules s v H; [reflexivity|]. cbn [evaluate_layer].
+  destruct (new_facts rules s) as [|f fs] eqn:E; [reflexivity|]. rewrite IHfuel by exact H.
+  unfold var_value. cbn [var_values]. rewrite get_puts. apply last_put_none. intros g G. rewrite <- E in G.
+  destruct (new_facts_in rules s g G) as [[r [I <-]] _]. apply H, I.
+Qed.
+Lemma layers_keep : forall ls s v, M.find v (snd (check_layers ls)) = None ->
+  var_value (fold_left (fun s rules => evaluate_layer (S (length rules)) rules s) ls s) v = var_value s v.
+Proof.
+  induction ls as [|rules ls IH]; intros s v H; [reflexivity|]. cbn [check_layers] in H.
+  destruct (check_layers ls) as [ok later]. apply put_heads in H. destruct H as [A B].
+  cbn [fold_left]. rewrite IH by exact A. apply evaluate_keeps, B.
+Qed.
+Lemma layers_keep_numbers : forall ls s n,
+  num_value (fold_left (fun s rules => evaluate_layer (S (length rules)) rules s) ls s) n = num_value s n.
+Proof.
+  induction ls as [|rules ls IH]; intros s n; [reflexivity|]. cbn [fold_left]. rewrite IH. apply layer_num.
+Qed.
+Lemma holds_agrees : forall c s t, (forall v, In v (condition_variables c) -> var_value s v = var_value t v) ->
+  (forall n, num_value s n = num_value t n) -> holds c s [] [] = holds c t [] [].
+Proof.
+  intros c s t V N. unfold holds, holds_facts. f_equal; [f_equal|].
+  - assert (F : forall f, In f (facts c) -> is_fact s f = is_fact t f).
+    { intros f I. unfold is_fact. rewrite V; [reflexivity|]. apply in_or_app. left. apply in_map, I. }
+    revert F. generalize (facts c). induction l as [|f l IH]; intro F; [reflexivity|]. cbn [forallb].
+    rewrite (F f) by (left; reflexivity). f_equal. apply IH. intros g G. apply F. right. exact G.
+  - assert (F : forall cl, In cl (clauses c) -> existsb (is_literal s) cl = existsb (is_literal t) cl).
+    { intros cl I. assert (L : forall l, In l cl -> is_literal s l = is_literal t l).
+      { intros l J. unfold is_literal, is_fact. rewrite V; [reflexivity|]. apply in_or_app. right.
+        apply in_map_iff. exists l. split; [reflexivity|]. apply in_concat. exists cl. split; assumption. }
+      clear I. induction cl as [|l cl IH]; [reflexivity|]. cbn [existsb].
+      rewrite (L l) by (left; reflexivity). f_equal. apply IH. intros g G. apply L. right. exact G. }
+    revert F. generalize (clauses c). induction l as [|f l IH]; intro F; [reflexivity|]. cbn [forallb].
+    rewrite (F f) by (left; reflexivity). f_equal. apply IH. intros g G. apply F. right. exact G.
+  - apply forallb_ext. intro l. f_equal. unfold value. generalize (amount (offset l) [] []).
+    induction (factors l) as [|f fs IH]; intro a; [reflexivity|]. cbn [fold_left]. rewrite N. apply IH.
+Qed.
+Theorem derive_closed : forall T, fst (check_layers (layers T)) = true -> forall s rules r,
+  In rules (layers T) -> In r rules -> holds (snd r) (derive T s) [] [] = true ->
+  is_fact (derive T s) (fst r) = true.
+Proof.
+  intros T C s0 rules r I J. unfold derive. generalize (reset_derived T s0) as s. revert C I.
+  generalize (layers T) as ls. induction ls as [|layer ls IH]; intros C I s H; [destruct I|].
+  cbn [check_layers] in C. destruct (check_layers ls) as [ok later] eqn:E. cbn [fst] in *.
+  apply andb_true_iff in C. destruct C as [Ok C]. rewrite forallb_forall in C. cbn [fold_left] in *.
+  destruct I as [<-|I]; [|apply IH; assumption].
+  pose proof (C _ J) as R. apply andb_true_iff in R. destruct R as [_ R]. rewrite forallb_forall in R.
+  assert (K : forall v, In v (fst (fst r) :: condition_variables (snd r)) -> forall s,
+    var_value (fold_left (fun s rules => evaluate_layer (S (length rules)) rules s) ls s) v = var_value s v).
+  { intros v V t. apply layers_keep. rewrite E. specialize (R _ V). cbn [snd].
+    destruct (M.find v later); [discriminate|reflexivity]. }
+  assert (One : forall r q, In r layer -> In q layer -> fst (fst r) = fst (fst q) ->
+    snd (fst r) = snd (fst q)).
+  { intros a b A B Eq. pose proof (C _ A) as CA. pose proof (C _ B) as CB.
+    apply andb_true_iff in CA. apply andb_true_iff in CB. destruct CA as [CA _]. destruct CB as [CB _].
+    clear A B. destruct a as [[va xa] ca], b as [[vb xb] cb]. cbn [fst snd] in *. subst vb.
+    destruct (M.find va _); [|discriminate]. lia. }
+  set (t := evaluate_layer (S (length layer)) layer s) in *.
+  rewrite (holds_agrees (snd r) _ t) in H;
+    [|intros v V; apply K; right; exact V|intro n; apply layers_keep_numbers].
+  unfold is_fact. rewrite K by (left; reflexivity).
+  pose proof (layer_closed layer One s) as Cl. fold t in Cl. unfold new_facts in Cl.
+  destruct (var_value t (fst (fst r)) =? snd (fst r)) eqn:F; [reflexivity|]. exfalso.
+  assert (X : In (fst r) (map fst (filter (fun r : fact * condition =>
+    negb (is_fact t (fst r)) && holds (snd r) t [] []) layer))).
+  { apply in_map, filter_In. split; [exact J|]. unfold is_fact. rewrite F, H. reflexivity. }
+  rewrite Cl in X. destruct X.
+Qed.

@@ -6,4 +6,4 @@ Extraction Language OCaml.
 Set Warnings "-extraction-opaque-accessed".
 Extraction "ocaml/checker.ml" check_certificate
   (* for the readers *) add_atom basics M.elements var_value Or Imply Exists Equal M.empty M.add Z.add Z.mul Qred
-  (* for the program that writes case trees *) instances pruned gathered instance_leaf goal_leaf conjuncts impossible base_truth implied symbolic_expression.
+  (* for the program that writes case trees *) instances pruned gathered instance_leaf goal_leaf conjuncts contradictory derived_world base_truth implied symbolic_expression.

@@ -31,6 +31,8 @@ Record names := Names {
   fact_of : atom_map (key * Z); number_of : atom_map key;
   changing : key -> bool;                          (* predicates and functions that actions change *)
   may_hold : atom_map unit;                        (* atoms of changing predicates that may hold in some state *)
+  derived_atoms : M.t (Z * atom);                  (* atoms of derived variables, with the values that mean them *)
+  derived_of : atom_map (key * Z);
   exclusive : list (list atom);                    (* groups of atoms of which at most one holds *)
   scale : positive;                                (* number = fluent times scale *)
   cost_scale : positive }.
@@ -64,7 +66,10 @@ Definition possible (k : knowledge) (v : key) : list Z :=
          (match List.find snd known with Some (x, _) => [x] | None => range (get (domain_size T) v) end).
 Definition known_fact (k : knowledge) (v : key) (x : Z) : option bool :=
   match M.find v (variables N) with
-  | None => None
+  | None => match M.find v (derived_atoms N) with
+            | Some (y, a) => match assoc a (literals k) with
+                             | Some true => if Z.eqb x y then Some true else None | _ => None end
+            | None => None end
   | Some _ => let ys := possible k v in
       if forallb (Z.eqb x) ys then Some true else if forallb (fun y => negb (Z.eqb x y)) ys then Some false else None
   end.
@@ -75,11 +80,15 @@ Definition base_truth (k : knowledge) (a : atom) : option bool :=
        | None => if excluded_by k a || negb (mem (may_hold N) a) then Some false
                  else match find_atom (fact_of N) a with Some (v, x) => known_fact k v x | None => None end
        end.
-(* A state in terms of the one before the step: atoms and fluents that have changed. *)
-Record symbolic := Symbolic { new_truths : list (atom * bool); new_values : list (atom * form) }.
-Definition unchanged := Symbolic [] [].
+(* A state in terms of the one before the step: atoms and fluents that have changed. If it is stale,
+   derived atoms may have changed, too. *)
+Record symbolic := Symbolic { new_truths : list (atom * bool); new_values : list (atom * form); stale : bool }.
+Definition unchanged := Symbolic [] [] false.
+Definition make_stale (s : symbolic) := Symbolic (new_truths s) (new_values s) true.
+Definition is_stale (s : symbolic) (p : key) : bool := stale s && is_derived P p.
 Definition symbolic_atom (k : knowledge) (s : symbolic) (a : atom) : option bool :=
-  match assoc a (new_truths s) with Some b => Some b | None => base_truth k a end.
+  if is_stale s (fst a) then None
+  else match assoc a (new_truths s) with Some b => Some b | None => base_truth k a end.
 Definition symbolic_value (s : symbolic) (f : atom) : result :=
   match assoc f (new_values s) with
   | Some g => Is g
@@ -177,7 +186,7 @@ Definition symbolic_happening (k : knowledge) (s : symbolic) (d : result) (time 
          | None => Unclear
          | Some cs => match symbolic_updates s cs (symbolic_changed_fluents cs) with
                       | None => Unclear
-                      | Some l => After (Symbolic (atoms_set_to cs true ++ atoms_set_to cs false ++ new_truths s) (l ++ new_values s)) time
+                      | Some l => After (Symbolic (atoms_set_to cs true ++ atoms_set_to cs false ++ new_truths s) (l ++ new_values s) (stale s)) time
                       end
          end
   end.
@@ -238,7 +247,7 @@ Definition symbolic_step (k : knowledge) (a : action) (env : list key) : outcome
       else if Qeq_bool d 0 then
         symbolic_happening k unchanged (Is (constant d)) d env (And (at_start a) (at_end a)) (Both (start_effect a) (end_effect a))
       else match symbolic_happening k unchanged (Is (constant d)) d env (at_start a) (start_effect a) with
-           | After s _ => symbolic_happening k s (Is (constant d)) d env (And (over_all a) (at_end a)) (end_effect a)
+           | After s _ => symbolic_happening k (make_stale s) (Is (constant d)) d env (And (over_all a) (at_end a)) (end_effect a)
            | r => r
            end
   | Some _, _ => Unclear
@@ -250,12 +259,12 @@ Fixpoint conjuncts (s : symbolic) (d : result) (env : list key) (f : formula) : 
                Knowledge (literals a ++ literals b) (bounds a ++ bounds b)
   | Atom p ts => match ground env ts with
                  | Some l => match assoc (p, l) (new_truths s) with
-                             | None => if changing N p then Knowledge [((p, l), true)] [] else Knowledge [] []
+                             | None => if changing N p && negb (is_stale s p) then Knowledge [((p, l), true)] [] else Knowledge [] []
                              | Some _ => Knowledge [] [] end
                  | None => Knowledge [] [] end
   | Not (Atom p ts) => match ground env ts with
                  | Some l => match assoc (p, l) (new_truths s) with
-                             | None => if changing N p then Knowledge [((p, l), false)] [] else Knowledge [] []
+                             | None => if changing N p && negb (is_stale s p) then Knowledge [((p, l), false)] [] else Knowledge [] []
                              | Some _ => Knowledge [] [] end
                  | None => Knowledge [] [] end
   | Compare strict a b => match symbolic_expression s d env (Minus a b) with Is g => Knowledge [] [(strict, g)] | _ => Knowledge [] [] end
@@ -270,7 +279,7 @@ Definition gathered (a : action) (env : list key) : knowledge :=
       let k := conjuncts unchanged time env (at_start a) in
       if Qeq_bool d 0 then join k (conjuncts unchanged time env (at_end a))
       else match symbolic_happening k unchanged time d env (at_start a) (start_effect a) with
-           | After s _ => join k (conjuncts s time env (And (over_all a) (at_end a)))
+           | After s _ => join k (conjuncts (make_stale s) time env (And (over_all a) (at_end a)))
            | _ => k
            end
   | _, _ => Knowledge [] []
@@ -282,6 +291,69 @@ Definition impossible (k : knowledge) : bool :=
                        | Some (v, _) => match possible k v with [] => true | _ => false end
                        | None => false end) (literals k)
   || existsb (fun b : bool * form => match snd b with ([], c) => if fst b then Qle_bool c 0 else less c 0 | _ => false end) (bounds k).
+
+(* Rules of derived predicates: an atom that holds has an instance whose body holds, and an atom
+   that does not hold has none. *)
+Fixpoint is_defined (env : list key) (f : formula) : bool :=
+  match f with
+  | Truth _ => true
+  | Atom _ ts => match ground env ts with Some _ => true | None => false end
+  | Same t u => match object_of env t, object_of env u with Some _, Some _ => true | _, _ => false end
+  | Compare _ _ _ => false
+  | Not g => is_defined env g
+  | And g h => is_defined env g && is_defined env h
+  | Forall t g => forallb (fun o => is_defined (env ++ [o]) g) (objects P t)
+  end.
+Definition is_rule_of (a : atom) (r : rule) : bool :=
+  Pos.eqb (fst a) (head r) && Nat.eqb (length (snd a)) (length (head_types r)) &&
+  forallb (fun x => existsb (Pos.eqb (fst x)) (objects P (snd x))) (combine (snd a) (head_types r)).
+Definition contradicts_rules (k : knowledge) : bool :=
+  existsb (fun l : atom * bool =>
+    let '(a, holds) := l in
+    is_derived P (fst a) &&
+    let rules := filter (is_rule_of a) (concat (strata P)) in
+    let body_truth r := symbolic_truth k unchanged Undefined (snd a) (body r) in
+    if holds then forallb (fun r => match body_truth r with Some false => true | _ => false end) rules
+    else existsb (fun r => match body_truth r with Some true => is_defined (snd a) (body r) | _ => false end) rules)
+    (literals k).
+Definition contradictory (k : knowledge) : bool := impossible k || contradicts_rules k.
+(* [next] accepts the knowledge of every way in which a formula is true (false, if [b] is). *)
+Fixpoint expand (f : formula) (b : bool) (env : list key) (next : knowledge -> bool) (k : knowledge) : bool :=
+  match f with
+  | Truth c => if Bool.eqb b c then next k else true
+  | Atom p ts =>
+      match ground env ts with
+      | None => true
+      | Some l => match base_truth k (p, l) with
+                  | Some c => if Bool.eqb b c then next k else true
+                  | None => next (Knowledge (((p, l), b) :: literals k) (bounds k)) end
+      end
+  | Same t u => match object_of env t, object_of env u with
+                | Some x, Some y => if Bool.eqb b (Pos.eqb x y) then next k else true | _, _ => true end
+  | Compare _ _ _ => next (if b then join k (conjuncts unchanged Undefined env f) else k)
+  | Not g => expand g (negb b) env next k
+  | And g h => if b then expand g true env (expand h true env next) k
+               else expand g false env next k && expand h false env next k
+  | Forall t g => if b then fold_right (fun o next => expand g true (env ++ [o]) next) next (objects P t) k
+                  else forallb (fun o => expand g false (env ++ [o]) next k) (objects P t)
+  end.
+(* Every occurrence of a predicate, with its polarity, is allowed. *)
+Fixpoint occurrences_ok (allowed : key -> bool -> bool) (b : bool) (f : formula) : bool :=
+  match f with
+  | Atom p _ => allowed p b
+  | Not g => occurrences_ok allowed (negb b) g
+  | And g h => occurrences_ok allowed b g && occurrences_ok allowed b h
+  | Forall _ g => occurrences_ok allowed b g
+  | _ => true
+  end.
+Definition is_head (p : key) (rules : list rule) : bool := existsb (fun r => Pos.eqb p (head r)) rules.
+Definition is_allowed (rules : list rule) (later : list (list rule)) (p : key) (b : bool) : bool :=
+  negb (existsb (is_head p) later) && (b || negb (is_head p rules)).
+Fixpoint is_stratified (strata : list (list rule)) : bool :=
+  match strata with
+  | [] => true
+  | rules :: later => forallb (fun r => occurrences_ok (is_allowed rules later) true (body r)) rules && is_stratified later
+  end.
 
 (* Comparisons of the task as forms times the scale. *)
 Definition scaled := Zpos (scale N) # 1.
@@ -384,7 +456,7 @@ Fixpoint known_effects_on (v : key) (k : knowledge) (cs : list (list literal * l
   end.
 (* Splits on atoms until a check succeeds. *)
 Fixpoint split_on (atoms : list atom) (check : knowledge -> bool) (k : knowledge) : bool :=
-  check k || impossible k ||
+  check k || contradictory k ||
   match atoms with
   | [] => false
   | a :: r => split_on r check (Knowledge ((a, true) :: literals k) (bounds k)) &&
@@ -412,7 +484,7 @@ Definition projected_ok (k : knowledge) (a : action) (env : list key) (o : optio
   | None, Some touched, Some numbers =>
       forallb (fun l : atom * bool => negb (snd l) || mem (may_hold N) (fst l)) touched &&
       forallb (fun g => match projected (fun a => in_group a g) false k env (start_effect a) with
-                        | Some cs => stays_exclusive k (Symbolic (truths_of cs) []) g | None => false end) (exclusive N) &&
+                        | Some cs => stays_exclusive k (Symbolic (truths_of cs) [] false) g | None => false end) (exclusive N) &&
       match o with
       | Some (o, ch) => admitted_choice o ch && known_condition k (precondition o) (slot_sizes o) ch
                         && distinct (map fst (number_effects o))
@@ -423,7 +495,7 @@ Definition projected_ok (k : knowledge) (a : action) (env : list key) (o : optio
       match symbolic_updates unchanged numbers (symbolic_changed_fluents numbers) with
       | None => false
       | Some l =>
-          let s := Symbolic [] l in
+          let s := Symbolic [] l false in
           forallb (number_ok s o)
             (match o with Some (o, _) => map fst (number_effects o) | None => [] end
              ++ flat_map (fun l => match find_atom (number_of N) (fst l) with Some n => [n] | None => [] end) l) &&
@@ -445,7 +517,7 @@ Definition leaf_ok (k : knowledge) (a : action) (env : list key) (o : option (op
 Fixpoint tree_ok (leaf : knowledge -> option (nat * choice) -> bool) (k : knowledge) (t : case_tree) : bool :=
   match t with
   | Decided o => leaf k o
-  | Impossible => impossible k
+  | Impossible => contradictory k
   | SplitAtom a t u => tree_ok leaf (Knowledge ((a, true) :: literals k) (bounds k)) t &&
                        tree_ok leaf (Knowledge ((a, false) :: literals k) (bounds k)) u
   | SplitForm f t u => tree_ok leaf (Knowledge (literals k) ((false, f) :: bounds k)) t &&
@@ -484,11 +556,38 @@ Fixpoint effect_heads (e : effect) : list key :=
   end.
 Variables (case : nat -> list key -> case_tree) (goal_case : case_tree).
 Definition action_ok (i : nat) (a : action) : bool :=
-  forallb (changing N) (effect_heads (start_effect a) ++ effect_heads (end_effect a)) &&
+  forallb (fun p => changing N p && negb (is_derived P p)) (effect_heads (start_effect a) ++ effect_heads (end_effect a)) &&
   forallb (fun env => tree_ok (instance_leaf a env) (gathered a env) (case i env)) (instances (pruned a) (parameters a) []).
 Definition all_entries {X} (m : atom_map X) : list (atom * X) := flat_map snd (PositiveMap.elements m).
 Definition same_atom (r : option atom) (a : atom) : bool := match r with Some b => atom_eqb b a | None => false end.
+(* Every derived atom that a rule yields may hold, and its derived variable follows by a rule of the
+   task. *)
+Definition ground_rules : M.t (list (Z * condition)) :=
+  fold_right (fun r m => M.add (fst (fst r)) ((snd (fst r), snd r) :: match M.find (fst (fst r)) m with Some l => l | None => [] end) m)
+    (M.empty _) (concat (layers T)).
+Definition rule_leaf (rules : M.t (list (Z * condition))) (a : atom) (k : knowledge) : bool :=
+  impossible k || mem (may_hold N) a &&
+  match find_atom (derived_of N) a with
+  | None => true
+  | Some (v, x) => match M.find v rules with
+                   | Some l => existsb (fun r => Z.eqb (fst r) x && known_condition k (snd r) [] []) l | None => false end
+  end.
+Definition rule_ok (rules : M.t (list (Z * condition))) (i : atom * formula) : bool :=
+  match find_atom (derived_of N) (fst i), mem (may_hold N) (fst i) with
+  | None, true => true
+  | _, _ => expand (snd i) true (snd (fst i)) (rule_leaf rules (fst i)) (Knowledge [] [])
+  end.
+Definition rules_ok : bool :=
+  is_stratified (strata P) && fst (check_layers (layers T)) &&
+  forallb (forallb (fun r => changing N (head r))) (strata P) &&
+  forallb (fun vxa => let '(v, (x, a)) := vxa in is_derived P (fst a) &&
+    match find_atom (derived_of N) a with Some (u, y) => Pos.eqb u v && Z.eqb y x | None => false end)
+    (M.elements (derived_atoms N)) &&
+  forallb (forallb (fun a : atom => negb (is_derived P (fst a)))) (exclusive N) &&
+  forallb (fun vl => forallb (fun xa : Z * atom => negb (is_derived P (fst (snd xa)))) (snd vl)) (M.elements (variables N)) &&
+  forallb (fun rules => forallb (rule_ok ground_rules) (rule_instances P rules)) (strata P).
 Definition faithful : bool :=
+  rules_ok &&
   forallb (fun e => negb (changing N (fst (fst e))) || mem (may_hold N) (fst e)) (all_entries (initial_atoms P)) &&
   forallb (fun vl => let '(v, vals) := vl in is_basic T v &&
      forallb (fun xa => let '(x, a) := xa in Bool.eqb (holds_in (initial P) a) (Z.eqb (var_value (init T) v) x) &&

@@ -1,6 +1,6 @@
 (* Every plan of the PDDL problem is simulated by a plan of the ground task that costs no more. *)
 From Coq Require Import ZArith QArith List Bool FMapPositive Lia Lqa Setoid.
-From Proved Require Import Task Check Proof Sound Lifted Faithful Symbolic.
+From Proved Require Import Task Check Proof Sound Derived Lifted Faithful Symbolic Axioms.
 Import ListNotations.
 Open Scope Q_scope.
 
@@ -8,7 +8,9 @@ Section Simulation.
 Variables (P : problem) (T : task) (N : names) (case : nat -> list key -> case_tree) (goal_case : case_tree).
 Hypothesis task_ok : check_task T = true.
 Hypothesis ok : faithful P T N case goal_case = true.
+Notation Describes := (DescribesIn P).
 
+(* A world with its derived atoms, or with some of them, and a state *)
 Record Rel (w : world) (s : state) : Prop := {
   r_var : forall v vals x a, M.find v (variables N) = Some vals -> In (x, a) vals ->
     holds_in w a = Z.eqb (var_value s v) x;
@@ -19,7 +21,22 @@ Record Rel (w : world) (s : state) : Prop := {
   r_may : forall a, changing N (fst a) = true -> holds_in w a = true -> mem (may_hold N) a = true;
   r_exclusive : forall g a b, In g (exclusive N) -> In a g -> In b g -> holds_in w a = true ->
     holds_in w b = true -> a = b;
+  r_derived : forall v x a, M.find v (derived_atoms N) = Some (x, a) -> holds_in w a = true ->
+    is_fact (derive T s) (v, x) = true;
   r_wf : wf T s }.
+(* The same, but for derived atoms *)
+Record Base (w : world) (s : state) : Prop := {
+  b_var : forall v vals x a, M.find v (variables N) = Some vals -> In (x, a) vals ->
+    holds_in w a = Z.eqb (var_value s v) x;
+  b_num : forall n f, M.find n (fluents N) = Some f ->
+    exists q, value_in w f = Some q /\ q * scaled N == inject_Z (num_value s n);
+  b_fact : forall p os, changing N p = false -> holds_in w (p, os) = holds_in (initial P) (p, os);
+  b_value : forall f, changing N (fst f) = false -> value_in w f = value_in (initial P) f;
+  b_may : forall a, is_derived P (fst a) = false -> changing N (fst a) = true -> holds_in w a = true ->
+    mem (may_hold N) a = true;
+  b_exclusive : forall g a b, In g (exclusive N) -> In a g -> In b g -> holds_in w a = true ->
+    holds_in w b = true -> a = b;
+  b_wf : wf T s }.
 
 Lemma parts :
   (forall a, changing N (fst a) = true -> holds_in (initial P) a = true -> mem (may_hold N) a = true) /\
@@ -34,7 +51,7 @@ Lemma parts :
   tree_ok P T N (goal_leaf P T N) (conjuncts P N unchanged Undefined [] (goal_formula P)) goal_case = true /\
   (forall i a, nth_error (actions P) i = Some a -> action_ok P T N case i a = true).
 Proof.
-  unfold faithful in ok. rewrite !andb_true_iff in ok. destruct ok as [[[[[[H1 H2] H3] H4] H5] H6] _].
+  unfold faithful in ok. rewrite !andb_true_iff in ok. destruct ok as [[[[[[[_ H1] H2] H3] H4] H5] H6] _].
   rewrite forallb_forall in H1, H2, H3, H4, H6. split; [|split; [|split; [|split; [|split]]]].
   - intros a C H. simpl in H. destruct (find_atom (initial_atoms P) a) as [u|] eqn:F; [|discriminate].
     apply find_entries in F.
@@ -69,6 +86,32 @@ Proof.
     apply (G _ 0%nat _ _ Hn).
 Qed.
 
+Lemma rule_parts :
+  is_stratified (strata P) = true /\ fst (check_layers (layers T)) = true /\
+  (forall p, is_derived P p = true -> changing N p = true) /\
+  (forall v x a, M.find v (derived_atoms N) = Some (x, a) -> is_derived P (fst a) = true /\
+     find_atom (derived_of N) a = Some (v, x)) /\
+  (forall g a, In g (exclusive N) -> In a g -> is_derived P (fst a) = false) /\
+  (forall v vals x a, M.find v (variables N) = Some vals -> In (x, a) vals -> is_derived P (fst a) = false) /\
+  (forall rules i, In rules (strata P) -> In i (rule_instances P rules) ->
+     rule_ok P T N (ground_rules T) i = true).
+Proof.
+  unfold faithful in ok. rewrite !andb_true_iff in ok. destruct ok as [[[[[[[H _] _] _] _] _] _] _].
+  unfold rules_ok in H. rewrite !andb_true_iff in H. destruct H as [[[[[[H1 H2] H3] H4] H5] H6] H7].
+  rewrite forallb_forall in H3, H4, H5, H6, H7. repeat (split; [assumption|]).
+  split; [|split; [|split; [|split]]].
+  - intros p D. unfold is_derived in D. apply existsb_exists in D. destruct D as [rules [I D]].
+    apply existsb_exists in D. destruct D as [r [J D]]. apply Pos.eqb_eq in D. subst p.
+    specialize (H3 _ I). rewrite forallb_forall in H3. apply H3, J.
+  - intros v x a F. apply M.elements_correct in F. specialize (H4 _ F). cbn beta iota in H4.
+    apply andb_true_iff in H4. destruct H4 as [D H4]. split; [exact D|].
+    destruct (find_atom (derived_of N) a) as [[u y]|]; [|discriminate]. apply andb_true_iff in H4.
+    destruct H4 as [E1 E2]. apply Pos.eqb_eq in E1. apply Z.eqb_eq in E2. subst. reflexivity.
+  - intros g a G I. specialize (H5 _ G). rewrite forallb_forall in H5. apply negb_true_iff, H5, I.
+  - intros v vals x a F I. apply M.elements_correct in F. specialize (H6 _ F). cbn [snd] in H6.
+    rewrite forallb_forall in H6. specialize (H6 _ I). cbn [snd] in H6. apply negb_true_iff, H6.
+  - intros rules i I J. specialize (H7 _ I). rewrite forallb_forall in H7. apply H7, J.
+Qed.
 Lemma exclusive_at_first : forall g a b, In g (exclusive N) -> In a g -> In b g ->
   holds_in (initial P) a = true -> holds_in (initial P) b = true -> a = b.
 Proof.
@@ -131,16 +174,18 @@ Proof.
       apply excluded_by_ok in E2.
       rewrite (r_var _ _ R _ _ _ _ F I), E1 in E2. discriminate.
 Qed.
-Lemma known_fact_ok : forall v x b, known_fact T N k v x = Some b ->
-  (exists vals, M.find v (variables N) = Some vals) /\ Z.eqb (var_value s v) x = b.
+Lemma known_fact_ok : forall v x b, known_fact T N k v x = Some b -> is_fact ds (v, x) = b.
 Proof.
-  intros v x b H. unfold known_fact in H. destruct (M.find v (variables N)) as [vals|] eqn:F; [|discriminate].
-  split; [exists vals; reflexivity|].
-  pose proof (possible_ok _ _ F) as I. cbv zeta in H. destruct (forallb (Z.eqb x) (possible T N k v)) eqn:A.
-  - injection H as <-. rewrite forallb_forall in A. specialize (A _ I). rewrite Z.eqb_sym. exact A.
-  - destruct (forallb (fun y => negb (Z.eqb x y)) (possible T N k v)) eqn:B; [|discriminate].
-    injection H as <-. rewrite forallb_forall in B. specialize (B _ I).
-    apply negb_true_iff in B. rewrite Z.eqb_sym. exact B.
+  intros v x b H. unfold known_fact in H. destruct (M.find v (variables N)) as [vals|] eqn:F.
+  - pose proof (possible_ok _ _ F) as I. unfold is_fact. cbn [fst snd]. rewrite (d_val _ _ F).
+    cbv zeta in H. destruct (forallb (Z.eqb x) (possible T N k v)) eqn:A.
+    + injection H as <-. rewrite forallb_forall in A. specialize (A _ I). rewrite Z.eqb_sym. exact A.
+    + destruct (forallb (fun y => negb (Z.eqb x y)) (possible T N k v)) eqn:B; [|discriminate].
+      injection H as <-. rewrite forallb_forall in B. specialize (B _ I).
+      apply negb_true_iff in B. rewrite Z.eqb_sym. exact B.
+  - destruct (M.find v (derived_atoms N)) as [[y a]|] eqn:D; [|discriminate].
+    destruct (assoc a (literals k)) as [[]|] eqn:A; try discriminate. destruct (Z.eqb_spec x y); [|discriminate].
+    injection H as <-. subst y. apply (r_derived _ _ R _ _ _ D). apply assoc_In in A. apply (proj1 K), A.
 Qed.
 Lemma base_truth_ok : forall a b, base_truth P T N k a = Some b -> holds_in w a = b.
 Proof.
@@ -151,9 +196,9 @@ Proof.
   destruct (excluded_by N k a) eqn:Ex; cbn [orb] in H; [injection H as <-; apply excluded_by_ok, Ex|].
   destruct (mem (may_hold N) a) eqn:M; cbn [negb] in H.
   - destruct (find_atom (fact_of N) a) as [[v x]|] eqn:F; [|discriminate]. apply known_fact_ok in H.
-    destruct H as [_ H].
     destruct parts as [_ [_ [A _]]]. destruct (A _ _ _ F) as [vals [F1 F2]].
-    rewrite (r_var _ _ R _ _ _ _ F1 F2). exact H.
+    rewrite (r_var _ _ R _ _ _ _ F1 F2). unfold is_fact in H. cbn [fst snd] in H. rewrite (d_val _ _ F1) in H.
+    exact H.
   - injection H as <-. destruct (holds_in w a) eqn:E2; [|reflexivity]. rewrite (r_may _ _ R a C E2) in M.
     discriminate.
 Qed.
@@ -178,6 +223,42 @@ Proof.
     pose proof (proj2 K _ _ I) as B.
     destruct f as [[|] c]; [|discriminate].
     destruct st; rewrite ev_empty in B; [apply Qle_bool_iff in H|apply less_spec in H]; lra.
+Qed.
+(* In a world with all of its derived atoms *)
+Variable below : world.
+Hypothesis complete : w = derived_world P below.
+Lemma defined_ok : forall f env, is_defined P env f = true -> truth P w None env f <> None.
+Proof.
+  induction f; intros env H; cbn [is_defined truth] in *; try discriminate.
+  - destruct (ground env ts); discriminate.
+  - destruct (object_of env t); [|discriminate]. destruct (object_of env u); discriminate.
+  - specialize (IHf _ H). destruct (truth P w None env f); [discriminate|congruence].
+  - apply andb_true_iff in H. destruct H as [H1 H2]. specialize (IHf1 _ H1). specialize (IHf2 _ H2).
+    destruct (truth P w None env f1) as [[]|], (truth P w None env f2) as [[]|]; simpl; congruence.
+  - induction (objects P type) as [|o os IH]; [discriminate|]. cbn [forallb fold_right] in *.
+    apply andb_true_iff in H. destruct H as [H1 H2]. specialize (IHf _ H1). specialize (IH H2).
+    destruct (truth P w None (env ++ [o]) f) as [[]|],
+      (fold_right (fun o r => and_kleene (truth P w None (env ++ [o]) f) r) (Some true) os) as [[]|];
+      simpl; congruence.
+Qed.
+Lemma contradictory_ok : forall k, Knows w k -> contradictory P T N k = true -> False.
+Proof.
+  intros k K H. unfold contradictory in H. apply orb_true_iff in H. destruct H as [H|H];
+    [eapply impossible_ok; eassumption|].
+  unfold contradicts_rules in H. apply existsb_exists in H. destruct H as [[a holds] [I H]].
+  apply andb_true_iff in H. destruct H as [D H]. cbv zeta in H. pose proof (proj1 K _ _ I) as A.
+  destruct rule_parts as [St _].
+  pose proof (symbolic_truth_ok P T N w k (base_truth_ok k K) static_value K w unchanged None Undefined
+    (describes_itself P w) eq_refl) as S. destruct holds.
+  - rewrite complete in A. destruct (rule_origin P below St a D A) as [r [Ir [Ru Tr]]]. rewrite <- complete in Tr.
+    rewrite forallb_forall in H. specialize (H r (proj2 (filter_In _ _ _) (conj Ir Ru))).
+    destruct (symbolic_truth P T N k unchanged Undefined (snd a) (body r)) as [[]|] eqn:E; try discriminate.
+    apply (S _ _ _ E). exact Tr.
+  - apply existsb_exists in H. destruct H as [r [J H]]. apply filter_In in J. destruct J as [Ir Ru].
+    destruct (symbolic_truth P T N k unchanged Undefined (snd a) (body r)) as [[]|] eqn:E; try discriminate.
+    apply S in E. apply defined_ok in H. assert (Tr : truth P w None (snd a) (body r) = Some true)
+      by (destruct (truth P w None (snd a) (body r)) as [[]|]; simpl in *; congruence).
+    rewrite complete in Tr. apply (rule_closed P below St a r Ir Ru) in Tr. rewrite <- complete in Tr. congruence.
 Qed.
 
 (* Operators *)
@@ -218,8 +299,7 @@ Lemma known_literal_ok : forall l b, known_literal T N k l = Some b -> is_litera
 Proof.
   intros [[v x] t] b H. unfold known_literal in H. cbn [fst snd] in H.
   destruct (known_fact T N k v x) as [c|] eqn:F; [|discriminate]. injection H as <-.
-  apply (known_fact_ok k K) in F. destruct F as [[vals F] E]. unfold is_literal, is_fact. cbn [fst snd].
-  rewrite (d_val _ _ F), E. reflexivity.
+  apply (known_fact_ok k K) in F. exact (f_equal (fun b => Bool.eqb b t) F).
 Qed.
 Lemma known_condition_ok : forall c szs ch, known_condition T N k c szs ch = true -> holds c ds szs ch = true.
 Proof.
@@ -228,8 +308,7 @@ Proof.
   unfold holds, holds_facts. rewrite !andb_true_iff. split; [split|]; apply forallb_forall.
   - intros [v x] I. specialize (H1 _ I). cbn [fst snd] in H1.
     destruct (known_fact T N k v x) as [[]|] eqn:F; try discriminate.
-    apply (known_fact_ok k K) in F. destruct F as [[vals F] E]. unfold is_fact. cbn [fst snd].
-    rewrite (d_val _ _ F). exact E.
+    apply (known_fact_ok k K), F.
   - intros cl I. specialize (H2 _ I). apply existsb_exists in H2. destruct H2 as [l [J E]].
     apply existsb_exists. exists l. split; [exact J|].
     destruct (known_literal T N k l) as [[]|] eqn:F; try discriminate. apply known_literal_ok, F.
@@ -348,7 +427,7 @@ Lemma simulated_ok : forall sy time o w', Describes w w' sy ->
   forallb (stays_exclusive P T N k sy) (exclusive N) = true ->
   match o with Some (o, _) => In o (operators T) | None => True end ->
   simulated P T N k sy time o = true ->
-  Rel w' (after_of o) /\ match o with Some (o, ch) => admitted o ch /\
+  Base w' (after_of o) /\ match o with Some (o, ch) => admitted o ch /\
     holds (precondition o) ds (slot_sizes o) ch = true | None => True end /\
   exists g, growth P N sy time = Some g /\ inject_Z (step_cost o) <= g * (Zpos (cost_scale N) # 1).
 Proof.
@@ -376,7 +455,9 @@ Proof.
     - rewrite Pre. reflexivity. }
   split; [|split].
   - split.
-    + intros v vals x a F I. rewrite (d_fact _ _ _ D).
+    + intros v vals x a F I. destruct rule_parts as [_ [_ [_ [_ [_ [Nd _]]]]]].
+      assert (St : is_stale P sy (fst a) = false) by (unfold is_stale; rewrite (Nd _ _ _ _ F I); apply andb_false_r).
+      rewrite (d_fact _ _ _ _ D a St).
       assert (Q : variable_ok T N k sy made v = true \/ (last_put made v (var_value s v) = var_value s v /\
         assoc a (new_truths sy) = None)).
       { destruct (in_dec Pos.eq_dec v (map fst made ++ flat_map (fun l =>
@@ -397,11 +478,13 @@ Proof.
         rewrite <- Q.
         destruct (assoc a (new_truths sy)); [reflexivity|]. apply (r_var _ _ R _ _ _ _ F I).
       * rewrite Q1, Q2. apply (r_var _ _ R _ _ _ _ F I).
-    + apply (numbers_ok sy); [exact (d_value _ _ _ D)| |exact H2].
+    + apply (numbers_ok sy); [exact (d_value _ _ _ _ D)| |exact H2].
       destruct o as [[o ch]|]; [apply Pre|exact Logic.I].
     + intros p os C. rewrite Sf by exact C. apply (r_fact _ _ R), C.
     + intros f C. rewrite Sv by exact C. apply (r_value _ _ R), C.
-    + intros a C Ha. rewrite (d_fact _ _ _ D) in Ha.
+    + intros a Da C Ha.
+      assert (St : is_stale P sy (fst a) = false) by (unfold is_stale; rewrite Da; apply andb_false_r).
+      rewrite (d_fact _ _ _ _ D a St) in Ha.
       destruct (assoc a (new_truths sy)) as [b|] eqn:A; [|apply (r_may _ _ R); assumption].
       subst b. rewrite forallb_forall in May. specialize (May _ (assoc_In _ _ _ _ A)). cbn [fst] in May.
       rewrite A in May. exact May.
@@ -414,7 +497,10 @@ Proof.
         apply orb_true_iff in Excl. destruct Excl as [Eq|F]; [apply atom_eqb_eq, Eq|]. exfalso.
         destruct (symbolic_atom P T N k sy y) as [[]|] eqn:Sy; try discriminate.
         apply (symbolic_atom_ok P T N w k (base_truth_ok k K) w' sy y false D) in Sy. congruence. }
-      pose proof (d_fact _ _ _ D a) as Da. pose proof (d_fact _ _ _ D b) as Db.
+      destruct rule_parts as [_ [_ [_ [_ [Nd _]]]]].
+      assert (St : forall x, In x g -> is_stale P sy (fst x) = false)
+        by (intros x X; unfold is_stale; rewrite (Nd _ _ G X); apply andb_false_r).
+      pose proof (d_fact _ _ _ _ D a (St _ A)) as Da. pose proof (d_fact _ _ _ _ D b (St _ B)) as Db.
       destruct (assoc a (new_truths sy)) as [ta|] eqn:Ea.
       * rewrite Da in Ha. subst ta. apply (One a b); assumption.
       * destruct (assoc b (new_truths sy)) as [tb|] eqn:Eb.
@@ -471,7 +557,7 @@ Proof.
   intros check. induction atoms as [|a atoms IH]; intros k K H; cbn [split_on] in H;
     rewrite !orb_true_iff in H;
     destruct H as [[H|H]|H]; try (exists k; split; assumption);
-      try (exfalso; eapply impossible_ok; eassumption);
+      try (exfalso; eapply contradictory_ok; eassumption);
     try discriminate.
   apply andb_true_iff in H. destruct H as [H1 H2].
   destruct (holds_in w a) eqn:E; [apply (IH _) in H1; [exact H1|]|apply (IH _) in H2; [exact H2|]];
@@ -482,10 +568,10 @@ Lemma projected_ok_ok : forall k a env o w' d, Knows w k -> step P true w a env 
   (forall f, changing N (fst f) = false -> value_in w' f = value_in w f) ->
   match o with Some (o, _) => In o (operators T) | None => True end ->
   projected_ok P T N k a env o = true ->
-  Rel w' (after_of o) /\
+  Base w' (after_of o) /\
   match o with Some (o, ch) => admitted o ch /\ holds (precondition o) ds (slot_sizes o) ch = true
     | None => True end /\
-  d = 0 /\ exists l g, describes_values w' l /\ growth P N (Symbolic [] l) 0 = Some g /\
+  d = 0 /\ exists l g, describes_values w' l /\ growth P N (Symbolic [] l false) 0 = Some g /\
     inject_Z (step_cost o) <= g * (Zpos (cost_scale N) # 1).
 Proof.
   intros k a env o w' d K St Sf Sv Io H. unfold projected_ok in H.
@@ -507,7 +593,7 @@ Proof.
   { destruct o as [[o ch]|]; [|exact Logic.I]. rewrite !andb_true_iff in H3. destruct H3 as [[A1 A2] A3].
     split; [apply admitted_ok, A1|]. split; [apply (known_condition_ok k K), A2|exact A3]. }
   split; [|split; [destruct o as [[o ch]|]; [tauto|exact Logic.I]|split; [exact Hd|]]].
-  2: { exists l. destruct (growth P N (Symbolic [] l) 0) as [g|]; [|discriminate]. exists g.
+  2: { exists l. destruct (growth P N (Symbolic [] l false) 0) as [g|]; [|discriminate]. exists g.
        split; [exact V|]. split; [reflexivity|]. apply Qle_bool_iff, H6. }
   split.
   - intros v vals x b F I.
@@ -549,11 +635,11 @@ Proof.
         destruct parts as [_ [B _]]. destruct (B _ _ F) as [_ B']. destruct (B' _ _ I) as [_ B''].
         rewrite B''.
         left. reflexivity.
-  - apply (numbers_ok (Symbolic [] l)); [exact V| |exact H5].
+  - apply (numbers_ok (Symbolic [] l false)); [exact V| |exact H5].
     destruct o as [[o ch]|]; [apply Pre|exact Logic.I].
   - intros p os C. rewrite Sf by exact C. apply (r_fact _ _ R), C.
   - intros f C. rewrite Sv by exact C. apply (r_value _ _ R), C.
-  - intros b C Hb. destruct (added P T N w k (Base k K) static_value K env _ _ w' touched Ha Po b Hb) as
+  - intros b _ C Hb. destruct (added P T N w k (Base k K) static_value K env _ _ w' touched Ha Po b Hb) as
       [Q|Q];
       [apply (r_may _ _ R); assumption|]. specialize (H1 _ Q). exact H1.
   - intros g x y G X Y Hx Hy. specialize (H2 _ G).
@@ -596,10 +682,11 @@ Proof.
   intros w1 sy d r D A env. 
   assert (L : forall p ts b l, ground env ts = Some l -> holds_in w1 (p, l) = b ->
     Knows w (match assoc (p, l) (new_truths sy) with
-             | None => if changing N p then Knowledge [((p, l), b)] [] else Knowledge [] []
+             | None => if changing N p && negb (is_stale P sy p) then Knowledge [((p, l), b)] [] else Knowledge [] []
                | Some _ => Knowledge [] [] end)).
-  { intros p ts b l G H. rewrite (d_fact _ _ _ D) in H.
+  { intros p ts b l G H. pose proof (d_fact _ _ _ _ D (p, l)) as Df. cbn [fst] in Df.
     destruct (assoc (p, l) (new_truths sy)); [apply knows_nothing|].
+    destruct (is_stale P sy p); [rewrite andb_false_r; apply knows_nothing|]. rewrite (Df eq_refl) in H.
     destruct (changing N p); [|apply knows_nothing]. split; [intros b0 c [I|[]]; congruence|intros b0 c []]. }
   induction f; intro H; try (exact knows_nothing); cbn [truth conjuncts] in *.
   - destruct (ground env ts) as [l|] eqn:G; [|exact knows_nothing]. injection H as H. eapply L; eassumption.
@@ -638,17 +725,18 @@ Proof.
   destruct (Qeq_bool c 0).
   - match type of H with option_map _ ?h = _ => destruct h as [x|] eqn:E end; [|discriminate].
     apply happening_holds in E.
-    apply (conjuncts_ok w unchanged (Some q) (Is (constant c)) (describes_itself w) R1 env
+    apply (conjuncts_ok w unchanged (Some q) (Is (constant c)) (describes_itself P w) R1 env
       (And (at_start a) (at_end a))). exact E.
   - destruct (happening P w (Some q) env (at_start a) (start_effect a)) as [w1|] eqn:E1; [|discriminate].
-    pose proof (conjuncts_ok w unchanged (Some q) (Is (constant c)) (describes_itself w) R1 env _
+    pose proof (conjuncts_ok w unchanged (Some q) (Is (constant c)) (describes_itself P w) R1 env _
       (happening_holds _ _ _ _ _ _ E1)) as K0.
     apply (symbolic_happening_ok P T N w _ (base_truth_ok _ K0) static_value K0 w unchanged (Some q)
       (Is (constant c)) c) in E1; [|apply describes_itself|exact R1].
     destruct (symbolic_happening _ _ _ _ _ _ _ _ _ _) as [| |s1 t1]; try exact K0. destruct E1 as [_ E1].
     match type of H with option_map _ ?h = _ => destruct h as [x|] eqn:E end; [|discriminate].
     apply happening_holds in E.
-    apply knows_join; [exact K0|]. apply (conjuncts_ok w1 s1 (Some q) (Is (constant c)) E1 R1 env _ E).
+    apply knows_join; [exact K0|].
+    exact (conjuncts_ok _ (make_stale s1) (Some q) (Is (constant c)) (make_stale_ok P w _ _ E1) R1 env _ E).
 Qed.
 Lemma tree_cases : forall (leaf : knowledge -> option (nat * choice) -> bool) (Q : Prop),
   (forall k o, Knows w k -> leaf k o = true -> Q) -> forall t k, Knows w k ->
@@ -656,7 +744,7 @@ Lemma tree_cases : forall (leaf : knowledge -> option (nat * choice) -> bool) (Q
 Proof.
   intros leaf Q L. induction t; intros k K H; cbn [tree_ok] in H.
   - eapply L; eassumption.
-  - exfalso. eapply impossible_ok; eassumption.
+  - exfalso. eapply contradictory_ok; eassumption.
   - apply andb_true_iff in H. destruct H as [H1 H2].
     destruct (holds_in w a) eqn:E; [eapply IHt1; [|exact H1]|eapply IHt2; [|exact H2]];
       (split; [intros b c [I|I]; [injection I as <- <-; exact E|apply K, I]|apply K]).
@@ -666,7 +754,99 @@ Proof.
     + apply Qle_bool_iff, E.
     + apply le_false in E. rewrite ev_plus_form, ev_constant. lra.
 Qed.
+Lemma expand_ok : forall f b env next k, Knows w k -> truth P w None env f = Some b ->
+  expand P T N f b env next k = true -> exists k', Knows w k' /\ next k' = true.
+Proof.
+  induction f; intros v env next k K H E; cbn [expand truth] in *.
+  - injection H as <-. rewrite eqb_reflx in E. exists k. auto.
+  - destruct (ground env ts) as [l|]; [|discriminate]. injection H as H.
+    destruct (base_truth P T N k (p, l)) as [c|] eqn:B.
+    + apply (base_truth_ok k K) in B. rewrite H in B. subst c. rewrite eqb_reflx in E. exists k. auto.
+    + exists (Knowledge (((p, l), v) :: literals k) (bounds k)). split; [|exact E].
+      split; [intros a c [I|I]; [injection I as <- <-; exact H|apply K, I]|apply K].
+  - destruct (object_of env t); [|discriminate]. destruct (object_of env u); [|discriminate].
+    injection H as <-. rewrite eqb_reflx in E. exists k. auto.
+  - destruct v; [|exists k; auto]. eexists. split; [|exact E]. apply knows_join; [exact K|].
+    apply (conjuncts_ok w unchanged None Undefined (describes_itself P w) eq_refl env (Compare strict a b)).
+    exact H.
+  - destruct (truth P w None env f) as [t|] eqn:F; [|discriminate]. injection H as <-.
+    rewrite negb_involutive in E. eapply IHf; eassumption.
+  - destruct v.
+    + assert (A : truth P w None env f1 = Some true /\ truth P w None env f2 = Some true)
+        by (destruct (truth P w None env f1) as [[]|], (truth P w None env f2) as [[]|]; simpl in H;
+            split; congruence).
+      destruct A as [A1 A2]. destruct (IHf1 _ _ _ _ K A1 E) as [k1 [K1 E1]]. eapply IHf2; eassumption.
+    + apply andb_true_iff in E. destruct E as [E1 E2].
+      assert (A : truth P w None env f1 = Some false \/ truth P w None env f2 = Some false)
+        by (destruct (truth P w None env f1) as [[]|], (truth P w None env f2) as [[]|]; simpl in H;
+            try discriminate; auto).
+      destruct A as [A|A]; [eapply IHf1|eapply IHf2]; eassumption.
+  - destruct v.
+    + revert k K H E. induction (objects P type) as [|o os IH]; intros k K H E; cbn [fold_right] in *;
+        [exists k; auto|].
+      set (x := fold_right _ _ os) in H.
+      assert (A : truth P w None (env ++ [o]) f = Some true /\ x = Some true)
+        by (destruct (truth P w None (env ++ [o]) f) as [[]|], x as [[]|]; simpl in H; split; congruence).
+      destruct A as [A1 A2]. destruct (IHf _ _ _ _ K A1 E) as [k1 [K1 E1]]. exact (IH k1 K1 A2 E1).
+    + revert H E. induction (objects P type) as [|o os IH]; intros H E; cbn [fold_right forallb] in *;
+        [discriminate|].
+      apply andb_true_iff in E. destruct E as [E1 E2]. set (x := fold_right _ _ os) in *.
+      assert (A : truth P w None (env ++ [o]) f = Some false \/ x = Some false)
+        by (destruct (truth P w None (env ++ [o]) f) as [[]|], x as [[]|]; simpl in H; try discriminate; auto).
+      destruct A as [A|A]; [eapply IHf; eassumption|exact (IH A E2)].
+Qed.
 End State.
+
+(* Derived atoms *)
+Lemma ground_rules_ok : forall v l r, M.find v (ground_rules T) = Some l -> In r l ->
+  In ((v, fst r), snd r) (concat (layers T)).
+Proof.
+  unfold ground_rules. induction (concat (layers T)) as [|q rs IH]; intros v l r F I; cbn [fold_right] in F.
+  - rewrite M.gempty in F. discriminate.
+  - destruct (Pos.eq_dec v (fst (fst q))) as [e|e].
+    + subst v. rewrite M.gss in F. injection F as <-. destruct I as [<-|I].
+      * left. destruct q as [[v x] c]. reflexivity.
+      * right. match type of I with In _ (match ?e with Some _ => _ | None => _ end) => destruct e as [l|] eqn:E end;
+          [|destruct I]. eapply IH; eassumption.
+    + rewrite M.gso in F by exact e. right. eapply IH; eassumption.
+Qed.
+Definition follows (s : state) (a : atom) : Prop := mem (may_hold N) a = true /\
+  forall v x, find_atom (derived_of N) a = Some (v, x) -> is_fact (derive T s) (v, x) = true.
+Lemma with_facts_related : forall w s F, Base w s -> (forall a, mem F a = true -> follows s a) ->
+  Rel (with_facts P w F) s.
+Proof.
+  intros w s F B H. destruct rule_parts as [_ [_ [Ch [De [Ex [Va _]]]]]].
+  split; cbn [with_facts holds_in value_in].
+  - intros v vals x a Fi I. rewrite (Va _ _ _ _ Fi I). apply (b_var _ _ B _ _ _ _ Fi I).
+  - apply B.
+  - intros p os C. cbn [fst]. destruct (is_derived P p) eqn:D; [rewrite (Ch _ D) in C; discriminate|].
+    apply (b_fact _ _ B), C.
+  - apply B.
+  - intros a C A. destruct (is_derived P (fst a)) eqn:D; [apply (H a), A|apply (b_may _ _ B); assumption].
+  - intros g a b G I J. rewrite (Ex _ _ G I), (Ex _ _ G J). apply (b_exclusive _ _ B g); assumption.
+  - intros v x a D A. destruct (De _ _ _ D) as [D1 D2]. rewrite D1 in A. apply (H a A), D2.
+  - apply B.
+Qed.
+Lemma derived_related : forall w s, Base w s -> Rel (derived_world P w) s.
+Proof.
+  intros w s B. apply with_facts_related; [exact B|]. apply derived_invariant.
+  intros F rules i H I J Fi. pose proof (with_facts_related _ _ _ B H) as R.
+  destruct rule_parts as [_ [La [_ [_ [_ [_ Ok]]]]]]. specialize (Ok _ _ I J). unfold rule_ok in Ok.
+  assert (X : find_atom (derived_of N) (fst i) = None /\ mem (may_hold N) (fst i) = true \/
+    expand P T N (snd i) true (snd (fst i)) (rule_leaf P T N (ground_rules T) (fst i)) (Knowledge [] []) = true)
+    by (destruct (find_atom (derived_of N) (fst i)), (mem (may_hold N) (fst i)); auto).
+  destruct X as [[X1 X2]|X]; [split; [exact X2|intros v x E; congruence]|].
+  unfold fires_in in Fi. destruct (truth P (with_facts P w F) None (snd (fst i)) (snd i)) as [[]|] eqn:Tr;
+    try discriminate.
+  destruct (expand_ok _ _ R _ _ _ _ _ (knows_nothing _) Tr X) as [k [K L]]. unfold rule_leaf in L.
+  apply orb_true_iff in L. destruct L as [L|L]; [exfalso; eapply impossible_ok; eassumption|].
+  apply andb_true_iff in L. destruct L as [May L]. split; [exact May|]. intros v x E. rewrite E in L.
+  destruct (M.find v (ground_rules T)) as [l|] eqn:G; [|discriminate]. apply existsb_exists in L.
+  destruct L as [r [Ir L]]. apply andb_true_iff in L. destruct L as [Ex L]. apply Z.eqb_eq in Ex. subst x.
+  apply (known_condition_ok _ _ R k K) in L. pose proof (ground_rules_ok _ _ _ G Ir) as C.
+  apply in_concat in C. destruct C as [layer [C1 C2]].
+  exact (derive_closed T La s layer ((v, fst r), snd r) C1 C2 L).
+Qed.
 
 (* Instances *)
 Lemma ground_prefix : forall e more ts l, ground e ts = Some l -> ground (e ++ more) ts = Some l.
@@ -765,6 +945,12 @@ Proof.
     apply (updates_targets _ _ _ _ _ _ U) in A. apply targets_In in A.
     destruct A as [b [q' I]]. specialize (X _ I). simpl in X. congruence.
 Qed.
+Lemma derived_statics : forall w p os, changing N p = false ->
+  holds_in (derived_world P w) (p, os) = holds_in w (p, os).
+Proof.
+  intros w p os C. cbn [derived_world with_facts holds_in fst]. destruct (is_derived P p) eqn:D; [|reflexivity].
+  destruct rule_parts as [_ [_ [X _]]]. rewrite (X _ D) in C. discriminate.
+Qed.
 Lemma step_statics : forall w a env w' d, forallb (changing N)
   (effect_heads (start_effect a) ++ effect_heads (end_effect a)) = true ->
   same_statics w -> step P true w a env = Some (w', d) ->
@@ -799,16 +985,17 @@ Proof.
     match type of H with option_map _ ?h = _ => destruct h as [y|] eqn:E end; [|discriminate].
     injection H as <- <-.
     pose proof (happening_statics _ _ _ _ _ _ C1 E1) as [K1 K2].
-    pose proof (happening_statics _ _ _ _ _ _ C2 E) as [K3 K4]. split.
-    + split; [intros p os Z; rewrite K3, K1 by exact Z; reflexivity|intros f Z; rewrite K4, K2 by exact Z;
-        reflexivity].
+    pose proof (happening_statics _ _ _ _ _ _ C2 E) as [K3 K4].
+    pose proof (derived_statics w1) as Kd. split.
+    + split; [intros p os Z; rewrite K3, Kd, K1 by exact Z; reflexivity|intros f Z; rewrite K4 by exact Z;
+        exact (K2 f Z)].
     + intros e more Q. apply happening_holds in E1. apply happening_holds in E. cbn [truth] in E.
       unfold pruned. rewrite A, (T1 _ _ _ Q E1).
-      assert (Te : truth P w1 (Some q) env (at_end a) = Some true) by
-        (destruct (truth P w1 (Some q) env (over_all a)) as [[]|],
-        (truth P w1 (Some q) env (at_end a)) as [[]|]; simpl in E; congruence).
+      assert (Te : truth P (derived_world P w1) (Some q) env (at_end a) = Some true) by
+        (destruct (truth P (derived_world P w1) (Some q) env (over_all a)) as [[]|],
+        (truth P (derived_world P w1) (Some q) env (at_end a)) as [[]|]; simpl in E; congruence).
       destruct (static_false P N e (at_end a)) eqn:F; [|reflexivity]. exfalso. rewrite Q in Te.
-      eapply static_false_ok; [|exact F|exact Te]. intros p os Z. rewrite K1 by exact Z. apply S, Z.
+      eapply static_false_ok; [|exact F|exact Te]. intros p os Z. rewrite Kd, K1 by exact Z. apply S, Z.
 Qed.
 Lemma instances_ok : forall (prune : list key -> bool) env types e more, env = e ++ more ->
   (forall e more, env = e ++ more -> prune e = false) -> length more = length types ->
@@ -877,7 +1064,7 @@ Proof.
     specialize (IHe1 _ _ eq_refl eq_refl). specialize (IHe2 _ _ eq_refl eq_refl). rewrite !ev_empty in IHe2.
     rewrite !ev_plus_form, !ev_constant, IHe1, IHe2. reflexivity.
 Qed.
-Lemma initially : Rel (initial P) (init T).
+Lemma initially : Base (initial P) (init T).
 Proof.
   destruct parts as [A1 [A2 [_ [A4 _]]]]. split; auto.
   - intros v vals x a F I. destruct (A2 _ _ F) as [_ B]. apply B, I.
@@ -886,28 +1073,32 @@ Proof.
   - apply wf_init; exact task_ok.
 Qed.
 Lemma simulation : forall steps w s spent w' spent', execute P true w spent steps = Some (w', spent') ->
-  Rel w s ->
+  Base w s ->
   exists ps c, Task.plan T s ps c /\ inject_Z c <= (measure w' + spent' - measure w - spent) *
-    (Zpos (cost_scale N) # 1) /\ exists s', Rel w' s'.
+    (Zpos (cost_scale N) # 1) /\ exists s', Base w' s'.
 Proof.
-  induction steps as [|[i env] steps IH]; intros w s spent w' spent' H R; cbn [execute] in H.
+  induction steps as [|[i env] steps IH]; intros w0 s spent w' spent' H R0; cbn [execute] in H;
+    pose proof (derived_related _ _ R0) as R; remember (derived_world P w0) as w eqn:Cw;
+    assert (Mw : measure w0 = measure w) by (subst w; reflexivity).
   - destruct (truth P w None [] (goal_formula P)) as [[]|] eqn:G; try discriminate. injection H as <- <-.
-    exists [], 0%Z.
+    rewrite Mw. exists [], 0%Z.
     split; [|split; [setoid_replace (measure w + spent - measure w - spent) with 0 by ring;
-      change (inject_Z 0) with 0; lra|exists s; exact R]].
+      change (inject_Z 0) with 0; lra|exists s; exact R0]].
     constructor. destruct parts as [_ [_ [_ [_ [B _]]]]]. 
-    eapply (tree_cases w s R (goal_leaf P T N));
+    eapply (tree_cases w s R w0 Cw (goal_leaf P T N));
       [|apply (conjuncts_ok w s R w unchanged None Undefined);
       [apply describes_itself|exact eq_refl|exact G]|exact B].
     intros k o K L. unfold goal_leaf in L.
     destruct (symbolic_truth P T N k unchanged Undefined [] (goal_formula P)) as [[]|] eqn:E.
     2: { exfalso. apply (symbolic_truth_ok P T N w k (base_truth_ok w s R k K) (static_value w s R) K w
-           unchanged None Undefined (describes_itself w) eq_refl) in E. apply E. exact G. }
+           unchanged None Undefined (describes_itself P w) eq_refl) in E. apply E. exact G. }
     all: apply (known_condition_ok w s R k K); exact L.
-  - destruct (nth_error (actions P) i) as [a|] eqn:Ni; [|discriminate].
+  - rewrite Mw. destruct (nth_error (actions P) i) as [a|] eqn:Ni; [|discriminate].
     destruct (step P true w a env) as [[w1 d]|] eqn:S; [|discriminate].
     destruct parts as [_ [_ [_ [_ [_ B]]]]]. specialize (B _ _ Ni). unfold action_ok in B.
-    apply andb_true_iff in B. destruct B as [C B].
+    apply andb_true_iff in B. destruct B as [C0 B].
+    assert (C : forallb (changing N) (effect_heads (start_effect a) ++ effect_heads (end_effect a)) = true).
+    { rewrite forallb_forall in *. intros p I. specialize (C0 _ I). apply andb_true_iff in C0. apply C0. }
     pose proof (step_statics w a env w1 d C (r_fact _ _ R) S) as [[K1 K2] Pr].
     rewrite forallb_forall in B. specialize (B env).
     assert (I : In env (instances P (pruned P N a) (parameters a) [])).
@@ -916,12 +1107,12 @@ Proof.
       apply (instances_ok _ env _ [] env); auto. apply Nat.eqb_eq, N1. }
     specialize (B I).
     assert (Go : exists o sy t, match o with Some (o, _) => In o (operators T)
-      | None => True end /\ Rel w1 (after_of s o) /\
+      | None => True end /\ Base w1 (after_of s o) /\
        match o with Some (o, ch) => admitted o ch /\
          holds (precondition o) (derive T s) (slot_sizes o) ch = true
          | None => True end /\ describes_values w w1 (new_values sy) /\ t == d /\
        exists g, growth P N sy t = Some g /\ inject_Z (step_cost o) <= g * (Zpos (cost_scale N) # 1)).
-    { eapply (tree_cases w s R); [|eapply gathered_ok; eassumption|exact B]. intros k o K L.
+    { eapply (tree_cases w s R w0 Cw); [|eapply gathered_ok; eassumption|exact B]. intros k o K L.
       assert (L' : exists o, match o with Some (o, _) => In o (operators T)
         | None => True end /\ leaf_ok P T N k a env o = true).
       { unfold instance_leaf in L. destruct o as [[j ch]|]; [|exists None; split; [exact Logic.I|exact L]].
@@ -931,14 +1122,14 @@ Proof.
       pose proof (symbolic_step_ok P T N w k (base_truth_ok w s R k K) (static_value w s R) K a env w1 d S)
         as Q.
       destruct (symbolic_step P T N k a env) as [| |sy t]; [destruct Q| |].
-      { destruct (projected_ok_ok w s R k a env o' w1 d K S K1 K2 Io L) as [R1 [Ad [Td [l [g G]]]]].
-        exists o', (Symbolic [] l), 0. rewrite Td. cbn [new_values]. destruct G as [G1 [G2 G3]].
+      { destruct (projected_ok_ok w s R w0 Cw k a env o' w1 d K S K1 K2 Io L) as [R1 [Ad [Td [l [g G]]]]].
+        exists o', (Symbolic [] l false), 0. rewrite Td. cbn [new_values]. destruct G as [G1 [G2 G3]].
         split; [exact Io|]. split; [exact R1|]. split; [exact Ad|]. split; [exact G1|]. split; [reflexivity|].
         exists g. split; [exact G2|exact G3]. }
       destruct Q as [Q D].
       rewrite !andb_true_iff in L. destruct L as [[L1 LX] L2].
       destruct (simulated_ok w s R k K sy t o' w1 D K1 K2 L1 LX Io L2) as [R1 [Ad G]]. exists o', sy, t.
-      pose proof (d_value _ _ _ D : describes_values w w1 (new_values sy)) as DV. tauto. }
+      pose proof (d_value _ _ _ _ D : describes_values w w1 (new_values sy)) as DV. tauto. }
     destruct Go as [o [sy [t [Io [R1 [Ad [D [Td [g [Gr Co]]]]]]]]]].
     destruct (IH _ _ _ _ _ H R1) as [ps [c [Pl [Le End]]]].
     assert (M : g == measure w1 - measure w + per_time P * d + per_step P).

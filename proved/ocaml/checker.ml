@@ -579,6 +579,12 @@ let rec nth_error l = function
            | [] -> None
            | _ :: l0 -> nth_error l0 n0)
 
+(** val concat : 'a1 list list -> 'a1 list **)
+
+let rec concat = function
+| [] -> []
+| x :: l0 -> app x (concat l0)
+
 (** val list_eq_dec : ('a1 -> 'a1 -> bool) -> 'a1 list -> 'a1 list -> bool **)
 
 let rec list_eq_dec eq_dec0 l l' =
@@ -1674,6 +1680,32 @@ let check_task t0 =
       (forallb (forallb (fun r -> negb (is_basic t0 (fst (fst r)))))
         t0.layers)) (forallb (fun d -> negb (is_basic t0 (fst d))) t0.derived)
 
+(** val condition_variables : condition -> key0 list **)
+
+let condition_variables c =
+  app (map fst c.facts) (map (fun l -> fst (fst l)) (concat c.clauses))
+
+(** val check_layers : (fact * condition) list list -> bool * z M.t **)
+
+let rec check_layers = function
+| [] -> (true, M.empty)
+| rules :: rest ->
+  let (ok, later) = check_layers rest in
+  let heads =
+    fold_left (fun m r -> M.add (fst (fst r)) (snd (fst r)) m) rules later
+  in
+  (((&&) ok
+     (forallb (fun r ->
+       (&&)
+         (match M.find (fst (fst r)) heads with
+          | Some x -> Z.eqb x (snd (fst r))
+          | None -> false)
+         (forallb (fun v ->
+           match M.find v later with
+           | Some _ -> false
+           | None -> true) ((fst (fst r)) :: (condition_variables (snd r)))))
+       rules)), heads)
+
 (** val check :
     task -> argument -> z option -> (state -> positive list) -> bool **)
 
@@ -1817,10 +1849,12 @@ type action = { parameters : key1 list; duration : expression option;
 
 type world = { holds_in : (atom -> bool); value_in : (atom -> q option) }
 
+type rule = { head : key1; head_types : key1 list; body : formula }
+
 type problem = { objects : (key1 -> key1 list); actions : action list;
-                 initial_atoms : unit atom_map; initial_values : q atom_map;
-                 goal_formula : formula; metric : expression; per_time : 
-                 q; per_step : q }
+                 strata : rule list list; initial_atoms : unit atom_map;
+                 initial_values : q atom_map; goal_formula : formula;
+                 metric : expression; per_time : q; per_step : q }
 
 (** val initial : problem -> world **)
 
@@ -1920,6 +1954,75 @@ let rec truth p w d env = function
 | Forall (t0, g) ->
   fold_right (fun o r -> and_kleene (truth p w d (app env (o :: [])) g) r)
     (Some true) (p.objects t0)
+
+(** val is_derived : problem -> key1 -> bool **)
+
+let is_derived p p0 =
+  existsb (existsb (fun r -> Coq_Pos.eqb p0 r.head)) p.strata
+
+(** val with_facts : problem -> world -> unit atom_map -> world **)
+
+let with_facts p w facts0 =
+  { holds_in = (fun a ->
+    if is_derived p (fst a)
+    then (match find_atom facts0 a with
+          | Some _ -> true
+          | None -> false)
+    else w.holds_in a); value_in = w.value_in }
+
+(** val tuples : problem -> key1 list -> key1 list list **)
+
+let rec tuples p = function
+| [] -> [] :: []
+| t0 :: r ->
+  flat_map (fun o -> map (fun x -> o :: x) (tuples p r)) (p.objects t0)
+
+(** val rule_instances : problem -> rule list -> (atom * formula) list **)
+
+let rule_instances p rules =
+  flat_map (fun r ->
+    map (fun env -> ((r.head, env), r.body)) (tuples p r.head_types)) rules
+
+(** val fires_in : problem -> world -> (atom * formula) -> bool **)
+
+let fires_in p w i =
+  match truth p w None (snd (fst i)) (snd i) with
+  | Some b -> b
+  | None -> false
+
+(** val new_atoms : problem -> world -> (atom * formula) list -> atom list **)
+
+let new_atoms p w instances0 =
+  map fst
+    (filter (fun i -> (&&) (negb (w.holds_in (fst i))) (fires_in p w i))
+      instances0)
+
+(** val evaluate_stratum :
+    problem -> nat -> (atom * formula) list -> world -> unit atom_map -> unit
+    atom_map **)
+
+let rec evaluate_stratum p rounds instances0 w facts0 =
+  match rounds with
+  | O -> facts0
+  | S rounds0 ->
+    (match new_atoms p (with_facts p w facts0) instances0 with
+     | [] -> facts0
+     | a :: l ->
+       evaluate_stratum p rounds0 instances0 w
+         (fold_left (fun m a0 -> add_atom a0 () m) (a :: l) facts0))
+
+(** val derived_facts : problem -> world -> unit atom_map **)
+
+let derived_facts p w =
+  fold_left (fun facts0 rules ->
+    let instances0 = rule_instances p rules in
+    evaluate_stratum p (S (length instances0)) instances0 w facts0) p.strata
+    PositiveMap.empty
+
+(** val derived_world : problem -> world -> world **)
+
+let derived_world p w =
+  with_facts p w (derived_facts p w)
 
 type change =
 | Fact of atom * bool
@@ -2063,8 +2166,8 @@ let step p allow_zero w a env =
                                 a.start_effect with
                         | Some w1 ->
                           option_map (fun w0 -> (w0, d))
-                            (happening p w1 (Some d) env (And (a.over_all,
-                              a.at_end)) a.end_effect)
+                            (happening p (derived_world p w1) (Some d) env
+                              (And (a.over_all, a.at_end)) a.end_effect)
                         | None -> None)
            | None -> None)
         | None ->
@@ -2077,14 +2180,14 @@ let step p allow_zero w a env =
 
 let rec execute p allow_zero w spent = function
 | [] ->
-  (match truth p w None [] p.goal_formula with
+  (match truth p (derived_world p w) None [] p.goal_formula with
    | Some b -> if b then Some (w, spent) else None
    | None -> None)
 | p0 :: r ->
   let (i, env) = p0 in
   (match nth_error p.actions i with
    | Some a ->
-     (match step p allow_zero w a env with
+     (match step p allow_zero (derived_world p w) a env with
       | Some p1 ->
         let (w', d) = p1 in
         execute p allow_zero w'
@@ -2146,8 +2249,9 @@ let plus_result a c b =
 type names = { variables : (z * atom) list M.t; fluents : atom M.t;
                fact_of : (key1 * z) atom_map; number_of : key1 atom_map;
                changing : (key1 -> bool); may_hold : unit atom_map;
-               exclusive : atom list list; scale : positive;
-               cost_scale : positive }
+               derived_atoms : (z * atom) M.t;
+               derived_of : (key1 * z) atom_map; exclusive : atom list list;
+               scale : positive; cost_scale : positive }
 
 type case_tree =
 | Decided of (nat * choice) option
@@ -2214,7 +2318,14 @@ let known_fact t0 n k v x =
     if forallb (Z.eqb x) ys
     then Some true
     else if forallb (fun y -> negb (Z.eqb x y)) ys then Some false else None
-  | None -> None
+  | None ->
+    (match M.find v n.derived_atoms with
+     | Some p ->
+       let (y, a) = p in
+       (match assoc a k.literals with
+        | Some b -> if b then if Z.eqb x y then Some true else None else None
+        | None -> None)
+     | None -> None)
 
 (** val base_truth :
     problem -> task -> names -> knowledge -> atom -> bool option **)
@@ -2232,20 +2343,32 @@ let base_truth p t0 n k a =
                 | None -> None))
 
 type symbolic = { new_truths : (atom * bool) list;
-                  new_values : (atom * form) list }
+                  new_values : (atom * form) list; stale : bool }
 
 (** val unchanged : symbolic **)
 
 let unchanged =
-  { new_truths = []; new_values = [] }
+  { new_truths = []; new_values = []; stale = false }
+
+(** val make_stale : symbolic -> symbolic **)
+
+let make_stale s =
+  { new_truths = s.new_truths; new_values = s.new_values; stale = true }
+
+(** val is_stale : problem -> symbolic -> key1 -> bool **)
+
+let is_stale p s p0 =
+  (&&) s.stale (is_derived p p0)
 
 (** val symbolic_atom :
     problem -> task -> names -> knowledge -> symbolic -> atom -> bool option **)
 
 let symbolic_atom p t0 n k s a =
-  match assoc a s.new_truths with
-  | Some b -> Some b
-  | None -> base_truth p t0 n k a
+  if is_stale p s (fst a)
+  then None
+  else (match assoc a s.new_truths with
+        | Some b -> Some b
+        | None -> base_truth p t0 n k a)
 
 (** val symbolic_value : problem -> names -> symbolic -> atom -> result **)
 
@@ -2519,7 +2642,8 @@ let symbolic_happening p t0 n k s d time env f e =
                     After ({ new_truths =
                       (app (atoms_set_to cs true)
                         (app (atoms_set_to cs false) s.new_truths));
-                      new_values = (app l s.new_values) }, time)
+                      new_values = (app l s.new_values); stale = s.stale },
+                      time)
                   | None -> Unclear)
                | None -> Unclear)
     else Never
@@ -2533,7 +2657,7 @@ let symbolic_happening p t0 n k s d time env f e =
                After ({ new_truths =
                  (app (atoms_set_to cs true)
                    (app (atoms_set_to cs false) s.new_truths)); new_values =
-                 (app l s.new_values) }, time)
+                 (app l s.new_values); stale = s.stale }, time)
              | None -> Unclear)
           | None -> Unclear)
 
@@ -2662,8 +2786,9 @@ let symbolic_step p t0 n k a env =
                else (match symbolic_happening p t0 n k unchanged (Is
                              (constant d)) d env a.at_start a.start_effect with
                      | After (s, _) ->
-                       symbolic_happening p t0 n k s (Is (constant d)) d env
-                         (And (a.over_all, a.at_end)) a.end_effect
+                       symbolic_happening p t0 n k (make_stale s) (Is
+                         (constant d)) d env (And (a.over_all, a.at_end))
+                         a.end_effect
                      | x -> x)
         | _ :: _ -> Unclear))
   | None ->
@@ -2681,7 +2806,7 @@ let rec conjuncts p n s d env = function
      (match assoc (p0, l) s.new_truths with
       | Some _ -> { literals = []; bounds = [] }
       | None ->
-        if n.changing p0
+        if (&&) (n.changing p0) (negb (is_stale p s p0))
         then { literals = (((p0, l), true) :: []); bounds = [] }
         else { literals = []; bounds = [] })
    | None -> { literals = []; bounds = [] })
@@ -2697,7 +2822,7 @@ let rec conjuncts p n s d env = function
         (match assoc (p0, l) s.new_truths with
          | Some _ -> { literals = []; bounds = [] }
          | None ->
-           if n.changing p0
+           if (&&) (n.changing p0) (negb (is_stale p s p0))
            then { literals = (((p0, l), false) :: []); bounds = [] }
            else { literals = []; bounds = [] })
       | None -> { literals = []; bounds = [] })
@@ -2732,7 +2857,8 @@ let gathered p t0 n a env =
                         a.at_start a.start_effect with
                 | After (s, _) ->
                   join k
-                    (conjuncts p n s time env (And (a.over_all, a.at_end)))
+                    (conjuncts p n (make_stale s) time env (And (a.over_all,
+                      a.at_end)))
                 | _ -> k)
         | _ :: _ -> { literals = []; bounds = [] })
      | _ -> { literals = []; bounds = [] })
@@ -2764,6 +2890,125 @@ let impossible p t0 n k =
          then qle_bool c { qnum = Z0; qden = XH }
          else less c { qnum = Z0; qden = XH }
        | _ :: _ -> false)) k.bounds)
+
+(** val is_defined : problem -> key1 list -> formula -> bool **)
+
+let rec is_defined p env = function
+| Truth _ -> true
+| Atom (_, ts) -> (match ground env ts with
+                   | Some _ -> true
+                   | None -> false)
+| Same (t0, u) ->
+  (match object_of env t0 with
+   | Some _ -> (match object_of env u with
+                | Some _ -> true
+                | None -> false)
+   | None -> false)
+| Compare (_, _, _) -> false
+| Not g -> is_defined p env g
+| And (g, h) -> (&&) (is_defined p env g) (is_defined p env h)
+| Forall (t0, g) ->
+  forallb (fun o -> is_defined p (app env (o :: [])) g) (p.objects t0)
+
+(** val is_rule_of : problem -> atom -> rule -> bool **)
+
+let is_rule_of p a r =
+  (&&)
+    ((&&) (Coq_Pos.eqb (fst a) r.head)
+      (Nat.eqb (length (snd a)) (length r.head_types)))
+    (forallb (fun x -> existsb (Coq_Pos.eqb (fst x)) (p.objects (snd x)))
+      (combine (snd a) r.head_types))
+
+(** val contradicts_rules : problem -> task -> names -> knowledge -> bool **)
+
+let contradicts_rules p t0 n k =
+  existsb (fun l ->
+    let (a, holds0) = l in
+    (&&) (is_derived p (fst a))
+      (let rules = filter (is_rule_of p a) (concat p.strata) in
+       let body_truth = fun r ->
+         symbolic_truth p t0 n k unchanged Undefined (snd a) r.body
+       in
+       if holds0
+       then forallb (fun r ->
+              match body_truth r with
+              | Some b -> if b then false else true
+              | None -> false) rules
+       else existsb (fun r ->
+              match body_truth r with
+              | Some b -> if b then is_defined p (snd a) r.body else false
+              | None -> false) rules)) k.literals
+
+(** val contradictory : problem -> task -> names -> knowledge -> bool **)
+
+let contradictory p t0 n k =
+  (||) (impossible p t0 n k) (contradicts_rules p t0 n k)
+
+(** val expand :
+    problem -> task -> names -> formula -> bool -> key1 list -> (knowledge ->
+    bool) -> knowledge -> bool **)
+
+let rec expand p t0 n f b env next k =
+  match f with
+  | Truth c -> if eqb b c then next k else true
+  | Atom (p0, ts) ->
+    (match ground env ts with
+     | Some l ->
+       (match base_truth p t0 n k (p0, l) with
+        | Some c -> if eqb b c then next k else true
+        | None ->
+          next { literals = (((p0, l), b) :: k.literals); bounds = k.bounds })
+     | None -> true)
+  | Same (t1, u) ->
+    (match object_of env t1 with
+     | Some x ->
+       (match object_of env u with
+        | Some y -> if eqb b (Coq_Pos.eqb x y) then next k else true
+        | None -> true)
+     | None -> true)
+  | Compare (_, _, _) ->
+    next (if b then join k (conjuncts p n unchanged Undefined env f) else k)
+  | Not g -> expand p t0 n g (negb b) env next k
+  | And (g, h) ->
+    if b
+    then expand p t0 n g true env (expand p t0 n h true env next) k
+    else (&&) (expand p t0 n g false env next k)
+           (expand p t0 n h false env next k)
+  | Forall (t1, g) ->
+    if b
+    then fold_right (fun o next0 ->
+           expand p t0 n g true (app env (o :: [])) next0) next
+           (p.objects t1) k
+    else forallb (fun o -> expand p t0 n g false (app env (o :: [])) next k)
+           (p.objects t1)
+
+(** val occurrences_ok : (key1 -> bool -> bool) -> bool -> formula -> bool **)
+
+let rec occurrences_ok allowed b = function
+| Atom (p, _) -> allowed p b
+| Not g -> occurrences_ok allowed (negb b) g
+| And (g, h) -> (&&) (occurrences_ok allowed b g) (occurrences_ok allowed b h)
+| Forall (_, g) -> occurrences_ok allowed b g
+| _ -> true
+
+(** val is_head : key1 -> rule list -> bool **)
+
+let is_head p rules =
+  existsb (fun r -> Coq_Pos.eqb p r.head) rules
+
+(** val is_allowed : rule list -> rule list list -> key1 -> bool -> bool **)
+
+let is_allowed rules later p b =
+  (&&) (negb (existsb (is_head p) later)) ((||) b (negb (is_head p rules)))
+
+(** val is_stratified : rule list list -> bool **)
+
+let rec is_stratified = function
+| [] -> true
+| rules :: later ->
+  (&&)
+    (forallb (fun r -> occurrences_ok (is_allowed rules later) true r.body)
+      rules) (is_stratified later)
 
 (** val scaled : names -> q **)
 
@@ -3008,7 +3253,7 @@ let rec known_effects_on t0 n v k = function
     -> bool **)
 
 let rec split_on p t0 n atoms check0 k =
-  (||) ((||) (check0 k) (impossible p t0 n k))
+  (||) ((||) (check0 k) (contradictory p t0 n k))
     (match atoms with
      | [] -> false
      | a :: r ->
@@ -3077,7 +3322,7 @@ let projected_ok p t0 n k a env o =
                             env a.start_effect with
                     | Some cs ->
                       stays_exclusive p t0 n k { new_truths = (truths_of cs);
-                        new_values = [] } g
+                        new_values = []; stale = false } g
                     | None -> false) n.exclusive))
                 (match o with
                  | Some p0 ->
@@ -3101,7 +3346,7 @@ let projected_ok p t0 n k a env o =
             (match symbolic_updates p n unchanged numbers0
                      (symbolic_changed_fluents numbers0) with
              | Some l ->
-               let s = { new_truths = []; new_values = l } in
+               let s = { new_truths = []; new_values = l; stale = false } in
                (&&)
                  (forallb (number_ok n s o)
                    (app
@@ -3146,7 +3391,7 @@ let leaf_ok p t0 n k a env o =
 
 let rec tree_ok p t0 n leaf k = function
 | Decided o -> leaf k o
-| Impossible -> impossible p t0 n k
+| Impossible -> contradictory p t0 n k
 | SplitAtom (a, t2, u) ->
   (&&)
     (tree_ok p t0 n leaf { literals = ((a, true) :: k.literals); bounds =
@@ -3250,7 +3495,7 @@ let rec effect_heads = function
 
 let action_ok p t0 n case i a =
   (&&)
-    (forallb n.changing
+    (forallb (fun p0 -> (&&) (n.changing p0) (negb (is_derived p p0)))
       (app (effect_heads a.start_effect) (effect_heads a.end_effect)))
     (forallb (fun env ->
       tree_ok p t0 n (instance_leaf p t0 n a env) (gathered p t0 n a env)
@@ -3260,6 +3505,73 @@ let action_ok p t0 n case i a =
 
 let all_entries m =
   flat_map snd (PositiveMap.elements m)
+
+(** val ground_rules : task -> (z * condition) list M.t **)
+
+let ground_rules t0 =
+  fold_right (fun r m ->
+    M.add (fst (fst r)) (((snd (fst r)),
+      (snd r)) :: (match M.find (fst (fst r)) m with
+                   | Some l -> l
+                   | None -> [])) m) M.empty (concat t0.layers)
+
+(** val rule_leaf :
+    problem -> task -> names -> (z * condition) list M.t -> atom -> knowledge
+    -> bool **)
+
+let rule_leaf p t0 n rules a k =
+  (||) (impossible p t0 n k)
+    ((&&) (mem0 n.may_hold a)
+      (match find_atom n.derived_of a with
+       | Some p0 ->
+         let (v, x) = p0 in
+         (match M.find v rules with
+          | Some l ->
+            existsb (fun r ->
+              (&&) (Z.eqb (fst r) x) (known_condition t0 n k (snd r) [] [])) l
+          | None -> false)
+       | None -> true))
+
+(** val rule_ok :
+    problem -> task -> names -> (z * condition) list M.t -> (atom * formula)
+    -> bool **)
+
+let rule_ok p t0 n rules i =
+  match find_atom n.derived_of (fst i) with
+  | Some _ ->
+    expand p t0 n (snd i) true (snd (fst i)) (rule_leaf p t0 n rules (fst i))
+      { literals = []; bounds = [] }
+  | None ->
+    if mem0 n.may_hold (fst i)
+    then true
+    else expand p t0 n (snd i) true (snd (fst i))
+           (rule_leaf p t0 n rules (fst i)) { literals = []; bounds = [] }
+
+(** val rules_ok : problem -> task -> names -> bool **)
+
+let rules_ok p t0 n =
+  (&&)
+    ((&&)
+      ((&&)
+        ((&&)
+          ((&&)
+            ((&&) (is_stratified p.strata) (fst (check_layers t0.layers)))
+            (forallb (forallb (fun r -> n.changing r.head)) p.strata))
+          (forallb (fun vxa ->
+            let (v, y) = vxa in
+            let (x, a) = y in
+            (&&) (is_derived p (fst a))
+              (match find_atom n.derived_of a with
+               | Some p0 ->
+                 let (u, y0) = p0 in (&&) (Coq_Pos.eqb u v) (Z.eqb y0 x)
+               | None -> false)) (M.elements n.derived_atoms)))
+        (forallb (forallb (fun a -> negb (is_derived p (fst a)))) n.exclusive))
+      (forallb (fun vl ->
+        forallb (fun xa -> negb (is_derived p (fst (snd xa)))) (snd vl))
+        (M.elements n.variables)))
+    (forallb (fun rules ->
+      forallb (rule_ok p t0 n (ground_rules t0)) (rule_instances p rules))
+      p.strata)
 
 (** val faithful :
     problem -> task -> names -> (nat -> key1 list -> case_tree) -> case_tree
@@ -3272,9 +3584,10 @@ let faithful p t0 n case goal_case =
         ((&&)
           ((&&)
             ((&&)
-              (forallb (fun e ->
-                (||) (negb (n.changing (fst (fst e))))
-                  (mem0 n.may_hold (fst e))) (all_entries p.initial_atoms))
+              ((&&) (rules_ok p t0 n)
+                (forallb (fun e ->
+                  (||) (negb (n.changing (fst (fst e))))
+                    (mem0 n.may_hold (fst e))) (all_entries p.initial_atoms)))
               (forallb (fun vl ->
                 let (v, vals) = vl in
                 (&&) (is_basic t0 v)

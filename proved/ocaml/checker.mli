@@ -156,6 +156,8 @@ val nth : nat -> 'a1 list -> 'a1 -> 'a1
 
 val nth_error : 'a1 list -> nat -> 'a1 option
 
+val concat : 'a1 list list -> 'a1 list
+
 val list_eq_dec : ('a1 -> 'a1 -> bool) -> 'a1 list -> 'a1 list -> bool
 
 val map : ('a1 -> 'a2) -> 'a1 list -> 'a2 list
@@ -625,6 +627,10 @@ val distinct : key0 list -> bool
 
 val check_task : task -> bool
 
+val condition_variables : condition -> key0 list
+
+val check_layers : (fact * condition) list list -> bool * z M.t
+
 val check : task -> argument -> z option -> (state -> positive list) -> bool
 
 type key1 = positive
@@ -689,10 +695,12 @@ type action = { parameters : key1 list; duration : expression option;
 
 type world = { holds_in : (atom -> bool); value_in : (atom -> q option) }
 
+type rule = { head : key1; head_types : key1 list; body : formula }
+
 type problem = { objects : (key1 -> key1 list); actions : action list;
-                 initial_atoms : unit atom_map; initial_values : q atom_map;
-                 goal_formula : formula; metric : expression; per_time : 
-                 q; per_step : q }
+                 strata : rule list list; initial_atoms : unit atom_map;
+                 initial_values : q atom_map; goal_formula : formula;
+                 metric : expression; per_time : q; per_step : q }
 
 val initial : problem -> world
 
@@ -710,6 +718,26 @@ val and_kleene : bool option -> bool option -> bool option
 
 val truth :
   problem -> world -> q option -> key1 list -> formula -> bool option
+
+val is_derived : problem -> key1 -> bool
+
+val with_facts : problem -> world -> unit atom_map -> world
+
+val tuples : problem -> key1 list -> key1 list list
+
+val rule_instances : problem -> rule list -> (atom * formula) list
+
+val fires_in : problem -> world -> (atom * formula) -> bool
+
+val new_atoms : problem -> world -> (atom * formula) list -> atom list
+
+val evaluate_stratum :
+  problem -> nat -> (atom * formula) list -> world -> unit atom_map -> unit
+  atom_map
+
+val derived_facts : problem -> world -> unit atom_map
+
+val derived_world : problem -> world -> world
 
 type change =
 | Fact of atom * bool
@@ -763,8 +791,9 @@ val plus_result : result -> q -> result -> result
 type names = { variables : (z * atom) list M.t; fluents : atom M.t;
                fact_of : (key1 * z) atom_map; number_of : key1 atom_map;
                changing : (key1 -> bool); may_hold : unit atom_map;
-               exclusive : atom list list; scale : positive;
-               cost_scale : positive }
+               derived_atoms : (z * atom) M.t;
+               derived_of : (key1 * z) atom_map; exclusive : atom list list;
+               scale : positive; cost_scale : positive }
 
 type case_tree =
 | Decided of (nat * choice) option
@@ -789,9 +818,13 @@ val known_fact : task -> names -> knowledge -> key1 -> z -> bool option
 val base_truth : problem -> task -> names -> knowledge -> atom -> bool option
 
 type symbolic = { new_truths : (atom * bool) list;
-                  new_values : (atom * form) list }
+                  new_values : (atom * form) list; stale : bool }
 
 val unchanged : symbolic
+
+val make_stale : symbolic -> symbolic
+
+val is_stale : problem -> symbolic -> key1 -> bool
 
 val symbolic_atom :
   problem -> task -> names -> knowledge -> symbolic -> atom -> bool option
@@ -869,6 +902,26 @@ val join : knowledge -> knowledge -> knowledge
 val gathered : problem -> task -> names -> action -> key1 list -> knowledge
 
 val impossible : problem -> task -> names -> knowledge -> bool
+
+val is_defined : problem -> key1 list -> formula -> bool
+
+val is_rule_of : problem -> atom -> rule -> bool
+
+val contradicts_rules : problem -> task -> names -> knowledge -> bool
+
+val contradictory : problem -> task -> names -> knowledge -> bool
+
+val expand :
+  problem -> task -> names -> formula -> bool -> key1 list -> (knowledge ->
+  bool) -> knowledge -> bool
+
+val occurrences_ok : (key1 -> bool -> bool) -> bool -> formula -> bool
+
+val is_head : key1 -> rule list -> bool
+
+val is_allowed : rule list -> rule list list -> key1 -> bool -> bool
+
+val is_stratified : rule list list -> bool
 
 val scaled : names -> q
 
@@ -966,6 +1019,18 @@ val action_ok :
   action -> bool
 
 val all_entries : 'a1 atom_map -> (atom * 'a1) list
+
+val ground_rules : task -> (z * condition) list M.t
+
+val rule_leaf :
+  problem -> task -> names -> (z * condition) list M.t -> atom -> knowledge
+  -> bool
+
+val rule_ok :
+  problem -> task -> names -> (z * condition) list M.t -> (atom * formula) ->
+  bool
+
+val rules_ok : problem -> task -> names -> bool
 
 val faithful :
   problem -> task -> names -> (nat -> key1 list -> case_tree) -> case_tree ->

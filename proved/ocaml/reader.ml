@@ -115,7 +115,7 @@ let problem domain_text problem_text =
     | _ -> reject "(define (%s NAME) ...) is expected" kind in
   let domain = sections "domain" domain_text and problem = sections "problem" problem_text in
   let check_names allowed = List.iter (fun (name, _) -> if not (List.mem name allowed) then reject "not covered: %s" name) in
-  check_names [":requirements"; ":types"; ":constants"; ":predicates"; ":functions"; ":action"; ":durative-action"] domain;
+  check_names [":requirements"; ":types"; ":constants"; ":predicates"; ":functions"; ":derived"; ":action"; ":durative-action"] domain;
   check_names [":domain"; ":requirements"; ":objects"; ":init"; ":goal"; ":metric"] problem;
   let section sections name = match List.filter (fun (other, _) -> other = name) sections with
     | [] -> []
@@ -149,6 +149,7 @@ let problem domain_text problem_text =
   let predicates = declarations (section domain ":predicates") and functions = declarations (section domain ":functions") in
   distinct "a predicate" (List.map fst predicates);
   distinct "a function" (List.map fst functions);
+  let derived_names = List.filter_map (function ":derived", List (Word name :: _) :: _ -> Some name | _ -> None) domain in
   let applied what declared name arguments = match List.assoc_opt name declared with
     | Some arity when arity = List.length arguments -> ()
     | Some arity -> reject "%s has %d arguments: %s" what arity name
@@ -226,11 +227,42 @@ let problem domain_text problem_text =
     | Word _ | List (List _ :: _) -> reject "an effect is expected"
   and put scope holds name arguments =
     applied "predicate" predicates name arguments;
+    if List.mem name derived_names then reject "a derived predicate is in an effect: %s" name;
     C.Put (holds, predicate_key name, List.map (term scope) arguments)
   and both = function
     | [] -> C.Nothing
     | [only] -> only
     | first :: others -> C.Both (first, both others) in
+
+  (* Derived predicates. The stratum of one is that of what it refers to, or the next one if the
+     reference is negated. *)
+  let derived = List.filter_map (function
+    | ":derived", [List (Word name :: parameters); body] ->
+      let parameters = variables parameters in
+      applied "predicate" predicates name parameters;
+      Some (name, { C.head = predicate_key name; head_types = List.map snd parameters; body = condition (List.map fst parameters) body })
+    | ":derived", _ -> reject "(:derived (PREDICATE ...) CONDITION) is expected"
+    | _ -> None) domain in
+  let heads = List.sort_uniq compare (List.map (fun (_, rule) -> rule.C.head) derived) in
+  let rec references positive = function
+    | C.Atom (p, _) -> [p, positive]
+    | C.Not f -> references (not positive) f
+    | C.And (f, g) -> references positive f @ references positive g
+    | C.Forall (_, f) -> references positive f
+    | C.Truth _ | C.Same _ | C.Compare _ -> [] in
+  let level = Hashtbl.create 10 in
+  let level_of p = Option.value ~default:0 (Hashtbl.find_opt level p) in
+  let rec raise_levels rounds =
+    if rounds < 0 then reject "a derived predicate depends on its own negation";
+    let raised = List.filter (fun (_, rule) ->
+      let least (p, positive) = if List.mem p heads then level_of p + (if positive then 0 else 1) else 0 in
+      let most = List.fold_left (fun most reference -> max most (least reference)) (level_of rule.C.head) (references true rule.C.body) in
+      let is_raised = most > level_of rule.C.head in
+      Hashtbl.replace level rule.C.head most; is_raised) derived in
+    if raised <> [] then raise_levels (rounds - 1) in
+  raise_levels (List.length heads * List.length heads);
+  let strata = List.init (List.length heads) (fun i ->
+    List.filter_map (fun (_, rule) -> if level_of rule.C.head = i then Some rule else None) derived) in
 
   (* The parts at start, over all and at end of what a durative action requires or does. *)
   let rec timed times read join quantify scope = function
@@ -300,7 +332,10 @@ let problem domain_text problem_text =
      | Some other when not (C.qeq_bool other value) -> reject "two initial values: %s" name
      | _ -> ());
     initial_values := C.add_atom fluent value !initial_values in
-  let atom name arguments = applied "predicate" predicates name arguments; predicate_key name, ground arguments in
+  let atom name arguments =
+    applied "predicate" predicates name arguments;
+    if List.mem name derived_names then reject "a derived predicate is in :init: %s" name;
+    predicate_key name, ground arguments in
   let negated = ref [] in
   List.iter (function
     | List [Word "="; List (Word name :: arguments); Word value] -> set_value name arguments (decimal value)
@@ -336,7 +371,7 @@ let problem domain_text problem_text =
     | [] -> false, (zero, C.Constant zero), one
     | _ -> reject "not covered: a metric other than minimize or maximize" in
   { task = { C.objects = (fun kind -> Option.value ~default:[] (Hashtbl.find_opt members kind));
-             actions = List.map snd actions; initial_atoms = !initial_atoms; initial_values = !initial_values;
+             actions = List.map snd actions; strata; initial_atoms = !initial_atoms; initial_values = !initial_values;
              goal_formula; metric; per_time; per_step };
     maximizes; action_names = List.map fst actions; object_names = List.map fst objects }
 
