@@ -197,25 +197,74 @@ Proof.
   induction ls as [|rules ls IH]; intros F a H; [reflexivity|]. cbn [existsb] in H. apply orb_false_iff in H.
   destruct H as [H1 H2]. cbn [fold_left]. rewrite IH by exact H2. apply stratum_other, not_head, H1.
 Qed.
-Lemma derived_invariant : forall Q : atom -> Prop,
-  (forall F rules i, (forall a, mem F a = true -> Q a) -> In rules (strata P) -> In i (rule_instances P rules) ->
-     fires_in P (W F) i = true -> Q (fst i)) ->
+(* Every atom of a partial evaluation has a rule whose body holds in it. *)
+Definition has_rule (V : world) (a : atom) : Prop :=
+  exists r, In r (concat (strata P)) /\ is_rule_of P a r = true /\ truth P V None (snd a) (body r) = Some true.
+Definition is_settled (ls : list (list rule)) (p : key) (b : bool) : bool := b || negb (existsb (is_head p) ls).
+Definition justified (ls : list (list rule)) (F : atom_map unit) : Prop := forall a, mem F a = true ->
+  exists r, In r (concat (strata P)) /\ is_rule_of P a r = true /\ truth P (W F) None (snd a) (body r) = Some true /\
+    occurrences_ok (is_settled ls) true (body r) = true.
+Lemma occurrences_weaken : forall (A B : key -> bool -> bool), (forall p b, A p b = true -> B p b = true) ->
+  forall f b, occurrences_ok A b f = true -> occurrences_ok B b f = true.
+Proof.
+  intros A B H. induction f; intros v O; cbn [occurrences_ok] in *; auto.
+  apply andb_true_iff in O. destruct O as [O1 O2]. rewrite (IHf1 _ O1), (IHf2 _ O2). reflexivity.
+Qed.
+Lemma instance_rule : forall rules i, In rules (strata P) -> In i (rule_instances P rules) ->
+  exists r, In r rules /\ In r (concat (strata P)) /\ is_rule_of P (fst i) r = true /\ snd i = body r.
+Proof.
+  intros rules i I J. apply instance_spec in J. destruct J as [r [J [A [B C]]]]. exists r. split; [exact J|].
+  split; [apply in_concat; exists rules; auto|]. split; [|exact B].
+  unfold is_rule_of. apply tuples_spec in C. rewrite <- andb_assoc, C, A, Pos.eqb_refl. reflexivity.
+Qed.
+Lemma derived_invariant : is_stratified (strata P) = true -> forall Q : atom -> Prop,
+  (forall F rules i, (forall a, mem F a = true -> Q a) -> (forall a, mem F a = true -> has_rule (W F) a) ->
+     In rules (strata P) -> In i (rule_instances P rules) -> fires_in P (W F) i = true -> Q (fst i)) ->
   forall a, mem (derived_facts P w) a = true -> Q a.
 Proof.
-  intros Q H. unfold derived_facts.
-  assert (S : forall rules, In rules (strata P) -> forall n F, (forall a, mem F a = true -> Q a) ->
-    forall a, mem (evaluate_stratum P n (rule_instances P rules) w F) a = true -> Q a).
-  { intros rules R. induction n; intros F I a M; [apply I, M|]. cbn [evaluate_stratum] in M.
-    destruct (new_atoms P (W F) (rule_instances P rules)) as [|c new] eqn:E; [apply I, M|]. rewrite <- E in M.
-    revert a M. apply IHn. intros a M. rewrite mem_fold in M. apply orb_true_iff in M.
-    destruct M as [M|M]; [|apply I, M]. apply in_atoms, new_atoms_in in M. destruct M as [i [J [<- [Fi _]]]].
-    eapply H; eassumption. }
-  assert (G : forall ls, incl ls (strata P) -> forall F, (forall a, mem F a = true -> Q a) ->
-    forall a, mem (all_rounds ls F) a = true -> Q a).
-  { induction ls as [|rules ls IH]; intros Sub F I; [exact I|]. cbn [fold_left]. apply IH.
-    - intros x X. apply Sub. right. exact X.
-    - apply S; [apply Sub; left; reflexivity|exact I]. }
-  apply G; [intros x X; exact X|]. intros a M. rewrite mem_empty in M. discriminate.
+  intros Str Q H. unfold derived_facts.
+  assert (Stratum : forall rules later, In rules (strata P) -> is_stratified (rules :: later) = true -> forall n F,
+    (forall a, mem F a = true -> Q a) -> justified (rules :: later) F ->
+    let F' := evaluate_stratum P n (rule_instances P rules) w F in
+    (forall a, mem F' a = true -> Q a) /\ justified (rules :: later) F').
+  { intros rules later R St. induction n; intros F I J; [split; assumption|]. cbn [evaluate_stratum].
+    destruct (new_atoms P (W F) (rule_instances P rules)) as [|c new] eqn:E; [split; assumption|]. rewrite <- E.
+    set (F1 := fold_left (fun m a => add_atom a tt m) (new_atoms P (W F) (rule_instances P rules)) F).
+    assert (Keep : forall f env, occurrences_ok (is_settled (rules :: later)) true f = true ->
+      truth P (W F) None env f = Some true -> truth P (W F1) None env f = Some true).
+    { intros f env O Tr. apply (truth_kept P (is_settled (rules :: later)) (W F)); [| |reflexivity|exact O|exact Tr];
+        intros b Al; cbn [with_facts holds_in]; destruct (is_derived P (fst b)); auto.
+      - change (mem F b = true -> mem F1 b = true). intro M. unfold F1. rewrite mem_fold, M. apply orb_true_r.
+      - change (mem F b = false -> mem F1 b = false). intro M. unfold F1. rewrite mem_fold, M, orb_false_r.
+        destruct (existsb (atom_eqb b) (new_atoms P (W F) (rule_instances P rules))) eqn:X; [|reflexivity].
+        exfalso. apply in_atoms, new_atoms_in in X. destruct X as [i [Ii [A _]]]. cbn [is_settled orb existsb] in Al.
+        apply negb_true_iff, orb_false_iff in Al. destruct Al as [Al _].
+        apply (not_head _ _ Al _ Ii). exact (f_equal fst A). }
+    apply IHn.
+    - intros a M. unfold F1 in M. rewrite mem_fold in M. apply orb_true_iff in M.
+      destruct M as [M|M]; [|apply I, M]. apply in_atoms, new_atoms_in in M. destruct M as [i [Ii [<- [Fi _]]]].
+      apply (H F rules i); auto. intros b B. destruct (J b B) as [r X]. exists r. tauto.
+    - intros a M. unfold F1 in M. rewrite mem_fold in M. apply orb_true_iff in M. destruct M as [M|M].
+      + apply in_atoms, new_atoms_in in M. destruct M as [i [Ii [<- [Fi _]]]].
+        destruct (instance_rule _ _ R Ii) as [r [Ir [Ic [Ru B]]]]. exists r. split; [exact Ic|]. split; [exact Ru|].
+        cbn [is_stratified] in St. apply andb_true_iff in St. destruct St as [St _].
+        rewrite forallb_forall in St. specialize (St _ Ir).
+        assert (O : occurrences_ok (is_settled (rules :: later)) true (body r) = true).
+        { eapply occurrences_weaken; [|exact St]. intros p b. unfold is_allowed, is_settled. cbn [existsb].
+          destruct b, (is_head p rules), (existsb (is_head p) later); simpl; auto. }
+        split; [|exact O]. apply Keep; [exact O|]. unfold fires_in in Fi. rewrite B in Fi.
+        destruct (truth P (W F) None (snd (fst i)) (body r)) as [[]|]; [reflexivity|discriminate|discriminate].
+      + destruct (J a M) as [r [Ic [Ru [Tr O]]]]. exists r. auto. }
+  assert (G : forall ls, incl ls (strata P) -> is_stratified ls = true -> forall F, (forall a, mem F a = true -> Q a) ->
+    justified ls F -> forall a, mem (all_rounds ls F) a = true -> Q a).
+  { induction ls as [|rules ls IH]; intros Sub St F I J; [exact I|]. cbn [fold_left].
+    destruct (Stratum rules ls (Sub _ (or_introl eq_refl)) St (S (length (rule_instances P rules))) F I J) as [I1 J1].
+    apply IH; [intros x X; apply Sub; right; exact X| |exact I1|].
+    - cbn [is_stratified] in St. apply andb_true_iff in St. apply St.
+    - intros a M. destruct (J1 a M) as [r [Ic [Ru [Tr O]]]]. exists r. split; [exact Ic|]. split; [exact Ru|].
+      split; [exact Tr|]. eapply occurrences_weaken; [|exact O]. intros p b. unfold is_settled. cbn [existsb].
+      destruct b, (is_head p rules), (existsb (is_head p) ls); simpl; auto. }
+  apply (G (strata P)); [intros x X; exact X|exact Str| |]; intros a M; rewrite mem_empty in M; discriminate.
 Qed.
 Lemma rounds_origin : forall ls, is_stratified ls = true -> forall F a, mem (all_rounds ls F) a = true ->
   mem F a = true \/ exists r, In r (concat ls) /\ fst a = head r /\ In (snd a) (tuples P (head_types r)) /\
@@ -281,7 +330,7 @@ Qed.
 Hypothesis stratified : is_stratified (strata P) = true.
 Notation dw := (derived_world P w).
 Lemma rule_origin : forall a, is_derived P (fst a) = true -> holds_in dw a = true ->
-  exists r, In r (concat (strata P)) /\ is_rule_of P a r = true /\ truth P dw None (snd a) (body r) = Some true.
+  has_rule dw a.
 Proof.
   intros a D H. cbn [derived_world with_facts holds_in] in H. rewrite D in H.
   destruct (rounds_origin _ stratified _ _ H) as [M|[r [I [A [B C]]]]]; [rewrite mem_empty in M; discriminate|].

@@ -31,8 +31,9 @@ Record names := Names {
   fact_of : atom_map (key * Z); number_of : atom_map key;
   changing : key -> bool;                          (* predicates and functions that actions change *)
   may_hold : atom_map unit;                        (* atoms of changing predicates that may hold in some state *)
-  derived_atoms : M.t (Z * atom);                  (* atoms of derived variables, with the values that mean them *)
+  derived_atoms : M.t (Z * Z * atom);              (* derived variables: value with the atom, value without it *)
   derived_of : atom_map (key * Z);
+  equivalent : bool;                               (* a derived variable has its value only if the atom holds *)
   exclusive : list (list atom);                    (* groups of atoms of which at most one holds *)
   scale : positive;                                (* number = fluent times scale *)
   cost_scale : positive }.
@@ -64,11 +65,13 @@ Definition possible (k : knowledge) (v : key) : list Z :=
   filter (fun y => forallb (fun xb => Bool.eqb (Z.eqb y (fst xb)) (snd xb)) known &&
                    negb (existsb (fun xa => Z.eqb y (fst xa) && excluded_by k (snd xa)) atoms))
          (match List.find snd known with Some (x, _) => [x] | None => range (get (domain_size T) v) end).
-Definition known_fact (k : knowledge) (v : key) (x : Z) : option bool :=
+Definition known_fact (full : bool) (k : knowledge) (v : key) (x : Z) : option bool :=
   match M.find v (variables N) with
   | None => match M.find v (derived_atoms N) with
-            | Some (y, a) => match assoc a (literals k) with
-                             | Some true => if Z.eqb x y then Some true else None | _ => None end
+            | Some (y, d, a) => match assoc a (literals k) with
+                                | Some true => Some (Z.eqb x y)
+                                | Some false => if full then Some (Z.eqb x d) else None
+                                | None => None end
             | None => None end
   | Some _ => let ys := possible k v in
       if forallb (Z.eqb x) ys then Some true else if forallb (fun y => negb (Z.eqb x y)) ys then Some false else None
@@ -78,7 +81,7 @@ Definition base_truth (k : knowledge) (a : atom) : option bool :=
   else match assoc a (literals k) with
        | Some b => Some b
        | None => if excluded_by k a || negb (mem (may_hold N) a) then Some false
-                 else match find_atom (fact_of N) a with Some (v, x) => known_fact k v x | None => None end
+                 else match find_atom (fact_of N) a with Some (v, x) => known_fact false k v x | None => None end
        end.
 (* A state in terms of the one before the step: atoms and fluents that have changed. If it is stale,
    derived atoms may have changed, too. *)
@@ -307,18 +310,21 @@ Fixpoint is_defined (env : list key) (f : formula) : bool :=
 Definition is_rule_of (a : atom) (r : rule) : bool :=
   Pos.eqb (fst a) (head r) && Nat.eqb (length (snd a)) (length (head_types r)) &&
   forallb (fun x => existsb (Pos.eqb (fst x)) (objects P (snd x))) (combine (snd a) (head_types r)).
+Definition rules_of (a : atom) : list rule := filter (is_rule_of a) (concat (strata P)).
 Definition contradicts_rules (k : knowledge) : bool :=
   existsb (fun l : atom * bool =>
     let '(a, holds) := l in
     is_derived P (fst a) &&
-    let rules := filter (is_rule_of a) (concat (strata P)) in
     let body_truth r := symbolic_truth k unchanged Undefined (snd a) (body r) in
-    if holds then forallb (fun r => match body_truth r with Some false => true | _ => false end) rules
-    else existsb (fun r => match body_truth r with Some true => is_defined (snd a) (body r) | _ => false end) rules)
+    if holds then forallb (fun r => match body_truth r with Some false => true | _ => false end) (rules_of a)
+    else existsb (fun r => match body_truth r with Some true => is_defined (snd a) (body r) | _ => false end) (rules_of a))
     (literals k).
 Definition contradictory (k : knowledge) : bool := impossible k || contradicts_rules k.
-(* [next] accepts the knowledge of every way in which a formula is true (false, if [b] is). *)
-Fixpoint expand (f : formula) (b : bool) (env : list key) (next : knowledge -> bool) (k : knowledge) : bool :=
+(* [next] accepts the knowledge of every way in which a formula is true (false, if [b] is); [after]
+   adds to it what follows from an atom. *)
+Definition continuation := knowledge -> bool.
+Fixpoint expand (after : atom -> bool -> continuation -> continuation) (f : formula) (b : bool) (env : list key)
+    (next : continuation) (k : knowledge) : bool :=
   match f with
   | Truth c => if Bool.eqb b c then next k else true
   | Atom p ts =>
@@ -326,17 +332,49 @@ Fixpoint expand (f : formula) (b : bool) (env : list key) (next : knowledge -> b
       | None => true
       | Some l => match base_truth k (p, l) with
                   | Some c => if Bool.eqb b c then next k else true
-                  | None => next (Knowledge (((p, l), b) :: literals k) (bounds k)) end
+                  | None => after (p, l) b next (Knowledge (((p, l), b) :: literals k) (bounds k)) end
       end
   | Same t u => match object_of env t, object_of env u with
                 | Some x, Some y => if Bool.eqb b (Pos.eqb x y) then next k else true | _, _ => true end
   | Compare _ _ _ => next (if b then join k (conjuncts unchanged Undefined env f) else k)
-  | Not g => expand g (negb b) env next k
-  | And g h => if b then expand g true env (expand h true env next) k
-               else expand g false env next k && expand h false env next k
-  | Forall t g => if b then fold_right (fun o next => expand g true (env ++ [o]) next) next (objects P t) k
-                  else forallb (fun o => expand g false (env ++ [o]) next k) (objects P t)
+  | Not g => expand after g (negb b) env next k
+  | And g h => if b then expand after g true env (expand after h true env next) k
+               else expand after g false env next k && expand after h false env next k
+  | Forall t g => if b then fold_right (fun o next => expand after g true (env ++ [o]) next) next (objects P t) k
+                  else forallb (fun o => expand after g false (env ++ [o]) next k) (objects P t)
   end.
+Definition is_unfolded (a : atom) : bool :=
+  is_derived P (fst a) && match find_atom (derived_of N) a with None => true | Some _ => false end.
+(* A derived atom without a variable holds by one of its rules. *)
+Fixpoint unfold (depth : nat) (a : atom) (b : bool) (next : continuation) (k : knowledge) : bool :=
+  match depth with
+  | O => next k
+  | S depth => if b && is_unfolded a
+               then forallb (fun r => expand (unfold depth) (body r) true (snd a) next k) (rules_of a) else next k
+  end.
+(* The truth value of a formula that is certainly defined. *)
+Fixpoint definite (look : atom -> option bool) (env : list key) (f : formula) : option bool :=
+  match f with
+  | Truth b => Some b
+  | Atom p ts => match ground env ts with Some l => look (p, l) | None => None end
+  | Same t u => match object_of env t, object_of env u with Some a, Some b => Some (Pos.eqb a b) | _, _ => None end
+  | Compare _ _ _ => None
+  | Not g => option_map negb (definite look env g)
+  | And g h => and_kleene (definite look env g) (definite look env h)
+  | Forall t g => fold_right (fun o r => and_kleene (definite look (env ++ [o]) g) r) (Some true) (objects P t)
+  end.
+Definition is_some (b : bool) (t : option bool) : bool := match t with Some c => Bool.eqb b c | None => false end.
+Fixpoint look_up (depth : nat) (k : knowledge) (a : atom) : option bool :=
+  match base_truth k a, depth with
+  | Some b, _ => Some b
+  | None, O => None
+  | None, S depth =>
+      if is_unfolded a then
+        let truths := map (fun r => definite (look_up depth k) (snd a) (body r)) (rules_of a) in
+        if existsb (is_some true) truths then Some true else if forallb (is_some false) truths then Some false else None
+      else None
+  end.
+Definition max_unfoldings := 8%nat.
 (* Every occurrence of a predicate, with its polarity, is allowed. *)
 Fixpoint occurrences_ok (allowed : key -> bool -> bool) (b : bool) (f : formula) : bool :=
   match f with
@@ -371,19 +409,19 @@ Definition form_of (l : linear) (szs : list Z) (ch : choice) : option form :=
 (* The form times the scale is an integer, so more than -1 is enough. *)
 Definition required (k : knowledge) (f : form) : bool :=
   implied k true (plus_form f 1 (constant (/ scaled))).
-Definition known_literal (k : knowledge) (l : literal) : option bool :=
-  option_map (fun b => Bool.eqb b (snd l)) (known_fact k (fst (fst l)) (snd (fst l))).
+Definition known_literal (full : bool) (k : knowledge) (l : literal) : option bool :=
+  option_map (fun b => Bool.eqb b (snd l)) (known_fact full k (fst (fst l)) (snd (fst l))).
 Definition is_true (r : option bool) : bool := match r with Some b => b | None => false end.
 Definition is_false (r : option bool) : bool := match r with Some b => negb b | None => false end.
-Definition known_condition (k : knowledge) (c : condition) (szs : list Z) (ch : choice) : bool :=
-  forallb (fun f => is_true (known_fact k (fst f) (snd f))) (facts c) &&
-  forallb (existsb (fun l => is_true (known_literal k l))) (clauses c) &&
+Definition known_condition (full : bool) (k : knowledge) (c : condition) (szs : list Z) (ch : choice) : bool :=
+  forallb (fun f => is_true (known_fact full k (fst f) (snd f))) (facts c) &&
+  forallb (existsb (fun l => is_true (known_literal full k l))) (clauses c) &&
   forallb (fun l => match form_of l szs ch with Some f => required k f | None => false end) (comparisons c).
 Fixpoint known_effects (k : knowledge) (cs : list (list literal * list fact)) : option (list fact) :=
   match cs with
   | [] => Some []
-  | c :: r => if existsb (fun l => is_false (known_literal k l)) (fst c) then known_effects k r
-              else if forallb (fun l => is_true (known_literal k l)) (fst c) then option_map (app (snd c)) (known_effects k r)
+  | c :: r => if existsb (fun l => is_false (known_literal (equivalent N) k l)) (fst c) then known_effects k r
+              else if forallb (fun l => is_true (known_literal (equivalent N) k l)) (fst c) then option_map (app (snd c)) (known_effects k r)
               else None
   end.
 Definition admitted_choice (o : operator) (ch : choice) : bool :=
@@ -421,7 +459,7 @@ Definition step_cost (o : option (operator * choice)) : Z :=
   match o with Some (o, ch) => amount (cost o) (slot_sizes o) ch | None => 0 end.
 Definition simulated (k : knowledge) (s : symbolic) (time : Q) (o : option (operator * choice)) : bool :=
   match match o with
-        | Some (o, ch) => if admitted_choice o ch && known_condition k (precondition o) (slot_sizes o) ch && distinct (map fst (number_effects o))
+        | Some (o, ch) => if admitted_choice o ch && known_condition (equivalent N) k (precondition o) (slot_sizes o) ch && distinct (map fst (number_effects o))
                           then option_map (app (effects o)) (known_effects k (conditional o)) else None
         | None => Some [] end with
   | None => false
@@ -449,8 +487,8 @@ Fixpoint known_effects_on (v : key) (k : knowledge) (cs : list (list literal * l
   match cs with
   | [] => Some []
   | c :: r => if forallb (fun f => negb (Pos.eqb (fst f) v)) (snd c) then known_effects_on v k r
-              else if existsb (fun l => is_false (known_literal k l)) (fst c) then known_effects_on v k r
-              else if forallb (fun l => is_true (known_literal k l)) (fst c)
+              else if existsb (fun l => is_false (known_literal (equivalent N) k l)) (fst c) then known_effects_on v k r
+              else if forallb (fun l => is_true (known_literal (equivalent N) k l)) (fst c)
                    then option_map (app (snd c)) (known_effects_on v k r)
               else None
   end.
@@ -486,7 +524,7 @@ Definition projected_ok (k : knowledge) (a : action) (env : list key) (o : optio
       forallb (fun g => match projected (fun a => in_group a g) false k env (start_effect a) with
                         | Some cs => stays_exclusive k (Symbolic (truths_of cs) [] false) g | None => false end) (exclusive N) &&
       match o with
-      | Some (o, ch) => admitted_choice o ch && known_condition k (precondition o) (slot_sizes o) ch
+      | Some (o, ch) => admitted_choice o ch && known_condition (equivalent N) k (precondition o) (slot_sizes o) ch
                         && distinct (map fst (number_effects o))
       | None => true end &&
       forallb (projected_variable_ok k a env o)
@@ -529,7 +567,7 @@ Definition instance_leaf (a : action) (env : list key) (k : knowledge) (o : opti
   | Some (i, ch) => match nth_error (operators T) i with Some o => leaf_ok k a env (Some (o, ch)) | None => false end
   end.
 Definition goal_leaf (k : knowledge) (_ : option (nat * choice)) : bool :=
-  match symbolic_truth k unchanged Undefined [] (goal_formula P) with Some false => true | _ => known_condition k (goal T) [] [] end.
+  match symbolic_truth k unchanged Undefined [] (goal_formula P) with Some false => true | _ => known_condition (equivalent N) k (goal T) [] [] end.
 
 (* Instances for which the conditions on what never changes may hold: parameters are bound one after
    another. *)
@@ -570,21 +608,51 @@ Definition rule_leaf (rules : M.t (list (Z * condition))) (a : atom) (k : knowle
   match find_atom (derived_of N) a with
   | None => true
   | Some (v, x) => match M.find v rules with
-                   | Some l => existsb (fun r => Z.eqb (fst r) x && known_condition k (snd r) [] []) l | None => false end
+                   | Some l => existsb (fun r => Z.eqb (fst r) x && known_condition false k (snd r) [] []) l | None => false end
   end.
 Definition rule_ok (rules : M.t (list (Z * condition))) (i : atom * formula) : bool :=
   match find_atom (derived_of N) (fst i), mem (may_hold N) (fst i) with
   | None, true => true
-  | _, _ => expand (snd i) true (snd (fst i)) (rule_leaf rules (fst i)) (Knowledge [] [])
+  | _, _ => expand (unfold max_unfoldings) (snd i) true (snd (fst i)) (rule_leaf rules (fst i)) (Knowledge [] [])
+  end.
+(* Every rule of the task for a derived variable follows from a rule of its atom. *)
+Definition ground_literals (c : condition) : list (atom * bool) :=
+  flat_map (fun f : fact =>
+    match M.find (fst f) (variables N), M.find (fst f) (derived_atoms N) with
+    | Some vals, _ => map (fun xa => (snd xa, Z.eqb (snd f) (fst xa))) vals
+    | None, Some (y, _, a) => [(a, Z.eqb (snd f) y)]
+    | None, None => [] end) (facts c).
+Definition ground_rule_ok (heads : M.t Z) (r : fact * condition) : bool :=
+  match M.find (fst (fst r)) (derived_atoms N) with
+  | None => true
+  | Some (_, _, a) =>
+      forallb (fun f => match M.find (fst f) (derived_atoms N) with
+                        | Some (y, _, _) => Z.eqb (snd f) y || match M.find (fst f) heads with None => true | Some _ => false end
+                        | None => true end) (facts (snd r)) &&
+      let k := Knowledge (ground_literals (snd r)) [] in
+      existsb (fun rule => is_some true (definite (look_up max_unfoldings k) (snd a) (body rule))) (rules_of a)
+  end.
+Fixpoint ground_rules_ok (ls : list (list (fact * condition))) : bool * M.t Z :=
+  match ls with
+  | [] => (true, M.empty Z)
+  | rules :: rest =>
+      let '(ok, later) := ground_rules_ok rest in
+      let heads := fold_left (fun m r => M.add (fst (fst r)) (snd (fst r)) m) rules later in
+      (ok && forallb (ground_rule_ok heads) rules, heads)
   end.
 Definition rules_ok : bool :=
   is_stratified (strata P) && fst (check_layers (layers T)) &&
   forallb (forallb (fun r => changing N (head r))) (strata P) &&
-  forallb (fun vxa => let '(v, (x, a)) := vxa in is_derived P (fst a) &&
+  forallb (fun vxa => let '(v, (x, d, a)) := vxa in is_derived P (fst a) && negb (is_basic T v) && negb (Z.eqb x d) &&
+    existsb (fun f => Pos.eqb (fst f) v) (derived T) &&
+    forallb (fun f => negb (Pos.eqb (fst f) v) || Z.eqb (snd f) d) (derived T) &&
     match find_atom (derived_of N) a with Some (u, y) => Pos.eqb u v && Z.eqb y x | None => false end)
     (M.elements (derived_atoms N)) &&
   forallb (forallb (fun a : atom => negb (is_derived P (fst a)))) (exclusive N) &&
   forallb (fun vl => forallb (fun xa : Z * atom => negb (is_derived P (fst (snd xa)))) (snd vl)) (M.elements (variables N)) &&
+  forallb (forallb (fun r : fact * condition => match M.find (fst (fst r)) (derived_atoms N) with
+                             | Some (x, _, _) => Z.eqb (snd (fst r)) x | None => true end)) (layers T) &&
+  (negb (equivalent N) || fst (ground_rules_ok (layers T))) &&
   forallb (fun rules => forallb (rule_ok ground_rules) (rule_instances P rules)) (strata P).
 Definition faithful : bool :=
   rules_ok &&

@@ -21,7 +21,7 @@ Record Rel (w : world) (s : state) : Prop := {
   r_may : forall a, changing N (fst a) = true -> holds_in w a = true -> mem (may_hold N) a = true;
   r_exclusive : forall g a b, In g (exclusive N) -> In a g -> In b g -> holds_in w a = true ->
     holds_in w b = true -> a = b;
-  r_derived : forall v x a, M.find v (derived_atoms N) = Some (x, a) -> holds_in w a = true ->
+  r_derived : forall v x d a, M.find v (derived_atoms N) = Some (x, d, a) -> holds_in w a = true ->
     is_fact (derive T s) (v, x) = true;
   r_wf : wf T s }.
 (* The same, but for derived atoms *)
@@ -89,7 +89,7 @@ Qed.
 Lemma rule_parts :
   is_stratified (strata P) = true /\ fst (check_layers (layers T)) = true /\
   (forall p, is_derived P p = true -> changing N p = true) /\
-  (forall v x a, M.find v (derived_atoms N) = Some (x, a) -> is_derived P (fst a) = true /\
+  (forall v x d a, M.find v (derived_atoms N) = Some (x, d, a) -> is_derived P (fst a) = true /\
      find_atom (derived_of N) a = Some (v, x)) /\
   (forall g a, In g (exclusive N) -> In a g -> is_derived P (fst a) = false) /\
   (forall v vals x a, M.find v (variables N) = Some vals -> In (x, a) vals -> is_derived P (fst a) = false) /\
@@ -97,20 +97,41 @@ Lemma rule_parts :
      rule_ok P T N (ground_rules T) i = true).
 Proof.
   unfold faithful in ok. rewrite !andb_true_iff in ok. destruct ok as [[[[[[[H _] _] _] _] _] _] _].
-  unfold rules_ok in H. rewrite !andb_true_iff in H. destruct H as [[[[[[H1 H2] H3] H4] H5] H6] H7].
+  unfold rules_ok in H. rewrite !andb_true_iff in H. destruct H as [[[[[[[[H1 H2] H3] H4] H5] H6] _] _] H7].
   rewrite forallb_forall in H3, H4, H5, H6, H7. repeat (split; [assumption|]).
   split; [|split; [|split; [|split]]].
   - intros p D. unfold is_derived in D. apply existsb_exists in D. destruct D as [rules [I D]].
     apply existsb_exists in D. destruct D as [r [J D]]. apply Pos.eqb_eq in D. subst p.
     specialize (H3 _ I). rewrite forallb_forall in H3. apply H3, J.
-  - intros v x a F. apply M.elements_correct in F. specialize (H4 _ F). cbn beta iota in H4.
-    apply andb_true_iff in H4. destruct H4 as [D H4]. split; [exact D|].
+  - intros v x d a F. apply M.elements_correct in F. specialize (H4 _ F). cbn beta iota in H4.
+    rewrite !andb_true_iff in H4. destruct H4 as [[[[[D _] _] _] _] H4]. split; [exact D|].
     destruct (find_atom (derived_of N) a) as [[u y]|]; [|discriminate]. apply andb_true_iff in H4.
     destruct H4 as [E1 E2]. apply Pos.eqb_eq in E1. apply Z.eqb_eq in E2. subst. reflexivity.
   - intros g a G I. specialize (H5 _ G). rewrite forallb_forall in H5. apply negb_true_iff, H5, I.
   - intros v vals x a F I. apply M.elements_correct in F. specialize (H6 _ F). cbn [snd] in H6.
     rewrite forallb_forall in H6. specialize (H6 _ I). cbn [snd] in H6. apply negb_true_iff, H6.
   - intros rules i I J. specialize (H7 _ I). rewrite forallb_forall in H7. apply H7, J.
+Qed.
+Lemma ground_parts :
+  (forall v x d a, M.find v (derived_atoms N) = Some (x, d, a) -> is_basic T v = false /\ x <> d /\
+     (exists f, In f (derived T) /\ fst f = v) /\ (forall f, In f (derived T) -> fst f = v -> snd f = d)) /\
+  (forall v x d a rules r, M.find v (derived_atoms N) = Some (x, d, a) -> In rules (layers T) -> In r rules ->
+     fst (fst r) = v -> snd (fst r) = x) /\
+  (equivalent N = true -> fst (ground_rules_ok P T N (layers T)) = true).
+Proof.
+  unfold faithful in ok. rewrite !andb_true_iff in ok. destruct ok as [[[[[[[H _] _] _] _] _] _] _].
+  unfold rules_ok in H. rewrite !andb_true_iff in H. destruct H as [[[[[[[[_ _] _] H4] _] _] H8] H9] _].
+  rewrite forallb_forall in H4, H8. split; [|split].
+  - intros v x d a F. apply M.elements_correct in F. specialize (H4 _ F). cbn beta iota in H4.
+    rewrite !andb_true_iff in H4. destruct H4 as [[[[[_ B] X] E] D] _].
+    split; [apply negb_true_iff, B|]. split; [intro Q; subst; rewrite Z.eqb_refl in X; discriminate|]. split.
+    + apply existsb_exists in E. destruct E as [f [I E]]. apply Pos.eqb_eq in E. exists f. auto.
+    + intros [u y] I Ef. rewrite forallb_forall in D. specialize (D _ I). cbn [fst snd] in *. subst u.
+      rewrite Pos.eqb_refl in D.
+      cbn [negb orb] in D. apply Z.eqb_eq, D.
+  - intros v x d a rules r F I J E. specialize (H8 _ I). rewrite forallb_forall in H8. specialize (H8 _ J).
+    rewrite E, F in H8. apply Z.eqb_eq, H8.
+  - intro E. rewrite E in H9. exact H9.
 Qed.
 Lemma exclusive_at_first : forall g a b, In g (exclusive N) -> In a g -> In b g ->
   holds_in (initial P) a = true -> holds_in (initial P) b = true -> a = b.
@@ -133,6 +154,8 @@ Lemma d_num : forall n f, M.find n (fluents N) = Some f -> num_value ds n = num_
 Proof. intros n f F. rewrite derive_num. destruct parts as [_ [_ [_ [A _]]]]. rewrite (proj1 (A _ _ F)).
 reflexivity. Qed.
 
+Definition lower_ok : Prop := forall v x d a, M.find v (derived_atoms N) = Some (x, d, a) ->
+  holds_in w a = false -> var_value ds v = d.
 Section Known.
 Variable k : knowledge.
 Hypothesis K : Knows w k.
@@ -174,18 +197,22 @@ Proof.
       apply excluded_by_ok in E2.
       rewrite (r_var _ _ R _ _ _ _ F I), E1 in E2. discriminate.
 Qed.
-Lemma known_fact_ok : forall v x b, known_fact T N k v x = Some b -> is_fact ds (v, x) = b.
+Lemma known_fact_ok : forall full, (full = true -> lower_ok) -> forall v x b,
+  known_fact T N full k v x = Some b -> is_fact ds (v, x) = b.
 Proof.
-  intros v x b H. unfold known_fact in H. destruct (M.find v (variables N)) as [vals|] eqn:F.
+  intros full Lo v x b H. unfold known_fact in H. destruct (M.find v (variables N)) as [vals|] eqn:F.
   - pose proof (possible_ok _ _ F) as I. unfold is_fact. cbn [fst snd]. rewrite (d_val _ _ F).
     cbv zeta in H. destruct (forallb (Z.eqb x) (possible T N k v)) eqn:A.
     + injection H as <-. rewrite forallb_forall in A. specialize (A _ I). rewrite Z.eqb_sym. exact A.
     + destruct (forallb (fun y => negb (Z.eqb x y)) (possible T N k v)) eqn:B; [|discriminate].
       injection H as <-. rewrite forallb_forall in B. specialize (B _ I).
       apply negb_true_iff in B. rewrite Z.eqb_sym. exact B.
-  - destruct (M.find v (derived_atoms N)) as [[y a]|] eqn:D; [|discriminate].
-    destruct (assoc a (literals k)) as [[]|] eqn:A; try discriminate. destruct (Z.eqb_spec x y); [|discriminate].
-    injection H as <-. subst y. apply (r_derived _ _ R _ _ _ D). apply assoc_In in A. apply (proj1 K), A.
+  - destruct (M.find v (derived_atoms N)) as [[[y d] a]|] eqn:D; [|discriminate].
+    destruct (assoc a (literals k)) as [t|] eqn:A; [|discriminate]. apply assoc_In, (proj1 K) in A.
+    unfold is_fact. cbn [fst snd]. destruct t.
+    + injection H as <-. apply (r_derived _ _ R _ _ _ _ D) in A. unfold is_fact in A. cbn [fst snd] in A.
+      apply Z.eqb_eq in A. rewrite A. apply Z.eqb_sym.
+    + destruct full; [|discriminate]. injection H as <-. rewrite (Lo eq_refl _ _ _ _ D A). apply Z.eqb_sym.
 Qed.
 Lemma base_truth_ok : forall a b, base_truth P T N k a = Some b -> holds_in w a = b.
 Proof.
@@ -195,7 +222,7 @@ Proof.
   { apply assoc_In in E. rewrite (proj1 K _ _ E). congruence. }
   destruct (excluded_by N k a) eqn:Ex; cbn [orb] in H; [injection H as <-; apply excluded_by_ok, Ex|].
   destruct (mem (may_hold N) a) eqn:M; cbn [negb] in H.
-  - destruct (find_atom (fact_of N) a) as [[v x]|] eqn:F; [|discriminate]. apply known_fact_ok in H.
+  - destruct (find_atom (fact_of N) a) as [[v x]|] eqn:F; [|discriminate]. apply known_fact_ok in H; [|discriminate].
     destruct parts as [_ [_ [A _]]]. destruct (A _ _ _ F) as [vals [F1 F2]].
     rewrite (r_var _ _ R _ _ _ _ F1 F2). unfold is_fact in H. cbn [fst snd] in H. rewrite (d_val _ _ F1) in H.
     exact H.
@@ -261,6 +288,118 @@ Proof.
     rewrite complete in Tr. apply (rule_closed P below St a r Ir Ru) in Tr. rewrite <- complete in Tr. congruence.
 Qed.
 
+Lemma complete_origin : forall a, is_derived P (fst a) = true -> holds_in w a = true -> has_rule P w a.
+Proof.
+  intros a D H. rewrite complete in H. rewrite complete. destruct rule_parts as [St _].
+  apply (rule_origin P below St a D H).
+Qed.
+Lemma rules_of_spec : forall a r, In r (rules_of P a) <-> In r (concat (strata P)) /\ is_rule_of P a r = true.
+Proof. intros a r. apply filter_In. Qed.
+Lemma definite_ok : forall look, (forall a b, look a = Some b -> holds_in w a = b) -> forall f env b,
+  definite P look env f = Some b -> truth P w None env f = Some b.
+Proof.
+  intros look L. induction f; intros env v H; cbn [definite truth] in *; try exact H; try discriminate.
+  - destruct (ground env ts); [|discriminate]. rewrite (L _ _ H). reflexivity.
+  - destruct (definite P look env f) as [t|] eqn:E; [|discriminate]. rewrite (IHf _ _ E). exact H.
+  - destruct (definite P look env f1) as [x|] eqn:E1; [rewrite (IHf1 _ _ E1)|];
+      destruct (definite P look env f2) as [y|] eqn:E2; try (rewrite (IHf2 _ _ E2)); try exact H;
+      try destruct x; try destruct y; try discriminate; injection H as <-;
+      try (destruct (truth P w None env f1) as [[]|]; reflexivity);
+      destruct (truth P w None env f2) as [[]|]; reflexivity.
+  - revert v H. induction (objects P type) as [|o os IH]; intros v H; cbn [fold_right] in *; [exact H|].
+    set (x := fold_right _ _ os) in H. set (y := fold_right _ _ os).
+    assert (X : forall b, x = Some b -> y = Some b) by exact IH. clearbody x y. clear IH.
+    destruct (definite P look (env ++ [o]) f) as [t|] eqn:E.
+    + rewrite (IHf _ _ E). destruct x as [c|]; [rewrite (X _ eq_refl); exact H|].
+      destruct t; [discriminate|]. injection H as <-. reflexivity.
+    + destruct x as [[]|]; try discriminate. injection H as <-. rewrite (X _ eq_refl).
+      destruct (truth P w None (env ++ [o]) f) as [[]|]; reflexivity.
+Qed.
+Lemma look_up_ok : forall k, Knows w k -> forall n a b, look_up P T N n k a = Some b -> holds_in w a = b.
+Proof.
+  intros k K. induction n; intros a b H; cbn [look_up] in H;
+    (destruct (base_truth P T N k a) as [c|] eqn:B; [injection H as <-; apply (base_truth_ok k K), B|]);
+    [discriminate|].
+  destruct (is_unfolded P N a) eqn:U; [|discriminate]. unfold is_unfolded in U. apply andb_true_iff in U.
+  destruct U as [D _]. destruct (existsb _ _) eqn:E; [injection H as <-|].
+  - apply existsb_exists in E. destruct E as [t [I E]]. apply in_map_iff in I. destruct I as [r [<- I]].
+    apply rules_of_spec in I. destruct I as [I Ru].
+    destruct (definite P (look_up P T N n k) (snd a) (body r)) as [[]|] eqn:F; try discriminate.
+    apply (definite_ok _ (IHn)) in F. rewrite complete in F. rewrite complete. destruct rule_parts as [St _].
+    exact (rule_closed P below St a r I Ru F).
+  - destruct (forallb _ _) eqn:A; [injection H as <-|discriminate]. destruct (holds_in w a) eqn:Ha; [|reflexivity].
+    destruct (complete_origin _ D Ha) as [r [I [Ru Tr]]]. rewrite forallb_forall in A.
+    specialize (A (definite P (look_up P T N n k) (snd a) (body r))).
+    assert (J : In r (rules_of P a)) by (apply rules_of_spec; auto).
+    specialize (A (in_map (fun r => definite P (look_up P T N n k) (snd a) (body r)) _ _ J)).
+    destruct (definite P (look_up P T N n k) (snd a) (body r)) as [[]|] eqn:F; try discriminate.
+    apply (definite_ok _ (IHn)) in F. congruence.
+Qed.
+Lemma ground_rules_ok_rest : forall before rules rest, fst (ground_rules_ok P T N (before ++ rules :: rest)) = true ->
+  forallb (ground_rule_ok P T N (snd (check_layers (rules :: rest)))) rules = true.
+Proof.
+  assert (S : forall ls, snd (ground_rules_ok P T N ls) = snd (check_layers ls)).
+  { induction ls as [|rules ls IH]; [reflexivity|]. cbn [ground_rules_ok check_layers].
+    destruct (ground_rules_ok P T N ls), (check_layers ls). cbn [snd] in *. subst. reflexivity. }
+  induction before as [|layer before IH]; intros rules rest H; cbn [app ground_rules_ok] in H.
+  - specialize (S rest). cbn [check_layers]. destruct (ground_rules_ok P T N rest), (check_layers rest).
+    cbn [fst snd] in *. subst. apply andb_true_iff in H. apply H.
+  - apply IH. destruct (ground_rules_ok P T N (before ++ rules :: rest)). cbn [fst] in *.
+    apply andb_true_iff in H. apply H.
+Qed.
+Lemma lower_atoms : equivalent N = true -> forall v x d a, M.find v (derived_atoms N) = Some (x, d, a) ->
+  is_fact ds (v, x) = true -> holds_in w a = true.
+Proof.
+  intro Eq. destruct ground_parts as [G1 [G2 G3]]. specialize (G3 Eq).
+  assert (H : forall v x, (exists d a, M.find v (derived_atoms N) = Some (x, d, a)) -> is_fact ds (v, x) = true ->
+    forall x d a, M.find v (derived_atoms N) = Some (x, d, a) -> holds_in w a = true).
+  { apply (derive_invariant T s (fun v x => exists d a, M.find v (derived_atoms N) = Some (x, d, a))
+      (fun v => forall x d a, M.find v (derived_atoms N) = Some (x, d, a) -> holds_in w a = true));
+      [apply heads; exact task_ok|apply deriveds; exact task_ok| |].
+    - intros v x [d [a F]] Is. exfalso. destruct (G1 _ _ _ _ F) as [_ [Ne [Ex De]]].
+      unfold is_fact, reset_derived, var_value in Is. cbn [fst snd var_values] in Is. rewrite get_puts in Is.
+      apply Z.eqb_eq in Is. pose proof (last_put_some (derived T) v
+        (get (put_all (map (fun v => (v, get (var_values s) v)) (basics T)) (M.empty Z)) v) Ex) as L.
+      apply De in L; [|reflexivity]. cbn [snd] in L. apply Ne. etransitivity; [symmetry; exact Is|exact L].
+    - intros rules rest before t r L I B1 B2 B3 Ho _ x d a F. rewrite L in G3.
+      apply ground_rules_ok_rest in G3. rewrite forallb_forall in G3. specialize (G3 _ I).
+      unfold ground_rule_ok in G3. rewrite F in G3. apply andb_true_iff in G3. destruct G3 as [Neg G3].
+      rewrite forallb_forall in Neg. apply existsb_exists in G3. destruct G3 as [rule [Ir G3]].
+      apply rules_of_spec in Ir. destruct Ir as [Ir Ru].
+      set (k := Knowledge (ground_literals N (snd r)) []) in *.
+      assert (K : Knows w k).
+      { split; [|intros ? ? []]. intros b c J. unfold k, ground_literals in J. cbn [literals] in J.
+        apply in_flat_map in J. destruct J as [[u z] [J J2]]. cbn [fst snd] in J2.
+        assert (Is : var_value t u = z).
+        { unfold holds, holds_facts in Ho. rewrite !andb_true_iff in Ho. destruct Ho as [[Ho _] _].
+          rewrite forallb_forall in Ho. specialize (Ho _ J). unfold is_fact in Ho. apply Z.eqb_eq in Ho. exact Ho. }
+        destruct (M.find u (variables N)) as [vals|] eqn:V.
+        - apply in_map_iff in J2. destruct J2 as [[y b'] [E J2]]. injection E as <- <-. cbn [fst snd].
+          rewrite (r_var _ _ R _ _ _ _ V J2). f_equal. rewrite <- Is. symmetry. apply B1.
+          destruct parts as [_ [A _]]. apply (A _ _ V).
+        - destruct (M.find u (derived_atoms N)) as [[[y e] b']|] eqn:D; [|destruct J2].
+          destruct J2 as [J2|[]]. injection J2 as <- <-. destruct (Z.eqb_spec z y) as [E|E].
+          + subst y. apply (B3 u z (ex_intro _ e (ex_intro _ b' D))) with (x := z) (d := e); [|exact D].
+            unfold is_fact. cbn [fst snd]. apply Z.eqb_eq, Is.
+          + destruct (holds_in w b') eqn:Hb; [|reflexivity]. exfalso. apply (r_derived _ _ R _ _ _ _ D) in Hb.
+            specialize (Neg _ J). cbn [fst snd] in Neg. rewrite D in Neg.
+            destruct (Z.eqb_spec z y); [contradiction|]. cbn [orb] in Neg.
+            assert (N0 : M.find u (snd (check_layers (rules :: rest))) = None)
+              by (destruct (M.find u (snd (check_layers (rules :: rest)))); [discriminate|reflexivity]).
+            apply B2 in N0. unfold is_fact in Hb. cbn [fst snd] in Hb. apply Z.eqb_eq in Hb. congruence. }
+      destruct (definite P (look_up P T N max_unfoldings k) (snd a) (body rule)) as [[]|] eqn:Df; try discriminate.
+      apply (definite_ok _ (look_up_ok k K max_unfoldings)) in Df. rewrite complete in Df. rewrite complete.
+      destruct rule_parts as [St _]. exact (rule_closed P below St a rule Ir Ru Df). }
+  intros v x d a F Is. exact (H v x (ex_intro _ d (ex_intro _ a F)) Is x d a F).
+Qed.
+Lemma lower_holds : equivalent N = true -> lower_ok.
+Proof.
+  intros Eq v x d a F Ha. destruct ground_parts as [G1 [G2 _]]. destruct (G1 _ _ _ _ F) as [_ [_ [Ex De]]].
+  destruct (derived_values T s v x d Ex De (fun rules r I J E => G2 _ _ _ _ _ _ F I J E)) as [E|E]; [|exact E].
+  exfalso. assert (Is : is_fact ds (v, x) = true) by (unfold is_fact; cbn [fst snd]; apply Z.eqb_eq; exact E).
+  pose proof (lower_atoms Eq _ _ _ _ F Is) as X. congruence.
+Qed.
+
 (* Operators *)
 Section Operators.
 Variable k : knowledge.
@@ -295,23 +434,26 @@ Proof.
   rewrite F in B. change 1 with (inject_Z 1) in B. rewrite <- inject_Z_plus in B.
   change 0 with (inject_Z 0) in B. rewrite <- Zlt_Qlt in B. lia.
 Qed.
-Lemma known_literal_ok : forall l b, known_literal T N k l = Some b -> is_literal ds l = b.
+Lemma known_literal_ok : forall full, (full = true -> lower_ok) -> forall l b,
+  known_literal T N full k l = Some b -> is_literal ds l = b.
 Proof.
-  intros [[v x] t] b H. unfold known_literal in H. cbn [fst snd] in H.
-  destruct (known_fact T N k v x) as [c|] eqn:F; [|discriminate]. injection H as <-.
-  apply (known_fact_ok k K) in F. exact (f_equal (fun b => Bool.eqb b t) F).
+  intros full Lo [[v x] t] b H. unfold known_literal in H. cbn [fst snd] in H.
+  destruct (known_fact T N full k v x) as [c|] eqn:F; [|discriminate]. injection H as <-.
+  apply (known_fact_ok k K full Lo) in F. exact (f_equal (fun b => Bool.eqb b t) F).
 Qed.
-Lemma known_condition_ok : forall c szs ch, known_condition T N k c szs ch = true -> holds c ds szs ch = true.
+Lemma known_condition_ok : forall full, (full = true -> lower_ok) -> forall c szs ch,
+  known_condition T N full k c szs ch = true -> holds c ds szs ch = true.
 Proof.
-  intros c szs ch H. unfold known_condition in H. rewrite !andb_true_iff in H. destruct H as [[H1 H2] H3].
+  intros full Lo c szs ch H. unfold known_condition in H. rewrite !andb_true_iff in H. destruct H as [[H1 H2] H3].
   rewrite forallb_forall in H1, H2, H3.
   unfold holds, holds_facts. rewrite !andb_true_iff. split; [split|]; apply forallb_forall.
   - intros [v x] I. specialize (H1 _ I). cbn [fst snd] in H1.
-    destruct (known_fact T N k v x) as [[]|] eqn:F; try discriminate.
-    apply (known_fact_ok k K), F.
+    destruct (known_fact T N full k v x) as [[]|] eqn:F; try discriminate.
+    apply (known_fact_ok k K full Lo), F.
   - intros cl I. specialize (H2 _ I). apply existsb_exists in H2. destruct H2 as [l [J E]].
     apply existsb_exists. exists l. split; [exact J|].
-    destruct (known_literal T N k l) as [[]|] eqn:F; try discriminate. apply known_literal_ok, F.
+    destruct (known_literal T N full k l) as [[]|] eqn:F; try discriminate.
+    apply (known_literal_ok full Lo), F.
   - intros l I. specialize (H3 _ I). destruct (form_of N l szs ch) as [g|] eqn:F; [|discriminate].
     apply Z.leb_le. eapply required_ok; eassumption.
 Qed.
@@ -322,7 +464,8 @@ Proof.
   destruct (existsb _ (fst c)) eqn:E.
   - replace (fires ds c) with false; [apply IH, H|]. symmetry. unfold fires. apply existsb_exists in E.
     destruct E as [x [I E]].
-    destruct (known_literal T N k x) as [[]|] eqn:F; try discriminate. apply known_literal_ok in F.
+    destruct (known_literal T N (equivalent N) k x) as [[]|] eqn:F; try discriminate.
+    apply (known_literal_ok _ lower_holds) in F.
     destruct (forallb _ _) eqn:A; [|reflexivity].
     rewrite forallb_forall in A. rewrite (A _ I) in F. discriminate.
   - destruct (forallb _ (fst c)) eqn:A; [|discriminate].
@@ -330,7 +473,8 @@ Proof.
     replace (fires ds c) with true; [simpl; f_equal; apply IH; reflexivity|]. symmetry. unfold fires.
     apply forallb_forall. intros x I.
     rewrite forallb_forall in A. specialize (A _ I).
-    destruct (known_literal T N k x) as [[]|] eqn:F; try discriminate. apply known_literal_ok, F.
+    destruct (known_literal T N (equivalent N) k x) as [[]|] eqn:F; try discriminate.
+    apply (known_literal_ok _ lower_holds), F.
 Qed.
 
 Lemma admitted_ok : forall o ch, admitted_choice o ch = true -> admitted o ch.
@@ -440,10 +584,10 @@ Proof.
     made = made_facts o ds
                 | None => made = [] end).
   { destruct o as [[o ch]|]; [|congruence].
-    destruct (admitted_choice o ch && known_condition T N k (precondition o) (slot_sizes o) ch &&
+    destruct (admitted_choice o ch && known_condition T N (equivalent N) k (precondition o) (slot_sizes o) ch &&
       distinct (map fst (number_effects o))) eqn:A; [|discriminate].
     rewrite !andb_true_iff in A. destruct A as [[A1 A2] A3]. split; [apply admitted_ok, A1|].
-    split; [apply known_condition_ok, A2|]. split; [exact A3|].
+    split; [apply (known_condition_ok _ lower_holds), A2|]. split; [exact A3|].
     destruct (known_effects T N k (conditional o)) as [l|] eqn:F; [|discriminate].
     apply known_effects_ok in F. simpl in E. injection E as <-. unfold made_facts. congruence. }
   assert (Val : forall v vals, M.find v (variables N) = Some vals ->
@@ -533,16 +677,16 @@ Proof.
     apply negb_true_iff in Z. apply Pos.eqb_neq in Z. contradiction.
   - destruct (existsb _ (fst c)) eqn:E.
     + replace (fires ds c) with false; [apply IH, H|]. symmetry. unfold fires. apply existsb_exists in E.
-      destruct E as [y [I E]]. destruct (known_literal T N k y) as [[]|] eqn:F; try discriminate.
-      apply (known_literal_ok k K) in F. destruct (forallb (is_literal ds) (fst c)) eqn:A; [|reflexivity].
+      destruct E as [y [I E]]. destruct (known_literal T N (equivalent N) k y) as [[]|] eqn:F; try discriminate.
+      apply (known_literal_ok k K _ lower_holds) in F. destruct (forallb (is_literal ds) (fst c)) eqn:A; [|reflexivity].
       rewrite forallb_forall in A. rewrite (A _ I) in F. discriminate.
     + destruct (forallb _ (fst c)) eqn:A; [|discriminate].
       destruct (known_effects_on T N v k cs) as [r|]; [|discriminate]. injection H as <-.
       replace (fires ds c) with true.
       * cbn [flat_map]. rewrite !last_put_app. apply IH. reflexivity.
       * symmetry. unfold fires. apply forallb_forall. intros y I. rewrite forallb_forall in A.
-        specialize (A _ I). destruct (known_literal T N k y) as [[]|] eqn:F; try discriminate.
-        apply (known_literal_ok k K), F.
+        specialize (A _ I). destruct (known_literal T N (equivalent N) k y) as [[]|] eqn:F; try discriminate.
+        apply (known_literal_ok k K _ lower_holds), F.
 Qed.
 Lemma step_instantaneous : forall a env w' d, duration a = None -> step P true w a env = Some (w', d) ->
   happening P w None env (at_start a) (start_effect a) = Some w' /\ d = 0.
@@ -591,7 +735,7 @@ Proof.
     holds (precondition o) ds (slot_sizes o) ch = true /\ distinct (map fst (number_effects o)) = true
     | None => True end).
   { destruct o as [[o ch]|]; [|exact Logic.I]. rewrite !andb_true_iff in H3. destruct H3 as [[A1 A2] A3].
-    split; [apply admitted_ok, A1|]. split; [apply (known_condition_ok k K), A2|exact A3]. }
+    split; [apply admitted_ok, A1|]. split; [apply (known_condition_ok k K _ lower_holds), A2|exact A3]. }
   split; [|split; [destruct o as [[o ch]|]; [tauto|exact Logic.I]|split; [exact Hd|]]].
   2: { exists l. destruct (growth P N (Symbolic [] l false) 0) as [g|]; [|discriminate]. exists g.
        split; [exact V|]. split; [reflexivity|]. apply Qle_bool_iff, H6. }
@@ -754,15 +898,18 @@ Proof.
     + apply Qle_bool_iff, E.
     + apply le_false in E. rewrite ev_plus_form, ev_constant. lra.
 Qed.
-Lemma expand_ok : forall f b env next k, Knows w k -> truth P w None env f = Some b ->
-  expand P T N f b env next k = true -> exists k', Knows w k' /\ next k' = true.
+Definition accepts (next : continuation) : Prop := exists k, Knows w k /\ next k = true.
+Definition is_sound (after : atom -> bool -> continuation -> continuation) : Prop := forall a b next k,
+  Knows w k -> holds_in w a = b -> after a b next k = true -> accepts next.
+Lemma expand_ok : forall after, is_sound after -> forall f b env next k, Knows w k ->
+  truth P w None env f = Some b -> expand P T N after f b env next k = true -> accepts next.
 Proof.
-  induction f; intros v env next k K H E; cbn [expand truth] in *.
+  intros after Af. induction f; intros v env next k K H E; cbn [expand truth] in *.
   - injection H as <-. rewrite eqb_reflx in E. exists k. auto.
   - destruct (ground env ts) as [l|]; [|discriminate]. injection H as H.
     destruct (base_truth P T N k (p, l)) as [c|] eqn:B.
     + apply (base_truth_ok k K) in B. rewrite H in B. subst c. rewrite eqb_reflx in E. exists k. auto.
-    + exists (Knowledge (((p, l), v) :: literals k) (bounds k)). split; [|exact E].
+    + refine (Af _ _ _ _ _ H E).
       split; [intros a c [I|I]; [injection I as <- <-; exact H|apply K, I]|apply K].
   - destruct (object_of env t); [|discriminate]. destruct (object_of env u); [|discriminate].
     injection H as <-. rewrite eqb_reflx in E. exists k. auto.
@@ -795,6 +942,15 @@ Proof.
         by (destruct (truth P w None (env ++ [o]) f) as [[]|], x as [[]|]; simpl in H; try discriminate; auto).
       destruct A as [A|A]; [eapply IHf; eassumption|exact (IH A E2)].
 Qed.
+Lemma unfold_ok : (forall a, is_derived P (fst a) = true -> holds_in w a = true -> has_rule P w a) ->
+  forall n, is_sound (unfold P T N n).
+Proof.
+  intros O. induction n; intros a b next k K H E; cbn [unfold] in E; [exists k; auto|].
+  destruct (b && is_unfolded P N a) eqn:U; [|exists k; auto]. apply andb_true_iff in U. destruct U as [-> U].
+  unfold is_unfolded in U. apply andb_true_iff in U. destruct U as [D _].
+  destruct (O _ D H) as [r [I [Ru Tr]]]. rewrite forallb_forall in E.
+  apply (expand_ok _ IHn (body r) true (snd a) next k K Tr). apply E, filter_In. auto.
+Qed.
 End State.
 
 (* Derived atoms *)
@@ -824,26 +980,29 @@ Proof.
   - apply B.
   - intros a C A. destruct (is_derived P (fst a)) eqn:D; [apply (H a), A|apply (b_may _ _ B); assumption].
   - intros g a b G I J. rewrite (Ex _ _ G I), (Ex _ _ G J). apply (b_exclusive _ _ B g); assumption.
-  - intros v x a D A. destruct (De _ _ _ D) as [D1 D2]. rewrite D1 in A. apply (H a A), D2.
+  - intros v x d a D A. destruct (De _ _ _ _ D) as [D1 D2]. rewrite D1 in A. apply (H a A), D2.
   - apply B.
 Qed.
 Lemma derived_related : forall w s, Base w s -> Rel (derived_world P w) s.
 Proof.
-  intros w s B. apply with_facts_related; [exact B|]. apply derived_invariant.
-  intros F rules i H I J Fi. pose proof (with_facts_related _ _ _ B H) as R.
+  intros w s B. apply with_facts_related; [exact B|]. apply derived_invariant; [apply rule_parts|].
+  intros F rules i H Ju I J Fi. pose proof (with_facts_related _ _ _ B H) as R.
   destruct rule_parts as [_ [La [_ [_ [_ [_ Ok]]]]]]. specialize (Ok _ _ I J). unfold rule_ok in Ok.
   assert (X : find_atom (derived_of N) (fst i) = None /\ mem (may_hold N) (fst i) = true \/
-    expand P T N (snd i) true (snd (fst i)) (rule_leaf P T N (ground_rules T) (fst i)) (Knowledge [] []) = true)
+    expand P T N (unfold P T N max_unfoldings) (snd i) true (snd (fst i)) (rule_leaf P T N (ground_rules T) (fst i)) (Knowledge [] []) = true)
     by (destruct (find_atom (derived_of N) (fst i)), (mem (may_hold N) (fst i)); auto).
   destruct X as [[X1 X2]|X]; [split; [exact X2|intros v x E; congruence]|].
   unfold fires_in in Fi. destruct (truth P (with_facts P w F) None (snd (fst i)) (snd i)) as [[]|] eqn:Tr;
     try discriminate.
-  destruct (expand_ok _ _ R _ _ _ _ _ (knows_nothing _) Tr X) as [k [K L]]. unfold rule_leaf in L.
+  assert (Or : forall a, is_derived P (fst a) = true -> holds_in (with_facts P w F) a = true ->
+    has_rule P (with_facts P w F) a).
+  { intros a D A. cbn [with_facts holds_in] in A. rewrite D in A. exact (Ju a A). }
+  destruct (expand_ok _ _ R _ (unfold_ok _ _ R Or max_unfoldings) _ _ _ _ _ (knows_nothing _) Tr X) as [k [K L]]. unfold rule_leaf in L.
   apply orb_true_iff in L. destruct L as [L|L]; [exfalso; eapply impossible_ok; eassumption|].
   apply andb_true_iff in L. destruct L as [May L]. split; [exact May|]. intros v x E. rewrite E in L.
   destruct (M.find v (ground_rules T)) as [l|] eqn:G; [|discriminate]. apply existsb_exists in L.
   destruct L as [r [Ir L]]. apply andb_true_iff in L. destruct L as [Ex L]. apply Z.eqb_eq in Ex. subst x.
-  apply (known_condition_ok _ _ R k K) in L. pose proof (ground_rules_ok _ _ _ G Ir) as C.
+  apply (known_condition_ok _ _ R k K false) in L; [|discriminate]. pose proof (ground_rules_ok _ _ _ G Ir) as C.
   apply in_concat in C. destruct C as [layer [C1 C2]].
   exact (derive_closed T La s layer ((v, fst r), snd r) C1 C2 L).
 Qed.
@@ -1092,7 +1251,7 @@ Proof.
     destruct (symbolic_truth P T N k unchanged Undefined [] (goal_formula P)) as [[]|] eqn:E.
     2: { exfalso. apply (symbolic_truth_ok P T N w k (base_truth_ok w s R k K) (static_value w s R) K w
            unchanged None Undefined (describes_itself P w) eq_refl) in E. apply E. exact G. }
-    all: apply (known_condition_ok w s R k K); exact L.
+    all: apply (known_condition_ok w s R k K (equivalent N)); [apply (lower_holds w s R w0 Cw)|exact L].
   - rewrite Mw. destruct (nth_error (actions P) i) as [a|] eqn:Ni; [|discriminate].
     destruct (step P true w a env) as [[w1 d]|] eqn:S; [|discriminate].
     destruct parts as [_ [_ [_ [_ [_ B]]]]]. specialize (B _ _ Ni). unfold action_ok in B.
@@ -1128,7 +1287,7 @@ Proof.
         exists g. split; [exact G2|exact G3]. }
       destruct Q as [Q D].
       rewrite !andb_true_iff in L. destruct L as [[L1 LX] L2].
-      destruct (simulated_ok w s R k K sy t o' w1 D K1 K2 L1 LX Io L2) as [R1 [Ad G]]. exists o', sy, t.
+      destruct (simulated_ok w s R w0 Cw k K sy t o' w1 D K1 K2 L1 LX Io L2) as [R1 [Ad G]]. exists o', sy, t.
       pose proof (d_value _ _ _ _ D : describes_values w w1 (new_values sy)) as DV. tauto. }
     destruct Go as [o [sy [t [Io [R1 [Ad [D [Td [g [Gr Co]]]]]]]]]].
     destruct (IH _ _ _ _ _ H R1) as [ps [c [Pl [Le End]]]].

@@ -59,6 +59,15 @@ changed domain.pddl 's/(or (open ?s ?r) (open ?r ?s))/(door ?s ?r)/'
 changed domain.pddl 's/(or (at ?r) (exists/(or (lit ?r) (exists/'
 changed domain.pddl 's/(door ?r ?s) (reach ?r)/(door ?r ?s)/'
 changed problem.pddl 's/(at r1)/(at r2)/'
+directory=tests/lamps
+accepted "$directory" 'proved: the plan of 2 steps is optimal, metric 2'
+mutated "$directory"
+changed domain.pddl 's/(dark ?r - room) (not (lit ?r))/(dark ?r - room) (not (on ?r))/'
+changed domain.pddl 's/(:derived (dark ?r - room) (not (lit ?r)))/(:derived (dark ?r - room) (lit ?r))/'
+changed domain.pddl 's/(when (dark ?r)/(when (not (dark ?r))/'
+changed domain.pddl 's/(or (corridor ?s ?r) (open ?s ?r)/(or (open ?s ?r)/'
+changed problem.pddl 's/(on hall)//'
+changed problem.pddl 's/(not (lit bedroom))/(lit bedroom)/'
 directory=tests/ugv
 accepted "$directory" 'proved: the plan of 4 steps is optimal, metric 408'
 mutated "$directory"

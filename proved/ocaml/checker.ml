@@ -2249,9 +2249,10 @@ let plus_result a c b =
 type names = { variables : (z * atom) list M.t; fluents : atom M.t;
                fact_of : (key1 * z) atom_map; number_of : key1 atom_map;
                changing : (key1 -> bool); may_hold : unit atom_map;
-               derived_atoms : (z * atom) M.t;
-               derived_of : (key1 * z) atom_map; exclusive : atom list list;
-               scale : positive; cost_scale : positive }
+               derived_atoms : ((z * z) * atom) M.t;
+               derived_of : (key1 * z) atom_map; equivalent : bool;
+               exclusive : atom list list; scale : positive;
+               cost_scale : positive }
 
 type case_tree =
 | Decided of (nat * choice) option
@@ -2309,9 +2310,9 @@ let possible t0 n k v =
      | None -> range (get t0.domain_size v))
 
 (** val known_fact :
-    task -> names -> knowledge -> key1 -> z -> bool option **)
+    task -> names -> bool -> knowledge -> key1 -> z -> bool option **)
 
-let known_fact t0 n k v x =
+let known_fact t0 n full k v x =
   match M.find v n.variables with
   | Some _ ->
     let ys = possible t0 n k v in
@@ -2321,9 +2322,13 @@ let known_fact t0 n k v x =
   | None ->
     (match M.find v n.derived_atoms with
      | Some p ->
-       let (y, a) = p in
+       let (p0, a) = p in
+       let (y, d) = p0 in
        (match assoc a k.literals with
-        | Some b -> if b then if Z.eqb x y then Some true else None else None
+        | Some b ->
+          if b
+          then Some (Z.eqb x y)
+          else if full then Some (Z.eqb x d) else None
         | None -> None)
      | None -> None)
 
@@ -2339,7 +2344,7 @@ let base_truth p t0 n k a =
           if (||) (excluded_by n k a) (negb (mem0 n.may_hold a))
           then Some false
           else (match find_atom n.fact_of a with
-                | Some p0 -> let (v, x) = p0 in known_fact t0 n k v x
+                | Some p0 -> let (v, x) = p0 in known_fact t0 n false k v x
                 | None -> None))
 
 type symbolic = { new_truths : (atom * bool) list;
@@ -2919,36 +2924,43 @@ let is_rule_of p a r =
     (forallb (fun x -> existsb (Coq_Pos.eqb (fst x)) (p.objects (snd x)))
       (combine (snd a) r.head_types))
 
+(** val rules_of : problem -> atom -> rule list **)
+
+let rules_of p a =
+  filter (is_rule_of p a) (concat p.strata)
+
 (** val contradicts_rules : problem -> task -> names -> knowledge -> bool **)
 
 let contradicts_rules p t0 n k =
   existsb (fun l ->
     let (a, holds0) = l in
     (&&) (is_derived p (fst a))
-      (let rules = filter (is_rule_of p a) (concat p.strata) in
-       let body_truth = fun r ->
+      (let body_truth = fun r ->
          symbolic_truth p t0 n k unchanged Undefined (snd a) r.body
        in
        if holds0
        then forallb (fun r ->
               match body_truth r with
               | Some b -> if b then false else true
-              | None -> false) rules
+              | None -> false) (rules_of p a)
        else existsb (fun r ->
               match body_truth r with
               | Some b -> if b then is_defined p (snd a) r.body else false
-              | None -> false) rules)) k.literals
+              | None -> false) (rules_of p a))) k.literals
 
 (** val contradictory : problem -> task -> names -> knowledge -> bool **)
 
 let contradictory p t0 n k =
   (||) (impossible p t0 n k) (contradicts_rules p t0 n k)
 
-(** val expand :
-    problem -> task -> names -> formula -> bool -> key1 list -> (knowledge ->
-    bool) -> knowledge -> bool **)
+type continuation = knowledge -> bool
 
-let rec expand p t0 n f b env next k =
+(** val expand :
+    problem -> task -> names -> (atom -> bool -> continuation ->
+    continuation) -> formula -> bool -> key1 list -> continuation ->
+    knowledge -> bool **)
+
+let rec expand p t0 n after f b env next k =
   match f with
   | Truth c -> if eqb b c then next k else true
   | Atom (p0, ts) ->
@@ -2957,7 +2969,8 @@ let rec expand p t0 n f b env next k =
        (match base_truth p t0 n k (p0, l) with
         | Some c -> if eqb b c then next k else true
         | None ->
-          next { literals = (((p0, l), b) :: k.literals); bounds = k.bounds })
+          after (p0, l) b next { literals = (((p0, l), b) :: k.literals);
+            bounds = k.bounds })
      | None -> true)
   | Same (t1, u) ->
     (match object_of env t1 with
@@ -2968,19 +2981,99 @@ let rec expand p t0 n f b env next k =
      | None -> true)
   | Compare (_, _, _) ->
     next (if b then join k (conjuncts p n unchanged Undefined env f) else k)
-  | Not g -> expand p t0 n g (negb b) env next k
+  | Not g -> expand p t0 n after g (negb b) env next k
   | And (g, h) ->
     if b
-    then expand p t0 n g true env (expand p t0 n h true env next) k
-    else (&&) (expand p t0 n g false env next k)
-           (expand p t0 n h false env next k)
+    then expand p t0 n after g true env (expand p t0 n after h true env next)
+           k
+    else (&&) (expand p t0 n after g false env next k)
+           (expand p t0 n after h false env next k)
   | Forall (t1, g) ->
     if b
     then fold_right (fun o next0 ->
-           expand p t0 n g true (app env (o :: [])) next0) next
+           expand p t0 n after g true (app env (o :: [])) next0) next
            (p.objects t1) k
-    else forallb (fun o -> expand p t0 n g false (app env (o :: [])) next k)
+    else forallb (fun o ->
+           expand p t0 n after g false (app env (o :: [])) next k)
            (p.objects t1)
+
+(** val is_unfolded : problem -> names -> atom -> bool **)
+
+let is_unfolded p n a =
+  (&&) (is_derived p (fst a))
+    (match find_atom n.derived_of a with
+     | Some _ -> false
+     | None -> true)
+
+(** val unfold :
+    problem -> task -> names -> nat -> atom -> bool -> continuation ->
+    knowledge -> bool **)
+
+let rec unfold p t0 n depth a b next k =
+  match depth with
+  | O -> next k
+  | S depth0 ->
+    if (&&) b (is_unfolded p n a)
+    then forallb (fun r ->
+           expand p t0 n (unfold p t0 n depth0) r.body true (snd a) next k)
+           (rules_of p a)
+    else next k
+
+(** val definite :
+    problem -> (atom -> bool option) -> key1 list -> formula -> bool option **)
+
+let rec definite p look env = function
+| Truth b -> Some b
+| Atom (p0, ts) ->
+  (match ground env ts with
+   | Some l -> look (p0, l)
+   | None -> None)
+| Same (t0, u) ->
+  (match object_of env t0 with
+   | Some a ->
+     (match object_of env u with
+      | Some b -> Some (Coq_Pos.eqb a b)
+      | None -> None)
+   | None -> None)
+| Compare (_, _, _) -> None
+| Not g -> option_map negb (definite p look env g)
+| And (g, h) -> and_kleene (definite p look env g) (definite p look env h)
+| Forall (t0, g) ->
+  fold_right (fun o r ->
+    and_kleene (definite p look (app env (o :: [])) g) r) (Some true)
+    (p.objects t0)
+
+(** val is_some : bool -> bool option -> bool **)
+
+let is_some b = function
+| Some c -> eqb b c
+| None -> false
+
+(** val look_up :
+    problem -> task -> names -> nat -> knowledge -> atom -> bool option **)
+
+let rec look_up p t0 n depth k a =
+  match base_truth p t0 n k a with
+  | Some b -> Some b
+  | None ->
+    (match depth with
+     | O -> None
+     | S depth0 ->
+       if is_unfolded p n a
+       then let truths =
+              map (fun r ->
+                definite p (look_up p t0 n depth0 k) (snd a) r.body)
+                (rules_of p a)
+            in
+            if existsb (is_some true) truths
+            then Some true
+            else if forallb (is_some false) truths then Some false else None
+       else None)
+
+(** val max_unfoldings : nat **)
+
+let max_unfoldings =
+  S (S (S (S (S (S (S (S O)))))))
 
 (** val occurrences_ok : (key1 -> bool -> bool) -> bool -> formula -> bool **)
 
@@ -3048,11 +3141,11 @@ let required n k f =
     (plus_form f { qnum = (Zpos XH); qden = XH } (constant (qinv (scaled n))))
 
 (** val known_literal :
-    task -> names -> knowledge -> literal -> bool option **)
+    task -> names -> bool -> knowledge -> literal -> bool option **)
 
-let known_literal t0 n k l =
+let known_literal t0 n full k l =
   option_map (fun b -> eqb b (snd l))
-    (known_fact t0 n k (fst (fst l)) (snd (fst l)))
+    (known_fact t0 n full k (fst (fst l)) (snd (fst l)))
 
 (** val is_true : bool option -> bool **)
 
@@ -3067,13 +3160,15 @@ let is_false = function
 | None -> false
 
 (** val known_condition :
-    task -> names -> knowledge -> condition -> z list -> choice -> bool **)
+    task -> names -> bool -> knowledge -> condition -> z list -> choice ->
+    bool **)
 
-let known_condition t0 n k c szs ch =
+let known_condition t0 n full k c szs ch =
   (&&)
     ((&&)
-      (forallb (fun f -> is_true (known_fact t0 n k (fst f) (snd f))) c.facts)
-      (forallb (existsb (fun l -> is_true (known_literal t0 n k l)))
+      (forallb (fun f -> is_true (known_fact t0 n full k (fst f) (snd f)))
+        c.facts)
+      (forallb (existsb (fun l -> is_true (known_literal t0 n full k l)))
         c.clauses))
     (forallb (fun l ->
       match form_of n l szs ch with
@@ -3087,9 +3182,10 @@ let known_condition t0 n k c szs ch =
 let rec known_effects t0 n k = function
 | [] -> Some []
 | c :: r ->
-  if existsb (fun l -> is_false (known_literal t0 n k l)) (fst c)
+  if existsb (fun l -> is_false (known_literal t0 n n.equivalent k l)) (fst c)
   then known_effects t0 n k r
-  else if forallb (fun l -> is_true (known_literal t0 n k l)) (fst c)
+  else if forallb (fun l -> is_true (known_literal t0 n n.equivalent k l))
+            (fst c)
        then option_map (app (snd c)) (known_effects t0 n k r)
        else None
 
@@ -3182,8 +3278,8 @@ let simulated p t0 n k s time o =
           let (o0, ch) = p0 in
           if (&&)
                ((&&) (admitted_choice o0 ch)
-                 (known_condition t0 n k o0.precondition o0.slot_sizes ch))
-               (distinct (map fst o0.number_effects))
+                 (known_condition t0 n n.equivalent k o0.precondition
+                   o0.slot_sizes ch)) (distinct (map fst o0.number_effects))
           then option_map (app o0.effects)
                  (known_effects t0 n k o0.conditional)
           else None
@@ -3242,9 +3338,11 @@ let rec known_effects_on t0 n v k = function
 | c :: r ->
   if forallb (fun f -> negb (Coq_Pos.eqb (fst f) v)) (snd c)
   then known_effects_on t0 n v k r
-  else if existsb (fun l -> is_false (known_literal t0 n k l)) (fst c)
+  else if existsb (fun l -> is_false (known_literal t0 n n.equivalent k l))
+            (fst c)
        then known_effects_on t0 n v k r
-       else if forallb (fun l -> is_true (known_literal t0 n k l)) (fst c)
+       else if forallb (fun l ->
+                 is_true (known_literal t0 n n.equivalent k l)) (fst c)
             then option_map (app (snd c)) (known_effects_on t0 n v k r)
             else None
 
@@ -3329,8 +3427,9 @@ let projected_ok p t0 n k a env o =
                    let (o0, ch) = p0 in
                    (&&)
                      ((&&) (admitted_choice o0 ch)
-                       (known_condition t0 n k o0.precondition o0.slot_sizes
-                         ch)) (distinct (map fst o0.number_effects))
+                       (known_condition t0 n n.equivalent k o0.precondition
+                         o0.slot_sizes ch))
+                     (distinct (map fst o0.number_effects))
                  | None -> true))
               (forallb (projected_variable_ok p t0 n k a env o)
                 (app
@@ -3423,8 +3522,9 @@ let instance_leaf p t0 n a env k = function
 
 let goal_leaf p t0 n k _ =
   match symbolic_truth p t0 n k unchanged Undefined [] p.goal_formula with
-  | Some b -> if b then known_condition t0 n k t0.goal [] [] else true
-  | None -> known_condition t0 n k t0.goal [] []
+  | Some b ->
+    if b then known_condition t0 n n.equivalent k t0.goal [] [] else true
+  | None -> known_condition t0 n n.equivalent k t0.goal [] []
 
 (** val static_false : problem -> names -> key1 list -> formula -> bool **)
 
@@ -3528,7 +3628,8 @@ let rule_leaf p t0 n rules a k =
          (match M.find v rules with
           | Some l ->
             existsb (fun r ->
-              (&&) (Z.eqb (fst r) x) (known_condition t0 n k (snd r) [] [])) l
+              (&&) (Z.eqb (fst r) x)
+                (known_condition t0 n false k (snd r) [] [])) l
           | None -> false)
        | None -> true))
 
@@ -3539,13 +3640,63 @@ let rule_leaf p t0 n rules a k =
 let rule_ok p t0 n rules i =
   match find_atom n.derived_of (fst i) with
   | Some _ ->
-    expand p t0 n (snd i) true (snd (fst i)) (rule_leaf p t0 n rules (fst i))
-      { literals = []; bounds = [] }
+    expand p t0 n (unfold p t0 n max_unfoldings) (snd i) true (snd (fst i))
+      (rule_leaf p t0 n rules (fst i)) { literals = []; bounds = [] }
   | None ->
     if mem0 n.may_hold (fst i)
     then true
-    else expand p t0 n (snd i) true (snd (fst i))
-           (rule_leaf p t0 n rules (fst i)) { literals = []; bounds = [] }
+    else expand p t0 n (unfold p t0 n max_unfoldings) (snd i) true
+           (snd (fst i)) (rule_leaf p t0 n rules (fst i)) { literals = [];
+           bounds = [] }
+
+(** val ground_literals : names -> condition -> (atom * bool) list **)
+
+let ground_literals n c =
+  flat_map (fun f ->
+    match M.find (fst f) n.variables with
+    | Some vals -> map (fun xa -> ((snd xa), (Z.eqb (snd f) (fst xa)))) vals
+    | None ->
+      (match M.find (fst f) n.derived_atoms with
+       | Some p ->
+         let (p0, a) = p in let (y, _) = p0 in (a, (Z.eqb (snd f) y)) :: []
+       | None -> [])) c.facts
+
+(** val ground_rule_ok :
+    problem -> task -> names -> z M.t -> (fact * condition) -> bool **)
+
+let ground_rule_ok p t0 n heads r =
+  match M.find (fst (fst r)) n.derived_atoms with
+  | Some p0 ->
+    let (_, a) = p0 in
+    (&&)
+      (forallb (fun f ->
+        match M.find (fst f) n.derived_atoms with
+        | Some p1 ->
+          let (p2, _) = p1 in
+          let (y, _) = p2 in
+          (||) (Z.eqb (snd f) y)
+            (match M.find (fst f) heads with
+             | Some _ -> false
+             | None -> true)
+        | None -> true) (snd r).facts)
+      (let k = { literals = (ground_literals n (snd r)); bounds = [] } in
+       existsb (fun rule0 ->
+         is_some true
+           (definite p (look_up p t0 n max_unfoldings k) (snd a) rule0.body))
+         (rules_of p a))
+  | None -> true
+
+(** val ground_rules_ok :
+    problem -> task -> names -> (fact * condition) list list -> bool * z M.t **)
+
+let rec ground_rules_ok p t0 n = function
+| [] -> (true, M.empty)
+| rules :: rest ->
+  let (ok, later) = ground_rules_ok p t0 n rest in
+  let heads =
+    fold_left (fun m r -> M.add (fst (fst r)) (snd (fst r)) m) rules later
+  in
+  (((&&) ok (forallb (ground_rule_ok p t0 n heads) rules)), heads)
 
 (** val rules_ok : problem -> task -> names -> bool **)
 
@@ -3555,20 +3706,40 @@ let rules_ok p t0 n =
       ((&&)
         ((&&)
           ((&&)
-            ((&&) (is_stratified p.strata) (fst (check_layers t0.layers)))
-            (forallb (forallb (fun r -> n.changing r.head)) p.strata))
-          (forallb (fun vxa ->
-            let (v, y) = vxa in
-            let (x, a) = y in
-            (&&) (is_derived p (fst a))
-              (match find_atom n.derived_of a with
-               | Some p0 ->
-                 let (u, y0) = p0 in (&&) (Coq_Pos.eqb u v) (Z.eqb y0 x)
-               | None -> false)) (M.elements n.derived_atoms)))
-        (forallb (forallb (fun a -> negb (is_derived p (fst a)))) n.exclusive))
-      (forallb (fun vl ->
-        forallb (fun xa -> negb (is_derived p (fst (snd xa)))) (snd vl))
-        (M.elements n.variables)))
+            ((&&)
+              ((&&)
+                ((&&) (is_stratified p.strata) (fst (check_layers t0.layers)))
+                (forallb (forallb (fun r -> n.changing r.head)) p.strata))
+              (forallb (fun vxa ->
+                let (v, y) = vxa in
+                let (y0, a) = y in
+                let (x, d) = y0 in
+                (&&)
+                  ((&&)
+                    ((&&)
+                      ((&&)
+                        ((&&) (is_derived p (fst a)) (negb (is_basic t0 v)))
+                        (negb (Z.eqb x d)))
+                      (existsb (fun f -> Coq_Pos.eqb (fst f) v) t0.derived))
+                    (forallb (fun f ->
+                      (||) (negb (Coq_Pos.eqb (fst f) v)) (Z.eqb (snd f) d))
+                      t0.derived))
+                  (match find_atom n.derived_of a with
+                   | Some p0 ->
+                     let (u, y1) = p0 in (&&) (Coq_Pos.eqb u v) (Z.eqb y1 x)
+                   | None -> false)) (M.elements n.derived_atoms)))
+            (forallb (forallb (fun a -> negb (is_derived p (fst a))))
+              n.exclusive))
+          (forallb (fun vl ->
+            forallb (fun xa -> negb (is_derived p (fst (snd xa)))) (snd vl))
+            (M.elements n.variables)))
+        (forallb
+          (forallb (fun r ->
+            match M.find (fst (fst r)) n.derived_atoms with
+            | Some p0 ->
+              let (p1, _) = p0 in let (x, _) = p1 in Z.eqb (snd (fst r)) x
+            | None -> true)) t0.layers))
+      ((||) (negb n.equivalent) (fst (ground_rules_ok p t0 n t0.layers))))
     (forallb (fun rules ->
       forallb (rule_ok p t0 n (ground_rules t0)) (rule_instances p rules))
       p.strata)

@@ -791,9 +791,10 @@ val plus_result : result -> q -> result -> result
 type names = { variables : (z * atom) list M.t; fluents : atom M.t;
                fact_of : (key1 * z) atom_map; number_of : key1 atom_map;
                changing : (key1 -> bool); may_hold : unit atom_map;
-               derived_atoms : (z * atom) M.t;
-               derived_of : (key1 * z) atom_map; exclusive : atom list list;
-               scale : positive; cost_scale : positive }
+               derived_atoms : ((z * z) * atom) M.t;
+               derived_of : (key1 * z) atom_map; equivalent : bool;
+               exclusive : atom list list; scale : positive;
+               cost_scale : positive }
 
 type case_tree =
 | Decided of (nat * choice) option
@@ -813,7 +814,8 @@ val excluded_by : names -> knowledge -> atom -> bool
 
 val possible : task -> names -> knowledge -> key1 -> z list
 
-val known_fact : task -> names -> knowledge -> key1 -> z -> bool option
+val known_fact :
+  task -> names -> bool -> knowledge -> key1 -> z -> bool option
 
 val base_truth : problem -> task -> names -> knowledge -> atom -> bool option
 
@@ -907,13 +909,33 @@ val is_defined : problem -> key1 list -> formula -> bool
 
 val is_rule_of : problem -> atom -> rule -> bool
 
+val rules_of : problem -> atom -> rule list
+
 val contradicts_rules : problem -> task -> names -> knowledge -> bool
 
 val contradictory : problem -> task -> names -> knowledge -> bool
 
+type continuation = knowledge -> bool
+
 val expand :
-  problem -> task -> names -> formula -> bool -> key1 list -> (knowledge ->
-  bool) -> knowledge -> bool
+  problem -> task -> names -> (atom -> bool -> continuation -> continuation)
+  -> formula -> bool -> key1 list -> continuation -> knowledge -> bool
+
+val is_unfolded : problem -> names -> atom -> bool
+
+val unfold :
+  problem -> task -> names -> nat -> atom -> bool -> continuation ->
+  knowledge -> bool
+
+val definite :
+  problem -> (atom -> bool option) -> key1 list -> formula -> bool option
+
+val is_some : bool -> bool option -> bool
+
+val look_up :
+  problem -> task -> names -> nat -> knowledge -> atom -> bool option
+
+val max_unfoldings : nat
 
 val occurrences_ok : (key1 -> bool -> bool) -> bool -> formula -> bool
 
@@ -931,14 +953,15 @@ val form_of : names -> linear -> z list -> choice -> form option
 
 val required : names -> knowledge -> form -> bool
 
-val known_literal : task -> names -> knowledge -> literal -> bool option
+val known_literal :
+  task -> names -> bool -> knowledge -> literal -> bool option
 
 val is_true : bool option -> bool
 
 val is_false : bool option -> bool
 
 val known_condition :
-  task -> names -> knowledge -> condition -> z list -> choice -> bool
+  task -> names -> bool -> knowledge -> condition -> z list -> choice -> bool
 
 val known_effects :
   task -> names -> knowledge -> (literal list * fact list) list -> fact list
@@ -1029,6 +1052,14 @@ val rule_leaf :
 val rule_ok :
   problem -> task -> names -> (z * condition) list M.t -> (atom * formula) ->
   bool
+
+val ground_literals : names -> condition -> (atom * bool) list
+
+val ground_rule_ok :
+  problem -> task -> names -> z M.t -> (fact * condition) -> bool
+
+val ground_rules_ok :
+  problem -> task -> names -> (fact * condition) list list -> bool * z M.t
 
 val rules_ok : problem -> task -> names -> bool
 

@@ -72,9 +72,9 @@ let atom_of name_key = function
 let atom = atom_of predicate_key and fluent = atom_of function_key
 let set insert items = List.fold_left insert C.M.empty items
 let names = function
-  | [variables; fluents; predicates; functions; may_hold; derived; exclusive; scale; cost_scale] ->
+  | [variables; fluents; predicates; functions; may_hold; derived; equivalent; exclusive; scale; cost_scale] ->
     let variables = list (pair position (list (pair whole atom))) variables and fluents = list (pair position fluent) fluents in
-    let derived = list (pair position (pair whole atom)) derived in
+    let derived = list (pair position (pair (pair whole whole) atom)) derived in
     let changing = set (fun set key -> C.M.add key () set) (list (fun item -> predicate_key (word item)) predicates
                                                            @ list (fun item -> function_key (word item)) functions) in
     { C.variables = set (fun map (v, atoms) -> C.M.add v atoms map) variables;
@@ -85,7 +85,8 @@ let names = function
       changing = (fun key -> C.M.find key changing <> None);
       may_hold = set (fun map atom -> C.add_atom atom () map) (list atom may_hold);
       derived_atoms = set (fun map (v, value) -> C.M.add v value map) derived;
-      derived_of = set (fun map (v, (x, atom)) -> C.add_atom atom (v, x) map) derived;
+      derived_of = set (fun map (v, ((x, _), atom)) -> C.add_atom atom (v, x) map) derived;
+      equivalent = word equivalent = "true";
       exclusive = list (list atom) exclusive;
       scale = C.Z.to_pos (whole scale); cost_scale = C.Z.to_pos (whole cost_scale) }
   | _ -> reject "names are expected"

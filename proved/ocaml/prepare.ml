@@ -150,7 +150,7 @@ let derivable problem names witness =
     rounds (C.rule_instances pddl rules)) pddl.C.strata;
   List.rev !derived
 
-let names_text problem task witness =
+let names_text equivalent problem task witness =
   let names = names_of_keys () in
   let heads_of_effects =
     List.concat_map (fun action -> C.effect_heads action.C.start_effect @ C.effect_heads action.C.end_effect) problem.R.task.C.actions in
@@ -166,7 +166,10 @@ let names_text problem task witness =
   let fluents = List.mapi (fun i fluent -> Printf.sprintf "(%d %s)" i (string fluent)) (array (field task "fluents")) in
   let derived_variable i values =
     let last = List.length (array values) - 1 in
-    List.filteri (fun x _ -> x < last) (array values) |> List.mapi (fun x atom -> Printf.sprintf "(%d (%d %s))" i x (string atom)) in
+    (* Variables for parts of conditions have no atom. *)
+    let is_atom x atom = x < last && (string atom).[0] = '(' in
+    List.mapi (fun x atom -> x, atom) (array values) |> List.filter (fun (x, atom) -> is_atom x atom)
+    |> List.map (fun (x, atom) -> Printf.sprintf "(%d ((%d %d) %s))" i x last (string atom)) in
   let derived = List.concat (List.filteri (fun i _ -> i >= basic) (List.mapi derived_variable (array (field task "variables")))) in
   let read_atom text = Evidence.atom (List.hd (R.expressions text)) in
   let changing = List.filter (fun key -> fst (Hashtbl.find names key) = "predicate") heads_of_effects in
@@ -174,8 +177,8 @@ let names_text problem task witness =
   let name key = snd (Hashtbl.find names key) in
   let derivable = List.map (fun (p, arguments) -> list name (p :: arguments)) (derivable problem changing (List.map read_atom may_hold)) in
   let group item = list string (array item) in
-  Printf.sprintf "(names %s %s %s %s %s %s %s %s %s)\n" (list Fun.id variables) (list Fun.id fluents)
-    (list Fun.id (heads "predicate")) (list Fun.id (heads "function")) (list Fun.id (may_hold @ derivable)) (list Fun.id derived) (list group (items witness "exclusive"))
+  Printf.sprintf "(names %s %s %s %s %s %s %b %s %s %s)\n" (list Fun.id variables) (list Fun.id fluents)
+    (list Fun.id (heads "predicate")) (list Fun.id (heads "function")) (list Fun.id (may_hold @ derivable)) (list Fun.id derived) equivalent (list group (items witness "exclusive"))
     (number (field task "number_scale")) (number (field (field task "objective") "scale"))
 
 let integer_text number =
@@ -241,7 +244,7 @@ let splits_of problem names duration =
 let splits_of_condition names condition =
   let atom (v, x) = match C.M.find v names.C.variables with
     | Some atoms -> (match List.assoc_opt x atoms with Some atom -> [Atom atom] | None -> List.map (fun (_, atom) -> Atom atom) atoms)
-    | None -> (match C.M.find v names.C.derived_atoms with Some (_, atom) -> [Atom atom] | None -> []) in
+    | None -> (match C.M.find v names.C.derived_atoms with Some ((_, _), atom) -> [Atom atom] | None -> []) in
   List.concat_map atom (condition.C.facts @ List.map fst (List.concat condition.C.clauses))
 
 exception No_tree
@@ -312,12 +315,24 @@ let prepare directory =
   let problem = R.problem (read "domain.pddl") (read "problem.pddl") in
   let task = json (read "task.json") in
   let argument = argument_text (json (read "argument.json")) in
-  let others =
-    "(claim " ^ claim_text (json (read "manifest.json")) ^ ")\n" ^ task_text task
-    ^ names_text problem task (json (read "witness.json")) in
-  let evidence = Evidence.read problem.R.action_names (others ^ "(argument () () ()) (goal-case (nothing)) (cases)") in
+  let claim_and_task = "(claim " ^ claim_text (json (read "manifest.json")) ^ ")\n" ^ task_text task in
+  let witness = json (read "witness.json") in
+  let with_names equivalent =
+    let others = claim_and_task ^ names_text equivalent problem task witness in
+    others, Evidence.read problem.R.action_names (others ^ "(argument () () ()) (goal-case (nothing)) (cases)") in
+  let follows (_, evidence) =
+    let task = evidence.Evidence.ground_task in
+    fst (C.ground_rules_ok problem.R.task task evidence.names task.C.layers) in
+  let equivalent = with_names true in
+  let others, evidence = if follows equivalent then equivalent else with_names false in
   let ground_task = evidence.Evidence.ground_task and names = evidence.Evidence.names and pddl = problem.R.task in
   let keys = names_of_keys () in
+  let rules = C.ground_rules ground_task in
+  List.iter (fun ((p, arguments), body) ->
+    if not (C.rule_ok pddl ground_task names rules ((p, arguments), body)) then
+      let name key = snd (Hashtbl.find keys key) in
+      R.reject "not covered: no rule of the task is found for the derived atom %s" (list name (p :: arguments)))
+    (List.concat_map (C.rule_instances pddl) pddl.C.strata);
   let search = search pddl ground_task names in
   let formula_splits, _ = splits_of pddl names C.Undefined in
   let goal_case =
