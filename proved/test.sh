@@ -78,4 +78,20 @@ changed problem.pddl 's/(:goal .*/(:goal (robot_at wp8))/'
 changed domain.pddl 's/(over all (corridor ?from ?to))//'
 changed domain.pddl 's/(at start (not (robot_at ?from)))//'
 changed plan.txt '1d'
+# A list of objectives: one certificate for each objective, with limits for those before it.
+cp -r tests/errands "$temporary/errands"
+for i in 1 2; do ocaml/prepare "tests/errands/$i" >"$temporary/$i"; done
+list() {
+  answer=$(ocaml/check_list "$temporary/errands" $2) || true
+  [ "$answer" = "$1" ] || fail "errands: $answer, where the answer should be: $1"
+  echo "errands: $answer"
+}
+list 'proved: the plan of 2 steps is optimal for the list of objectives, values 7, 0' "$temporary/1 $temporary/2"
+list 'not proved' "$temporary/2 $temporary/1"
+list 'rejected: there is one file of evidence for each objective' "$temporary/1"
+printf '(sneak home bank)\n(drive bank work)\n' >"$temporary/errands/plan.txt"
+list 'not proved' "$temporary/1 $temporary/2"
+cp tests/errands/plan.txt "$temporary/errands"
+printf 'minimize (risk)\nminimize (cost)\n' >"$temporary/errands/objectives.txt"
+list 'not proved' "$temporary/1 $temporary/2"
 echo 'test.sh: all as expected'

@@ -3841,3 +3841,69 @@ let check_certificate p t0 n case goal_case a oracle plan claim =
        (match claim with
         | Some _ -> false
         | None -> check t0 a None oracle))
+
+type objective = { objective_metric : expression; time_weight : q;
+                   step_weight : q }
+
+(** val with_objective : problem -> objective -> problem **)
+
+let with_objective p o =
+  { objects = p.objects; actions = p.actions; strata = p.strata;
+    initial_atoms = p.initial_atoms; initial_values = p.initial_values;
+    goal_formula = p.goal_formula; metric = o.objective_metric; per_time =
+    o.time_weight; per_step = o.step_weight }
+
+type evidence = { list_task : task; list_names : names;
+                  list_case : (nat -> key1 list -> case_tree);
+                  list_goal_case : case_tree; list_argument : argument;
+                  list_oracle : (state -> positive list) }
+
+(** val limited : problem -> expression -> q -> problem **)
+
+let limited p e m =
+  { objects = p.objects; actions = p.actions; strata = p.strata;
+    initial_atoms = p.initial_atoms; initial_values = p.initial_values;
+    goal_formula = (And ((Compare (false, (Constant m), e)),
+    p.goal_formula)); metric = p.metric; per_time = p.per_time; per_step =
+    p.per_step }
+
+(** val is_untimed : objective -> bool **)
+
+let is_untimed o =
+  (&&) (qeq_bool o.time_weight { qnum = Z0; qden = XH })
+    (qeq_bool o.step_weight { qnum = Z0; qden = XH })
+
+(** val check_list :
+    problem -> objective list -> evidence list -> (nat * key1 list) list -> q
+    list -> bool **)
+
+let rec check_list p objectives es plan ms =
+  match objectives with
+  | [] ->
+    (match es with
+     | [] -> (match ms with
+              | [] -> true
+              | _ :: _ -> false)
+     | _ :: _ -> false)
+  | o :: rest ->
+    (match es with
+     | [] -> false
+     | e :: es0 ->
+       (match ms with
+        | [] -> false
+        | m :: ms0 ->
+          (&&)
+            (check_certificate (with_objective p o) e.list_task e.list_names
+              e.list_case e.list_goal_case e.list_argument e.list_oracle plan
+              (Some m))
+            (match rest with
+             | [] ->
+               (match es0 with
+                | [] -> (match ms0 with
+                         | [] -> true
+                         | _ :: _ -> false)
+                | _ :: _ -> false)
+             | _ :: _ ->
+               (&&) (is_untimed o)
+                 (check_list (limited p o.objective_metric m) rest es0 plan
+                   ms0))))

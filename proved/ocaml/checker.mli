@@ -1073,3 +1073,21 @@ val check_certificate :
   problem -> task -> names -> (nat -> key1 list -> case_tree) -> case_tree ->
   argument -> (state -> positive list) -> (nat * key1 list) list -> q option
   -> bool
+
+type objective = { objective_metric : expression; time_weight : q;
+                   step_weight : q }
+
+val with_objective : problem -> objective -> problem
+
+type evidence = { list_task : task; list_names : names;
+                  list_case : (nat -> key1 list -> case_tree);
+                  list_goal_case : case_tree; list_argument : argument;
+                  list_oracle : (state -> positive list) }
+
+val limited : problem -> expression -> q -> problem
+
+val is_untimed : objective -> bool
+
+val check_list :
+  problem -> objective list -> evidence list -> (nat * key1 list) list -> q
+  list -> bool

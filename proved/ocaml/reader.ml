@@ -108,7 +108,8 @@ type problem = { task : C.problem; maximizes : bool; action_names : string list;
 
 let negative q = C.qred (C.qminus zero q)
 
-let problem domain_text problem_text =
+(* [metric] replaces the metric of the problem: minimize or maximize, and an expression. *)
+let problem ?metric domain_text problem_text =
   let sections kind text = match expressions text with
     | [List (Word "define" :: List [Word other; Word _] :: sections)] when other = kind ->
       List.map (function List (Word name :: items) -> name, items | _ -> reject "a section is expected") sections
@@ -139,9 +140,15 @@ let problem domain_text problem_text =
   let is_object name = List.mem_assoc name objects in
   let known_object name = if is_object name then object_key name else reject "unknown object: %s" name in
 
+  let variables items =
+    let variables = typed items in
+    List.iter (fun (name, _) -> if not (is_variable name) then reject "a variable is expected: %s" name) variables;
+    distinct "a variable" (List.map fst variables);
+    List.map (fun (name, kind) -> name, type_key (known_type kind)) variables in
+
   (* Predicates and functions with their numbers of arguments *)
   let rec declarations = function
-    | List (Word name :: arguments) :: others -> (name, List.length (typed arguments)) :: declarations others
+    | List (Word name :: arguments) :: others -> (name, List.length (variables arguments)) :: declarations others
     | Word "-" :: Word "number" :: others -> declarations others
     | Word "-" :: Word kind :: _ -> reject "not covered: functions with values of type %s" kind
     | [] -> []
@@ -180,11 +187,6 @@ let problem domain_text problem_text =
       applied "function" functions name arguments;
       C.Fluent (function_key name, List.map (term scope) arguments)
     | List _ -> reject "an expression is expected" in
-  let variables items =
-    let variables = typed items in
-    List.iter (fun (name, _) -> if not (is_variable name) then reject "a variable is expected: %s" name) variables;
-    distinct "a variable" (List.map fst variables);
-    List.map (fun (name, kind) -> name, type_key (known_type kind)) variables in
   (* Applies [quantify] once for each variable, the first one outermost. *)
   let quantified quantify scope items body =
     let variables = variables items in
@@ -362,7 +364,8 @@ let problem domain_text problem_text =
       let weight, value = weighted item in
       C.qred (C.qmult factor weight), C.Times (C.Constant factor, value)
     | item -> zero, expression [] item in
-  let maximizes, (per_time, metric), per_step = match section problem ":metric" with
+  let metric_items = match metric with Some items -> items | None -> section problem ":metric" in
+  let maximizes, (per_time, metric), per_step = match metric_items with
     | [Word "minimize"; item] -> false, weighted item, zero
     | [Word "maximize"; item] ->
       let weight, value = weighted item in
