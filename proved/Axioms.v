@@ -217,36 +217,60 @@ Proof.
   split; [apply in_concat; exists rules; auto|]. split; [|exact B].
   unfold is_rule_of. apply tuples_spec in C. rewrite <- andb_assoc, C, A, Pos.eqb_refl. reflexivity.
 Qed.
+(* The rules of the strata [before] have no consequence that is missing. *)
+Definition closed_under (before : list (list rule)) (F : atom_map unit) : Prop := forall r env, In r (concat before) ->
+  In env (tuples P (head_types r)) -> truth P (W F) None env (body r) = Some true -> mem F (head r, env) = true.
+Lemma earlier_bodies : forall before ls, is_stratified (before ++ ls) = true -> forall r, In r (concat before) ->
+  occurrences_ok (fun p _ => negb (existsb (is_head p) ls)) true (body r) = true.
+Proof.
+  induction before as [|rules before IH]; intros ls S r I; [destruct I|]. cbn [app is_stratified concat] in *.
+  apply andb_true_iff in S. destruct S as [S1 S2]. apply in_app_or in I. destruct I as [I|I]; [|apply IH; assumption].
+  rewrite forallb_forall in S1. eapply occurrences_weaken; [|exact (S1 _ I)]. intros p b A. unfold is_allowed in A.
+  rewrite existsb_app in A. destruct (existsb (is_head p) before), (existsb (is_head p) ls); simpl in *; auto.
+Qed.
 Lemma derived_invariant : is_stratified (strata P) = true -> forall Q : atom -> Prop,
-  (forall F rules i, (forall a, mem F a = true -> Q a) -> (forall a, mem F a = true -> has_rule (W F) a) ->
-     In rules (strata P) -> In i (rule_instances P rules) -> fires_in P (W F) i = true -> Q (fst i)) ->
+  (forall before rules later F0 F i, strata P = before ++ rules :: later ->
+     (forall a, mem F0 a = true -> Q a) -> (forall a, mem F0 a = true -> has_rule (W F0) a) -> closed_under before F0 ->
+     (forall a, existsb (is_head (fst a)) (rules :: later) = false -> mem F a = mem F0 a) ->
+     (forall a, mem F a = true -> Q a) -> (forall a, mem F a = true -> has_rule (W F) a) ->
+     In i (rule_instances P rules) -> fires_in P (W F) i = true -> Q (fst i)) ->
   forall a, mem (derived_facts P w) a = true -> Q a.
 Proof.
   intros Str Q H. unfold derived_facts.
-  assert (Stratum : forall rules later, In rules (strata P) -> is_stratified (rules :: later) = true -> forall n F,
+  assert (Just : forall ls F, justified ls F -> forall a, mem F a = true -> has_rule (W F) a)
+    by (intros ls F J a M; destruct (J a M) as [r X]; exists r; tauto).
+  assert (Stratum : forall before rules later F0, strata P = before ++ rules :: later ->
+    is_stratified (rules :: later) = true -> closed_under before F0 -> (forall a, mem F0 a = true -> Q a) ->
+    justified (rules :: later) F0 -> forall n F,
+    (forall a, existsb (is_head (fst a)) (rules :: later) = false -> mem F a = mem F0 a) ->
     (forall a, mem F a = true -> Q a) -> justified (rules :: later) F ->
     let F' := evaluate_stratum P n (rule_instances P rules) w F in
     (forall a, mem F' a = true -> Q a) /\ justified (rules :: later) F').
-  { intros rules later R St. induction n; intros F I J; [split; assumption|]. cbn [evaluate_stratum].
+  { intros before rules later F0 R St Cl I0 J0.
+    assert (R' : In rules (strata P)) by (rewrite R; apply in_elt).
+    induction n; intros F Same I J; [split; assumption|]. cbn [evaluate_stratum].
     destruct (new_atoms P (W F) (rule_instances P rules)) as [|c new] eqn:E; [split; assumption|]. rewrite <- E.
     set (F1 := fold_left (fun m a => add_atom a tt m) (new_atoms P (W F) (rule_instances P rules)) F).
+    assert (Other : forall b, is_head (fst b) rules = false -> mem F1 b = mem F b).
+    { intros b Hd. unfold F1. rewrite mem_fold.
+      destruct (existsb (atom_eqb b) (new_atoms P (W F) (rule_instances P rules))) eqn:X; [|reflexivity].
+      exfalso. apply in_atoms, new_atoms_in in X. destruct X as [i [Ii [A _]]].
+      apply (not_head _ _ Hd _ Ii). exact (f_equal fst A). }
     assert (Keep : forall f env, occurrences_ok (is_settled (rules :: later)) true f = true ->
       truth P (W F) None env f = Some true -> truth P (W F1) None env f = Some true).
     { intros f env O Tr. apply (truth_kept P (is_settled (rules :: later)) (W F)); [| |reflexivity|exact O|exact Tr];
         intros b Al; cbn [with_facts holds_in]; destruct (is_derived P (fst b)); auto.
       - change (mem F b = true -> mem F1 b = true). intro M. unfold F1. rewrite mem_fold, M. apply orb_true_r.
-      - change (mem F b = false -> mem F1 b = false). intro M. unfold F1. rewrite mem_fold, M, orb_false_r.
-        destruct (existsb (atom_eqb b) (new_atoms P (W F) (rule_instances P rules))) eqn:X; [|reflexivity].
-        exfalso. apply in_atoms, new_atoms_in in X. destruct X as [i [Ii [A _]]]. cbn [is_settled orb existsb] in Al.
-        apply negb_true_iff, orb_false_iff in Al. destruct Al as [Al _].
-        apply (not_head _ _ Al _ Ii). exact (f_equal fst A). }
+      - change (mem F b = false -> mem F1 b = false). intro M. rewrite Other; [exact M|].
+        cbn [is_settled orb existsb] in Al. apply negb_true_iff, orb_false_iff in Al. apply Al. }
     apply IHn.
+    - intros a N. rewrite Other; [apply Same, N|]. cbn [existsb] in N. apply orb_false_iff in N. apply N.
     - intros a M. unfold F1 in M. rewrite mem_fold in M. apply orb_true_iff in M.
       destruct M as [M|M]; [|apply I, M]. apply in_atoms, new_atoms_in in M. destruct M as [i [Ii [<- [Fi _]]]].
-      apply (H F rules i); auto. intros b B. destruct (J b B) as [r X]. exists r. tauto.
+      apply (H before rules later F0 F i); auto; eapply Just; eassumption.
     - intros a M. unfold F1 in M. rewrite mem_fold in M. apply orb_true_iff in M. destruct M as [M|M].
       + apply in_atoms, new_atoms_in in M. destruct M as [i [Ii [<- [Fi _]]]].
-        destruct (instance_rule _ _ R Ii) as [r [Ir [Ic [Ru B]]]]. exists r. split; [exact Ic|]. split; [exact Ru|].
+        destruct (instance_rule _ _ R' Ii) as [r [Ir [Ic [Ru B]]]]. exists r. split; [exact Ic|]. split; [exact Ru|].
         cbn [is_stratified] in St. apply andb_true_iff in St. destruct St as [St _].
         rewrite forallb_forall in St. specialize (St _ Ir).
         assert (O : occurrences_ok (is_settled (rules :: later)) true (body r) = true).
@@ -255,16 +279,41 @@ Proof.
         split; [|exact O]. apply Keep; [exact O|]. unfold fires_in in Fi. rewrite B in Fi.
         destruct (truth P (W F) None (snd (fst i)) (body r)) as [[]|]; [reflexivity|discriminate|discriminate].
       + destruct (J a M) as [r [Ic [Ru [Tr O]]]]. exists r. auto. }
-  assert (G : forall ls, incl ls (strata P) -> is_stratified ls = true -> forall F, (forall a, mem F a = true -> Q a) ->
-    justified ls F -> forall a, mem (all_rounds ls F) a = true -> Q a).
-  { induction ls as [|rules ls IH]; intros Sub St F I J; [exact I|]. cbn [fold_left].
-    destruct (Stratum rules ls (Sub _ (or_introl eq_refl)) St (S (length (rule_instances P rules))) F I J) as [I1 J1].
-    apply IH; [intros x X; apply Sub; right; exact X| |exact I1|].
+  assert (G : forall ls before, strata P = before ++ ls -> is_stratified ls = true -> forall F, closed_under before F ->
+    (forall a, mem F a = true -> Q a) -> justified ls F -> forall a, mem (all_rounds ls F) a = true -> Q a).
+  { induction ls as [|rules ls IH]; intros before R St F Cl I J; [exact I|]. cbn [fold_left].
+    set (instances := rule_instances P rules).
+    destruct (Stratum before rules ls F R St Cl I J (S (length instances)) F (fun a _ => eq_refl) I J) as [I1 J1].
+    fold instances in I1, J1. set (F1 := evaluate_stratum P (S (length instances)) instances w F) in *.
+    assert (D : all_derived instances).
+    { intros i X. apply instance_spec in X. destruct X as [q [X [Y _]]]. rewrite Y. unfold is_derived.
+      apply existsb_exists. exists rules. split; [rewrite R; apply in_elt|]. apply existsb_exists. exists q.
+      split; [exact X|apply Pos.eqb_refl]. }
+    apply (IH (before ++ [rules])); [rewrite R, <- app_assoc; reflexivity| | |exact I1|].
     - cbn [is_stratified] in St. apply andb_true_iff in St. apply St.
+    - intros r env Ir Et Tr. rewrite concat_app in Ir. cbn [concat] in Ir. rewrite app_nil_r in Ir.
+      apply in_app_or in Ir. destruct Ir as [Ir|Ir].
+      + apply stratum_grows. apply (Cl r env Ir Et).
+        rewrite R in Str. pose proof (earlier_bodies _ _ Str r Ir) as O.
+        apply (truth_kept P (fun p _ => negb (existsb (is_head p) (rules :: ls))) (W F1)); [| |reflexivity|exact O|exact Tr];
+          intros b Al; cbn [with_facts holds_in]; destruct (is_derived P (fst b)); auto;
+          apply negb_true_iff in Al; cbn [existsb] in Al; apply orb_false_iff in Al; destruct Al as [Al _].
+        * change (mem F1 b = true -> mem F b = true). unfold F1. rewrite stratum_other by (apply not_head, Al). auto.
+        * change (mem F1 b = false -> mem F b = false). unfold F1. rewrite stratum_other by (apply not_head, Al). auto.
+      + pose proof (stratum_closed instances F D) as C. fold F1 in C.
+        assert (X : In ((head r, env), body r) instances) by (apply instance_spec; exists r; auto).
+        destruct (mem F1 (head r, env)) eqn:M; [reflexivity|]. exfalso.
+        assert (Y : In (head r, env) (new_atoms P (W F1) instances)).
+        { unfold new_atoms. apply in_map_iff. exists ((head r, env), body r). split; [reflexivity|]. apply filter_In.
+          split; [exact X|]. pose proof (D _ X) as DX. cbn [fst snd] in DX. unfold fires_in.
+          cbn [fst snd with_facts holds_in]. rewrite DX.
+          change (negb (mem F1 (head r, env)) && match truth P (W F1) None env (body r) with Some b => b | None => false end = true).
+          rewrite M, Tr. reflexivity. }
+        rewrite C in Y. destruct Y.
     - intros a M. destruct (J1 a M) as [r [Ic [Ru [Tr O]]]]. exists r. split; [exact Ic|]. split; [exact Ru|].
       split; [exact Tr|]. eapply occurrences_weaken; [|exact O]. intros p b. unfold is_settled. cbn [existsb].
       destruct b, (is_head p rules), (existsb (is_head p) ls); simpl; auto. }
-  apply (G (strata P)); [intros x X; exact X|exact Str| |]; intros a M; rewrite mem_empty in M; discriminate.
+  apply (G (strata P) []); [reflexivity|exact Str|intros r env []| |]; intros a M; rewrite mem_empty in M; discriminate.
 Qed.
 Lemma rounds_origin : forall ls, is_stratified ls = true -> forall F a, mem (all_rounds ls F) a = true ->
   mem F a = true \/ exists r, In r (concat ls) /\ fst a = head r /\ In (snd a) (tuples P (head_types r)) /\

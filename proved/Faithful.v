@@ -65,12 +65,13 @@ Definition possible (k : knowledge) (v : key) : list Z :=
   filter (fun y => forallb (fun xb => Bool.eqb (Z.eqb y (fst xb)) (snd xb)) known &&
                    negb (existsb (fun xa => Z.eqb y (fst xa) && excluded_by k (snd xa)) atoms))
          (match List.find snd known with Some (x, _) => [x] | None => range (get (domain_size T) v) end).
-Definition known_fact (full : bool) (k : knowledge) (v : key) (x : Z) : option bool :=
+(* [full p]: a derived variable has its value only if the atom, of predicate p, holds. *)
+Definition known_fact (full : key -> bool) (k : knowledge) (v : key) (x : Z) : option bool :=
   match M.find v (variables N) with
   | None => match M.find v (derived_atoms N) with
             | Some (y, d, a) => match assoc a (literals k) with
                                 | Some true => Some (Z.eqb x y)
-                                | Some false => if full then Some (Z.eqb x d) else None
+                                | Some false => if full (fst a) then Some (Z.eqb x d) else None
                                 | None => None end
             | None => None end
   | Some _ => let ys := possible k v in
@@ -81,7 +82,7 @@ Definition base_truth (k : knowledge) (a : atom) : option bool :=
   else match assoc a (literals k) with
        | Some b => Some b
        | None => if excluded_by k a || negb (mem (may_hold N) a) then Some false
-                 else match find_atom (fact_of N) a with Some (v, x) => known_fact false k v x | None => None end
+                 else match find_atom (fact_of N) a with Some (v, x) => known_fact (fun _ => false) k v x | None => None end
        end.
 (* A state in terms of the one before the step: atoms and fluents that have changed. If it is stale,
    derived atoms may have changed, too. *)
@@ -345,14 +346,28 @@ Fixpoint expand (after : atom -> bool -> continuation -> continuation) (f : form
   end.
 Definition is_unfolded (a : atom) : bool :=
   is_derived P (fst a) && match find_atom (derived_of N) a with None => true | Some _ => false end.
-(* A derived atom without a variable holds by one of its rules. *)
-Fixpoint unfold (depth : nat) (a : atom) (b : bool) (next : continuation) (k : knowledge) : bool :=
+Definition is_head (p : key) (rules : list rule) : bool := existsb (fun r => Pos.eqb p (head r)) rules.
+(* The last stratum with a rule of the predicate, counted from 1; 0 if there is none. *)
+Fixpoint level (ls : list (list rule)) (p : key) : nat :=
+  match ls with
+  | [] => 0
+  | rules :: later => match level later p with O => if is_head p rules then 1 else 0 | S n => S (S n) end
+  end%nat.
+(* A derived atom without a variable holds by one of its rules. If it does not hold, none of its rules
+   applies, for atoms up to stratum [limit]. *)
+Fixpoint unfold (depth limit : nat) (a : atom) (b : bool) (next : continuation) (k : knowledge) : bool :=
   match depth with
   | O => next k
-  | S depth => if b && is_unfolded a
-               then forallb (fun r => expand (unfold depth) (body r) true (snd a) next k) (rules_of a) else next k
+  | S depth =>
+      if negb (is_unfolded a) then next k
+      else if b then forallb (fun r => expand (unfold depth limit) (body r) true (snd a) next k) (rules_of a)
+      else if Nat.leb (level (strata P) (fst a)) limit then
+        fold_right (fun r next => if is_defined (snd a) (body r)
+                                  then expand (unfold depth limit) (body r) false (snd a) next else next) next (rules_of a) k
+      else next k
   end.
-(* The truth value of a formula that is certainly defined. *)
+(* The truth value of a formula that is certainly defined. Of derived atoms, only those up to stratum
+   [limit] are unfolded. *)
 Fixpoint definite (look : atom -> option bool) (env : list key) (f : formula) : option bool :=
   match f with
   | Truth b => Some b
@@ -364,13 +379,13 @@ Fixpoint definite (look : atom -> option bool) (env : list key) (f : formula) : 
   | Forall t g => fold_right (fun o r => and_kleene (definite look (env ++ [o]) g) r) (Some true) (objects P t)
   end.
 Definition is_some (b : bool) (t : option bool) : bool := match t with Some c => Bool.eqb b c | None => false end.
-Fixpoint look_up (depth : nat) (k : knowledge) (a : atom) : option bool :=
+Fixpoint look_up (depth limit : nat) (k : knowledge) (a : atom) : option bool :=
   match base_truth k a, depth with
   | Some b, _ => Some b
   | None, O => None
   | None, S depth =>
-      if is_unfolded a then
-        let truths := map (fun r => definite (look_up depth k) (snd a) (body r)) (rules_of a) in
+      if is_unfolded a && Nat.leb (level (strata P) (fst a)) limit then
+        let truths := map (fun r => definite (look_up depth limit k) (snd a) (body r)) (rules_of a) in
         if existsb (is_some true) truths then Some true else if forallb (is_some false) truths then Some false else None
       else None
   end.
@@ -384,7 +399,6 @@ Fixpoint occurrences_ok (allowed : key -> bool -> bool) (b : bool) (f : formula)
   | Forall _ g => occurrences_ok allowed b g
   | _ => true
   end.
-Definition is_head (p : key) (rules : list rule) : bool := existsb (fun r => Pos.eqb p (head r)) rules.
 Definition is_allowed (rules : list rule) (later : list (list rule)) (p : key) (b : bool) : bool :=
   negb (existsb (is_head p) later) && (b || negb (is_head p rules)).
 Fixpoint is_stratified (strata : list (list rule)) : bool :=
@@ -409,19 +423,19 @@ Definition form_of (l : linear) (szs : list Z) (ch : choice) : option form :=
 (* The form times the scale is an integer, so more than -1 is enough. *)
 Definition required (k : knowledge) (f : form) : bool :=
   implied k true (plus_form f 1 (constant (/ scaled))).
-Definition known_literal (full : bool) (k : knowledge) (l : literal) : option bool :=
+Definition known_literal (full : key -> bool) (k : knowledge) (l : literal) : option bool :=
   option_map (fun b => Bool.eqb b (snd l)) (known_fact full k (fst (fst l)) (snd (fst l))).
 Definition is_true (r : option bool) : bool := match r with Some b => b | None => false end.
 Definition is_false (r : option bool) : bool := match r with Some b => negb b | None => false end.
-Definition known_condition (full : bool) (k : knowledge) (c : condition) (szs : list Z) (ch : choice) : bool :=
+Definition known_condition (full : key -> bool) (k : knowledge) (c : condition) (szs : list Z) (ch : choice) : bool :=
   forallb (fun f => is_true (known_fact full k (fst f) (snd f))) (facts c) &&
   forallb (existsb (fun l => is_true (known_literal full k l))) (clauses c) &&
   forallb (fun l => match form_of l szs ch with Some f => required k f | None => false end) (comparisons c).
 Fixpoint known_effects (k : knowledge) (cs : list (list literal * list fact)) : option (list fact) :=
   match cs with
   | [] => Some []
-  | c :: r => if existsb (fun l => is_false (known_literal (equivalent N) k l)) (fst c) then known_effects k r
-              else if forallb (fun l => is_true (known_literal (equivalent N) k l)) (fst c) then option_map (app (snd c)) (known_effects k r)
+  | c :: r => if existsb (fun l => is_false (known_literal (fun _ => equivalent N) k l)) (fst c) then known_effects k r
+              else if forallb (fun l => is_true (known_literal (fun _ => equivalent N) k l)) (fst c) then option_map (app (snd c)) (known_effects k r)
               else None
   end.
 Definition admitted_choice (o : operator) (ch : choice) : bool :=
@@ -459,7 +473,7 @@ Definition step_cost (o : option (operator * choice)) : Z :=
   match o with Some (o, ch) => amount (cost o) (slot_sizes o) ch | None => 0 end.
 Definition simulated (k : knowledge) (s : symbolic) (time : Q) (o : option (operator * choice)) : bool :=
   match match o with
-        | Some (o, ch) => if admitted_choice o ch && known_condition (equivalent N) k (precondition o) (slot_sizes o) ch && distinct (map fst (number_effects o))
+        | Some (o, ch) => if admitted_choice o ch && known_condition (fun _ => equivalent N) k (precondition o) (slot_sizes o) ch && distinct (map fst (number_effects o))
                           then option_map (app (effects o)) (known_effects k (conditional o)) else None
         | None => Some [] end with
   | None => false
@@ -487,8 +501,8 @@ Fixpoint known_effects_on (v : key) (k : knowledge) (cs : list (list literal * l
   match cs with
   | [] => Some []
   | c :: r => if forallb (fun f => negb (Pos.eqb (fst f) v)) (snd c) then known_effects_on v k r
-              else if existsb (fun l => is_false (known_literal (equivalent N) k l)) (fst c) then known_effects_on v k r
-              else if forallb (fun l => is_true (known_literal (equivalent N) k l)) (fst c)
+              else if existsb (fun l => is_false (known_literal (fun _ => equivalent N) k l)) (fst c) then known_effects_on v k r
+              else if forallb (fun l => is_true (known_literal (fun _ => equivalent N) k l)) (fst c)
                    then option_map (app (snd c)) (known_effects_on v k r)
               else None
   end.
@@ -524,7 +538,7 @@ Definition projected_ok (k : knowledge) (a : action) (env : list key) (o : optio
       forallb (fun g => match projected (fun a => in_group a g) false k env (start_effect a) with
                         | Some cs => stays_exclusive k (Symbolic (truths_of cs) [] false) g | None => false end) (exclusive N) &&
       match o with
-      | Some (o, ch) => admitted_choice o ch && known_condition (equivalent N) k (precondition o) (slot_sizes o) ch
+      | Some (o, ch) => admitted_choice o ch && known_condition (fun _ => equivalent N) k (precondition o) (slot_sizes o) ch
                         && distinct (map fst (number_effects o))
       | None => true end &&
       forallb (projected_variable_ok k a env o)
@@ -567,7 +581,7 @@ Definition instance_leaf (a : action) (env : list key) (k : knowledge) (o : opti
   | Some (i, ch) => match nth_error (operators T) i with Some o => leaf_ok k a env (Some (o, ch)) | None => false end
   end.
 Definition goal_leaf (k : knowledge) (_ : option (nat * choice)) : bool :=
-  match symbolic_truth k unchanged Undefined [] (goal_formula P) with Some false => true | _ => known_condition (equivalent N) k (goal T) [] [] end.
+  match symbolic_truth k unchanged Undefined [] (goal_formula P) with Some false => true | _ => known_condition (fun _ => equivalent N) k (goal T) [] [] end.
 
 (* Instances for which the conditions on what never changes may hold: parameters are bound one after
    another. *)
@@ -603,24 +617,31 @@ Definition same_atom (r : option atom) (a : atom) : bool := match r with Some b 
 Definition ground_rules : M.t (list (Z * condition)) :=
   fold_right (fun r m => M.add (fst (fst r)) ((snd (fst r), snd r) :: match M.find (fst (fst r)) m with Some l => l | None => [] end) m)
     (M.empty _) (concat (layers T)).
-Definition rule_leaf (rules : M.t (list (Z * condition))) (a : atom) (k : knowledge) : bool :=
+Definition rule_leaf (full : key -> bool) (rules : M.t (list (Z * condition))) (a : atom) (k : knowledge) : bool :=
   impossible k || mem (may_hold N) a &&
   match find_atom (derived_of N) a with
   | None => true
   | Some (v, x) => match M.find v rules with
-                   | Some l => existsb (fun r => Z.eqb (fst r) x && known_condition false k (snd r) [] []) l | None => false end
+                   | Some l => existsb (fun r => Z.eqb (fst r) x && known_condition full k (snd r) [] []) l | None => false end
   end.
-Definition rule_ok (rules : M.t (list (Z * condition))) (i : atom * formula) : bool :=
+Definition rule_ok (stratum : nat) (rules : M.t (list (Z * condition))) (i : atom * formula) : bool :=
   match find_atom (derived_of N) (fst i), mem (may_hold N) (fst i) with
   | None, true => true
-  | _, _ => expand (unfold max_unfoldings) (snd i) true (snd (fst i)) (rule_leaf rules (fst i)) (Knowledge [] [])
+  | _, _ => expand (unfold max_unfoldings stratum) (snd i) true (snd (fst i)) 
+              (rule_leaf (fun p => equivalent N && Nat.leb (level (strata P) p) stratum) rules (fst i)) (Knowledge [] [])
+  end.
+Fixpoint strata_ok (stratum : nat) (rules : M.t (list (Z * condition))) (ls : list (list rule)) : bool :=
+  match ls with
+  | [] => true
+  | here :: later => forallb (rule_ok stratum rules) (rule_instances P here) && strata_ok (S stratum) rules later
   end.
 (* Every rule of the task for a derived variable follows from a rule of its atom. *)
-Definition ground_literals (c : condition) : list (atom * bool) :=
+Definition ground_literals (limit : nat) (c : condition) : list (atom * bool) :=
   flat_map (fun f : fact =>
     match M.find (fst f) (variables N), M.find (fst f) (derived_atoms N) with
     | Some vals, _ => map (fun xa => (snd xa, Z.eqb (snd f) (fst xa))) vals
-    | None, Some (y, _, a) => [(a, Z.eqb (snd f) y)]
+    | None, Some (y, _, a) =>
+        if Z.eqb (snd f) y && negb (Nat.leb (level (strata P) (fst a)) limit) then [] else [(a, Z.eqb (snd f) y)]
     | None, None => [] end) (facts c).
 Definition ground_rule_ok (heads : M.t Z) (r : fact * condition) : bool :=
   match M.find (fst (fst r)) (derived_atoms N) with
@@ -629,8 +650,9 @@ Definition ground_rule_ok (heads : M.t Z) (r : fact * condition) : bool :=
       forallb (fun f => match M.find (fst f) (derived_atoms N) with
                         | Some (y, _, _) => Z.eqb (snd f) y || match M.find (fst f) heads with None => true | Some _ => false end
                         | None => true end) (facts (snd r)) &&
-      let k := Knowledge (ground_literals (snd r)) [] in
-      existsb (fun rule => is_some true (definite (look_up max_unfoldings k) (snd a) (body rule))) (rules_of a)
+      let limit := level (strata P) (fst a) in
+      let k := Knowledge (ground_literals limit (snd r)) [] in
+      existsb (fun rule => is_some true (definite (look_up max_unfoldings limit k) (snd a) (body rule))) (rules_of a)
   end.
 Fixpoint ground_rules_ok (ls : list (list (fact * condition))) : bool * M.t Z :=
   match ls with
@@ -653,7 +675,7 @@ Definition rules_ok : bool :=
   forallb (forallb (fun r : fact * condition => match M.find (fst (fst r)) (derived_atoms N) with
                              | Some (x, _, _) => Z.eqb (snd (fst r)) x | None => true end)) (layers T) &&
   (negb (equivalent N) || fst (ground_rules_ok (layers T))) &&
-  forallb (fun rules => forallb (rule_ok ground_rules) (rule_instances P rules)) (strata P).
+  strata_ok 0 ground_rules (strata P).
 Definition faithful : bool :=
   rules_ok &&
   forallb (fun e => negb (changing N (fst (fst e))) || mem (may_hold N) (fst e)) (all_entries (initial_atoms P)) &&

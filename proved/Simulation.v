@@ -93,12 +93,12 @@ Lemma rule_parts :
      find_atom (derived_of N) a = Some (v, x)) /\
   (forall g a, In g (exclusive N) -> In a g -> is_derived P (fst a) = false) /\
   (forall v vals x a, M.find v (variables N) = Some vals -> In (x, a) vals -> is_derived P (fst a) = false) /\
-  (forall rules i, In rules (strata P) -> In i (rule_instances P rules) ->
-     rule_ok P T N (ground_rules T) i = true).
+  (forall before rules later i, strata P = before ++ rules :: later -> In i (rule_instances P rules) ->
+     rule_ok P T N (length before) (ground_rules T) i = true).
 Proof.
   unfold faithful in ok. rewrite !andb_true_iff in ok. destruct ok as [[[[[[[H _] _] _] _] _] _] _].
   unfold rules_ok in H. rewrite !andb_true_iff in H. destruct H as [[[[[[[[H1 H2] H3] H4] H5] H6] _] _] H7].
-  rewrite forallb_forall in H3, H4, H5, H6, H7. repeat (split; [assumption|]).
+  rewrite forallb_forall in H3, H4, H5, H6. repeat (split; [assumption|]).
   split; [|split; [|split; [|split]]].
   - intros p D. unfold is_derived in D. apply existsb_exists in D. destruct D as [rules [I D]].
     apply existsb_exists in D. destruct D as [r [J D]]. apply Pos.eqb_eq in D. subst p.
@@ -110,7 +110,14 @@ Proof.
   - intros g a G I. specialize (H5 _ G). rewrite forallb_forall in H5. apply negb_true_iff, H5, I.
   - intros v vals x a F I. apply M.elements_correct in F. specialize (H6 _ F). cbn [snd] in H6.
     rewrite forallb_forall in H6. specialize (H6 _ I). cbn [snd] in H6. apply negb_true_iff, H6.
-  - intros rules i I J. specialize (H7 _ I). rewrite forallb_forall in H7. apply H7, J.
+  - intros before rules later i L J. rewrite L in H7. clear -H7 J.
+    assert (G : forall before n, strata_ok P T N n (ground_rules T) (before ++ rules :: later) = true ->
+      rule_ok P T N (n + length before) (ground_rules T) i = true).
+    { clear -J. induction before as [|r before IH]; intros n H; cbn [app strata_ok length] in *;
+        apply andb_true_iff in H; destruct H as [H1 H2].
+      - rewrite Nat.add_0_r. rewrite forallb_forall in H1. apply H1, J.
+      - apply IH in H2. rewrite Nat.add_succ_r. exact H2. }
+    exact (G before 0%nat H7).
 Qed.
 Lemma ground_parts :
   (forall v x d a, M.find v (derived_atoms N) = Some (x, d, a) -> is_basic T v = false /\ x <> d /\
@@ -154,8 +161,8 @@ Lemma d_num : forall n f, M.find n (fluents N) = Some f -> num_value ds n = num_
 Proof. intros n f F. rewrite derive_num. destruct parts as [_ [_ [_ [A _]]]]. rewrite (proj1 (A _ _ F)).
 reflexivity. Qed.
 
-Definition lower_ok : Prop := forall v x d a, M.find v (derived_atoms N) = Some (x, d, a) ->
-  holds_in w a = false -> var_value ds v = d.
+Definition lower_ok (full : key -> bool) : Prop := forall v x d a, M.find v (derived_atoms N) = Some (x, d, a) ->
+  full (fst a) = true -> holds_in w a = false -> var_value ds v = d.
 Section Known.
 Variable k : knowledge.
 Hypothesis K : Knows w k.
@@ -197,7 +204,7 @@ Proof.
       apply excluded_by_ok in E2.
       rewrite (r_var _ _ R _ _ _ _ F I), E1 in E2. discriminate.
 Qed.
-Lemma known_fact_ok : forall full, (full = true -> lower_ok) -> forall v x b,
+Lemma known_fact_ok : forall full, lower_ok full -> forall v x b,
   known_fact T N full k v x = Some b -> is_fact ds (v, x) = b.
 Proof.
   intros full Lo v x b H. unfold known_fact in H. destruct (M.find v (variables N)) as [vals|] eqn:F.
@@ -212,7 +219,7 @@ Proof.
     unfold is_fact. cbn [fst snd]. destruct t.
     + injection H as <-. apply (r_derived _ _ R _ _ _ _ D) in A. unfold is_fact in A. cbn [fst snd] in A.
       apply Z.eqb_eq in A. rewrite A. apply Z.eqb_sym.
-    + destruct full; [|discriminate]. injection H as <-. rewrite (Lo eq_refl _ _ _ _ D A). apply Z.eqb_sym.
+    + destruct (full (fst a)) eqn:Fu; [|discriminate]. injection H as <-. rewrite (Lo _ _ _ _ D Fu A). apply Z.eqb_sym.
 Qed.
 Lemma base_truth_ok : forall a b, base_truth P T N k a = Some b -> holds_in w a = b.
 Proof.
@@ -222,7 +229,7 @@ Proof.
   { apply assoc_In in E. rewrite (proj1 K _ _ E). congruence. }
   destruct (excluded_by N k a) eqn:Ex; cbn [orb] in H; [injection H as <-; apply excluded_by_ok, Ex|].
   destruct (mem (may_hold N) a) eqn:M; cbn [negb] in H.
-  - destruct (find_atom (fact_of N) a) as [[v x]|] eqn:F; [|discriminate]. apply known_fact_ok in H; [|discriminate].
+  - destruct (find_atom (fact_of N) a) as [[v x]|] eqn:F; [|discriminate]. apply known_fact_ok in H; [|intros ? ? ? ? _ X; discriminate X].
     destruct parts as [_ [_ [A _]]]. destruct (A _ _ _ F) as [vals [F1 F2]].
     rewrite (r_var _ _ R _ _ _ _ F1 F2). unfold is_fact in H. cbn [fst snd] in H. rewrite (d_val _ _ F1) in H.
     exact H.
@@ -251,6 +258,125 @@ Proof.
     destruct f as [[|] c]; [|discriminate].
     destruct st; rewrite ev_empty in B; [apply Qle_bool_iff in H|apply less_spec in H]; lra.
 Qed.
+(* Derived variables follow from atoms up to stratum [limit]. *)
+Section Lower.
+Variable limit : nat.
+Hypothesis Or : forall a, is_derived P (fst a) = true -> holds_in w a = true -> has_rule P w a.
+Hypothesis Cl : forall a r, (level (strata P) (fst a) <= limit)%nat -> In r (concat (strata P)) ->
+  is_rule_of P a r = true -> truth P w None (snd a) (body r) = Some true -> holds_in w a = true.
+Lemma rules_of_spec : forall a r, In r (rules_of P a) <-> In r (concat (strata P)) /\ is_rule_of P a r = true.
+Proof. intros a r. apply filter_In. Qed.
+Lemma definite_ok : forall look, (forall a b, look a = Some b -> holds_in w a = b) -> forall f env b,
+  definite P look env f = Some b -> truth P w None env f = Some b.
+Proof.
+  intros look L. induction f; intros env v H; cbn [definite truth] in *; try exact H; try discriminate.
+  - destruct (ground env ts); [|discriminate]. rewrite (L _ _ H). reflexivity.
+  - destruct (definite P look env f) as [t|] eqn:E; [|discriminate]. rewrite (IHf _ _ E). exact H.
+  - destruct (definite P look env f1) as [x|] eqn:E1; [rewrite (IHf1 _ _ E1)|];
+      destruct (definite P look env f2) as [y|] eqn:E2; try (rewrite (IHf2 _ _ E2)); try exact H;
+      try destruct x; try destruct y; try discriminate; injection H as <-;
+      try (destruct (truth P w None env f1) as [[]|]; reflexivity);
+      destruct (truth P w None env f2) as [[]|]; reflexivity.
+  - revert v H. induction (objects P type) as [|o os IH]; intros v H; cbn [fold_right] in *; [exact H|].
+    set (x := fold_right _ _ os) in H. set (y := fold_right _ _ os).
+    assert (X : forall b, x = Some b -> y = Some b) by exact IH. clearbody x y. clear IH.
+    destruct (definite P look (env ++ [o]) f) as [t|] eqn:E.
+    + rewrite (IHf _ _ E). destruct x as [c|]; [rewrite (X _ eq_refl); exact H|].
+      destruct t; [discriminate|]. injection H as <-. reflexivity.
+    + destruct x as [[]|]; try discriminate. injection H as <-. rewrite (X _ eq_refl).
+      destruct (truth P w None (env ++ [o]) f) as [[]|]; reflexivity.
+Qed.
+Lemma look_up_ok : forall k, Knows w k -> forall l, (l <= limit)%nat -> forall n a b, look_up P T N n l k a = Some b -> holds_in w a = b.
+Proof.
+  intros k K l Le. induction n; intros a b H; cbn [look_up] in H;
+    (destruct (base_truth P T N k a) as [c|] eqn:B; [injection H as <-; apply (base_truth_ok k K), B|]);
+    [discriminate|].
+  destruct (is_unfolded P N a && Nat.leb (level (strata P) (fst a)) l) eqn:U; [|discriminate].
+  apply andb_true_iff in U. destruct U as [U Lv]. apply Nat.leb_le in Lv. unfold is_unfolded in U.
+  apply andb_true_iff in U. destruct U as [D _]. destruct (existsb _ _) eqn:E; [injection H as <-|].
+  - apply existsb_exists in E. destruct E as [t [I E]]. apply in_map_iff in I. destruct I as [r [<- I]].
+    apply rules_of_spec in I. destruct I as [I Ru].
+    destruct (definite P (look_up P T N n l k) (snd a) (body r)) as [[]|] eqn:F; try discriminate.
+    apply (definite_ok _ (IHn)) in F. apply (Cl a r); [lia|exact I|exact Ru|exact F].
+  - destruct (forallb _ _) eqn:A; [injection H as <-|discriminate]. destruct (holds_in w a) eqn:Ha; [|reflexivity].
+    destruct (Or _ D Ha) as [r [I [Ru Tr]]]. rewrite forallb_forall in A.
+    specialize (A (definite P (look_up P T N n l k) (snd a) (body r))).
+    assert (J : In r (rules_of P a)) by (apply rules_of_spec; auto).
+    specialize (A (in_map (fun r => definite P (look_up P T N n l k) (snd a) (body r)) _ _ J)).
+    destruct (definite P (look_up P T N n l k) (snd a) (body r)) as [[]|] eqn:F; try discriminate.
+    apply (definite_ok _ (IHn)) in F. congruence.
+Qed.
+Lemma ground_rules_ok_rest : forall before rules rest, fst (ground_rules_ok P T N (before ++ rules :: rest)) = true ->
+  forallb (ground_rule_ok P T N (snd (check_layers (rules :: rest)))) rules = true.
+Proof.
+  assert (S : forall ls, snd (ground_rules_ok P T N ls) = snd (check_layers ls)).
+  { induction ls as [|rules ls IH]; [reflexivity|]. cbn [ground_rules_ok check_layers].
+    destruct (ground_rules_ok P T N ls), (check_layers ls). cbn [snd] in *. subst. reflexivity. }
+  induction before as [|layer before IH]; intros rules rest H; cbn [app ground_rules_ok] in H.
+  - specialize (S rest). cbn [check_layers]. destruct (ground_rules_ok P T N rest), (check_layers rest).
+    cbn [fst snd] in *. subst. apply andb_true_iff in H. apply H.
+  - apply IH. destruct (ground_rules_ok P T N (before ++ rules :: rest)). cbn [fst] in *.
+    apply andb_true_iff in H. apply H.
+Qed.
+Lemma lower_atoms : equivalent N = true -> forall v x d a, M.find v (derived_atoms N) = Some (x, d, a) ->
+  (level (strata P) (fst a) <= limit)%nat -> is_fact ds (v, x) = true -> holds_in w a = true.
+Proof.
+  intro Eq. destruct ground_parts as [G1 [G2 G3]]. specialize (G3 Eq).
+  assert (H : forall v x, (exists d a, M.find v (derived_atoms N) = Some (x, d, a)) -> is_fact ds (v, x) = true ->
+    forall x d a, M.find v (derived_atoms N) = Some (x, d, a) -> (level (strata P) (fst a) <= limit)%nat ->
+      holds_in w a = true).
+  { apply (derive_invariant T s (fun v x => exists d a, M.find v (derived_atoms N) = Some (x, d, a))
+      (fun v => forall x d a, M.find v (derived_atoms N) = Some (x, d, a) ->
+        (level (strata P) (fst a) <= limit)%nat -> holds_in w a = true));
+      [apply heads; exact task_ok|apply deriveds; exact task_ok| |].
+    - intros v x [d [a F]] Is. exfalso. destruct (G1 _ _ _ _ F) as [_ [Ne [Ex De]]].
+      unfold is_fact, reset_derived, var_value in Is. cbn [fst snd var_values] in Is. rewrite get_puts in Is.
+      apply Z.eqb_eq in Is. pose proof (last_put_some (derived T) v
+        (get (put_all (map (fun v => (v, get (var_values s) v)) (basics T)) (M.empty Z)) v) Ex) as L.
+      apply De in L; [|reflexivity]. cbn [snd] in L. apply Ne. etransitivity; [symmetry; exact Is|exact L].
+    - intros rules rest before t r L I B1 B2 B3 Ho _ x d a F Lv. rewrite L in G3.
+      apply ground_rules_ok_rest in G3. rewrite forallb_forall in G3. specialize (G3 _ I).
+      unfold ground_rule_ok in G3. rewrite F in G3. apply andb_true_iff in G3. destruct G3 as [Neg G3].
+      rewrite forallb_forall in Neg. apply existsb_exists in G3. destruct G3 as [rule [Ir G3]].
+      apply rules_of_spec in Ir. destruct Ir as [Ir Ru].
+      cbv zeta in G3.
+      set (k := Knowledge (ground_literals P N (level (strata P) (fst a)) (snd r)) []) in *.
+      assert (K : Knows w k).
+      { split; [|intros ? ? []]. intros b c J. unfold k, ground_literals in J. cbn [literals] in J.
+        apply in_flat_map in J. destruct J as [[u z] [J J2]]. cbn [fst snd] in J2.
+        assert (Is : var_value t u = z).
+        { unfold holds, holds_facts in Ho. rewrite !andb_true_iff in Ho. destruct Ho as [[Ho _] _].
+          rewrite forallb_forall in Ho. specialize (Ho _ J). unfold is_fact in Ho. apply Z.eqb_eq in Ho. exact Ho. }
+        destruct (M.find u (variables N)) as [vals|] eqn:V.
+        - apply in_map_iff in J2. destruct J2 as [[y b'] [E J2]]. injection E as <- <-. cbn [fst snd].
+          rewrite (r_var _ _ R _ _ _ _ V J2). f_equal. rewrite <- Is. symmetry. apply B1.
+          destruct parts as [_ [A _]]. apply (A _ _ V).
+        - destruct (M.find u (derived_atoms N)) as [[[y e] b']|] eqn:D; [|destruct J2].
+          destruct (Z.eqb_spec z y) as [E|E].
+          + destruct (Nat.leb (level (strata P) (fst b')) (level (strata P) (fst a))) eqn:Lb; [|destruct J2].
+            destruct J2 as [J2|[]]. injection J2 as <- <-. apply Nat.leb_le in Lb.
+            subst y. apply (B3 u z (ex_intro _ e (ex_intro _ b' D))) with (x := z) (d := e); [|exact D|lia].
+            unfold is_fact. cbn [fst snd]. apply Z.eqb_eq, Is.
+          + destruct J2 as [J2|[]]. injection J2 as <- <-. destruct (holds_in w b') eqn:Hb; [|reflexivity]. exfalso. apply (r_derived _ _ R _ _ _ _ D) in Hb.
+            specialize (Neg _ J). cbn [fst snd] in Neg. rewrite D in Neg.
+            destruct (Z.eqb_spec z y); [contradiction|]. cbn [orb] in Neg.
+            assert (N0 : M.find u (snd (check_layers (rules :: rest))) = None)
+              by (destruct (M.find u (snd (check_layers (rules :: rest)))); [discriminate|reflexivity]).
+            apply B2 in N0. unfold is_fact in Hb. cbn [fst snd] in Hb. apply Z.eqb_eq in Hb. congruence. }
+      destruct (definite P (look_up P T N max_unfoldings (level (strata P) (fst a)) k) (snd a) (body rule))
+        as [[]|] eqn:Df; try discriminate.
+      apply (definite_ok _ (look_up_ok k K _ Lv max_unfoldings)) in Df. exact (Cl a rule Lv Ir Ru Df). }
+  intros v x d a F Lv Is. exact (H v x (ex_intro _ d (ex_intro _ a F)) Is x d a F Lv).
+Qed.
+Lemma lower_up_to : lower_ok (fun p => equivalent N && Nat.leb (level (strata P) p) limit).
+Proof.
+  intros v x d a F Fu Ha. apply andb_true_iff in Fu. destruct Fu as [Eq Lv]. apply Nat.leb_le in Lv.
+  destruct ground_parts as [G1 [G2 _]]. destruct (G1 _ _ _ _ F) as [_ [_ [Ex De]]].
+  destruct (derived_values T s v x d Ex De (fun rules r I J E => G2 _ _ _ _ _ _ F I J E)) as [E|E]; [|exact E].
+  exfalso. assert (Is : is_fact ds (v, x) = true) by (unfold is_fact; cbn [fst snd]; apply Z.eqb_eq; exact E).
+  pose proof (lower_atoms Eq _ _ _ _ F Lv Is) as X. congruence.
+Qed.
+End Lower.
 (* In a world with all of its derived atoms *)
 Variable below : world.
 Hypothesis complete : w = derived_world P below.
@@ -293,113 +419,18 @@ Proof.
   intros a D H. rewrite complete in H. rewrite complete. destruct rule_parts as [St _].
   apply (rule_origin P below St a D H).
 Qed.
-Lemma rules_of_spec : forall a r, In r (rules_of P a) <-> In r (concat (strata P)) /\ is_rule_of P a r = true.
-Proof. intros a r. apply filter_In. Qed.
-Lemma definite_ok : forall look, (forall a b, look a = Some b -> holds_in w a = b) -> forall f env b,
-  definite P look env f = Some b -> truth P w None env f = Some b.
+Lemma level_bound : forall ls p, (level ls p <= length ls)%nat.
 Proof.
-  intros look L. induction f; intros env v H; cbn [definite truth] in *; try exact H; try discriminate.
-  - destruct (ground env ts); [|discriminate]. rewrite (L _ _ H). reflexivity.
-  - destruct (definite P look env f) as [t|] eqn:E; [|discriminate]. rewrite (IHf _ _ E). exact H.
-  - destruct (definite P look env f1) as [x|] eqn:E1; [rewrite (IHf1 _ _ E1)|];
-      destruct (definite P look env f2) as [y|] eqn:E2; try (rewrite (IHf2 _ _ E2)); try exact H;
-      try destruct x; try destruct y; try discriminate; injection H as <-;
-      try (destruct (truth P w None env f1) as [[]|]; reflexivity);
-      destruct (truth P w None env f2) as [[]|]; reflexivity.
-  - revert v H. induction (objects P type) as [|o os IH]; intros v H; cbn [fold_right] in *; [exact H|].
-    set (x := fold_right _ _ os) in H. set (y := fold_right _ _ os).
-    assert (X : forall b, x = Some b -> y = Some b) by exact IH. clearbody x y. clear IH.
-    destruct (definite P look (env ++ [o]) f) as [t|] eqn:E.
-    + rewrite (IHf _ _ E). destruct x as [c|]; [rewrite (X _ eq_refl); exact H|].
-      destruct t; [discriminate|]. injection H as <-. reflexivity.
-    + destruct x as [[]|]; try discriminate. injection H as <-. rewrite (X _ eq_refl).
-      destruct (truth P w None (env ++ [o]) f) as [[]|]; reflexivity.
+  induction ls as [|rules ls IH]; intro p; cbn [level length]; [lia|]. specialize (IH p).
+  destruct (level ls p); [destruct (is_head p rules); lia|lia].
 Qed.
-Lemma look_up_ok : forall k, Knows w k -> forall n a b, look_up P T N n k a = Some b -> holds_in w a = b.
+Lemma lower_holds : lower_ok (fun _ => equivalent N).
 Proof.
-  intros k K. induction n; intros a b H; cbn [look_up] in H;
-    (destruct (base_truth P T N k a) as [c|] eqn:B; [injection H as <-; apply (base_truth_ok k K), B|]);
-    [discriminate|].
-  destruct (is_unfolded P N a) eqn:U; [|discriminate]. unfold is_unfolded in U. apply andb_true_iff in U.
-  destruct U as [D _]. destruct (existsb _ _) eqn:E; [injection H as <-|].
-  - apply existsb_exists in E. destruct E as [t [I E]]. apply in_map_iff in I. destruct I as [r [<- I]].
-    apply rules_of_spec in I. destruct I as [I Ru].
-    destruct (definite P (look_up P T N n k) (snd a) (body r)) as [[]|] eqn:F; try discriminate.
-    apply (definite_ok _ (IHn)) in F. rewrite complete in F. rewrite complete. destruct rule_parts as [St _].
-    exact (rule_closed P below St a r I Ru F).
-  - destruct (forallb _ _) eqn:A; [injection H as <-|discriminate]. destruct (holds_in w a) eqn:Ha; [|reflexivity].
-    destruct (complete_origin _ D Ha) as [r [I [Ru Tr]]]. rewrite forallb_forall in A.
-    specialize (A (definite P (look_up P T N n k) (snd a) (body r))).
-    assert (J : In r (rules_of P a)) by (apply rules_of_spec; auto).
-    specialize (A (in_map (fun r => definite P (look_up P T N n k) (snd a) (body r)) _ _ J)).
-    destruct (definite P (look_up P T N n k) (snd a) (body r)) as [[]|] eqn:F; try discriminate.
-    apply (definite_ok _ (IHn)) in F. congruence.
+  intros v x d a F Eq Ha. destruct rule_parts as [St _].
+  apply (lower_up_to (length (strata P)) complete_origin) with (x := x) (a := a); [|exact F| |exact Ha].
+  - intros b r _ I Ru Tr. rewrite complete in Tr. rewrite complete. exact (rule_closed P below St b r I Ru Tr).
+  - cbv beta. rewrite Eq. apply Nat.leb_le, level_bound.
 Qed.
-Lemma ground_rules_ok_rest : forall before rules rest, fst (ground_rules_ok P T N (before ++ rules :: rest)) = true ->
-  forallb (ground_rule_ok P T N (snd (check_layers (rules :: rest)))) rules = true.
-Proof.
-  assert (S : forall ls, snd (ground_rules_ok P T N ls) = snd (check_layers ls)).
-  { induction ls as [|rules ls IH]; [reflexivity|]. cbn [ground_rules_ok check_layers].
-    destruct (ground_rules_ok P T N ls), (check_layers ls). cbn [snd] in *. subst. reflexivity. }
-  induction before as [|layer before IH]; intros rules rest H; cbn [app ground_rules_ok] in H.
-  - specialize (S rest). cbn [check_layers]. destruct (ground_rules_ok P T N rest), (check_layers rest).
-    cbn [fst snd] in *. subst. apply andb_true_iff in H. apply H.
-  - apply IH. destruct (ground_rules_ok P T N (before ++ rules :: rest)). cbn [fst] in *.
-    apply andb_true_iff in H. apply H.
-Qed.
-Lemma lower_atoms : equivalent N = true -> forall v x d a, M.find v (derived_atoms N) = Some (x, d, a) ->
-  is_fact ds (v, x) = true -> holds_in w a = true.
-Proof.
-  intro Eq. destruct ground_parts as [G1 [G2 G3]]. specialize (G3 Eq).
-  assert (H : forall v x, (exists d a, M.find v (derived_atoms N) = Some (x, d, a)) -> is_fact ds (v, x) = true ->
-    forall x d a, M.find v (derived_atoms N) = Some (x, d, a) -> holds_in w a = true).
-  { apply (derive_invariant T s (fun v x => exists d a, M.find v (derived_atoms N) = Some (x, d, a))
-      (fun v => forall x d a, M.find v (derived_atoms N) = Some (x, d, a) -> holds_in w a = true));
-      [apply heads; exact task_ok|apply deriveds; exact task_ok| |].
-    - intros v x [d [a F]] Is. exfalso. destruct (G1 _ _ _ _ F) as [_ [Ne [Ex De]]].
-      unfold is_fact, reset_derived, var_value in Is. cbn [fst snd var_values] in Is. rewrite get_puts in Is.
-      apply Z.eqb_eq in Is. pose proof (last_put_some (derived T) v
-        (get (put_all (map (fun v => (v, get (var_values s) v)) (basics T)) (M.empty Z)) v) Ex) as L.
-      apply De in L; [|reflexivity]. cbn [snd] in L. apply Ne. etransitivity; [symmetry; exact Is|exact L].
-    - intros rules rest before t r L I B1 B2 B3 Ho _ x d a F. rewrite L in G3.
-      apply ground_rules_ok_rest in G3. rewrite forallb_forall in G3. specialize (G3 _ I).
-      unfold ground_rule_ok in G3. rewrite F in G3. apply andb_true_iff in G3. destruct G3 as [Neg G3].
-      rewrite forallb_forall in Neg. apply existsb_exists in G3. destruct G3 as [rule [Ir G3]].
-      apply rules_of_spec in Ir. destruct Ir as [Ir Ru].
-      set (k := Knowledge (ground_literals N (snd r)) []) in *.
-      assert (K : Knows w k).
-      { split; [|intros ? ? []]. intros b c J. unfold k, ground_literals in J. cbn [literals] in J.
-        apply in_flat_map in J. destruct J as [[u z] [J J2]]. cbn [fst snd] in J2.
-        assert (Is : var_value t u = z).
-        { unfold holds, holds_facts in Ho. rewrite !andb_true_iff in Ho. destruct Ho as [[Ho _] _].
-          rewrite forallb_forall in Ho. specialize (Ho _ J). unfold is_fact in Ho. apply Z.eqb_eq in Ho. exact Ho. }
-        destruct (M.find u (variables N)) as [vals|] eqn:V.
-        - apply in_map_iff in J2. destruct J2 as [[y b'] [E J2]]. injection E as <- <-. cbn [fst snd].
-          rewrite (r_var _ _ R _ _ _ _ V J2). f_equal. rewrite <- Is. symmetry. apply B1.
-          destruct parts as [_ [A _]]. apply (A _ _ V).
-        - destruct (M.find u (derived_atoms N)) as [[[y e] b']|] eqn:D; [|destruct J2].
-          destruct J2 as [J2|[]]. injection J2 as <- <-. destruct (Z.eqb_spec z y) as [E|E].
-          + subst y. apply (B3 u z (ex_intro _ e (ex_intro _ b' D))) with (x := z) (d := e); [|exact D].
-            unfold is_fact. cbn [fst snd]. apply Z.eqb_eq, Is.
-          + destruct (holds_in w b') eqn:Hb; [|reflexivity]. exfalso. apply (r_derived _ _ R _ _ _ _ D) in Hb.
-            specialize (Neg _ J). cbn [fst snd] in Neg. rewrite D in Neg.
-            destruct (Z.eqb_spec z y); [contradiction|]. cbn [orb] in Neg.
-            assert (N0 : M.find u (snd (check_layers (rules :: rest))) = None)
-              by (destruct (M.find u (snd (check_layers (rules :: rest)))); [discriminate|reflexivity]).
-            apply B2 in N0. unfold is_fact in Hb. cbn [fst snd] in Hb. apply Z.eqb_eq in Hb. congruence. }
-      destruct (definite P (look_up P T N max_unfoldings k) (snd a) (body rule)) as [[]|] eqn:Df; try discriminate.
-      apply (definite_ok _ (look_up_ok k K max_unfoldings)) in Df. rewrite complete in Df. rewrite complete.
-      destruct rule_parts as [St _]. exact (rule_closed P below St a rule Ir Ru Df). }
-  intros v x d a F Is. exact (H v x (ex_intro _ d (ex_intro _ a F)) Is x d a F).
-Qed.
-Lemma lower_holds : equivalent N = true -> lower_ok.
-Proof.
-  intros Eq v x d a F Ha. destruct ground_parts as [G1 [G2 _]]. destruct (G1 _ _ _ _ F) as [_ [_ [Ex De]]].
-  destruct (derived_values T s v x d Ex De (fun rules r I J E => G2 _ _ _ _ _ _ F I J E)) as [E|E]; [|exact E].
-  exfalso. assert (Is : is_fact ds (v, x) = true) by (unfold is_fact; cbn [fst snd]; apply Z.eqb_eq; exact E).
-  pose proof (lower_atoms Eq _ _ _ _ F Is) as X. congruence.
-Qed.
-
 (* Operators *)
 Section Operators.
 Variable k : knowledge.
@@ -434,14 +465,14 @@ Proof.
   rewrite F in B. change 1 with (inject_Z 1) in B. rewrite <- inject_Z_plus in B.
   change 0 with (inject_Z 0) in B. rewrite <- Zlt_Qlt in B. lia.
 Qed.
-Lemma known_literal_ok : forall full, (full = true -> lower_ok) -> forall l b,
+Lemma known_literal_ok : forall full, lower_ok full -> forall l b,
   known_literal T N full k l = Some b -> is_literal ds l = b.
 Proof.
   intros full Lo [[v x] t] b H. unfold known_literal in H. cbn [fst snd] in H.
   destruct (known_fact T N full k v x) as [c|] eqn:F; [|discriminate]. injection H as <-.
   apply (known_fact_ok k K full Lo) in F. exact (f_equal (fun b => Bool.eqb b t) F).
 Qed.
-Lemma known_condition_ok : forall full, (full = true -> lower_ok) -> forall c szs ch,
+Lemma known_condition_ok : forall full, lower_ok full -> forall c szs ch,
   known_condition T N full k c szs ch = true -> holds c ds szs ch = true.
 Proof.
   intros full Lo c szs ch H. unfold known_condition in H. rewrite !andb_true_iff in H. destruct H as [[H1 H2] H3].
@@ -464,7 +495,7 @@ Proof.
   destruct (existsb _ (fst c)) eqn:E.
   - replace (fires ds c) with false; [apply IH, H|]. symmetry. unfold fires. apply existsb_exists in E.
     destruct E as [x [I E]].
-    destruct (known_literal T N (equivalent N) k x) as [[]|] eqn:F; try discriminate.
+    destruct (known_literal T N (fun _ => equivalent N) k x) as [[]|] eqn:F; try discriminate.
     apply (known_literal_ok _ lower_holds) in F.
     destruct (forallb _ _) eqn:A; [|reflexivity].
     rewrite forallb_forall in A. rewrite (A _ I) in F. discriminate.
@@ -473,7 +504,7 @@ Proof.
     replace (fires ds c) with true; [simpl; f_equal; apply IH; reflexivity|]. symmetry. unfold fires.
     apply forallb_forall. intros x I.
     rewrite forallb_forall in A. specialize (A _ I).
-    destruct (known_literal T N (equivalent N) k x) as [[]|] eqn:F; try discriminate.
+    destruct (known_literal T N (fun _ => equivalent N) k x) as [[]|] eqn:F; try discriminate.
     apply (known_literal_ok _ lower_holds), F.
 Qed.
 
@@ -584,7 +615,7 @@ Proof.
     made = made_facts o ds
                 | None => made = [] end).
   { destruct o as [[o ch]|]; [|congruence].
-    destruct (admitted_choice o ch && known_condition T N (equivalent N) k (precondition o) (slot_sizes o) ch &&
+    destruct (admitted_choice o ch && known_condition T N (fun _ => equivalent N) k (precondition o) (slot_sizes o) ch &&
       distinct (map fst (number_effects o))) eqn:A; [|discriminate].
     rewrite !andb_true_iff in A. destruct A as [[A1 A2] A3]. split; [apply admitted_ok, A1|].
     split; [apply (known_condition_ok _ lower_holds), A2|]. split; [exact A3|].
@@ -677,7 +708,7 @@ Proof.
     apply negb_true_iff in Z. apply Pos.eqb_neq in Z. contradiction.
   - destruct (existsb _ (fst c)) eqn:E.
     + replace (fires ds c) with false; [apply IH, H|]. symmetry. unfold fires. apply existsb_exists in E.
-      destruct E as [y [I E]]. destruct (known_literal T N (equivalent N) k y) as [[]|] eqn:F; try discriminate.
+      destruct E as [y [I E]]. destruct (known_literal T N (fun _ => equivalent N) k y) as [[]|] eqn:F; try discriminate.
       apply (known_literal_ok k K _ lower_holds) in F. destruct (forallb (is_literal ds) (fst c)) eqn:A; [|reflexivity].
       rewrite forallb_forall in A. rewrite (A _ I) in F. discriminate.
     + destruct (forallb _ (fst c)) eqn:A; [|discriminate].
@@ -685,7 +716,7 @@ Proof.
       replace (fires ds c) with true.
       * cbn [flat_map]. rewrite !last_put_app. apply IH. reflexivity.
       * symmetry. unfold fires. apply forallb_forall. intros y I. rewrite forallb_forall in A.
-        specialize (A _ I). destruct (known_literal T N (equivalent N) k y) as [[]|] eqn:F; try discriminate.
+        specialize (A _ I). destruct (known_literal T N (fun _ => equivalent N) k y) as [[]|] eqn:F; try discriminate.
         apply (known_literal_ok k K _ lower_holds), F.
 Qed.
 Lemma step_instantaneous : forall a env w' d, duration a = None -> step P true w a env = Some (w', d) ->
@@ -942,14 +973,27 @@ Proof.
         by (destruct (truth P w None (env ++ [o]) f) as [[]|], x as [[]|]; simpl in H; try discriminate; auto).
       destruct A as [A|A]; [eapply IHf; eassumption|exact (IH A E2)].
 Qed.
-Lemma unfold_ok : (forall a, is_derived P (fst a) = true -> holds_in w a = true -> has_rule P w a) ->
-  forall n, is_sound (unfold P T N n).
+Lemma unfold_ok : (forall a, is_derived P (fst a) = true -> holds_in w a = true -> has_rule P w a) -> forall limit,
+  (forall a r, (level (strata P) (fst a) <= limit)%nat -> In r (concat (strata P)) -> is_rule_of P a r = true ->
+     truth P w None (snd a) (body r) = Some true -> holds_in w a = true) ->
+  forall n, is_sound (unfold P T N n limit).
 Proof.
-  intros O. induction n; intros a b next k K H E; cbn [unfold] in E; [exists k; auto|].
-  destruct (b && is_unfolded P N a) eqn:U; [|exists k; auto]. apply andb_true_iff in U. destruct U as [-> U].
-  unfold is_unfolded in U. apply andb_true_iff in U. destruct U as [D _].
-  destruct (O _ D H) as [r [I [Ru Tr]]]. rewrite forallb_forall in E.
-  apply (expand_ok _ IHn (body r) true (snd a) next k K Tr). apply E, filter_In. auto.
+  intros O limit Cl. induction n; intros a b next k K H E; cbn [unfold] in E; [exists k; auto|].
+  destruct (is_unfolded P N a) eqn:U; cbn [negb] in E; [|exists k; auto].
+  unfold is_unfolded in U. apply andb_true_iff in U. destruct U as [D _]. destruct b.
+  - destruct (O _ D H) as [r [I [Ru Tr]]]. rewrite forallb_forall in E.
+    apply (expand_ok _ IHn (body r) true (snd a) next k K Tr). apply E, filter_In. auto.
+  - destruct (Nat.leb (level (strata P) (fst a)) limit) eqn:Lv; [|exists k; auto]. apply Nat.leb_le in Lv.
+    assert (Fa : forall r, In r (rules_of P a) -> truth P w None (snd a) (body r) <> Some true).
+    { intros r I Tr. apply rules_of_spec in I. destruct I as [I Ru]. rewrite (Cl a r Lv I Ru Tr) in H. discriminate. }
+    revert k K E. induction (rules_of P a) as [|r rs IH]; intros k K E; cbn [fold_right] in E; [exists k; auto|].
+    assert (Fr : forall r, In r rs -> truth P w None (snd a) (body r) <> Some true)
+      by (intros q I; apply Fa; right; exact I).
+    destruct (is_defined P (snd a) (body r)) eqn:Df; [|exact (IH Fr k K E)].
+    apply defined_ok in Df. pose proof (Fa r (or_introl eq_refl)) as Ne.
+    assert (Tr : truth P w None (snd a) (body r) = Some false)
+      by (destruct (truth P w None (snd a) (body r)) as [[]|]; congruence).
+    destruct (expand_ok _ IHn (body r) false (snd a) _ k K Tr E) as [k1 [K1 E1]]. exact (IH Fr k1 K1 E1).
 Qed.
 End State.
 
@@ -983,28 +1027,85 @@ Proof.
   - intros v x d a D A. destruct (De _ _ _ _ D) as [D1 D2]. rewrite D1 in A. apply (H a A), D2.
   - apply B.
 Qed.
+Lemma settled_level : forall before ls p, existsb (is_head p) ls = false <-> (level (before ++ ls) p <= length before)%nat.
+Proof.
+  assert (Z : forall ls p, existsb (is_head p) ls = false <-> level ls p = 0%nat).
+  { induction ls as [|rules ls IH]; intro p; [split; reflexivity|]. cbn [existsb level]. specialize (IH p).
+    destruct (existsb (is_head p) ls), (level ls p); destruct (is_head p rules); cbn [orb]; split; intro H;
+      try discriminate; try reflexivity; try lia; destruct IH as [I1 I2]; try (specialize (I1 eq_refl); discriminate);
+      specialize (I2 eq_refl); discriminate. }
+  induction before as [|rules before IH]; intros ls p; cbn [app length level].
+  - rewrite Z. lia.
+  - rewrite IH. destruct (level (before ++ ls) p); [destruct (is_head p rules); lia|lia].
+Qed.
 Lemma derived_related : forall w s, Base w s -> Rel (derived_world P w) s.
 Proof.
   intros w s B. apply with_facts_related; [exact B|]. apply derived_invariant; [apply rule_parts|].
-  intros F rules i H Ju I J Fi. pose proof (with_facts_related _ _ _ B H) as R.
-  destruct rule_parts as [_ [La [_ [_ [_ [_ Ok]]]]]]. specialize (Ok _ _ I J). unfold rule_ok in Ok.
+  intros before rules later F0 F i L H0 Ju0 Cl0 Same H Ju J Fi. pose proof (with_facts_related _ _ _ B H) as R.
+  pose proof (with_facts_related _ _ _ B H0) as R0.
+  destruct rule_parts as [_ [La [_ [De [_ [_ Ok]]]]]]. specialize (Ok _ _ _ _ L J). unfold rule_ok in Ok.
+  set (full := fun p => equivalent N && Nat.leb (level (strata P) p) (length before)) in *.
   assert (X : find_atom (derived_of N) (fst i) = None /\ mem (may_hold N) (fst i) = true \/
-    expand P T N (unfold P T N max_unfoldings) (snd i) true (snd (fst i)) (rule_leaf P T N (ground_rules T) (fst i)) (Knowledge [] []) = true)
+    expand P T N (unfold P T N max_unfoldings (length before)) (snd i) true (snd (fst i)) (rule_leaf P T N full (ground_rules T) (fst i))
+      (Knowledge [] []) = true)
     by (destruct (find_atom (derived_of N) (fst i)), (mem (may_hold N) (fst i)); auto).
   destruct X as [[X1 X2]|X]; [split; [exact X2|intros v x E; congruence]|].
+  assert (Or : forall F, (forall a, mem F a = true -> has_rule P (with_facts P w F) a) -> forall a,
+    is_derived P (fst a) = true -> holds_in (with_facts P w F) a = true -> has_rule P (with_facts P w F) a).
+  { intros F' Ju' a D A. cbn [with_facts holds_in] in A. rewrite D in A. exact (Ju' a A). }
+  assert (Closed0 : forall b r, (level (strata P) (fst b) <= length before)%nat -> In r (concat (strata P)) ->
+    is_rule_of P b r = true -> truth P (with_facts P w F0) None (snd b) (body r) = Some true ->
+    holds_in (with_facts P w F0) b = true).
+  { intros b r Lv I Ru Tr. rewrite L in Lv. apply settled_level in Lv. rewrite L, concat_app in I.
+    unfold is_rule_of in Ru. rewrite <- andb_assoc in Ru. apply andb_true_iff in Ru. destruct Ru as [Hd Ty].
+    apply Pos.eqb_eq in Hd. apply in_app_or in I. destruct I as [I|I].
+    + apply (proj2 (tuples_spec P _ _)) in Ty. pose proof (Cl0 r (snd b) I Ty Tr) as M. rewrite <- Hd in M.
+      cbn [with_facts holds_in]. replace (is_derived P (fst b)) with true; [destruct b; exact M|].
+      symmetry. apply in_concat in I. destruct I as [rs [I1 I2]]. rewrite Hd. apply (head_derived P rs); [|exact I2].
+      rewrite L. apply in_or_app. left. exact I1.
+    + exfalso. apply in_concat in I. destruct I as [rs [I1 I2]].
+      assert (E : existsb (is_head (fst b)) (rules :: later) = true); [|congruence].
+      apply existsb_exists. exists rs. split; [exact I1|]. apply existsb_exists. exists r. split; [exact I2|].
+      apply Pos.eqb_eq, Hd. }
+  assert (Closed : forall b r, (level (strata P) (fst b) <= length before)%nat -> In r (concat (strata P)) ->
+    is_rule_of P b r = true -> truth P (with_facts P w F) None (snd b) (body r) = Some true ->
+    holds_in (with_facts P w F) b = true).
+  { intros b r Lv I Ru Tr. pose proof (proj1 rule_parts) as St. rewrite L in St.
+    assert (Ib : In r (concat before)).
+    { pose proof I as I'. rewrite L, concat_app in I'. apply in_app_or in I'. destruct I' as [I'|I']; [exact I'|exfalso].
+      pose proof Lv as Lv'. rewrite L in Lv'. apply settled_level in Lv'. apply in_concat in I'.
+      destruct I' as [rs [I1 I2]]. unfold is_rule_of in Ru. rewrite !andb_true_iff in Ru. destruct Ru as [[Hd _] _].
+      assert (E : existsb (is_head (fst b)) (rules :: later) = true); [|congruence].
+      apply existsb_exists. exists rs. split; [exact I1|]. apply existsb_exists. exists r. split; [exact I2|exact Hd]. }
+    assert (Tr0 : truth P (with_facts P w F0) None (snd b) (body r) = Some true).
+    { pose proof (earlier_bodies before (rules :: later) St r Ib) as O.
+      apply (truth_kept P (fun p _ => negb (existsb (is_head p) (rules :: later))) (with_facts P w F));
+        [| |reflexivity|exact O|exact Tr];
+        intros c Al; apply negb_true_iff in Al; cbn [with_facts holds_in]; destruct (is_derived P (fst c)); auto.
+      - change (mem F c = true -> mem F0 c = true). rewrite (Same c Al). auto.
+      - change (mem F c = false -> mem F0 c = false). rewrite (Same c Al). auto. }
+    pose proof (Closed0 b r Lv I Ru Tr0) as Hb. pose proof Lv as Lv'. rewrite L in Lv'. apply settled_level in Lv'.
+    cbn [with_facts holds_in] in *. destruct (is_derived P (fst b)); [|exact Hb].
+    change (mem F0 b = true) in Hb. change (mem F b = true). rewrite (Same b Lv'). exact Hb. }
+  (* What does not hold in the earlier strata does not follow in the ground task. *)
+  assert (Lo : lower_ok (with_facts P w F) s full).
+  { intros v x d a Fv Fu Ha. destruct (De _ _ _ _ Fv) as [D _].
+    apply (lower_up_to _ _ R0 (length before) (Or F0 Ju0)) with (x := x) (a := a); [|exact Fv|exact Fu|].
+    - exact Closed0.
+    - cbn [with_facts holds_in] in Ha |- *. rewrite D in *. unfold full in Fu. apply andb_true_iff in Fu.
+      destruct Fu as [_ Fu]. apply Nat.leb_le in Fu. rewrite L in Fu. apply settled_level in Fu.
+      change (mem F a = false) in Ha. change (mem F0 a = false). rewrite <- (Same a Fu). exact Ha. }
   unfold fires_in in Fi. destruct (truth P (with_facts P w F) None (snd (fst i)) (snd i)) as [[]|] eqn:Tr;
     try discriminate.
-  assert (Or : forall a, is_derived P (fst a) = true -> holds_in (with_facts P w F) a = true ->
-    has_rule P (with_facts P w F) a).
-  { intros a D A. cbn [with_facts holds_in] in A. rewrite D in A. exact (Ju a A). }
-  destruct (expand_ok _ _ R _ (unfold_ok _ _ R Or max_unfoldings) _ _ _ _ _ (knows_nothing _) Tr X) as [k [K L]]. unfold rule_leaf in L.
-  apply orb_true_iff in L. destruct L as [L|L]; [exfalso; eapply impossible_ok; eassumption|].
-  apply andb_true_iff in L. destruct L as [May L]. split; [exact May|]. intros v x E. rewrite E in L.
-  destruct (M.find v (ground_rules T)) as [l|] eqn:G; [|discriminate]. apply existsb_exists in L.
-  destruct L as [r [Ir L]]. apply andb_true_iff in L. destruct L as [Ex L]. apply Z.eqb_eq in Ex. subst x.
-  apply (known_condition_ok _ _ R k K false) in L; [|discriminate]. pose proof (ground_rules_ok _ _ _ G Ir) as C.
+  destruct (expand_ok _ _ R _ (unfold_ok _ _ R (Or F Ju) (length before) Closed max_unfoldings) _ _ _ _ _ (knows_nothing _) Tr X)
+    as [k [K Lf]]. unfold rule_leaf in Lf.
+  apply orb_true_iff in Lf. destruct Lf as [Lf|Lf]; [exfalso; exact (impossible_ok _ _ R k K Lf)|].
+  apply andb_true_iff in Lf. destruct Lf as [May Lf]. split; [exact May|]. intros v x E. rewrite E in Lf.
+  destruct (M.find v (ground_rules T)) as [l|] eqn:G; [|discriminate]. apply existsb_exists in Lf.
+  destruct Lf as [r [Ir Lf]]. apply andb_true_iff in Lf. destruct Lf as [Ex Lf]. apply Z.eqb_eq in Ex. subst x.
+  apply (known_condition_ok _ _ R k K full Lo) in Lf. pose proof (ground_rules_ok _ _ _ G Ir) as C.
   apply in_concat in C. destruct C as [layer [C1 C2]].
-  exact (derive_closed T La s layer ((v, fst r), snd r) C1 C2 L).
+  exact (derive_closed T La s layer ((v, fst r), snd r) C1 C2 Lf).
 Qed.
 
 (* Instances *)
@@ -1251,7 +1352,7 @@ Proof.
     destruct (symbolic_truth P T N k unchanged Undefined [] (goal_formula P)) as [[]|] eqn:E.
     2: { exfalso. apply (symbolic_truth_ok P T N w k (base_truth_ok w s R k K) (static_value w s R) K w
            unchanged None Undefined (describes_itself P w) eq_refl) in E. apply E. exact G. }
-    all: apply (known_condition_ok w s R k K (equivalent N)); [apply (lower_holds w s R w0 Cw)|exact L].
+    all: apply (known_condition_ok w s R k K (fun _ => equivalent N)); [apply (lower_holds w s R w0 Cw)|exact L].
   - rewrite Mw. destruct (nth_error (actions P) i) as [a|] eqn:Ni; [|discriminate].
     destruct (step P true w a env) as [[w1 d]|] eqn:S; [|discriminate].
     destruct parts as [_ [_ [_ [_ [_ B]]]]]. specialize (B _ _ Ni). unfold action_ok in B.

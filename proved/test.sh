@@ -66,6 +66,7 @@ changed domain.pddl 's/(dark ?r - room) (not (lit ?r))/(dark ?r - room) (not (on
 changed domain.pddl 's/(:derived (dark ?r - room) (not (lit ?r)))/(:derived (dark ?r - room) (lit ?r))/'
 changed domain.pddl 's/(when (dark ?r)/(when (not (dark ?r))/'
 changed domain.pddl 's/(or (corridor ?s ?r) (open ?s ?r)/(or (open ?s ?r)/'
+changed domain.pddl 's/(:derived (some-dark) (exists/(:derived (some-dark) (forall/'
 changed problem.pddl 's/(on hall)//'
 changed problem.pddl 's/(not (lit bedroom))/(lit bedroom)/'
 directory=tests/ugv

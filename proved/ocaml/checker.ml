@@ -98,6 +98,15 @@ module Nat =
     | S n' -> (match m with
                | O -> false
                | S m' -> eqb n' m')
+
+  (** val leb : nat -> nat -> bool **)
+
+  let rec leb n m =
+    match n with
+    | O -> true
+    | S n' -> (match m with
+               | O -> false
+               | S m' -> leb n' m')
  end
 
 module Pos =
@@ -2310,7 +2319,7 @@ let possible t0 n k v =
      | None -> range (get t0.domain_size v))
 
 (** val known_fact :
-    task -> names -> bool -> knowledge -> key1 -> z -> bool option **)
+    task -> names -> (key1 -> bool) -> knowledge -> key1 -> z -> bool option **)
 
 let known_fact t0 n full k v x =
   match M.find v n.variables with
@@ -2328,7 +2337,7 @@ let known_fact t0 n full k v x =
         | Some b ->
           if b
           then Some (Z.eqb x y)
-          else if full then Some (Z.eqb x d) else None
+          else if full (fst a) then Some (Z.eqb x d) else None
         | None -> None)
      | None -> None)
 
@@ -2344,7 +2353,8 @@ let base_truth p t0 n k a =
           if (||) (excluded_by n k a) (negb (mem0 n.may_hold a))
           then Some false
           else (match find_atom n.fact_of a with
-                | Some p0 -> let (v, x) = p0 in known_fact t0 n false k v x
+                | Some p0 ->
+                  let (v, x) = p0 in known_fact t0 n (fun _ -> false) k v x
                 | None -> None))
 
 type symbolic = { new_truths : (atom * bool) list;
@@ -3005,19 +3015,42 @@ let is_unfolded p n a =
      | Some _ -> false
      | None -> true)
 
+(** val is_head : key1 -> rule list -> bool **)
+
+let is_head p rules =
+  existsb (fun r -> Coq_Pos.eqb p r.head) rules
+
+(** val level : rule list list -> key1 -> nat **)
+
+let rec level ls p =
+  match ls with
+  | [] -> O
+  | rules :: later ->
+    (match level later p with
+     | O -> if is_head p rules then S O else O
+     | S n -> S (S n))
+
 (** val unfold :
-    problem -> task -> names -> nat -> atom -> bool -> continuation ->
+    problem -> task -> names -> nat -> nat -> atom -> bool -> continuation ->
     knowledge -> bool **)
 
-let rec unfold p t0 n depth a b next k =
+let rec unfold p t0 n depth limit a b next k =
   match depth with
   | O -> next k
   | S depth0 ->
-    if (&&) b (is_unfolded p n a)
-    then forallb (fun r ->
-           expand p t0 n (unfold p t0 n depth0) r.body true (snd a) next k)
-           (rules_of p a)
-    else next k
+    if negb (is_unfolded p n a)
+    then next k
+    else if b
+         then forallb (fun r ->
+                expand p t0 n (unfold p t0 n depth0 limit) r.body true
+                  (snd a) next k) (rules_of p a)
+         else if Nat.leb (level p.strata (fst a)) limit
+              then fold_right (fun r next0 ->
+                     if is_defined p (snd a) r.body
+                     then expand p t0 n (unfold p t0 n depth0 limit) r.body
+                            false (snd a) next0
+                     else next0) next (rules_of p a) k
+              else next k
 
 (** val definite :
     problem -> (atom -> bool option) -> key1 list -> formula -> bool option **)
@@ -3050,19 +3083,19 @@ let is_some b = function
 | None -> false
 
 (** val look_up :
-    problem -> task -> names -> nat -> knowledge -> atom -> bool option **)
+    problem -> task -> names -> nat -> nat -> knowledge -> atom -> bool option **)
 
-let rec look_up p t0 n depth k a =
+let rec look_up p t0 n depth limit k a =
   match base_truth p t0 n k a with
   | Some b -> Some b
   | None ->
     (match depth with
      | O -> None
      | S depth0 ->
-       if is_unfolded p n a
+       if (&&) (is_unfolded p n a) (Nat.leb (level p.strata (fst a)) limit)
        then let truths =
               map (fun r ->
-                definite p (look_up p t0 n depth0 k) (snd a) r.body)
+                definite p (look_up p t0 n depth0 limit k) (snd a) r.body)
                 (rules_of p a)
             in
             if existsb (is_some true) truths
@@ -3083,11 +3116,6 @@ let rec occurrences_ok allowed b = function
 | And (g, h) -> (&&) (occurrences_ok allowed b g) (occurrences_ok allowed b h)
 | Forall (_, g) -> occurrences_ok allowed b g
 | _ -> true
-
-(** val is_head : key1 -> rule list -> bool **)
-
-let is_head p rules =
-  existsb (fun r -> Coq_Pos.eqb p r.head) rules
 
 (** val is_allowed : rule list -> rule list list -> key1 -> bool -> bool **)
 
@@ -3141,7 +3169,7 @@ let required n k f =
     (plus_form f { qnum = (Zpos XH); qden = XH } (constant (qinv (scaled n))))
 
 (** val known_literal :
-    task -> names -> bool -> knowledge -> literal -> bool option **)
+    task -> names -> (key1 -> bool) -> knowledge -> literal -> bool option **)
 
 let known_literal t0 n full k l =
   option_map (fun b -> eqb b (snd l))
@@ -3160,8 +3188,8 @@ let is_false = function
 | None -> false
 
 (** val known_condition :
-    task -> names -> bool -> knowledge -> condition -> z list -> choice ->
-    bool **)
+    task -> names -> (key1 -> bool) -> knowledge -> condition -> z list ->
+    choice -> bool **)
 
 let known_condition t0 n full k c szs ch =
   (&&)
@@ -3182,9 +3210,11 @@ let known_condition t0 n full k c szs ch =
 let rec known_effects t0 n k = function
 | [] -> Some []
 | c :: r ->
-  if existsb (fun l -> is_false (known_literal t0 n n.equivalent k l)) (fst c)
+  if existsb (fun l ->
+       is_false (known_literal t0 n (fun _ -> n.equivalent) k l)) (fst c)
   then known_effects t0 n k r
-  else if forallb (fun l -> is_true (known_literal t0 n n.equivalent k l))
+  else if forallb (fun l ->
+            is_true (known_literal t0 n (fun _ -> n.equivalent) k l)) 
             (fst c)
        then option_map (app (snd c)) (known_effects t0 n k r)
        else None
@@ -3278,8 +3308,9 @@ let simulated p t0 n k s time o =
           let (o0, ch) = p0 in
           if (&&)
                ((&&) (admitted_choice o0 ch)
-                 (known_condition t0 n n.equivalent k o0.precondition
-                   o0.slot_sizes ch)) (distinct (map fst o0.number_effects))
+                 (known_condition t0 n (fun _ -> n.equivalent) k
+                   o0.precondition o0.slot_sizes ch))
+               (distinct (map fst o0.number_effects))
           then option_map (app o0.effects)
                  (known_effects t0 n k o0.conditional)
           else None
@@ -3338,11 +3369,13 @@ let rec known_effects_on t0 n v k = function
 | c :: r ->
   if forallb (fun f -> negb (Coq_Pos.eqb (fst f) v)) (snd c)
   then known_effects_on t0 n v k r
-  else if existsb (fun l -> is_false (known_literal t0 n n.equivalent k l))
+  else if existsb (fun l ->
+            is_false (known_literal t0 n (fun _ -> n.equivalent) k l)) 
             (fst c)
        then known_effects_on t0 n v k r
        else if forallb (fun l ->
-                 is_true (known_literal t0 n n.equivalent k l)) (fst c)
+                 is_true (known_literal t0 n (fun _ -> n.equivalent) k l))
+                 (fst c)
             then option_map (app (snd c)) (known_effects_on t0 n v k r)
             else None
 
@@ -3427,8 +3460,8 @@ let projected_ok p t0 n k a env o =
                    let (o0, ch) = p0 in
                    (&&)
                      ((&&) (admitted_choice o0 ch)
-                       (known_condition t0 n n.equivalent k o0.precondition
-                         o0.slot_sizes ch))
+                       (known_condition t0 n (fun _ -> n.equivalent) k
+                         o0.precondition o0.slot_sizes ch))
                      (distinct (map fst o0.number_effects))
                  | None -> true))
               (forallb (projected_variable_ok p t0 n k a env o)
@@ -3523,8 +3556,10 @@ let instance_leaf p t0 n a env k = function
 let goal_leaf p t0 n k _ =
   match symbolic_truth p t0 n k unchanged Undefined [] p.goal_formula with
   | Some b ->
-    if b then known_condition t0 n n.equivalent k t0.goal [] [] else true
-  | None -> known_condition t0 n n.equivalent k t0.goal [] []
+    if b
+    then known_condition t0 n (fun _ -> n.equivalent) k t0.goal [] []
+    else true
+  | None -> known_condition t0 n (fun _ -> n.equivalent) k t0.goal [] []
 
 (** val static_false : problem -> names -> key1 list -> formula -> bool **)
 
@@ -3616,10 +3651,10 @@ let ground_rules t0 =
                    | None -> [])) m) M.empty (concat t0.layers)
 
 (** val rule_leaf :
-    problem -> task -> names -> (z * condition) list M.t -> atom -> knowledge
-    -> bool **)
+    problem -> task -> names -> (key1 -> bool) -> (z * condition) list M.t ->
+    atom -> knowledge -> bool **)
 
-let rule_leaf p t0 n rules a k =
+let rule_leaf p t0 n full rules a k =
   (||) (impossible p t0 n k)
     ((&&) (mem0 n.may_hold a)
       (match find_atom n.derived_of a with
@@ -3629,36 +3664,57 @@ let rule_leaf p t0 n rules a k =
           | Some l ->
             existsb (fun r ->
               (&&) (Z.eqb (fst r) x)
-                (known_condition t0 n false k (snd r) [] [])) l
+                (known_condition t0 n full k (snd r) [] [])) l
           | None -> false)
        | None -> true))
 
 (** val rule_ok :
-    problem -> task -> names -> (z * condition) list M.t -> (atom * formula)
-    -> bool **)
+    problem -> task -> names -> nat -> (z * condition) list M.t ->
+    (atom * formula) -> bool **)
 
-let rule_ok p t0 n rules i =
+let rule_ok p t0 n stratum rules i =
   match find_atom n.derived_of (fst i) with
   | Some _ ->
-    expand p t0 n (unfold p t0 n max_unfoldings) (snd i) true (snd (fst i))
-      (rule_leaf p t0 n rules (fst i)) { literals = []; bounds = [] }
+    expand p t0 n (unfold p t0 n max_unfoldings stratum) (snd i) true
+      (snd (fst i))
+      (rule_leaf p t0 n (fun p0 ->
+        (&&) n.equivalent (Nat.leb (level p.strata p0) stratum)) rules
+        (fst i)) { literals = []; bounds = [] }
   | None ->
     if mem0 n.may_hold (fst i)
     then true
-    else expand p t0 n (unfold p t0 n max_unfoldings) (snd i) true
-           (snd (fst i)) (rule_leaf p t0 n rules (fst i)) { literals = [];
-           bounds = [] }
+    else expand p t0 n (unfold p t0 n max_unfoldings stratum) (snd i) true
+           (snd (fst i))
+           (rule_leaf p t0 n (fun p0 ->
+             (&&) n.equivalent (Nat.leb (level p.strata p0) stratum)) rules
+             (fst i)) { literals = []; bounds = [] }
 
-(** val ground_literals : names -> condition -> (atom * bool) list **)
+(** val strata_ok :
+    problem -> task -> names -> nat -> (z * condition) list M.t -> rule list
+    list -> bool **)
 
-let ground_literals n c =
+let rec strata_ok p t0 n stratum rules = function
+| [] -> true
+| here :: later ->
+  (&&) (forallb (rule_ok p t0 n stratum rules) (rule_instances p here))
+    (strata_ok p t0 n (S stratum) rules later)
+
+(** val ground_literals :
+    problem -> names -> nat -> condition -> (atom * bool) list **)
+
+let ground_literals p n limit c =
   flat_map (fun f ->
     match M.find (fst f) n.variables with
     | Some vals -> map (fun xa -> ((snd xa), (Z.eqb (snd f) (fst xa)))) vals
     | None ->
       (match M.find (fst f) n.derived_atoms with
-       | Some p ->
-         let (p0, a) = p in let (y, _) = p0 in (a, (Z.eqb (snd f) y)) :: []
+       | Some p0 ->
+         let (p1, a) = p0 in
+         let (y, _) = p1 in
+         if (&&) (Z.eqb (snd f) y)
+              (negb (Nat.leb (level p.strata (fst a)) limit))
+         then []
+         else (a, (Z.eqb (snd f) y)) :: []
        | None -> [])) c.facts
 
 (** val ground_rule_ok :
@@ -3679,11 +3735,13 @@ let ground_rule_ok p t0 n heads r =
              | Some _ -> false
              | None -> true)
         | None -> true) (snd r).facts)
-      (let k = { literals = (ground_literals n (snd r)); bounds = [] } in
+      (let limit = level p.strata (fst a) in
+       let k = { literals = (ground_literals p n limit (snd r)); bounds = [] }
+       in
        existsb (fun rule0 ->
          is_some true
-           (definite p (look_up p t0 n max_unfoldings k) (snd a) rule0.body))
-         (rules_of p a))
+           (definite p (look_up p t0 n max_unfoldings limit k) (snd a)
+             rule0.body)) (rules_of p a))
   | None -> true
 
 (** val ground_rules_ok :
@@ -3740,9 +3798,7 @@ let rules_ok p t0 n =
               let (p1, _) = p0 in let (x, _) = p1 in Z.eqb (snd (fst r)) x
             | None -> true)) t0.layers))
       ((||) (negb n.equivalent) (fst (ground_rules_ok p t0 n t0.layers))))
-    (forallb (fun rules ->
-      forallb (rule_ok p t0 n (ground_rules t0)) (rule_instances p rules))
-      p.strata)
+    (strata_ok p t0 n O (ground_rules t0) p.strata)
 
 (** val faithful :
     problem -> task -> names -> (nat -> key1 list -> case_tree) -> case_tree

@@ -51,6 +51,8 @@ module MakeOrderTac :
 module Nat :
  sig
   val eqb : nat -> nat -> bool
+
+  val leb : nat -> nat -> bool
  end
 
 module Pos :
@@ -815,7 +817,7 @@ val excluded_by : names -> knowledge -> atom -> bool
 val possible : task -> names -> knowledge -> key1 -> z list
 
 val known_fact :
-  task -> names -> bool -> knowledge -> key1 -> z -> bool option
+  task -> names -> (key1 -> bool) -> knowledge -> key1 -> z -> bool option
 
 val base_truth : problem -> task -> names -> knowledge -> atom -> bool option
 
@@ -923,8 +925,12 @@ val expand :
 
 val is_unfolded : problem -> names -> atom -> bool
 
+val is_head : key1 -> rule list -> bool
+
+val level : rule list list -> key1 -> nat
+
 val unfold :
-  problem -> task -> names -> nat -> atom -> bool -> continuation ->
+  problem -> task -> names -> nat -> nat -> atom -> bool -> continuation ->
   knowledge -> bool
 
 val definite :
@@ -933,13 +939,11 @@ val definite :
 val is_some : bool -> bool option -> bool
 
 val look_up :
-  problem -> task -> names -> nat -> knowledge -> atom -> bool option
+  problem -> task -> names -> nat -> nat -> knowledge -> atom -> bool option
 
 val max_unfoldings : nat
 
 val occurrences_ok : (key1 -> bool -> bool) -> bool -> formula -> bool
-
-val is_head : key1 -> rule list -> bool
 
 val is_allowed : rule list -> rule list list -> key1 -> bool -> bool
 
@@ -954,14 +958,15 @@ val form_of : names -> linear -> z list -> choice -> form option
 val required : names -> knowledge -> form -> bool
 
 val known_literal :
-  task -> names -> bool -> knowledge -> literal -> bool option
+  task -> names -> (key1 -> bool) -> knowledge -> literal -> bool option
 
 val is_true : bool option -> bool
 
 val is_false : bool option -> bool
 
 val known_condition :
-  task -> names -> bool -> knowledge -> condition -> z list -> choice -> bool
+  task -> names -> (key1 -> bool) -> knowledge -> condition -> z list ->
+  choice -> bool
 
 val known_effects :
   task -> names -> knowledge -> (literal list * fact list) list -> fact list
@@ -1046,14 +1051,19 @@ val all_entries : 'a1 atom_map -> (atom * 'a1) list
 val ground_rules : task -> (z * condition) list M.t
 
 val rule_leaf :
-  problem -> task -> names -> (z * condition) list M.t -> atom -> knowledge
-  -> bool
+  problem -> task -> names -> (key1 -> bool) -> (z * condition) list M.t ->
+  atom -> knowledge -> bool
 
 val rule_ok :
-  problem -> task -> names -> (z * condition) list M.t -> (atom * formula) ->
-  bool
+  problem -> task -> names -> nat -> (z * condition) list M.t ->
+  (atom * formula) -> bool
 
-val ground_literals : names -> condition -> (atom * bool) list
+val strata_ok :
+  problem -> task -> names -> nat -> (z * condition) list M.t -> rule list
+  list -> bool
+
+val ground_literals :
+  problem -> names -> nat -> condition -> (atom * bool) list
 
 val ground_rule_ok :
   problem -> task -> names -> z M.t -> (fact * condition) -> bool

@@ -328,11 +328,11 @@ let prepare directory =
   let ground_task = evidence.Evidence.ground_task and names = evidence.Evidence.names and pddl = problem.R.task in
   let keys = names_of_keys () in
   let rules = C.ground_rules ground_task in
-  List.iter (fun ((p, arguments), body) ->
-    if not (C.rule_ok pddl ground_task names rules ((p, arguments), body)) then
+  List.iteri (fun stratum here -> List.iter (fun ((p, arguments), body) ->
+    if not (C.rule_ok pddl ground_task names (R.nat stratum) rules ((p, arguments), body)) then
       let name key = snd (Hashtbl.find keys key) in
       R.reject "not covered: no rule of the task is found for the derived atom %s" (list name (p :: arguments)))
-    (List.concat_map (C.rule_instances pddl) pddl.C.strata);
+    (C.rule_instances pddl here)) pddl.C.strata;
   let search = search pddl ground_task names in
   let formula_splits, _ = splits_of pddl names C.Undefined in
   let goal_case =

@@ -1,7 +1,7 @@
 (define (problem evening)
   (:domain lamps)
   (:objects
-    hall kitchen bedroom - room)
+    hall kitchen - room)
   (:init
     (corridor hall kitchen)
     (door kitchen bedroom)
