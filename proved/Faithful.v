@@ -17,6 +17,9 @@ Definition plus_form (a : form) (c : Q) (b : form) : form :=
   (fold_left (fun l t => plus_term (fst t) (c * snd t) l) (fst b) (fst a), Qred (snd a + c * snd b)).
 Definition constant (q : Q) : form := ([], q).
 Definition fluent (f : atom) : form := ([(f, 1)], 0).
+Definition default (o : option Q) : Q := match o with Some q => q | None => 0 end.
+Definition ev (w : world) (f : form) : Q := fold_right (fun t s =>
+  default (value_in w (fst t)) * snd t + s) (snd f) (fst f).
 Inductive result := Undefined | Unknown | Is (f : form).
 Definition plus_result (a : result) (c : Q) (b : result) : result :=
   match a, b with
@@ -34,6 +37,7 @@ Record names := Names {
   derived_atoms : M.t (Z * Z * atom);              (* derived variables: value with the atom, value without it *)
   derived_of : atom_map (key * Z);
   equivalent : bool;                               (* a derived variable has its value only if the atom holds *)
+  invariants : list (bool * form);                 (* forms that are > 0 if strict, else >= 0, in all states *)
   exclusive : list (list atom);                    (* groups of atoms of which at most one holds *)
   scale : positive;                                (* number = fluent times scale *)
   cost_scale : positive }.
@@ -274,6 +278,7 @@ Fixpoint conjuncts (s : symbolic) (d : result) (env : list key) (f : formula) : 
   | Compare strict a b => match symbolic_expression s d env (Minus a b) with Is g => Knowledge [] [(strict, g)] | _ => Knowledge [] [] end
   | _ => Knowledge [] []
   end.
+Definition with_invariants (k : knowledge) := Knowledge (literals k) (invariants N ++ bounds k).
 Definition join (k l : knowledge) := Knowledge (literals k ++ literals l) (bounds k ++ bounds l).
 Definition gathered (a : action) (env : list key) : knowledge :=
   match duration a, symbolic_duration a env with
@@ -294,7 +299,7 @@ Definition impossible (k : knowledge) : bool :=
                     || match find_atom (fact_of N) (fst l) with
                        | Some (v, _) => match possible k v with [] => true | _ => false end
                        | None => false end) (literals k)
-  || existsb (fun b : bool * form => match snd b with ([], c) => if fst b then Qle_bool c 0 else less c 0 | _ => false end) (bounds k).
+  || existsb (fun b : bool * form => implied k (negb (fst b)) (plus_form (constant 0) (-1 # 1) (snd b))) (bounds k).
 
 (* Rules of derived predicates: an atom that holds has an instance whose body holds, and an atom
    that does not hold has none. *)
@@ -488,6 +493,13 @@ Definition simulated (k : knowledge) (s : symbolic) (time : Q) (o : option (oper
       | None => false
       end
   end.
+(* A form over the state after the step, as a form over the state before it. *)
+Definition form_after (s : symbolic) (f : form) : form :=
+  fold_right (fun t g => plus_form g (snd t) (match assoc (fst t) (new_values s) with Some h => h | None => fluent (fst t) end))
+    (constant (snd f)) (fst f).
+Definition stays_invariant (k : knowledge) (s : symbolic) (i : bool * form) : bool :=
+  forallb (fun t => match assoc (fst t) (new_values s) with None => true | Some _ => false end) (fst (snd i))
+  || implied k (fst i) (form_after s (snd i)).
 (* At most one atom of a group holds after the step. *)
 Definition stays_exclusive (k : knowledge) (s : symbolic) (g : list atom) : bool :=
   forallb (fun a => match assoc a (new_truths s) with
@@ -548,6 +560,7 @@ Definition projected_ok (k : knowledge) (a : action) (env : list key) (o : optio
       | None => false
       | Some l =>
           let s := Symbolic [] l false in
+          forallb (stays_invariant k s) (invariants N) &&
           forallb (number_ok s o)
             (match o with Some (o, _) => map fst (number_effects o) | None => [] end
              ++ flat_map (fun l => match find_atom (number_of N) (fst l) with Some n => [n] | None => [] end) l) &&
@@ -564,7 +577,7 @@ Definition leaf_ok (k : knowledge) (a : action) (env : list key) (o : option (op
   | Unclear => projected_ok k a env o
   | After s time =>
       forallb (fun l => match assoc (fst l) (new_truths s) with Some true => mem (may_hold N) (fst l) | _ => true end) (new_truths s) &&
-      forallb (stays_exclusive k s) (exclusive N) && simulated k s time o
+      forallb (stays_exclusive k s) (exclusive N) && forallb (stays_invariant k s) (invariants N) && simulated k s time o
   end.
 Fixpoint tree_ok (leaf : knowledge -> option (nat * choice) -> bool) (k : knowledge) (t : case_tree) : bool :=
   match t with
@@ -609,7 +622,7 @@ Fixpoint effect_heads (e : effect) : list key :=
 Variables (case : nat -> list key -> case_tree) (goal_case : case_tree).
 Definition action_ok (i : nat) (a : action) : bool :=
   forallb (fun p => changing N p && negb (is_derived P p)) (effect_heads (start_effect a) ++ effect_heads (end_effect a)) &&
-  forallb (fun env => tree_ok (instance_leaf a env) (gathered a env) (case i env)) (instances (pruned a) (parameters a) []).
+  forallb (fun env => tree_ok (instance_leaf a env) (with_invariants (gathered a env)) (case i env)) (instances (pruned a) (parameters a) []).
 Definition all_entries {X} (m : atom_map X) : list (atom * X) := flat_map snd (PositiveMap.elements m).
 Definition same_atom (r : option atom) (a : atom) : bool := match r with Some b => atom_eqb b a | None => false end.
 (* Every derived atom that a rule yields may hold, and its derived variable follows by a rule of the
@@ -677,7 +690,8 @@ Definition rules_ok : bool :=
   (negb (equivalent N) || fst (ground_rules_ok (layers T))) &&
   strata_ok 0 ground_rules (strata P).
 Definition faithful : bool :=
-  rules_ok &&
+  forallb (fun i : bool * form => if fst i then less 0 (ev (initial P) (snd i)) else Qle_bool 0 (ev (initial P) (snd i)))
+    (invariants N) && rules_ok &&
   forallb (fun e => negb (changing N (fst (fst e))) || mem (may_hold N) (fst e)) (all_entries (initial_atoms P)) &&
   forallb (fun vl => let '(v, vals) := vl in is_basic T v &&
      forallb (fun xa => let '(x, a) := xa in Bool.eqb (holds_in (initial P) a) (Z.eqb (var_value (init T) v) x) &&
@@ -688,7 +702,7 @@ Definition faithful : bool :=
   forallb (fun nf => let '(n, f) := nf in mem_key n (numbers T) && changing N (fst f) &&
      match value_in (initial P) f with Some q => Qeq_bool (q * scaled) (inject_Z (num_value (init T) n)) | None => false end &&
      match find_atom (number_of N) f with Some m => Pos.eqb m n | None => false end) (M.elements (fluents N)) &&
-  tree_ok goal_leaf (conjuncts unchanged Undefined [] (goal_formula P)) goal_case &&
+  tree_ok goal_leaf (with_invariants (conjuncts unchanged Undefined [] (goal_formula P))) goal_case &&
   forallb (fun ia => action_ok (fst ia) (snd ia)) (combine (seq 0 (length (actions P))) (actions P)) &&
   forallb (fun g => forallb (fun a => negb (holds_in (initial P) a) ||
     forallb (fun b => atom_eqb a b || negb (holds_in (initial P) b)) g) g) (exclusive N).

@@ -23,6 +23,7 @@ Record Rel (w : world) (s : state) : Prop := {
     holds_in w b = true -> a = b;
   r_derived : forall v x d a, M.find v (derived_atoms N) = Some (x, d, a) -> holds_in w a = true ->
     is_fact (derive T s) (v, x) = true;
+  r_invariant : forall st f, In (st, f) (invariants N) -> if st : bool then 0 < ev w f else 0 <= ev w f;
   r_wf : wf T s }.
 (* The same, but for derived atoms *)
 Record Base (w : world) (s : state) : Prop := {
@@ -36,6 +37,7 @@ Record Base (w : world) (s : state) : Prop := {
     mem (may_hold N) a = true;
   b_exclusive : forall g a b, In g (exclusive N) -> In a g -> In b g -> holds_in w a = true ->
     holds_in w b = true -> a = b;
+  b_invariant : forall st f, In (st, f) (invariants N) -> if st : bool then 0 < ev w f else 0 <= ev w f;
   b_wf : wf T s }.
 
 Lemma parts :
@@ -48,10 +50,10 @@ Lemma parts :
   (forall n f, M.find n (fluents N) = Some f -> mem_key n (numbers T) = true /\ changing N (fst f) = true /\
      find_atom (number_of N) f = Some n /\ exists q, value_in (initial P) f = Some q /\
        q * scaled N == inject_Z (num_value (init T) n)) /\
-  tree_ok P T N (goal_leaf P T N) (conjuncts P N unchanged Undefined [] (goal_formula P)) goal_case = true /\
+  tree_ok P T N (goal_leaf P T N) (with_invariants N (conjuncts P N unchanged Undefined [] (goal_formula P))) goal_case = true /\
   (forall i a, nth_error (actions P) i = Some a -> action_ok P T N case i a = true).
 Proof.
-  unfold faithful in ok. rewrite !andb_true_iff in ok. destruct ok as [[[[[[[_ H1] H2] H3] H4] H5] H6] _].
+  unfold faithful in ok. rewrite !andb_true_iff in ok. destruct ok as [[[[[[[[_ _] H1] H2] H3] H4] H5] H6] _].
   rewrite forallb_forall in H1, H2, H3, H4, H6. split; [|split; [|split; [|split; [|split]]]].
   - intros a C H. simpl in H. destruct (find_atom (initial_atoms P) a) as [u|] eqn:F; [|discriminate].
     apply find_entries in F.
@@ -96,7 +98,7 @@ Lemma rule_parts :
   (forall before rules later i, strata P = before ++ rules :: later -> In i (rule_instances P rules) ->
      rule_ok P T N (length before) (ground_rules T) i = true).
 Proof.
-  unfold faithful in ok. rewrite !andb_true_iff in ok. destruct ok as [[[[[[[H _] _] _] _] _] _] _].
+  unfold faithful in ok. rewrite !andb_true_iff in ok. destruct ok as [[[[[[[[_ H] _] _] _] _] _] _] _].
   unfold rules_ok in H. rewrite !andb_true_iff in H. destruct H as [[[[[[[[H1 H2] H3] H4] H5] H6] _] _] H7].
   rewrite forallb_forall in H3, H4, H5, H6. repeat (split; [assumption|]).
   split; [|split; [|split; [|split]]].
@@ -126,7 +128,7 @@ Lemma ground_parts :
      fst (fst r) = v -> snd (fst r) = x) /\
   (equivalent N = true -> fst (ground_rules_ok P T N (layers T)) = true).
 Proof.
-  unfold faithful in ok. rewrite !andb_true_iff in ok. destruct ok as [[[[[[[H _] _] _] _] _] _] _].
+  unfold faithful in ok. rewrite !andb_true_iff in ok. destruct ok as [[[[[[[[_ H] _] _] _] _] _] _] _].
   unfold rules_ok in H. rewrite !andb_true_iff in H. destruct H as [[[[[[[[_ _] _] H4] _] _] H8] H9] _].
   rewrite forallb_forall in H4, H8. split; [|split].
   - intros v x d a F. apply M.elements_correct in F. specialize (H4 _ F). cbn beta iota in H4.
@@ -139,6 +141,13 @@ Proof.
   - intros v x d a rules r F I J E. specialize (H8 _ I). rewrite forallb_forall in H8. specialize (H8 _ J).
     rewrite E, F in H8. apply Z.eqb_eq, H8.
   - intro E. rewrite E in H9. exact H9.
+Qed.
+Lemma invariant_at_first : forall st f, In (st, f) (invariants N) ->
+  if st : bool then 0 < ev (initial P) f else 0 <= ev (initial P) f.
+Proof.
+  intros st f I. unfold faithful in ok. rewrite !andb_true_iff in ok. destruct ok as [[[[[[[[H _] _] _] _] _] _] _] _].
+  rewrite forallb_forall in H. specialize (H _ I). cbn [fst snd] in H.
+  destruct st; [apply less_spec, H|apply Qle_bool_iff, H].
 Qed.
 Lemma exclusive_at_first : forall g a b, In g (exclusive N) -> In a g -> In b g ->
   holds_in (initial P) a = true -> holds_in (initial P) b = true -> a = b.
@@ -254,9 +263,8 @@ Proof.
       destruct (A _ _ _ F) as [vals [F1 _]].
       pose proof (possible_ok k K _ _ F1) as Q. destruct (possible T N k v); [destruct Q|discriminate].
   - apply existsb_exists in H. destruct H as [[st f] [I H]]. cbn [fst snd] in H.
-    pose proof (proj2 K _ _ I) as B.
-    destruct f as [[|] c]; [|discriminate].
-    destruct st; rewrite ev_empty in B; [apply Qle_bool_iff in H|apply less_spec in H]; lra.
+    pose proof (proj2 K _ _ I) as B. apply (implied_ok w k K) in H.
+    destruct st; cbn [negb] in H; rewrite ev_plus_form, ev_constant in H; lra.
 Qed.
 (* Derived variables follow from atoms up to stratum [limit]. *)
 Section Lower.
@@ -594,19 +602,43 @@ Proof.
       * rewrite Q1, (ev_fluent w f), E0. cbn [default]. rewrite Q0.
         destruct o as [[o ch]|]; [rewrite Q2 in Y|]; rewrite Y; reflexivity.
 Qed.
+Lemma form_after_ok : forall sy w', describes_values w' (new_values sy) -> forall f, ev w' f == ev w (form_after sy f).
+Proof.
+  intros sy w' D [l c]. unfold form_after. cbn [fst snd]. induction l as [|[f q] l IH]; cbn [fold_right].
+  - rewrite ev_constant. reflexivity.
+  - rewrite ev_plus_form, <- IH, ev_cons. cbn [fst snd]. specialize (D f). destruct (assoc f (new_values sy)) as [h|].
+    + destruct D as [x [D1 D2]]. rewrite D1. cbn [default]. rewrite D2. ring.
+    + rewrite D, ev_fluent. ring.
+Qed.
+Lemma stays_invariant_ok : forall sy w', describes_values w' (new_values sy) ->
+  forallb (stays_invariant k sy) (invariants N) = true ->
+  forall st f, In (st, f) (invariants N) -> if st : bool then 0 < ev w' f else 0 <= ev w' f.
+Proof.
+  intros sy w' D H st f I. rewrite forallb_forall in H. specialize (H _ I). unfold stays_invariant in H.
+  cbn [fst snd] in H. apply orb_true_iff in H. destruct H as [H|H].
+  - assert (E : ev w' f == ev w f).
+    { rewrite forallb_forall in H. destruct f as [l c]. cbn [fst] in H. clear I.
+      induction l as [|[g q] l IH]; [reflexivity|]. rewrite !ev_cons. cbn [fst snd].
+      rewrite IH by (intros t J; apply H; right; exact J). specialize (H _ (or_introl eq_refl)). cbn [fst] in H.
+      specialize (D g). destruct (assoc g (new_values sy)); [discriminate|]. rewrite D. reflexivity. }
+    pose proof (r_invariant _ _ R _ _ I) as X. destruct st; rewrite E; exact X.
+  - apply (implied_ok w k K) in H.
+    destruct st; rewrite (form_after_ok sy w' D f); exact H.
+Qed.
 Lemma simulated_ok : forall sy time o w', Describes w w' sy ->
   (forall p os, changing N p = false -> holds_in w' (p, os) = holds_in w (p, os)) ->
   (forall f, changing N (fst f) = false -> value_in w' f = value_in w f) ->
   forallb (fun l => match assoc (fst l) (new_truths sy) with Some true => mem (may_hold N) (fst l)
     | _ => true end) (new_truths sy) = true ->
   forallb (stays_exclusive P T N k sy) (exclusive N) = true ->
+  forallb (stays_invariant k sy) (invariants N) = true ->
   match o with Some (o, _) => In o (operators T) | None => True end ->
   simulated P T N k sy time o = true ->
   Base w' (after_of o) /\ match o with Some (o, ch) => admitted o ch /\
     holds (precondition o) ds (slot_sizes o) ch = true | None => True end /\
   exists g, growth P N sy time = Some g /\ inject_Z (step_cost o) <= g * (Zpos (cost_scale N) # 1).
 Proof.
-  intros sy time o w' D Sf Sv May Excl Io H. unfold simulated in H.
+  intros sy time o w' D Sf Sv May Excl Inv Io H. unfold simulated in H.
   match type of H with match ?e with None => _ | Some _ => _ end = _ => destruct e as [made|] eqn:E end;
     [|discriminate].
   rewrite !andb_true_iff in H. destruct H as [[H1 H2] H3]. rewrite forallb_forall in H1, H2.
@@ -681,6 +713,7 @@ Proof.
       * destruct (assoc b (new_truths sy)) as [tb|] eqn:Eb.
         -- rewrite Db in Hb. subst tb. symmetry. apply (One b a); assumption.
         -- apply (r_exclusive _ _ R g); congruence.
+    + exact (stays_invariant_ok sy w' (d_value _ _ _ _ D) Inv).
     + destruct o as [[o ch]|]; [|apply R]. apply wf_apply; [exact task_ok|exact Io|].
       apply wf_derive; [apply heads|apply deriveds|apply R]; exact task_ok.
   - destruct o as [[o ch]|]; [|exact I]. tauto.
@@ -757,7 +790,7 @@ Proof.
   rewrite !andb_true_iff in H. destruct H as [[[[H1 H2] H3] H4] H5].
   destruct (symbolic_updates P N unchanged nums (symbolic_changed_fluents nums)) as [l|] eqn:U;
     [|discriminate].
-  cbv zeta in H5. apply andb_true_iff in H5. destruct H5 as [H5 H6]. rewrite forallb_forall in H1, H2, H4, H5.
+  cbv zeta in H5. rewrite !andb_true_iff in H5. destruct H5 as [[Inv H5] H6]. rewrite forallb_forall in H1, H2, H4, H5.
   assert (Base : forall k, Knows w k -> forall a b, base_truth P T N k a = Some b -> holds_in w a = b)
     by (intros k' K'; apply (base_truth_ok k' K')).
   assert (V : describes_values w' l).
@@ -839,6 +872,7 @@ Proof.
     + destruct (assoc y (truths_of cs)) as [ty|] eqn:Ey.
       * rewrite Dy in Hy. subst ty. symmetry. apply (One y x); assumption.
       * apply (r_exclusive _ _ R g); congruence.
+  - exact (stays_invariant_ok k K (Symbolic [] l false) w' V Inv).
   - destruct o as [[o ch]|]; [|apply R]. apply wf_apply; [exact task_ok|exact Io|].
     apply wf_derive; [apply heads|apply deriveds|apply R]; exact task_ok.
 Qed.
@@ -848,6 +882,11 @@ Lemma knows_join : forall a b, Knows w a -> Knows w b -> Knows w (join a b).
 Proof.
   intros a b [A1 A2] [B1 B2].
   split; simpl; intros ? ? I; apply in_app_or in I; destruct I; auto; [apply A2|apply B2]; assumption.
+Qed.
+Lemma knows_invariants : forall k, Knows w k -> Knows w (with_invariants N k).
+Proof.
+  intros k [K1 K2]. split; [exact K1|]. intros st f I. cbn [with_invariants bounds] in I. apply in_app_or in I.
+  destruct I as [I|I]; [apply (r_invariant _ _ R), I|apply K2, I].
 Qed.
 Lemma knows_nothing : Knows w (Knowledge [] []).
 Proof. split; intros ? ? []. Qed.
@@ -1025,6 +1064,7 @@ Proof.
   - intros a C A. destruct (is_derived P (fst a)) eqn:D; [apply (H a), A|apply (b_may _ _ B); assumption].
   - intros g a b G I J. rewrite (Ex _ _ G I), (Ex _ _ G J). apply (b_exclusive _ _ B g); assumption.
   - intros v x d a D A. destruct (De _ _ _ _ D) as [D1 D2]. rewrite D1 in A. apply (H a A), D2.
+  - exact (b_invariant _ _ B).
   - apply B.
 Qed.
 Lemma settled_level : forall before ls p, existsb (is_head p) ls = false <-> (level (before ++ ls) p <= length before)%nat.
@@ -1330,6 +1370,7 @@ Proof.
   - intros v vals x a F I. destruct (A2 _ _ F) as [_ B]. apply B, I.
   - intros n f F. apply A4, F.
   - apply exclusive_at_first.
+  - apply invariant_at_first.
   - apply wf_init; exact task_ok.
 Qed.
 Lemma simulation : forall steps w s spent w' spent', execute P true w spent steps = Some (w', spent') ->
@@ -1346,7 +1387,7 @@ Proof.
       change (inject_Z 0) with 0; lra|exists s; exact R0]].
     constructor. destruct parts as [_ [_ [_ [_ [B _]]]]]. 
     eapply (tree_cases w s R w0 Cw (goal_leaf P T N));
-      [|apply (conjuncts_ok w s R w unchanged None Undefined);
+      [|apply (knows_invariants w s R), (conjuncts_ok w s R w unchanged None Undefined);
       [apply describes_itself|exact eq_refl|exact G]|exact B].
     intros k o K L. unfold goal_leaf in L.
     destruct (symbolic_truth P T N k unchanged Undefined [] (goal_formula P)) as [[]|] eqn:E.
@@ -1372,7 +1413,7 @@ Proof.
          holds (precondition o) (derive T s) (slot_sizes o) ch = true
          | None => True end /\ describes_values w w1 (new_values sy) /\ t == d /\
        exists g, growth P N sy t = Some g /\ inject_Z (step_cost o) <= g * (Zpos (cost_scale N) # 1)).
-    { eapply (tree_cases w s R w0 Cw); [|eapply gathered_ok; eassumption|exact B]. intros k o K L.
+    { eapply (tree_cases w s R w0 Cw); [|apply (knows_invariants w s R); eapply gathered_ok; eassumption|exact B]. intros k o K L.
       assert (L' : exists o, match o with Some (o, _) => In o (operators T)
         | None => True end /\ leaf_ok P T N k a env o = true).
       { unfold instance_leaf in L. destruct o as [[j ch]|]; [|exists None; split; [exact Logic.I|exact L]].
@@ -1387,8 +1428,8 @@ Proof.
         split; [exact Io|]. split; [exact R1|]. split; [exact Ad|]. split; [exact G1|]. split; [reflexivity|].
         exists g. split; [exact G2|exact G3]. }
       destruct Q as [Q D].
-      rewrite !andb_true_iff in L. destruct L as [[L1 LX] L2].
-      destruct (simulated_ok w s R w0 Cw k K sy t o' w1 D K1 K2 L1 LX Io L2) as [R1 [Ad G]]. exists o', sy, t.
+      rewrite !andb_true_iff in L. destruct L as [[[L1 LX] LI] L2].
+      destruct (simulated_ok w s R w0 Cw k K sy t o' w1 D K1 K2 L1 LX LI Io L2) as [R1 [Ad G]]. exists o', sy, t.
       pose proof (d_value _ _ _ _ D : describes_values w w1 (new_values sy)) as DV. tauto. }
     destruct Go as [o [sy [t [Io [R1 [Ad [D [Td [g [Gr Co]]]]]]]]]].
     destruct (IH _ _ _ _ _ H R1) as [ps [c [Pl [Le End]]]].

@@ -41,9 +41,6 @@ Lemma le_false : forall x y, Qle_bool x y = false <-> y < x.
 Proof. intros. pose proof (less_spec y x) as H. unfold less in H. rewrite negb_true_iff in H. exact H. Qed.
 
 (* Linear forms *)
-Definition default (o : option Q) : Q := match o with Some q => q | None => 0 end.
-Definition ev (w : world) (f : form) : Q := fold_right (fun t s =>
-  default (value_in w (fst t)) * snd t + s) (snd f) (fst f).
 Lemma ev_shift : forall w l c, ev w (l, c) == ev w (l, 0) + c.
 Proof. intros w l c. unfold ev. simpl. induction l as [|t l IH]; simpl; [ring|]. rewrite IH. ring. Qed.
 Lemma ev_cons : forall w t l c, ev w (t :: l, c) == default (value_in w (fst t)) * snd t + ev w (l, c).

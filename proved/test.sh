@@ -52,6 +52,11 @@ changed() {
   if cmp -s "$directory/$1" "$temporary/changed/$1"; then fail "nothing is changed by $2"; fi
   if answer=$(ocaml/check "$temporary/changed" "$temporary/evidence.txt"); then fail "accepted after $2: $answer"; fi
 }
+# The comparison needs the range of the battery.
+directory=tests/battery
+accepted "$directory" 'proved: the plan of 2 steps is optimal, metric 2'
+changed problem.pddl 's/(= (battery) 10.5)/(= (battery) 12.5)/'
+changed domain.pddl 's/(decrease (battery)/(increase (battery)/'
 directory=$stored/doors
 accepted "$directory" 'proved: the plan of 3 steps is optimal, metric 3'
 mutated "$directory"

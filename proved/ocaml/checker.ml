@@ -569,14 +569,14 @@ let zeq_bool x y =
 
 (** val nth : nat -> 'a1 list -> 'a1 -> 'a1 **)
 
-let rec nth n l default =
+let rec nth n l default0 =
   match n with
   | O -> (match l with
-          | [] -> default
+          | [] -> default0
           | x :: _ -> x)
   | S m -> (match l with
-            | [] -> default
-            | _ :: t0 -> nth m t0 default)
+            | [] -> default0
+            | _ :: t0 -> nth m t0 default0)
 
 (** val nth_error : 'a1 list -> nat -> 'a1 option **)
 
@@ -2238,6 +2238,19 @@ let constant q0 =
 let fluent f =
   (((f, { qnum = (Zpos XH); qden = XH }) :: []), { qnum = Z0; qden = XH })
 
+(** val default : q option -> q **)
+
+let default = function
+| Some q0 -> q0
+| None -> { qnum = Z0; qden = XH }
+
+(** val ev : world -> form -> q **)
+
+let ev w f =
+  fold_right (fun t0 s ->
+    qplus (qmult (default (w.value_in (fst t0))) (snd t0)) s) (snd f) 
+    (fst f)
+
 type result =
 | Undefined
 | Unknown
@@ -2260,8 +2273,8 @@ type names = { variables : (z * atom) list M.t; fluents : atom M.t;
                changing : (key1 -> bool); may_hold : unit atom_map;
                derived_atoms : ((z * z) * atom) M.t;
                derived_of : (key1 * z) atom_map; equivalent : bool;
-               exclusive : atom list list; scale : positive;
-               cost_scale : positive }
+               invariants : (bool * form) list; exclusive : atom list list;
+               scale : positive; cost_scale : positive }
 
 type case_tree =
 | Decided of (nat * choice) option
@@ -2848,6 +2861,11 @@ let rec conjuncts p n s d env = function
   { literals = (app a.literals b.literals); bounds = (app a.bounds b.bounds) }
 | _ -> { literals = []; bounds = [] }
 
+(** val with_invariants : names -> knowledge -> knowledge **)
+
+let with_invariants n k =
+  { literals = k.literals; bounds = (app n.invariants k.bounds) }
+
 (** val join : knowledge -> knowledge -> knowledge **)
 
 let join k l =
@@ -2898,13 +2916,9 @@ let impossible p t0 n k =
             | _ :: _ -> false)
          | None -> false)) k.literals)
     (existsb (fun b ->
-      let (l, c) = snd b in
-      (match l with
-       | [] ->
-         if fst b
-         then qle_bool c { qnum = Z0; qden = XH }
-         else less c { qnum = Z0; qden = XH }
-       | _ :: _ -> false)) k.bounds)
+      implied k (negb (fst b))
+        (plus_form (constant { qnum = Z0; qden = XH }) { qnum = (Zneg XH);
+          qden = XH } (snd b))) k.bounds)
 
 (** val is_defined : problem -> key1 list -> formula -> bool **)
 
@@ -3340,6 +3354,25 @@ let simulated p t0 n k s time o =
        | None -> false)
   | None -> false
 
+(** val form_after : symbolic -> form -> form **)
+
+let form_after s f =
+  fold_right (fun t0 g ->
+    plus_form g (snd t0)
+      (match assoc (fst t0) s.new_values with
+       | Some h -> h
+       | None -> fluent (fst t0))) (constant (snd f)) (fst f)
+
+(** val stays_invariant : knowledge -> symbolic -> (bool * form) -> bool **)
+
+let stays_invariant k s i =
+  (||)
+    (forallb (fun t0 ->
+      match assoc (fst t0) s.new_values with
+      | Some _ -> false
+      | None -> true) (fst (snd i)))
+    (implied k (fst i) (form_after s (snd i)))
+
 (** val stays_exclusive :
     problem -> task -> names -> knowledge -> symbolic -> atom list -> bool **)
 
@@ -3480,16 +3513,17 @@ let projected_ok p t0 n k a env o =
              | Some l ->
                let s = { new_truths = []; new_values = l; stale = false } in
                (&&)
-                 (forallb (number_ok n s o)
-                   (app
-                     (match o with
-                      | Some p0 ->
-                        let (o0, _) = p0 in map fst o0.number_effects
-                      | None -> [])
-                     (flat_map (fun l0 ->
-                       match find_atom n.number_of (fst l0) with
-                       | Some n0 -> n0 :: []
-                       | None -> []) l)))
+                 ((&&) (forallb (stays_invariant k s) n.invariants)
+                   (forallb (number_ok n s o)
+                     (app
+                       (match o with
+                        | Some p0 ->
+                          let (o0, _) = p0 in map fst o0.number_effects
+                        | None -> [])
+                       (flat_map (fun l0 ->
+                         match find_atom n.number_of (fst l0) with
+                         | Some n0 -> n0 :: []
+                         | None -> []) l))))
                  (match growth p n s { qnum = Z0; qden = XH } with
                   | Some g ->
                     qle_bool (inject_Z (step_cost o))
@@ -3510,11 +3544,13 @@ let leaf_ok p t0 n k a env o =
   | After (s, time) ->
     (&&)
       ((&&)
-        (forallb (fun l ->
-          match assoc (fst l) s.new_truths with
-          | Some b -> if b then mem0 n.may_hold (fst l) else true
-          | None -> true) s.new_truths)
-        (forallb (stays_exclusive p t0 n k s) n.exclusive))
+        ((&&)
+          (forallb (fun l ->
+            match assoc (fst l) s.new_truths with
+            | Some b -> if b then mem0 n.may_hold (fst l) else true
+            | None -> true) s.new_truths)
+          (forallb (stays_exclusive p t0 n k s) n.exclusive))
+        (forallb (stays_invariant k s) n.invariants))
       (simulated p t0 n k s time o)
 
 (** val tree_ok :
@@ -3633,8 +3669,9 @@ let action_ok p t0 n case i a =
     (forallb (fun p0 -> (&&) (n.changing p0) (negb (is_derived p p0)))
       (app (effect_heads a.start_effect) (effect_heads a.end_effect)))
     (forallb (fun env ->
-      tree_ok p t0 n (instance_leaf p t0 n a env) (gathered p t0 n a env)
-        (case i env)) (instances p (pruned p n a) a.parameters []))
+      tree_ok p t0 n (instance_leaf p t0 n a env)
+        (with_invariants n (gathered p t0 n a env)) (case i env))
+      (instances p (pruned p n a) a.parameters []))
 
 (** val all_entries : 'a1 atom_map -> (atom * 'a1) list **)
 
@@ -3811,7 +3848,15 @@ let faithful p t0 n case goal_case =
         ((&&)
           ((&&)
             ((&&)
-              ((&&) (rules_ok p t0 n)
+              ((&&)
+                ((&&)
+                  (forallb (fun i ->
+                    if fst i
+                    then less { qnum = Z0; qden = XH }
+                           (ev (initial p) (snd i))
+                    else qle_bool { qnum = Z0; qden = XH }
+                           (ev (initial p) (snd i))) n.invariants)
+                  (rules_ok p t0 n))
                 (forallb (fun e ->
                   (||) (negb (n.changing (fst (fst e))))
                     (mem0 n.may_hold (fst e))) (all_entries p.initial_atoms)))
@@ -3848,7 +3893,8 @@ let faithful p t0 n case goal_case =
                | Some m -> Coq_Pos.eqb m n0
                | None -> false)) (M.elements n.fluents)))
         (tree_ok p t0 n (goal_leaf p t0 n)
-          (conjuncts p n unchanged Undefined [] p.goal_formula) goal_case))
+          (with_invariants n
+            (conjuncts p n unchanged Undefined [] p.goal_formula)) goal_case))
       (forallb (fun ia -> action_ok p t0 n case (fst ia) (snd ia))
         (combine (seq O (length p.actions)) p.actions)))
     (forallb (fun g ->

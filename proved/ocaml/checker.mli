@@ -783,6 +783,10 @@ val constant : q -> form
 
 val fluent : atom -> form
 
+val default : q option -> q
+
+val ev : world -> form -> q
+
 type result =
 | Undefined
 | Unknown
@@ -795,8 +799,8 @@ type names = { variables : (z * atom) list M.t; fluents : atom M.t;
                changing : (key1 -> bool); may_hold : unit atom_map;
                derived_atoms : ((z * z) * atom) M.t;
                derived_of : (key1 * z) atom_map; equivalent : bool;
-               exclusive : atom list list; scale : positive;
-               cost_scale : positive }
+               invariants : (bool * form) list; exclusive : atom list list;
+               scale : positive; cost_scale : positive }
 
 type case_tree =
 | Decided of (nat * choice) option
@@ -901,6 +905,8 @@ val symbolic_step :
 val conjuncts :
   problem -> names -> symbolic -> result -> key1 list -> formula -> knowledge
 
+val with_invariants : names -> knowledge -> knowledge
+
 val join : knowledge -> knowledge -> knowledge
 
 val gathered : problem -> task -> names -> action -> key1 list -> knowledge
@@ -992,6 +998,10 @@ val step_cost : (operator * choice) option -> z
 val simulated :
   problem -> task -> names -> knowledge -> symbolic -> q ->
   (operator * choice) option -> bool
+
+val form_after : symbolic -> form -> form
+
+val stays_invariant : knowledge -> symbolic -> (bool * form) -> bool
 
 val stays_exclusive :
   problem -> task -> names -> knowledge -> symbolic -> atom list -> bool

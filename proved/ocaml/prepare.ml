@@ -150,7 +150,21 @@ let derivable problem names witness =
     rounds (C.rule_instances pddl rules)) pddl.C.strata;
   List.rev !derived
 
-let names_text equivalent problem task witness =
+(* The ranges of numbers in the witness, as invariants. *)
+let ranges witness =
+  let fluent name = match R.expressions name with
+    | [R.List [R.Word "-"; _]] | [] -> R.reject "a fluent is expected"
+    | _ -> name in
+  List.concat_map (fun item -> match array item with
+    | [String name; least; most] ->
+      let bound factor sign = function
+        | Null -> []
+        | value -> [Printf.sprintf "(false ((%s %s)) %s)" (fluent name) factor (sign (string value))] in
+      let negated value = if value.[0] = '-' then String.sub value 1 (String.length value - 1) else "-" ^ value in
+      bound "1" negated least @ bound "-1" Fun.id most
+    | _ -> R.reject "a range is expected") (items witness "numbers")
+
+let names_text invariants equivalent problem task witness =
   let names = names_of_keys () in
   let heads_of_effects =
     List.concat_map (fun action -> C.effect_heads action.C.start_effect @ C.effect_heads action.C.end_effect) problem.R.task.C.actions in
@@ -177,8 +191,8 @@ let names_text equivalent problem task witness =
   let name key = snd (Hashtbl.find names key) in
   let derivable = List.map (fun (p, arguments) -> list name (p :: arguments)) (derivable problem changing (List.map read_atom may_hold)) in
   let group item = list string (array item) in
-  Printf.sprintf "(names %s %s %s %s %s %s %b %s %s %s)\n" (list Fun.id variables) (list Fun.id fluents)
-    (list Fun.id (heads "predicate")) (list Fun.id (heads "function")) (list Fun.id (may_hold @ derivable)) (list Fun.id derived) equivalent (list group (items witness "exclusive"))
+  Printf.sprintf "(names %s %s %s %s %s %s %b %s %s %s %s)\n" (list Fun.id variables) (list Fun.id fluents)
+    (list Fun.id (heads "predicate")) (list Fun.id (heads "function")) (list Fun.id (may_hold @ derivable)) (list Fun.id derived) equivalent (list Fun.id invariants) (list group (items witness "exclusive"))
     (number (field task "number_scale")) (number (field (field task "objective") "scale"))
 
 let integer_text number =
@@ -248,6 +262,7 @@ let splits_of_condition names condition =
   List.concat_map atom (condition.C.facts @ List.map fst (List.concat condition.C.clauses))
 
 exception No_tree
+exception No_invariant of string
 
 let max_splits = 14
 
@@ -308,7 +323,9 @@ let claim_text manifest = match field manifest "claim" with
   | String "unsolvable" -> "unsolvable"
   | claim -> string (field (field claim "optimal") "metric")
 
-let prepare directory =
+(* The evidence with these invariants *)
+let prepare_with invariants_of directory =
+  let output = Buffer.create 100000 in
   let read name =
     let channel = open_in_bin (Filename.concat directory name) in
     Fun.protect ~finally:(fun () -> close_in channel) (fun () -> really_input_string channel (in_channel_length channel)) in
@@ -318,7 +335,7 @@ let prepare directory =
   let claim_and_task = "(claim " ^ claim_text (json (read "manifest.json")) ^ ")\n" ^ task_text task in
   let witness = json (read "witness.json") in
   let with_names equivalent =
-    let others = claim_and_task ^ names_text equivalent problem task witness in
+    let others = claim_and_task ^ names_text (invariants_of witness) equivalent problem task witness in
     others, Evidence.read problem.R.action_names (others ^ "(argument () () ()) (goal-case (nothing)) (cases)") in
   let follows (_, evidence) =
     let task = evidence.Evidence.ground_task in
@@ -338,11 +355,11 @@ let prepare directory =
   let goal_case =
     try search (C.goal_leaf pddl ground_task names) [None]
         (formula_splits [] pddl.C.goal_formula @ splits_of_condition names ground_task.C.goal)
-        (C.conjuncts pddl names C.unchanged C.Undefined [] pddl.C.goal_formula)
+        (C.with_invariants names (C.conjuncts pddl names C.unchanged C.Undefined [] pddl.C.goal_formula))
     with No_tree -> R.reject "no case tree is found for the goal" in
-  print_string others;
-  print_string argument;
-  Printf.printf "(goal-case %s)\n(cases" (tree_text keys goal_case);
+  Buffer.add_string output others;
+  Buffer.add_string output argument;
+  Printf.bprintf output "(goal-case %s)\n(cases" (tree_text keys goal_case);
   let by_action = operators_by_action task in
   List.iter2 (fun name action ->
     let instances = C.instances pddl (C.pruned pddl names action) action.C.parameters [] in
@@ -363,14 +380,23 @@ let prepare directory =
       let splits = formula env action.C.at_start @ formula env action.C.over_all @ formula env action.C.at_end
                    @ effect env action.C.start_effect @ effect env action.C.end_effect @ operator_splits in
       match search (C.instance_leaf pddl ground_task names action env) (candidates @ [None]) splits
-              (C.gathered pddl ground_task names action env) with
+              (C.with_invariants names (C.gathered pddl ground_task names action env)) with
       | C.Decided None -> ()
-      | tree -> Printf.printf "\n((%s) %s)" (String.concat " " (name :: objects)) (tree_text keys tree)
-      | exception No_tree -> R.reject "no case tree is found for (%s)" (String.concat " " (name :: objects))) instances)
+      | tree -> Printf.bprintf output "\n((%s) %s)" (String.concat " " (name :: objects)) (tree_text keys tree)
+      | exception No_tree -> raise (No_invariant (String.concat " " (name :: objects)))) instances)
     problem.R.action_names pddl.C.actions;
-  print_string ")\n"
+  Buffer.add_string output ")\n";
+  output
+
+(* Most tasks need no ranges of numbers. *)
+let prepare directory =
+  print_string (Buffer.contents (
+    try prepare_with (fun _ -> []) directory
+    with No_invariant _ -> prepare_with ranges directory))
 
 let () =
   match Sys.argv with
-  | [| _; directory |] -> (try prepare directory with R.Rejected message -> prerr_endline ("rejected: " ^ message); exit 3)
+  | [| _; directory |] -> (try prepare directory with
+    | R.Rejected message -> prerr_endline ("rejected: " ^ message); exit 3
+    | No_invariant instance -> prerr_endline ("rejected: no case tree is found for (" ^ instance ^ ")"); exit 3)
   | _ -> prerr_endline "usage: prepare CERTIFICATE > EVIDENCE"; exit 2
