@@ -140,15 +140,16 @@ let problem ?metric domain_text problem_text =
   let is_object name = List.mem_assoc name objects in
   let known_object name = if is_object name then object_key name else reject "unknown object: %s" name in
 
+  let typed_variables =
+    let read (name, kind) = if is_variable name then name, type_key (known_type kind) else reject "a variable is expected: %s" name in
+    fun items -> List.map read (typed items) in
   let variables items =
-    let variables = typed items in
-    List.iter (fun (name, _) -> if not (is_variable name) then reject "a variable is expected: %s" name) variables;
-    distinct "a variable" (List.map fst variables);
-    List.map (fun (name, kind) -> name, type_key (known_type kind)) variables in
+    let variables = typed_variables items in
+    distinct "a variable" (List.map fst variables); variables in
 
   (* Predicates and functions with their numbers of arguments *)
   let rec declarations = function
-    | List (Word name :: arguments) :: others -> (name, List.length (variables arguments)) :: declarations others
+    | List (Word name :: arguments) :: others -> (name, List.length (typed_variables arguments)) :: declarations others
     | Word "-" :: Word "number" :: others -> declarations others
     | Word "-" :: Word kind :: _ -> reject "not covered: functions with values of type %s" kind
     | [] -> []
