@@ -213,6 +213,21 @@ Definition check_task : bool :=
   forallb (forallb (fun r => negb (is_basic (fst (fst r))))) (layers T) &&
   forallb (fun d => negb (is_basic (fst d))) (derived T).
 
+Definition condition_variables (c : condition) : list key :=
+  map fst (facts c) ++ map (fun l => fst (fst l)) (concat (clauses c)).
+(* Rules do not depend on variables of later layers, and the rules of a variable have one value.
+   Second result: the variables of the layers with their values. *)
+Fixpoint check_layers (ls : list (list (fact * condition))) : bool * M.t Z :=
+  match ls with
+  | [] => (true, M.empty Z)
+  | rules :: rest =>
+      let '(ok, later) := check_layers rest in
+      let heads := fold_left (fun m r => M.add (fst (fst r)) (snd (fst r)) m) rules later in
+      (ok && forallb (fun r => match M.find (fst (fst r)) heads with Some x => x =? snd (fst r) | None => false end &&
+                 forallb (fun v => match M.find v later with None => true | Some _ => false end)
+                   (fst (fst r) :: condition_variables (snd r))) rules, heads)
+  end.
+
 Definition check : bool :=
   match claim, existsb (fun c => match c with [] => true | _ => false end) (clauses (goal T)) with
   | None, true => true

@@ -1,6 +1,5 @@
 (* Semantics of PDDL actions executed one after another: the formal counterpart of
-   crates/pddl/src/validate/definition.md for tasks without derived predicates, timed initial literals and
-   chosen durations. This file, the statement of the theorem [optimal], and the readers are all that
+   crates/pddl/src/validate/definition.md for tasks without timed initial literals and chosen durations. This file, the statement of the theorem [optimal], and the readers are all that
    has to be believed. *)
 From Coq Require Import ZArith QArith List Bool FMapPositive.
 Import ListNotations.
@@ -45,9 +44,12 @@ Record action := Action {
   duration : option expression;                    (* none: instantaneous; only the part at start is used *)
   at_start : formula; start_effect : effect; over_all : formula; at_end : formula; end_effect : effect }.
 Record world := World { holds_in : atom -> bool; value_in : atom -> option Q }.
+(* A derived predicate holds of objects of these types if the body holds. *)
+Record rule := Rule { head : key; head_types : list key; body : formula }.
 Record problem := Problem {
   objects : key -> list key;                       (* the objects of a type *)
   actions : list action;
+  strata : list (list rule);                       (* negation refers to earlier strata only *)
   initial_atoms : atom_map unit; initial_values : atom_map Q;
   goal_formula : formula;
   metric : expression;                             (* to be minimized, with *)
@@ -101,6 +103,36 @@ Fixpoint truth (w : world) (d : option Q) (env : list key) (f : formula) : optio
   | Forall t g => fold_right (fun o r => and_kleene (truth w d (env ++ [o]) g) r) (Some true) (objects P t)
   end.
 
+(* Derived predicates: in each stratum, the least set of atoms that contains the head of every
+   instance of a rule whose body holds. *)
+Definition is_derived (p : key) : bool := existsb (existsb (fun r => Pos.eqb p (head r))) (strata P).
+(* The world in which exactly these derived atoms hold. *)
+Definition with_facts (w : world) (facts : atom_map unit) : world :=
+  World (fun a => if is_derived (fst a) then match find_atom facts a with Some _ => true | None => false end
+                  else holds_in w a) (value_in w).
+Fixpoint tuples (types : list key) : list (list key) :=
+  match types with [] => [[]] | t :: r => flat_map (fun o => map (cons o) (tuples r)) (objects P t) end.
+Definition rule_instances (rules : list rule) : list (atom * formula) :=
+  flat_map (fun r => map (fun env => ((head r, env), body r)) (tuples (head_types r))) rules.
+Definition fires_in (w : world) (i : atom * formula) : bool :=
+  match truth w None (snd (fst i)) (snd i) with Some b => b | None => false end.
+Definition new_atoms (w : world) (instances : list (atom * formula)) : list atom :=
+  map fst (filter (fun i => negb (holds_in w (fst i)) && fires_in w i) instances).
+(* Theorem [stratum_closed] shows that the number of instances bounds the number of rounds. *)
+Fixpoint evaluate_stratum (rounds : nat) (instances : list (atom * formula)) (w : world) (facts : atom_map unit)
+    : atom_map unit :=
+  match rounds with
+  | O => facts
+  | S rounds => match new_atoms (with_facts w facts) instances with
+                | [] => facts
+                | new => evaluate_stratum rounds instances w (fold_left (fun m a => add_atom a tt m) new facts)
+                end
+  end.
+Definition derived_facts (w : world) : atom_map unit :=
+  fold_left (fun facts rules => let instances := rule_instances rules in
+               evaluate_stratum (S (length instances)) instances w facts) (strata P) (PositiveMap.empty _).
+Definition derived_world (w : world) : world := with_facts w (derived_facts w).
+
 (* The changes that an effect makes; undefined if it needs an undefined value. *)
 Inductive change := Fact (a : atom) (holds : bool) | Number (a : atom) (assigns : bool) (q : Q).
 Definition both {X} (a b : option (list X)) : option (list X) :=
@@ -152,7 +184,7 @@ Definition happening (w : world) (d : option Q) (env : list key) (f : formula) (
       end
   | _, _ => None
   end.
-(* One step: the state after it and its duration. With duration 0, start and end are one happening.
+(* One step from a state with its derived atoms: the state after it and its duration. With duration 0, start and end are one happening.
    The definition forbids that start and end interfere then; [allow_zero] permits such steps. *)
 Definition step (allow_zero : bool) (w : world) (a : action) (env : list key) : option (world * Q) :=
   if negb (Nat.eqb (length env) (length (parameters a)) &&
@@ -172,7 +204,7 @@ Definition step (allow_zero : bool) (w : world) (a : action) (env : list key) : 
           else match happening w (Some d) env (at_start a) (start_effect a) with
                | None => None
                | Some w1 => option_map (fun w => (w, d))
-                   (happening w1 (Some d) env (And (over_all a) (at_end a)) (end_effect a))
+                   (happening (derived_world w1) (Some d) env (And (over_all a) (at_end a)) (end_effect a))
                end
       end
   end.
@@ -181,11 +213,11 @@ Definition step (allow_zero : bool) (w : world) (a : action) (env : list key) : 
 Fixpoint execute (allow_zero : bool) (w : world) (spent : Q) (plan : list (nat * list key))
     : option (world * Q) :=
   match plan with
-  | [] => match truth w None [] (goal_formula P) with Some true => Some (w, spent) | _ => None end
+  | [] => match truth (derived_world w) None [] (goal_formula P) with Some true => Some (w, spent) | _ => None end
   | (i, env) :: r =>
       match nth_error (actions P) i with
       | None => None
-      | Some a => match step allow_zero w a env with
+      | Some a => match step allow_zero (derived_world w) a env with
                   | Some (w', d) => execute allow_zero w' (Qred (spent + per_time P * d + per_step P)) r
                   | None => None
                   end

@@ -30,10 +30,10 @@ Proof.
       rewrite Iq in B. unfold q in B. rewrite Qred_correct in B.
       unfold final_metric in F2. destruct (eval w2 None [] (metric P)) as [x|] eqn:E2; [|discriminate].
       injection F2 as <-.
-      assert (G : forall w s v, Rel P T N w s -> eval w None [] (metric P) = Some v -> measure P N w == v).
+      assert (G : forall w s v, Base P T N w s -> eval w None [] (metric P) = Some v -> measure P N w == v).
       { intros w' s v R E. pose proof
-          (symbolic_expression_ok P N w' (r_value _ _ _ _ _ R) w' unchanged None Undefined
-          (describes_itself w') eq_refl [] (metric P)) as L.
+          (symbolic_expression_ok P N w' (b_value _ _ _ _ _ R) w' unchanged None Undefined
+          (describes_itself P w') eq_refl [] (metric P)) as L.
         unfold measure. unfold is_linear in H0.
         destruct (symbolic_expression P N unchanged Undefined [] (metric P)) as [| |f]; try discriminate.
         symmetry. apply L, E. }

@@ -41,9 +41,6 @@ Lemma le_false : forall x y, Qle_bool x y = false <-> y < x.
 Proof. intros. pose proof (less_spec y x) as H. unfold less in H. rewrite negb_true_iff in H. exact H. Qed.
 
 (* Linear forms *)
-Definition default (o : option Q) : Q := match o with Some q => q | None => 0 end.
-Definition ev (w : world) (f : form) : Q := fold_right (fun t s =>
-  default (value_in w (fst t)) * snd t + s) (snd f) (fst f).
 Lemma ev_shift : forall w l c, ev w (l, c) == ev w (l, 0) + c.
 Proof. intros w l c. unfold ev. simpl. induction l as [|t l IH]; simpl; [ring|]. rewrite IH. ring. Qed.
 Lemma ev_cons : forall w t l c, ev w (t :: l, c) == default (value_in w (fst t)) * snd t + ev w (l, c).
@@ -76,13 +73,14 @@ Lemma ev_empty : forall w q, ev w ([], q) == q.
 Proof. intros. reflexivity. Qed.
 
 (* A symbolic state describes a world relative to an earlier world [w0]. *)
-Record Describes (w0 w : world) (s : symbolic) : Prop := {
-  d_fact : forall a, holds_in w a = match assoc a (new_truths s) with Some b => b | None => holds_in w0 a end;
+Record DescribesIn (P : problem) (w0 w : world) (s : symbolic) : Prop := {
+  d_fact : forall a, is_stale P s (fst a) = false ->
+    holds_in w a = match assoc a (new_truths s) with Some b => b | None => holds_in w0 a end;
   d_value : forall f, match assoc f (new_values s) with
                       | Some g => exists q, value_in w f = Some q /\ q == ev w0 g
                       | None => value_in w f = value_in w0 f end }.
-Lemma describes_itself : forall w, Describes w w unchanged.
-Proof. intro w. split; reflexivity. Qed.
+Lemma describes_itself : forall P w, DescribesIn P w w unchanged.
+Proof. intros P w. split; reflexivity. Qed.
 Definition agrees (w0 : world) (o : option Q) (r : result) : Prop :=
   match r with Is g => forall q, o = Some q -> q == ev w0 g | Undefined => o = None | Unknown => True end.
 Definition Knows (w : world) (k : knowledge) : Prop :=
@@ -91,6 +89,7 @@ Definition Knows (w : world) (k : knowledge) : Prop :=
 
 Section Evaluation.
 Variables (P : problem) (T : task) (N : names) (w0 : world) (k : knowledge).
+Notation Describes := (DescribesIn P).
 Hypothesis base_truth_ok : forall a b, base_truth P T N k a = Some b -> holds_in w0 a = b.
 Hypothesis static_value : forall f, changing N (fst f) = false -> value_in w0 f = value_in (initial P) f.
 Hypothesis known : Knows w0 k.
@@ -98,12 +97,12 @@ Hypothesis known : Knows w0 k.
 Lemma symbolic_atom_ok : forall w s a b, Describes w0 w s -> symbolic_atom P T N k s a = Some b ->
   holds_in w a = b.
 Proof.
-  intros w s a b D H. rewrite (d_fact _ _ _ D). unfold symbolic_atom in H.
-  destruct (assoc a (new_truths s)); [congruence|]. apply base_truth_ok, H.
+  intros w s a b D H. unfold symbolic_atom in H. destruct (is_stale P s (fst a)) eqn:St; [discriminate|].
+  rewrite (d_fact _ _ _ _ D a St). destruct (assoc a (new_truths s)); [congruence|]. apply base_truth_ok, H.
 Qed.
 Lemma symbolic_value_ok : forall w s f, Describes w0 w s -> agrees w0 (value_in w f) (symbolic_value P N s f).
 Proof.
-  intros w s f D. pose proof (d_value _ _ _ D f) as H. unfold symbolic_value.
+  intros w s f D. pose proof (d_value _ _ _ _ D f) as H. unfold symbolic_value.
   destruct (assoc f (new_values s)) as [g|].
   - destruct H as [q [E H]]. simpl. intros x X. rewrite E in X. injection X as <-. exact H.
   - rewrite H. destruct (changing N (fst f)) eqn:C; simpl.
@@ -345,18 +344,24 @@ Proof.
     pose proof (symbolic_changes_ok w s d r D R e env cs ss C C3) as F; rewrite (targets_same _ _ F) in U;
     destruct (symbolic_updates P N s ss (symbolic_changed_fluents ss)) as [m|] eqn:U3; [|exact I]; split;
       [reflexivity|]; split; cbn [holds_in value_in new_truths new_values].
-  1,3: intro a; rewrite !assoc_app, !(truths_ok _ _ _ _ F), (d_fact _ _ _ D); destruct (sets_atom cs a true);
+  1,3: intros a St; rewrite !assoc_app, !(truths_ok _ _ _ _ F), (d_fact _ _ _ _ D a St); destruct (sets_atom cs a true);
          [reflexivity|];
        destruct (sets_atom cs a false); [reflexivity|]; reflexivity.
   all: intro g; rewrite assoc_app; pose proof (updates_ok w s cs ss D F _ l m U U3 g) as Q;
          destruct (assoc g m);
        [destruct Q as [q [Q1 Q2]]; exists q; rewrite Q1; split; [reflexivity|exact Q2]|rewrite Q;
-         apply (d_value _ _ _ D)].
+         apply (d_value _ _ _ _ D)].
 Qed.
 Lemma symbolic_duration_ok : forall a env e d, duration a = Some e -> eval w0 None env e = Some d ->
   agrees w0 (Some d) (symbolic_duration P N a env).
 Proof. intros a env e d A E. unfold symbolic_duration. rewrite A, <- E.
 apply symbolic_expression_ok; [apply describes_itself|exact eq_refl]. Qed.
+Lemma make_stale_ok : forall w s, Describes w0 w s -> Describes w0 (derived_world P w) (make_stale s).
+Proof.
+  intros w s D. split; [|exact (d_value _ _ _ _ D)]. intros a St. unfold is_stale in St. cbn [make_stale stale] in St.
+  cbn [derived_world with_facts holds_in]. cbn [andb] in St. rewrite St.
+  apply (d_fact _ _ _ _ D). unfold is_stale. rewrite St, andb_false_r. reflexivity.
+Qed.
 Lemma symbolic_step_ok : forall a env w' d, step P true w0 a env = Some (w', d) ->
   match symbolic_step P T N k a env with Never => False | Unclear => True
     | After s t => t == d /\ Describes w0 w' s end.
@@ -391,7 +396,8 @@ Proof.
     destruct (symbolic_happening _ _ _ _ _ _ _ _ _ _) as [| |s1 t1]; auto. destruct E1 as [_ E1].
     match type of H with option_map _ ?h = _ => destruct h as [x|] eqn:E end; [|discriminate].
     injection H as <- <-.
-    apply (symbolic_happening_ok w1 s1 (Some q) (Is (constant c)) c) in E; [|exact E1|exact R].
+    apply (symbolic_happening_ok _ (make_stale s1) (Some q) (Is (constant c)) c) in E;
+      [|apply make_stale_ok, E1|exact R].
     destruct (symbolic_happening _ _ _ _ _ _ _ _ _ _); auto. destruct E as [-> E].
     split; [symmetry; exact L|exact E].
 Qed.
@@ -417,12 +423,12 @@ Proof.
   - destruct (ground env ts); [|discriminate].
     destruct (eval w0 None env e) as [q|] eqn:Ev; [|discriminate]. injection H as <-. cbn [filter kept].
     destruct n; [|injection K as <-; constructor].
-    pose proof (symbolic_expression_ok w0 unchanged None Undefined (describes_itself w0) eq_refl env e) as G.
+    pose proof (symbolic_expression_ok w0 unchanged None Undefined (describes_itself P w0) eq_refl env e) as G.
     destruct (symbolic_expression P N unchanged Undefined env e) as [| |g]; try discriminate.
     injection K as <-. constructor; [|constructor]. simpl. repeat split. apply G. exact Ev.
   - eapply both_filter; [| |exact H|exact K]; intros; [eapply IHe1|eapply IHe2]; eassumption.
   - destruct (symbolic_truth P T N k unchanged Undefined env f) as [b|] eqn:E.
-    + apply (symbolic_truth_ok w0 unchanged None Undefined (describes_itself w0) eq_refl) in E.
+    + apply (symbolic_truth_ok w0 unchanged None Undefined (describes_itself P w0) eq_refl) in E.
       destruct (truth P w0 None env f) as [[]|]; [| |discriminate]; destruct b; simpl in E; try congruence.
       * eapply IHe; eassumption.
       * injection H as <-. injection K as <-. constructor.
@@ -461,7 +467,7 @@ Proof.
   - eapply (both_in _ _ _ _ _ listed L M); [| |exact H|exact K]; intros; [eapply IHe1|eapply IHe2];
       eassumption.
   - destruct (symbolic_truth P T N k unchanged Undefined env f) as [b|] eqn:E.
-    + apply (symbolic_truth_ok w0 unchanged None Undefined (describes_itself w0) eq_refl) in E.
+    + apply (symbolic_truth_ok w0 unchanged None Undefined (describes_itself P w0) eq_refl) in E.
       destruct (truth P w0 None env f) as [[]|]; [| |discriminate]; destruct b; simpl in E; try congruence.
       * eapply IHe; eassumption.
       * injection H as <-. intros c [].
@@ -547,7 +553,7 @@ Proof.
   assert (D : forall hs, updates w0 fs hs = updates w0 cs hs).
   { induction hs as [|h hs IH]; cbn [updates]; [reflexivity|]. rewrite B, IH. reflexivity. }
   rewrite (targets_same _ _ M) in A. rewrite <- A, <- D in Um.
-  pose proof (updates_ok w0 unchanged fs ss (describes_itself w0) M _ _ _ Um U g) as Q. rewrite V.
+  pose proof (updates_ok w0 unchanged fs ss (describes_itself P w0) M _ _ _ Um U g) as Q. rewrite V.
   destruct (assoc g l) as [h|];
     [destruct Q as [q [Q1 Q2]]; exists q; rewrite Q1; split; [reflexivity|exact Q2]|].
   rewrite Q. reflexivity.

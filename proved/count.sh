@@ -32,4 +32,14 @@ row '`proved/ocaml/reader.ml`' <ocaml/reader.ml
 row '`proved/ocaml/check.ml`' <ocaml/check.ml
 printf '| sum | %d |\n' "$total"
 printf '| `proved/ocaml/evidence.ml` | %d |\n' "$(lines <ocaml/evidence.ml)"
+believed=$total
+total=0
+row '`proved/Lists.v`, above "What follows"' <<EOF
+$(sed '/^(\* What follows/,$d' Lists.v | grep -v '^From\|^Import\|^Open')
+EOF
+row 'theorem `list_optimal` in `proved/Lists.v`' <<EOF
+$(sed -n '/^Theorem list_optimal/,/^Proof/p' Lists.v | grep -v '^Proof')
+EOF
+row '`proved/ocaml/check_list.ml`' <ocaml/check_list.ml
+total=$believed
 [ "$total" -le "$limit" ] || { echo "more than $limit lines have to be believed" >&2; exit 1; }

@@ -98,6 +98,15 @@ module Nat =
     | S n' -> (match m with
                | O -> false
                | S m' -> eqb n' m')
+
+  (** val leb : nat -> nat -> bool **)
+
+  let rec leb n m =
+    match n with
+    | O -> true
+    | S n' -> (match m with
+               | O -> false
+               | S m' -> leb n' m')
  end
 
 module Pos =
@@ -560,14 +569,14 @@ let zeq_bool x y =
 
 (** val nth : nat -> 'a1 list -> 'a1 -> 'a1 **)
 
-let rec nth n l default =
+let rec nth n l default0 =
   match n with
   | O -> (match l with
-          | [] -> default
+          | [] -> default0
           | x :: _ -> x)
   | S m -> (match l with
-            | [] -> default
-            | _ :: t0 -> nth m t0 default)
+            | [] -> default0
+            | _ :: t0 -> nth m t0 default0)
 
 (** val nth_error : 'a1 list -> nat -> 'a1 option **)
 
@@ -578,6 +587,12 @@ let rec nth_error l = function
 | S n0 -> (match l with
            | [] -> None
            | _ :: l0 -> nth_error l0 n0)
+
+(** val concat : 'a1 list list -> 'a1 list **)
+
+let rec concat = function
+| [] -> []
+| x :: l0 -> app x (concat l0)
 
 (** val list_eq_dec : ('a1 -> 'a1 -> bool) -> 'a1 list -> 'a1 list -> bool **)
 
@@ -1674,6 +1689,32 @@ let check_task t0 =
       (forallb (forallb (fun r -> negb (is_basic t0 (fst (fst r)))))
         t0.layers)) (forallb (fun d -> negb (is_basic t0 (fst d))) t0.derived)
 
+(** val condition_variables : condition -> key0 list **)
+
+let condition_variables c =
+  app (map fst c.facts) (map (fun l -> fst (fst l)) (concat c.clauses))
+
+(** val check_layers : (fact * condition) list list -> bool * z M.t **)
+
+let rec check_layers = function
+| [] -> (true, M.empty)
+| rules :: rest ->
+  let (ok, later) = check_layers rest in
+  let heads =
+    fold_left (fun m r -> M.add (fst (fst r)) (snd (fst r)) m) rules later
+  in
+  (((&&) ok
+     (forallb (fun r ->
+       (&&)
+         (match M.find (fst (fst r)) heads with
+          | Some x -> Z.eqb x (snd (fst r))
+          | None -> false)
+         (forallb (fun v ->
+           match M.find v later with
+           | Some _ -> false
+           | None -> true) ((fst (fst r)) :: (condition_variables (snd r)))))
+       rules)), heads)
+
 (** val check :
     task -> argument -> z option -> (state -> positive list) -> bool **)
 
@@ -1817,10 +1858,12 @@ type action = { parameters : key1 list; duration : expression option;
 
 type world = { holds_in : (atom -> bool); value_in : (atom -> q option) }
 
+type rule = { head : key1; head_types : key1 list; body : formula }
+
 type problem = { objects : (key1 -> key1 list); actions : action list;
-                 initial_atoms : unit atom_map; initial_values : q atom_map;
-                 goal_formula : formula; metric : expression; per_time : 
-                 q; per_step : q }
+                 strata : rule list list; initial_atoms : unit atom_map;
+                 initial_values : q atom_map; goal_formula : formula;
+                 metric : expression; per_time : q; per_step : q }
 
 (** val initial : problem -> world **)
 
@@ -1920,6 +1963,75 @@ let rec truth p w d env = function
 | Forall (t0, g) ->
   fold_right (fun o r -> and_kleene (truth p w d (app env (o :: [])) g) r)
     (Some true) (p.objects t0)
+
+(** val is_derived : problem -> key1 -> bool **)
+
+let is_derived p p0 =
+  existsb (existsb (fun r -> Coq_Pos.eqb p0 r.head)) p.strata
+
+(** val with_facts : problem -> world -> unit atom_map -> world **)
+
+let with_facts p w facts0 =
+  { holds_in = (fun a ->
+    if is_derived p (fst a)
+    then (match find_atom facts0 a with
+          | Some _ -> true
+          | None -> false)
+    else w.holds_in a); value_in = w.value_in }
+
+(** val tuples : problem -> key1 list -> key1 list list **)
+
+let rec tuples p = function
+| [] -> [] :: []
+| t0 :: r ->
+  flat_map (fun o -> map (fun x -> o :: x) (tuples p r)) (p.objects t0)
+
+(** val rule_instances : problem -> rule list -> (atom * formula) list **)
+
+let rule_instances p rules =
+  flat_map (fun r ->
+    map (fun env -> ((r.head, env), r.body)) (tuples p r.head_types)) rules
+
+(** val fires_in : problem -> world -> (atom * formula) -> bool **)
+
+let fires_in p w i =
+  match truth p w None (snd (fst i)) (snd i) with
+  | Some b -> b
+  | None -> false
+
+(** val new_atoms : problem -> world -> (atom * formula) list -> atom list **)
+
+let new_atoms p w instances0 =
+  map fst
+    (filter (fun i -> (&&) (negb (w.holds_in (fst i))) (fires_in p w i))
+      instances0)
+
+(** val evaluate_stratum :
+    problem -> nat -> (atom * formula) list -> world -> unit atom_map -> unit
+    atom_map **)
+
+let rec evaluate_stratum p rounds instances0 w facts0 =
+  match rounds with
+  | O -> facts0
+  | S rounds0 ->
+    (match new_atoms p (with_facts p w facts0) instances0 with
+     | [] -> facts0
+     | a :: l ->
+       evaluate_stratum p rounds0 instances0 w
+         (fold_left (fun m a0 -> add_atom a0 () m) (a :: l) facts0))
+
+(** val derived_facts : problem -> world -> unit atom_map **)
+
+let derived_facts p w =
+  fold_left (fun facts0 rules ->
+    let instances0 = rule_instances p rules in
+    evaluate_stratum p (S (length instances0)) instances0 w facts0) p.strata
+    PositiveMap.empty
+
+(** val derived_world : problem -> world -> world **)
+
+let derived_world p w =
+  with_facts p w (derived_facts p w)
 
 type change =
 | Fact of atom * bool
@@ -2063,8 +2175,8 @@ let step p allow_zero w a env =
                                 a.start_effect with
                         | Some w1 ->
                           option_map (fun w0 -> (w0, d))
-                            (happening p w1 (Some d) env (And (a.over_all,
-                              a.at_end)) a.end_effect)
+                            (happening p (derived_world p w1) (Some d) env
+                              (And (a.over_all, a.at_end)) a.end_effect)
                         | None -> None)
            | None -> None)
         | None ->
@@ -2077,14 +2189,14 @@ let step p allow_zero w a env =
 
 let rec execute p allow_zero w spent = function
 | [] ->
-  (match truth p w None [] p.goal_formula with
+  (match truth p (derived_world p w) None [] p.goal_formula with
    | Some b -> if b then Some (w, spent) else None
    | None -> None)
 | p0 :: r ->
   let (i, env) = p0 in
   (match nth_error p.actions i with
    | Some a ->
-     (match step p allow_zero w a env with
+     (match step p allow_zero (derived_world p w) a env with
       | Some p1 ->
         let (w', d) = p1 in
         execute p allow_zero w'
@@ -2126,6 +2238,19 @@ let constant q0 =
 let fluent f =
   (((f, { qnum = (Zpos XH); qden = XH }) :: []), { qnum = Z0; qden = XH })
 
+(** val default : q option -> q **)
+
+let default = function
+| Some q0 -> q0
+| None -> { qnum = Z0; qden = XH }
+
+(** val ev : world -> form -> q **)
+
+let ev w f =
+  fold_right (fun t0 s ->
+    qplus (qmult (default (w.value_in (fst t0))) (snd t0)) s) (snd f) 
+    (fst f)
+
 type result =
 | Undefined
 | Unknown
@@ -2146,8 +2271,10 @@ let plus_result a c b =
 type names = { variables : (z * atom) list M.t; fluents : atom M.t;
                fact_of : (key1 * z) atom_map; number_of : key1 atom_map;
                changing : (key1 -> bool); may_hold : unit atom_map;
-               exclusive : atom list list; scale : positive;
-               cost_scale : positive }
+               derived_atoms : ((z * z) * atom) M.t;
+               derived_of : (key1 * z) atom_map; equivalent : bool;
+               invariants : (bool * form) list; exclusive : atom list list;
+               scale : positive; cost_scale : positive }
 
 type case_tree =
 | Decided of (nat * choice) option
@@ -2205,16 +2332,27 @@ let possible t0 n k v =
      | None -> range (get t0.domain_size v))
 
 (** val known_fact :
-    task -> names -> knowledge -> key1 -> z -> bool option **)
+    task -> names -> (key1 -> bool) -> knowledge -> key1 -> z -> bool option **)
 
-let known_fact t0 n k v x =
+let known_fact t0 n full k v x =
   match M.find v n.variables with
   | Some _ ->
     let ys = possible t0 n k v in
     if forallb (Z.eqb x) ys
     then Some true
     else if forallb (fun y -> negb (Z.eqb x y)) ys then Some false else None
-  | None -> None
+  | None ->
+    (match M.find v n.derived_atoms with
+     | Some p ->
+       let (p0, a) = p in
+       let (y, d) = p0 in
+       (match assoc a k.literals with
+        | Some b ->
+          if b
+          then Some (Z.eqb x y)
+          else if full (fst a) then Some (Z.eqb x d) else None
+        | None -> None)
+     | None -> None)
 
 (** val base_truth :
     problem -> task -> names -> knowledge -> atom -> bool option **)
@@ -2228,24 +2366,37 @@ let base_truth p t0 n k a =
           if (||) (excluded_by n k a) (negb (mem0 n.may_hold a))
           then Some false
           else (match find_atom n.fact_of a with
-                | Some p0 -> let (v, x) = p0 in known_fact t0 n k v x
+                | Some p0 ->
+                  let (v, x) = p0 in known_fact t0 n (fun _ -> false) k v x
                 | None -> None))
 
 type symbolic = { new_truths : (atom * bool) list;
-                  new_values : (atom * form) list }
+                  new_values : (atom * form) list; stale : bool }
 
 (** val unchanged : symbolic **)
 
 let unchanged =
-  { new_truths = []; new_values = [] }
+  { new_truths = []; new_values = []; stale = false }
+
+(** val make_stale : symbolic -> symbolic **)
+
+let make_stale s =
+  { new_truths = s.new_truths; new_values = s.new_values; stale = true }
+
+(** val is_stale : problem -> symbolic -> key1 -> bool **)
+
+let is_stale p s p0 =
+  (&&) s.stale (is_derived p p0)
 
 (** val symbolic_atom :
     problem -> task -> names -> knowledge -> symbolic -> atom -> bool option **)
 
 let symbolic_atom p t0 n k s a =
-  match assoc a s.new_truths with
-  | Some b -> Some b
-  | None -> base_truth p t0 n k a
+  if is_stale p s (fst a)
+  then None
+  else (match assoc a s.new_truths with
+        | Some b -> Some b
+        | None -> base_truth p t0 n k a)
 
 (** val symbolic_value : problem -> names -> symbolic -> atom -> result **)
 
@@ -2519,7 +2670,8 @@ let symbolic_happening p t0 n k s d time env f e =
                     After ({ new_truths =
                       (app (atoms_set_to cs true)
                         (app (atoms_set_to cs false) s.new_truths));
-                      new_values = (app l s.new_values) }, time)
+                      new_values = (app l s.new_values); stale = s.stale },
+                      time)
                   | None -> Unclear)
                | None -> Unclear)
     else Never
@@ -2533,7 +2685,7 @@ let symbolic_happening p t0 n k s d time env f e =
                After ({ new_truths =
                  (app (atoms_set_to cs true)
                    (app (atoms_set_to cs false) s.new_truths)); new_values =
-                 (app l s.new_values) }, time)
+                 (app l s.new_values); stale = s.stale }, time)
              | None -> Unclear)
           | None -> Unclear)
 
@@ -2662,8 +2814,9 @@ let symbolic_step p t0 n k a env =
                else (match symbolic_happening p t0 n k unchanged (Is
                              (constant d)) d env a.at_start a.start_effect with
                      | After (s, _) ->
-                       symbolic_happening p t0 n k s (Is (constant d)) d env
-                         (And (a.over_all, a.at_end)) a.end_effect
+                       symbolic_happening p t0 n k (make_stale s) (Is
+                         (constant d)) d env (And (a.over_all, a.at_end))
+                         a.end_effect
                      | x -> x)
         | _ :: _ -> Unclear))
   | None ->
@@ -2681,7 +2834,7 @@ let rec conjuncts p n s d env = function
      (match assoc (p0, l) s.new_truths with
       | Some _ -> { literals = []; bounds = [] }
       | None ->
-        if n.changing p0
+        if (&&) (n.changing p0) (negb (is_stale p s p0))
         then { literals = (((p0, l), true) :: []); bounds = [] }
         else { literals = []; bounds = [] })
    | None -> { literals = []; bounds = [] })
@@ -2697,7 +2850,7 @@ let rec conjuncts p n s d env = function
         (match assoc (p0, l) s.new_truths with
          | Some _ -> { literals = []; bounds = [] }
          | None ->
-           if n.changing p0
+           if (&&) (n.changing p0) (negb (is_stale p s p0))
            then { literals = (((p0, l), false) :: []); bounds = [] }
            else { literals = []; bounds = [] })
       | None -> { literals = []; bounds = [] })
@@ -2707,6 +2860,11 @@ let rec conjuncts p n s d env = function
   let b = conjuncts p n s d env h in
   { literals = (app a.literals b.literals); bounds = (app a.bounds b.bounds) }
 | _ -> { literals = []; bounds = [] }
+
+(** val with_invariants : names -> knowledge -> knowledge **)
+
+let with_invariants n k =
+  { literals = k.literals; bounds = (app n.invariants k.bounds) }
 
 (** val join : knowledge -> knowledge -> knowledge **)
 
@@ -2732,7 +2890,8 @@ let gathered p t0 n a env =
                         a.at_start a.start_effect with
                 | After (s, _) ->
                   join k
-                    (conjuncts p n s time env (And (a.over_all, a.at_end)))
+                    (conjuncts p n (make_stale s) time env (And (a.over_all,
+                      a.at_end)))
                 | _ -> k)
         | _ :: _ -> { literals = []; bounds = [] })
      | _ -> { literals = []; bounds = [] })
@@ -2757,13 +2916,234 @@ let impossible p t0 n k =
             | _ :: _ -> false)
          | None -> false)) k.literals)
     (existsb (fun b ->
-      let (l, c) = snd b in
-      (match l with
-       | [] ->
-         if fst b
-         then qle_bool c { qnum = Z0; qden = XH }
-         else less c { qnum = Z0; qden = XH }
-       | _ :: _ -> false)) k.bounds)
+      implied k (negb (fst b))
+        (plus_form (constant { qnum = Z0; qden = XH }) { qnum = (Zneg XH);
+          qden = XH } (snd b))) k.bounds)
+
+(** val is_defined : problem -> key1 list -> formula -> bool **)
+
+let rec is_defined p env = function
+| Truth _ -> true
+| Atom (_, ts) -> (match ground env ts with
+                   | Some _ -> true
+                   | None -> false)
+| Same (t0, u) ->
+  (match object_of env t0 with
+   | Some _ -> (match object_of env u with
+                | Some _ -> true
+                | None -> false)
+   | None -> false)
+| Compare (_, _, _) -> false
+| Not g -> is_defined p env g
+| And (g, h) -> (&&) (is_defined p env g) (is_defined p env h)
+| Forall (t0, g) ->
+  forallb (fun o -> is_defined p (app env (o :: [])) g) (p.objects t0)
+
+(** val is_rule_of : problem -> atom -> rule -> bool **)
+
+let is_rule_of p a r =
+  (&&)
+    ((&&) (Coq_Pos.eqb (fst a) r.head)
+      (Nat.eqb (length (snd a)) (length r.head_types)))
+    (forallb (fun x -> existsb (Coq_Pos.eqb (fst x)) (p.objects (snd x)))
+      (combine (snd a) r.head_types))
+
+(** val rules_of : problem -> atom -> rule list **)
+
+let rules_of p a =
+  filter (is_rule_of p a) (concat p.strata)
+
+(** val contradicts_rules : problem -> task -> names -> knowledge -> bool **)
+
+let contradicts_rules p t0 n k =
+  existsb (fun l ->
+    let (a, holds0) = l in
+    (&&) (is_derived p (fst a))
+      (let body_truth = fun r ->
+         symbolic_truth p t0 n k unchanged Undefined (snd a) r.body
+       in
+       if holds0
+       then forallb (fun r ->
+              match body_truth r with
+              | Some b -> if b then false else true
+              | None -> false) (rules_of p a)
+       else existsb (fun r ->
+              match body_truth r with
+              | Some b -> if b then is_defined p (snd a) r.body else false
+              | None -> false) (rules_of p a))) k.literals
+
+(** val contradictory : problem -> task -> names -> knowledge -> bool **)
+
+let contradictory p t0 n k =
+  (||) (impossible p t0 n k) (contradicts_rules p t0 n k)
+
+type continuation = knowledge -> bool
+
+(** val expand :
+    problem -> task -> names -> (atom -> bool -> continuation ->
+    continuation) -> formula -> bool -> key1 list -> continuation ->
+    knowledge -> bool **)
+
+let rec expand p t0 n after f b env next k =
+  match f with
+  | Truth c -> if eqb b c then next k else true
+  | Atom (p0, ts) ->
+    (match ground env ts with
+     | Some l ->
+       (match base_truth p t0 n k (p0, l) with
+        | Some c -> if eqb b c then next k else true
+        | None ->
+          after (p0, l) b next { literals = (((p0, l), b) :: k.literals);
+            bounds = k.bounds })
+     | None -> true)
+  | Same (t1, u) ->
+    (match object_of env t1 with
+     | Some x ->
+       (match object_of env u with
+        | Some y -> if eqb b (Coq_Pos.eqb x y) then next k else true
+        | None -> true)
+     | None -> true)
+  | Compare (_, _, _) ->
+    next (if b then join k (conjuncts p n unchanged Undefined env f) else k)
+  | Not g -> expand p t0 n after g (negb b) env next k
+  | And (g, h) ->
+    if b
+    then expand p t0 n after g true env (expand p t0 n after h true env next)
+           k
+    else (&&) (expand p t0 n after g false env next k)
+           (expand p t0 n after h false env next k)
+  | Forall (t1, g) ->
+    if b
+    then fold_right (fun o next0 ->
+           expand p t0 n after g true (app env (o :: [])) next0) next
+           (p.objects t1) k
+    else forallb (fun o ->
+           expand p t0 n after g false (app env (o :: [])) next k)
+           (p.objects t1)
+
+(** val is_unfolded : problem -> names -> atom -> bool **)
+
+let is_unfolded p n a =
+  (&&) (is_derived p (fst a))
+    (match find_atom n.derived_of a with
+     | Some _ -> false
+     | None -> true)
+
+(** val is_head : key1 -> rule list -> bool **)
+
+let is_head p rules =
+  existsb (fun r -> Coq_Pos.eqb p r.head) rules
+
+(** val level : rule list list -> key1 -> nat **)
+
+let rec level ls p =
+  match ls with
+  | [] -> O
+  | rules :: later ->
+    (match level later p with
+     | O -> if is_head p rules then S O else O
+     | S n -> S (S n))
+
+(** val unfold :
+    problem -> task -> names -> nat -> nat -> atom -> bool -> continuation ->
+    knowledge -> bool **)
+
+let rec unfold p t0 n depth limit a b next k =
+  match depth with
+  | O -> next k
+  | S depth0 ->
+    if negb (is_unfolded p n a)
+    then next k
+    else if b
+         then forallb (fun r ->
+                expand p t0 n (unfold p t0 n depth0 limit) r.body true
+                  (snd a) next k) (rules_of p a)
+         else if Nat.leb (level p.strata (fst a)) limit
+              then fold_right (fun r next0 ->
+                     if is_defined p (snd a) r.body
+                     then expand p t0 n (unfold p t0 n depth0 limit) r.body
+                            false (snd a) next0
+                     else next0) next (rules_of p a) k
+              else next k
+
+(** val definite :
+    problem -> (atom -> bool option) -> key1 list -> formula -> bool option **)
+
+let rec definite p look env = function
+| Truth b -> Some b
+| Atom (p0, ts) ->
+  (match ground env ts with
+   | Some l -> look (p0, l)
+   | None -> None)
+| Same (t0, u) ->
+  (match object_of env t0 with
+   | Some a ->
+     (match object_of env u with
+      | Some b -> Some (Coq_Pos.eqb a b)
+      | None -> None)
+   | None -> None)
+| Compare (_, _, _) -> None
+| Not g -> option_map negb (definite p look env g)
+| And (g, h) -> and_kleene (definite p look env g) (definite p look env h)
+| Forall (t0, g) ->
+  fold_right (fun o r ->
+    and_kleene (definite p look (app env (o :: [])) g) r) (Some true)
+    (p.objects t0)
+
+(** val is_some : bool -> bool option -> bool **)
+
+let is_some b = function
+| Some c -> eqb b c
+| None -> false
+
+(** val look_up :
+    problem -> task -> names -> nat -> nat -> knowledge -> atom -> bool option **)
+
+let rec look_up p t0 n depth limit k a =
+  match base_truth p t0 n k a with
+  | Some b -> Some b
+  | None ->
+    (match depth with
+     | O -> None
+     | S depth0 ->
+       if (&&) (is_unfolded p n a) (Nat.leb (level p.strata (fst a)) limit)
+       then let truths =
+              map (fun r ->
+                definite p (look_up p t0 n depth0 limit k) (snd a) r.body)
+                (rules_of p a)
+            in
+            if existsb (is_some true) truths
+            then Some true
+            else if forallb (is_some false) truths then Some false else None
+       else None)
+
+(** val max_unfoldings : nat **)
+
+let max_unfoldings =
+  S (S (S (S (S (S (S (S O)))))))
+
+(** val occurrences_ok : (key1 -> bool -> bool) -> bool -> formula -> bool **)
+
+let rec occurrences_ok allowed b = function
+| Atom (p, _) -> allowed p b
+| Not g -> occurrences_ok allowed (negb b) g
+| And (g, h) -> (&&) (occurrences_ok allowed b g) (occurrences_ok allowed b h)
+| Forall (_, g) -> occurrences_ok allowed b g
+| _ -> true
+
+(** val is_allowed : rule list -> rule list list -> key1 -> bool -> bool **)
+
+let is_allowed rules later p b =
+  (&&) (negb (existsb (is_head p) later)) ((||) b (negb (is_head p rules)))
+
+(** val is_stratified : rule list list -> bool **)
+
+let rec is_stratified = function
+| [] -> true
+| rules :: later ->
+  (&&)
+    (forallb (fun r -> occurrences_ok (is_allowed rules later) true r.body)
+      rules) (is_stratified later)
 
 (** val scaled : names -> q **)
 
@@ -2803,11 +3183,11 @@ let required n k f =
     (plus_form f { qnum = (Zpos XH); qden = XH } (constant (qinv (scaled n))))
 
 (** val known_literal :
-    task -> names -> knowledge -> literal -> bool option **)
+    task -> names -> (key1 -> bool) -> knowledge -> literal -> bool option **)
 
-let known_literal t0 n k l =
+let known_literal t0 n full k l =
   option_map (fun b -> eqb b (snd l))
-    (known_fact t0 n k (fst (fst l)) (snd (fst l)))
+    (known_fact t0 n full k (fst (fst l)) (snd (fst l)))
 
 (** val is_true : bool option -> bool **)
 
@@ -2822,13 +3202,15 @@ let is_false = function
 | None -> false
 
 (** val known_condition :
-    task -> names -> knowledge -> condition -> z list -> choice -> bool **)
+    task -> names -> (key1 -> bool) -> knowledge -> condition -> z list ->
+    choice -> bool **)
 
-let known_condition t0 n k c szs ch =
+let known_condition t0 n full k c szs ch =
   (&&)
     ((&&)
-      (forallb (fun f -> is_true (known_fact t0 n k (fst f) (snd f))) c.facts)
-      (forallb (existsb (fun l -> is_true (known_literal t0 n k l)))
+      (forallb (fun f -> is_true (known_fact t0 n full k (fst f) (snd f)))
+        c.facts)
+      (forallb (existsb (fun l -> is_true (known_literal t0 n full k l)))
         c.clauses))
     (forallb (fun l ->
       match form_of n l szs ch with
@@ -2842,9 +3224,12 @@ let known_condition t0 n k c szs ch =
 let rec known_effects t0 n k = function
 | [] -> Some []
 | c :: r ->
-  if existsb (fun l -> is_false (known_literal t0 n k l)) (fst c)
+  if existsb (fun l ->
+       is_false (known_literal t0 n (fun _ -> n.equivalent) k l)) (fst c)
   then known_effects t0 n k r
-  else if forallb (fun l -> is_true (known_literal t0 n k l)) (fst c)
+  else if forallb (fun l ->
+            is_true (known_literal t0 n (fun _ -> n.equivalent) k l)) 
+            (fst c)
        then option_map (app (snd c)) (known_effects t0 n k r)
        else None
 
@@ -2937,7 +3322,8 @@ let simulated p t0 n k s time o =
           let (o0, ch) = p0 in
           if (&&)
                ((&&) (admitted_choice o0 ch)
-                 (known_condition t0 n k o0.precondition o0.slot_sizes ch))
+                 (known_condition t0 n (fun _ -> n.equivalent) k
+                   o0.precondition o0.slot_sizes ch))
                (distinct (map fst o0.number_effects))
           then option_map (app o0.effects)
                  (known_effects t0 n k o0.conditional)
@@ -2968,6 +3354,25 @@ let simulated p t0 n k s time o =
        | None -> false)
   | None -> false
 
+(** val form_after : symbolic -> form -> form **)
+
+let form_after s f =
+  fold_right (fun t0 g ->
+    plus_form g (snd t0)
+      (match assoc (fst t0) s.new_values with
+       | Some h -> h
+       | None -> fluent (fst t0))) (constant (snd f)) (fst f)
+
+(** val stays_invariant : knowledge -> symbolic -> (bool * form) -> bool **)
+
+let stays_invariant k s i =
+  (||)
+    (forallb (fun t0 ->
+      match assoc (fst t0) s.new_values with
+      | Some _ -> false
+      | None -> true) (fst (snd i)))
+    (implied k (fst i) (form_after s (snd i)))
+
 (** val stays_exclusive :
     problem -> task -> names -> knowledge -> symbolic -> atom list -> bool **)
 
@@ -2997,9 +3402,13 @@ let rec known_effects_on t0 n v k = function
 | c :: r ->
   if forallb (fun f -> negb (Coq_Pos.eqb (fst f) v)) (snd c)
   then known_effects_on t0 n v k r
-  else if existsb (fun l -> is_false (known_literal t0 n k l)) (fst c)
+  else if existsb (fun l ->
+            is_false (known_literal t0 n (fun _ -> n.equivalent) k l)) 
+            (fst c)
        then known_effects_on t0 n v k r
-       else if forallb (fun l -> is_true (known_literal t0 n k l)) (fst c)
+       else if forallb (fun l ->
+                 is_true (known_literal t0 n (fun _ -> n.equivalent) k l))
+                 (fst c)
             then option_map (app (snd c)) (known_effects_on t0 n v k r)
             else None
 
@@ -3008,7 +3417,7 @@ let rec known_effects_on t0 n v k = function
     -> bool **)
 
 let rec split_on p t0 n atoms check0 k =
-  (||) ((||) (check0 k) (impossible p t0 n k))
+  (||) ((||) (check0 k) (contradictory p t0 n k))
     (match atoms with
      | [] -> false
      | a :: r ->
@@ -3077,15 +3486,16 @@ let projected_ok p t0 n k a env o =
                             env a.start_effect with
                     | Some cs ->
                       stays_exclusive p t0 n k { new_truths = (truths_of cs);
-                        new_values = [] } g
+                        new_values = []; stale = false } g
                     | None -> false) n.exclusive))
                 (match o with
                  | Some p0 ->
                    let (o0, ch) = p0 in
                    (&&)
                      ((&&) (admitted_choice o0 ch)
-                       (known_condition t0 n k o0.precondition o0.slot_sizes
-                         ch)) (distinct (map fst o0.number_effects))
+                       (known_condition t0 n (fun _ -> n.equivalent) k
+                         o0.precondition o0.slot_sizes ch))
+                     (distinct (map fst o0.number_effects))
                  | None -> true))
               (forallb (projected_variable_ok p t0 n k a env o)
                 (app
@@ -3101,18 +3511,19 @@ let projected_ok p t0 n k a env o =
             (match symbolic_updates p n unchanged numbers0
                      (symbolic_changed_fluents numbers0) with
              | Some l ->
-               let s = { new_truths = []; new_values = l } in
+               let s = { new_truths = []; new_values = l; stale = false } in
                (&&)
-                 (forallb (number_ok n s o)
-                   (app
-                     (match o with
-                      | Some p0 ->
-                        let (o0, _) = p0 in map fst o0.number_effects
-                      | None -> [])
-                     (flat_map (fun l0 ->
-                       match find_atom n.number_of (fst l0) with
-                       | Some n0 -> n0 :: []
-                       | None -> []) l)))
+                 ((&&) (forallb (stays_invariant k s) n.invariants)
+                   (forallb (number_ok n s o)
+                     (app
+                       (match o with
+                        | Some p0 ->
+                          let (o0, _) = p0 in map fst o0.number_effects
+                        | None -> [])
+                       (flat_map (fun l0 ->
+                         match find_atom n.number_of (fst l0) with
+                         | Some n0 -> n0 :: []
+                         | None -> []) l))))
                  (match growth p n s { qnum = Z0; qden = XH } with
                   | Some g ->
                     qle_bool (inject_Z (step_cost o))
@@ -3133,11 +3544,13 @@ let leaf_ok p t0 n k a env o =
   | After (s, time) ->
     (&&)
       ((&&)
-        (forallb (fun l ->
-          match assoc (fst l) s.new_truths with
-          | Some b -> if b then mem0 n.may_hold (fst l) else true
-          | None -> true) s.new_truths)
-        (forallb (stays_exclusive p t0 n k s) n.exclusive))
+        ((&&)
+          (forallb (fun l ->
+            match assoc (fst l) s.new_truths with
+            | Some b -> if b then mem0 n.may_hold (fst l) else true
+            | None -> true) s.new_truths)
+          (forallb (stays_exclusive p t0 n k s) n.exclusive))
+        (forallb (stays_invariant k s) n.invariants))
       (simulated p t0 n k s time o)
 
 (** val tree_ok :
@@ -3146,7 +3559,7 @@ let leaf_ok p t0 n k a env o =
 
 let rec tree_ok p t0 n leaf k = function
 | Decided o -> leaf k o
-| Impossible -> impossible p t0 n k
+| Impossible -> contradictory p t0 n k
 | SplitAtom (a, t2, u) ->
   (&&)
     (tree_ok p t0 n leaf { literals = ((a, true) :: k.literals); bounds =
@@ -3178,8 +3591,11 @@ let instance_leaf p t0 n a env k = function
 
 let goal_leaf p t0 n k _ =
   match symbolic_truth p t0 n k unchanged Undefined [] p.goal_formula with
-  | Some b -> if b then known_condition t0 n k t0.goal [] [] else true
-  | None -> known_condition t0 n k t0.goal [] []
+  | Some b ->
+    if b
+    then known_condition t0 n (fun _ -> n.equivalent) k t0.goal [] []
+    else true
+  | None -> known_condition t0 n (fun _ -> n.equivalent) k t0.goal [] []
 
 (** val static_false : problem -> names -> key1 list -> formula -> bool **)
 
@@ -3250,16 +3666,176 @@ let rec effect_heads = function
 
 let action_ok p t0 n case i a =
   (&&)
-    (forallb n.changing
+    (forallb (fun p0 -> (&&) (n.changing p0) (negb (is_derived p p0)))
       (app (effect_heads a.start_effect) (effect_heads a.end_effect)))
     (forallb (fun env ->
-      tree_ok p t0 n (instance_leaf p t0 n a env) (gathered p t0 n a env)
-        (case i env)) (instances p (pruned p n a) a.parameters []))
+      tree_ok p t0 n (instance_leaf p t0 n a env)
+        (with_invariants n (gathered p t0 n a env)) (case i env))
+      (instances p (pruned p n a) a.parameters []))
 
 (** val all_entries : 'a1 atom_map -> (atom * 'a1) list **)
 
 let all_entries m =
   flat_map snd (PositiveMap.elements m)
+
+(** val ground_rules : task -> (z * condition) list M.t **)
+
+let ground_rules t0 =
+  fold_right (fun r m ->
+    M.add (fst (fst r)) (((snd (fst r)),
+      (snd r)) :: (match M.find (fst (fst r)) m with
+                   | Some l -> l
+                   | None -> [])) m) M.empty (concat t0.layers)
+
+(** val rule_leaf :
+    problem -> task -> names -> (key1 -> bool) -> (z * condition) list M.t ->
+    atom -> knowledge -> bool **)
+
+let rule_leaf p t0 n full rules a k =
+  (||) (impossible p t0 n k)
+    ((&&) (mem0 n.may_hold a)
+      (match find_atom n.derived_of a with
+       | Some p0 ->
+         let (v, x) = p0 in
+         (match M.find v rules with
+          | Some l ->
+            existsb (fun r ->
+              (&&) (Z.eqb (fst r) x)
+                (known_condition t0 n full k (snd r) [] [])) l
+          | None -> false)
+       | None -> true))
+
+(** val rule_ok :
+    problem -> task -> names -> nat -> (z * condition) list M.t ->
+    (atom * formula) -> bool **)
+
+let rule_ok p t0 n stratum rules i =
+  match find_atom n.derived_of (fst i) with
+  | Some _ ->
+    expand p t0 n (unfold p t0 n max_unfoldings stratum) (snd i) true
+      (snd (fst i))
+      (rule_leaf p t0 n (fun p0 ->
+        (&&) n.equivalent (Nat.leb (level p.strata p0) stratum)) rules
+        (fst i)) { literals = []; bounds = [] }
+  | None ->
+    if mem0 n.may_hold (fst i)
+    then true
+    else expand p t0 n (unfold p t0 n max_unfoldings stratum) (snd i) true
+           (snd (fst i))
+           (rule_leaf p t0 n (fun p0 ->
+             (&&) n.equivalent (Nat.leb (level p.strata p0) stratum)) rules
+             (fst i)) { literals = []; bounds = [] }
+
+(** val strata_ok :
+    problem -> task -> names -> nat -> (z * condition) list M.t -> rule list
+    list -> bool **)
+
+let rec strata_ok p t0 n stratum rules = function
+| [] -> true
+| here :: later ->
+  (&&) (forallb (rule_ok p t0 n stratum rules) (rule_instances p here))
+    (strata_ok p t0 n (S stratum) rules later)
+
+(** val ground_literals :
+    problem -> names -> nat -> condition -> (atom * bool) list **)
+
+let ground_literals p n limit c =
+  flat_map (fun f ->
+    match M.find (fst f) n.variables with
+    | Some vals -> map (fun xa -> ((snd xa), (Z.eqb (snd f) (fst xa)))) vals
+    | None ->
+      (match M.find (fst f) n.derived_atoms with
+       | Some p0 ->
+         let (p1, a) = p0 in
+         let (y, _) = p1 in
+         if (&&) (Z.eqb (snd f) y)
+              (negb (Nat.leb (level p.strata (fst a)) limit))
+         then []
+         else (a, (Z.eqb (snd f) y)) :: []
+       | None -> [])) c.facts
+
+(** val ground_rule_ok :
+    problem -> task -> names -> z M.t -> (fact * condition) -> bool **)
+
+let ground_rule_ok p t0 n heads r =
+  match M.find (fst (fst r)) n.derived_atoms with
+  | Some p0 ->
+    let (_, a) = p0 in
+    (&&)
+      (forallb (fun f ->
+        match M.find (fst f) n.derived_atoms with
+        | Some p1 ->
+          let (p2, _) = p1 in
+          let (y, _) = p2 in
+          (||) (Z.eqb (snd f) y)
+            (match M.find (fst f) heads with
+             | Some _ -> false
+             | None -> true)
+        | None -> true) (snd r).facts)
+      (let limit = level p.strata (fst a) in
+       let k = { literals = (ground_literals p n limit (snd r)); bounds = [] }
+       in
+       existsb (fun rule0 ->
+         is_some true
+           (definite p (look_up p t0 n max_unfoldings limit k) (snd a)
+             rule0.body)) (rules_of p a))
+  | None -> true
+
+(** val ground_rules_ok :
+    problem -> task -> names -> (fact * condition) list list -> bool * z M.t **)
+
+let rec ground_rules_ok p t0 n = function
+| [] -> (true, M.empty)
+| rules :: rest ->
+  let (ok, later) = ground_rules_ok p t0 n rest in
+  let heads =
+    fold_left (fun m r -> M.add (fst (fst r)) (snd (fst r)) m) rules later
+  in
+  (((&&) ok (forallb (ground_rule_ok p t0 n heads) rules)), heads)
+
+(** val rules_ok : problem -> task -> names -> bool **)
+
+let rules_ok p t0 n =
+  (&&)
+    ((&&)
+      ((&&)
+        ((&&)
+          ((&&)
+            ((&&)
+              ((&&)
+                ((&&) (is_stratified p.strata) (fst (check_layers t0.layers)))
+                (forallb (forallb (fun r -> n.changing r.head)) p.strata))
+              (forallb (fun vxa ->
+                let (v, y) = vxa in
+                let (y0, a) = y in
+                let (x, d) = y0 in
+                (&&)
+                  ((&&)
+                    ((&&)
+                      ((&&)
+                        ((&&) (is_derived p (fst a)) (negb (is_basic t0 v)))
+                        (negb (Z.eqb x d)))
+                      (existsb (fun f -> Coq_Pos.eqb (fst f) v) t0.derived))
+                    (forallb (fun f ->
+                      (||) (negb (Coq_Pos.eqb (fst f) v)) (Z.eqb (snd f) d))
+                      t0.derived))
+                  (match find_atom n.derived_of a with
+                   | Some p0 ->
+                     let (u, y1) = p0 in (&&) (Coq_Pos.eqb u v) (Z.eqb y1 x)
+                   | None -> false)) (M.elements n.derived_atoms)))
+            (forallb (forallb (fun a -> negb (is_derived p (fst a))))
+              n.exclusive))
+          (forallb (fun vl ->
+            forallb (fun xa -> negb (is_derived p (fst (snd xa)))) (snd vl))
+            (M.elements n.variables)))
+        (forallb
+          (forallb (fun r ->
+            match M.find (fst (fst r)) n.derived_atoms with
+            | Some p0 ->
+              let (p1, _) = p0 in let (x, _) = p1 in Z.eqb (snd (fst r)) x
+            | None -> true)) t0.layers))
+      ((||) (negb n.equivalent) (fst (ground_rules_ok p t0 n t0.layers))))
+    (strata_ok p t0 n O (ground_rules t0) p.strata)
 
 (** val faithful :
     problem -> task -> names -> (nat -> key1 list -> case_tree) -> case_tree
@@ -3272,9 +3848,18 @@ let faithful p t0 n case goal_case =
         ((&&)
           ((&&)
             ((&&)
-              (forallb (fun e ->
-                (||) (negb (n.changing (fst (fst e))))
-                  (mem0 n.may_hold (fst e))) (all_entries p.initial_atoms))
+              ((&&)
+                ((&&)
+                  (forallb (fun i ->
+                    if fst i
+                    then less { qnum = Z0; qden = XH }
+                           (ev (initial p) (snd i))
+                    else qle_bool { qnum = Z0; qden = XH }
+                           (ev (initial p) (snd i))) n.invariants)
+                  (rules_ok p t0 n))
+                (forallb (fun e ->
+                  (||) (negb (n.changing (fst (fst e))))
+                    (mem0 n.may_hold (fst e))) (all_entries p.initial_atoms)))
               (forallb (fun vl ->
                 let (v, vals) = vl in
                 (&&) (is_basic t0 v)
@@ -3308,7 +3893,8 @@ let faithful p t0 n case goal_case =
                | Some m -> Coq_Pos.eqb m n0
                | None -> false)) (M.elements n.fluents)))
         (tree_ok p t0 n (goal_leaf p t0 n)
-          (conjuncts p n unchanged Undefined [] p.goal_formula) goal_case))
+          (with_invariants n
+            (conjuncts p n unchanged Undefined [] p.goal_formula)) goal_case))
       (forallb (fun ia -> action_ok p t0 n case (fst ia) (snd ia))
         (combine (seq O (length p.actions)) p.actions)))
     (forallb (fun g ->
@@ -3357,3 +3943,69 @@ let check_certificate p t0 n case goal_case a oracle plan claim =
        (match claim with
         | Some _ -> false
         | None -> check t0 a None oracle))
+
+type objective = { objective_metric : expression; time_weight : q;
+                   step_weight : q }
+
+(** val with_objective : problem -> objective -> problem **)
+
+let with_objective p o =
+  { objects = p.objects; actions = p.actions; strata = p.strata;
+    initial_atoms = p.initial_atoms; initial_values = p.initial_values;
+    goal_formula = p.goal_formula; metric = o.objective_metric; per_time =
+    o.time_weight; per_step = o.step_weight }
+
+type evidence = { list_task : task; list_names : names;
+                  list_case : (nat -> key1 list -> case_tree);
+                  list_goal_case : case_tree; list_argument : argument;
+                  list_oracle : (state -> positive list) }
+
+(** val limited : problem -> expression -> q -> problem **)
+
+let limited p e m =
+  { objects = p.objects; actions = p.actions; strata = p.strata;
+    initial_atoms = p.initial_atoms; initial_values = p.initial_values;
+    goal_formula = (And ((Compare (false, (Constant m), e)),
+    p.goal_formula)); metric = p.metric; per_time = p.per_time; per_step =
+    p.per_step }
+
+(** val is_untimed : objective -> bool **)
+
+let is_untimed o =
+  (&&) (qeq_bool o.time_weight { qnum = Z0; qden = XH })
+    (qeq_bool o.step_weight { qnum = Z0; qden = XH })
+
+(** val check_list :
+    problem -> objective list -> evidence list -> (nat * key1 list) list -> q
+    list -> bool **)
+
+let rec check_list p objectives es plan ms =
+  match objectives with
+  | [] ->
+    (match es with
+     | [] -> (match ms with
+              | [] -> true
+              | _ :: _ -> false)
+     | _ :: _ -> false)
+  | o :: rest ->
+    (match es with
+     | [] -> false
+     | e :: es0 ->
+       (match ms with
+        | [] -> false
+        | m :: ms0 ->
+          (&&)
+            (check_certificate (with_objective p o) e.list_task e.list_names
+              e.list_case e.list_goal_case e.list_argument e.list_oracle plan
+              (Some m))
+            (match rest with
+             | [] ->
+               (match es0 with
+                | [] -> (match ms0 with
+                         | [] -> true
+                         | _ :: _ -> false)
+                | _ :: _ -> false)
+             | _ :: _ ->
+               (&&) (is_untimed o)
+                 (check_list (limited p o.objective_metric m) rest es0 plan
+                   ms0))))

@@ -51,6 +51,8 @@ module MakeOrderTac :
 module Nat :
  sig
   val eqb : nat -> nat -> bool
+
+  val leb : nat -> nat -> bool
  end
 
 module Pos :
@@ -155,6 +157,8 @@ val zeq_bool : z -> z -> bool
 val nth : nat -> 'a1 list -> 'a1 -> 'a1
 
 val nth_error : 'a1 list -> nat -> 'a1 option
+
+val concat : 'a1 list list -> 'a1 list
 
 val list_eq_dec : ('a1 -> 'a1 -> bool) -> 'a1 list -> 'a1 list -> bool
 
@@ -625,6 +629,10 @@ val distinct : key0 list -> bool
 
 val check_task : task -> bool
 
+val condition_variables : condition -> key0 list
+
+val check_layers : (fact * condition) list list -> bool * z M.t
+
 val check : task -> argument -> z option -> (state -> positive list) -> bool
 
 type key1 = positive
@@ -689,10 +697,12 @@ type action = { parameters : key1 list; duration : expression option;
 
 type world = { holds_in : (atom -> bool); value_in : (atom -> q option) }
 
+type rule = { head : key1; head_types : key1 list; body : formula }
+
 type problem = { objects : (key1 -> key1 list); actions : action list;
-                 initial_atoms : unit atom_map; initial_values : q atom_map;
-                 goal_formula : formula; metric : expression; per_time : 
-                 q; per_step : q }
+                 strata : rule list list; initial_atoms : unit atom_map;
+                 initial_values : q atom_map; goal_formula : formula;
+                 metric : expression; per_time : q; per_step : q }
 
 val initial : problem -> world
 
@@ -710,6 +720,26 @@ val and_kleene : bool option -> bool option -> bool option
 
 val truth :
   problem -> world -> q option -> key1 list -> formula -> bool option
+
+val is_derived : problem -> key1 -> bool
+
+val with_facts : problem -> world -> unit atom_map -> world
+
+val tuples : problem -> key1 list -> key1 list list
+
+val rule_instances : problem -> rule list -> (atom * formula) list
+
+val fires_in : problem -> world -> (atom * formula) -> bool
+
+val new_atoms : problem -> world -> (atom * formula) list -> atom list
+
+val evaluate_stratum :
+  problem -> nat -> (atom * formula) list -> world -> unit atom_map -> unit
+  atom_map
+
+val derived_facts : problem -> world -> unit atom_map
+
+val derived_world : problem -> world -> world
 
 type change =
 | Fact of atom * bool
@@ -753,6 +783,10 @@ val constant : q -> form
 
 val fluent : atom -> form
 
+val default : q option -> q
+
+val ev : world -> form -> q
+
 type result =
 | Undefined
 | Unknown
@@ -763,8 +797,10 @@ val plus_result : result -> q -> result -> result
 type names = { variables : (z * atom) list M.t; fluents : atom M.t;
                fact_of : (key1 * z) atom_map; number_of : key1 atom_map;
                changing : (key1 -> bool); may_hold : unit atom_map;
-               exclusive : atom list list; scale : positive;
-               cost_scale : positive }
+               derived_atoms : ((z * z) * atom) M.t;
+               derived_of : (key1 * z) atom_map; equivalent : bool;
+               invariants : (bool * form) list; exclusive : atom list list;
+               scale : positive; cost_scale : positive }
 
 type case_tree =
 | Decided of (nat * choice) option
@@ -784,14 +820,19 @@ val excluded_by : names -> knowledge -> atom -> bool
 
 val possible : task -> names -> knowledge -> key1 -> z list
 
-val known_fact : task -> names -> knowledge -> key1 -> z -> bool option
+val known_fact :
+  task -> names -> (key1 -> bool) -> knowledge -> key1 -> z -> bool option
 
 val base_truth : problem -> task -> names -> knowledge -> atom -> bool option
 
 type symbolic = { new_truths : (atom * bool) list;
-                  new_values : (atom * form) list }
+                  new_values : (atom * form) list; stale : bool }
 
 val unchanged : symbolic
+
+val make_stale : symbolic -> symbolic
+
+val is_stale : problem -> symbolic -> key1 -> bool
 
 val symbolic_atom :
   problem -> task -> names -> knowledge -> symbolic -> atom -> bool option
@@ -864,11 +905,55 @@ val symbolic_step :
 val conjuncts :
   problem -> names -> symbolic -> result -> key1 list -> formula -> knowledge
 
+val with_invariants : names -> knowledge -> knowledge
+
 val join : knowledge -> knowledge -> knowledge
 
 val gathered : problem -> task -> names -> action -> key1 list -> knowledge
 
 val impossible : problem -> task -> names -> knowledge -> bool
+
+val is_defined : problem -> key1 list -> formula -> bool
+
+val is_rule_of : problem -> atom -> rule -> bool
+
+val rules_of : problem -> atom -> rule list
+
+val contradicts_rules : problem -> task -> names -> knowledge -> bool
+
+val contradictory : problem -> task -> names -> knowledge -> bool
+
+type continuation = knowledge -> bool
+
+val expand :
+  problem -> task -> names -> (atom -> bool -> continuation -> continuation)
+  -> formula -> bool -> key1 list -> continuation -> knowledge -> bool
+
+val is_unfolded : problem -> names -> atom -> bool
+
+val is_head : key1 -> rule list -> bool
+
+val level : rule list list -> key1 -> nat
+
+val unfold :
+  problem -> task -> names -> nat -> nat -> atom -> bool -> continuation ->
+  knowledge -> bool
+
+val definite :
+  problem -> (atom -> bool option) -> key1 list -> formula -> bool option
+
+val is_some : bool -> bool option -> bool
+
+val look_up :
+  problem -> task -> names -> nat -> nat -> knowledge -> atom -> bool option
+
+val max_unfoldings : nat
+
+val occurrences_ok : (key1 -> bool -> bool) -> bool -> formula -> bool
+
+val is_allowed : rule list -> rule list list -> key1 -> bool -> bool
+
+val is_stratified : rule list list -> bool
 
 val scaled : names -> q
 
@@ -878,14 +963,16 @@ val form_of : names -> linear -> z list -> choice -> form option
 
 val required : names -> knowledge -> form -> bool
 
-val known_literal : task -> names -> knowledge -> literal -> bool option
+val known_literal :
+  task -> names -> (key1 -> bool) -> knowledge -> literal -> bool option
 
 val is_true : bool option -> bool
 
 val is_false : bool option -> bool
 
 val known_condition :
-  task -> names -> knowledge -> condition -> z list -> choice -> bool
+  task -> names -> (key1 -> bool) -> knowledge -> condition -> z list ->
+  choice -> bool
 
 val known_effects :
   task -> names -> knowledge -> (literal list * fact list) list -> fact list
@@ -911,6 +998,10 @@ val step_cost : (operator * choice) option -> z
 val simulated :
   problem -> task -> names -> knowledge -> symbolic -> q ->
   (operator * choice) option -> bool
+
+val form_after : symbolic -> form -> form
+
+val stays_invariant : knowledge -> symbolic -> (bool * form) -> bool
 
 val stays_exclusive :
   problem -> task -> names -> knowledge -> symbolic -> atom list -> bool
@@ -967,6 +1058,31 @@ val action_ok :
 
 val all_entries : 'a1 atom_map -> (atom * 'a1) list
 
+val ground_rules : task -> (z * condition) list M.t
+
+val rule_leaf :
+  problem -> task -> names -> (key1 -> bool) -> (z * condition) list M.t ->
+  atom -> knowledge -> bool
+
+val rule_ok :
+  problem -> task -> names -> nat -> (z * condition) list M.t ->
+  (atom * formula) -> bool
+
+val strata_ok :
+  problem -> task -> names -> nat -> (z * condition) list M.t -> rule list
+  list -> bool
+
+val ground_literals :
+  problem -> names -> nat -> condition -> (atom * bool) list
+
+val ground_rule_ok :
+  problem -> task -> names -> z M.t -> (fact * condition) -> bool
+
+val ground_rules_ok :
+  problem -> task -> names -> (fact * condition) list list -> bool * z M.t
+
+val rules_ok : problem -> task -> names -> bool
+
 val faithful :
   problem -> task -> names -> (nat -> key1 list -> case_tree) -> case_tree ->
   bool
@@ -977,3 +1093,21 @@ val check_certificate :
   problem -> task -> names -> (nat -> key1 list -> case_tree) -> case_tree ->
   argument -> (state -> positive list) -> (nat * key1 list) list -> q option
   -> bool
+
+type objective = { objective_metric : expression; time_weight : q;
+                   step_weight : q }
+
+val with_objective : problem -> objective -> problem
+
+type evidence = { list_task : task; list_names : names;
+                  list_case : (nat -> key1 list -> case_tree);
+                  list_goal_case : case_tree; list_argument : argument;
+                  list_oracle : (state -> positive list) }
+
+val limited : problem -> expression -> q -> problem
+
+val is_untimed : objective -> bool
+
+val check_list :
+  problem -> objective list -> evidence list -> (nat * key1 list) list -> q
+  list -> bool

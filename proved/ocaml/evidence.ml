@@ -70,10 +70,15 @@ let atom_of name_key = function
   | List (name :: arguments) -> name_key (word name), List.map (fun item -> object_key (word item)) arguments
   | _ -> reject "an atom is expected"
 let atom = atom_of predicate_key and fluent = atom_of function_key
+let form factors constant = list (pair fluent (fun item -> fraction (word item))) factors, fraction (word constant)
+let invariant = function
+  | List [strict; factors; constant] -> word strict = "true", form factors constant
+  | _ -> reject "an invariant is expected"
 let set insert items = List.fold_left insert C.M.empty items
 let names = function
-  | [variables; fluents; predicates; functions; may_hold; exclusive; scale; cost_scale] ->
+  | [variables; fluents; predicates; functions; may_hold; derived; equivalent; invariants; exclusive; scale; cost_scale] ->
     let variables = list (pair position (list (pair whole atom))) variables and fluents = list (pair position fluent) fluents in
+    let derived = list (pair position (pair (pair whole whole) atom)) derived in
     let changing = set (fun set key -> C.M.add key () set) (list (fun item -> predicate_key (word item)) predicates
                                                            @ list (fun item -> function_key (word item)) functions) in
     { C.variables = set (fun map (v, atoms) -> C.M.add v atoms map) variables;
@@ -83,13 +88,16 @@ let names = function
       number_of = set (fun map (n, fluent) -> C.add_atom fluent n map) fluents;
       changing = (fun key -> C.M.find key changing <> None);
       may_hold = set (fun map atom -> C.add_atom atom () map) (list atom may_hold);
+      derived_atoms = set (fun map (v, value) -> C.M.add v value map) derived;
+      derived_of = set (fun map (v, ((x, _), atom)) -> C.add_atom atom (v, x) map) derived;
+      equivalent = word equivalent = "true";
+      invariants = list invariant invariants;
       exclusive = list (list atom) exclusive;
       scale = C.Z.to_pos (whole scale); cost_scale = C.Z.to_pos (whole cost_scale) }
   | _ -> reject "names are expected"
 
 (* Case trees *)
 
-let form factors constant = list (pair fluent (fun item -> fraction (word item))) factors, fraction (word constant)
 let rec tree = function
   | List [Word "nothing"] -> C.Decided None
   | List [Word "operator"; i; choice] -> C.Decided (Some (nat (small i), list whole choice))

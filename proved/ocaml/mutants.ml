@@ -79,7 +79,7 @@ let longer_plans problem plan =
   let steps = List.concat (List.mapi (fun i action ->
       List.map (fun env -> i, action, env) (C.instances problem (fun _ -> false) action.C.parameters [])) problem.C.actions) in
   let successors world = List.filter_map (fun (i, action, env) ->
-      Option.map (fun (world, _) -> (R.nat i, env), world) (C.step problem false world action env)) steps in
+      Option.map (fun (world, _) -> (R.nat i, env), world) (C.step problem false (C.derived_world problem world) action env)) steps in
   let extend (prefix, world) = List.map (fun (step, world) -> prefix @ [step], world) (successors world) in
   let once = extend ([], C.initial problem) in
   List.map (fun (prefix, _) -> prefix @ plan) (once @ List.concat_map extend once)

@@ -119,9 +119,56 @@ let names_of_keys () =
     Hashtbl.replace names key (String.sub name 0 space, String.sub name (space + 1) (String.length name - space - 1))) R.keys;
   names
 
-let names_text problem task witness =
+(* The derived atoms that may hold, if the atoms of the witness may hold and may not hold. *)
+let derivable problem names witness =
+  let pddl = problem.R.task in
+  let key (p, arguments) = p :: arguments in
+  let possible = Hashtbl.create 1000 in
+  List.iter (fun atom -> Hashtbl.replace possible (key atom) ()) witness;
+  let is_derived p = C.is_derived pddl p in
+  let is_changing p = is_derived p || List.mem p names in
+  let rec may wanted env = function
+    | C.Truth b -> b = wanted
+    | C.Atom (p, terms) -> (match C.ground env terms with
+        | None -> false
+        | Some arguments when is_changing p -> not wanted || Hashtbl.mem possible (p :: arguments)
+        | Some arguments -> (C.find_atom pddl.C.initial_atoms (p, arguments) <> None) = wanted)
+    | C.Same (t, u) -> (match C.object_of env t, C.object_of env u with Some a, Some b -> (a = b) = wanted | _ -> false)
+    | C.Compare _ -> true
+    | C.Not f -> may (not wanted) env f
+    | C.And (f, g) -> if wanted then may true env f && may true env g else may false env f || may false env g
+    | C.Forall (kind, f) ->
+      let test o = may wanted (env @ [o]) f in
+      if wanted then List.for_all test (pddl.C.objects kind) else List.exists test (pddl.C.objects kind) in
+  let derived = ref [] in
+  List.iter (fun rules ->
+    let rec rounds instances =
+      let is_new, others = List.partition (fun ((_, env), body) -> may true env body) instances in
+      List.iter (fun (atom, _) ->
+        if not (Hashtbl.mem possible (key atom)) then (Hashtbl.replace possible (key atom) (); derived := atom :: !derived)) is_new;
+      if is_new <> [] then rounds others in
+    rounds (C.rule_instances pddl rules)) pddl.C.strata;
+  List.rev !derived
+
+(* The ranges of numbers in the witness, as invariants. *)
+let ranges witness =
+  let fluent name = match R.expressions name with
+    | [R.List [R.Word "-"; _]] | [] -> R.reject "a fluent is expected"
+    | _ -> name in
+  List.concat_map (fun item -> match array item with
+    | [String name; least; most] ->
+      let bound factor sign = function
+        | Null -> []
+        | value -> [Printf.sprintf "(false ((%s %s)) %s)" (fluent name) factor (sign (string value))] in
+      let negated value = if value.[0] = '-' then String.sub value 1 (String.length value - 1) else "-" ^ value in
+      bound "1" negated least @ bound "-1" Fun.id most
+    | _ -> R.reject "a range is expected") (items witness "numbers")
+
+let names_text invariants equivalent problem task witness =
   let names = names_of_keys () in
-  let heads = List.concat_map (fun action -> C.effect_heads action.C.start_effect @ C.effect_heads action.C.end_effect) problem.C.actions in
+  let heads_of_effects =
+    List.concat_map (fun action -> C.effect_heads action.C.start_effect @ C.effect_heads action.C.end_effect) problem.R.task.C.actions in
+  let heads = heads_of_effects @ List.map (fun rule -> rule.C.head) (List.concat problem.R.task.C.strata) in
   let heads what = List.sort_uniq compare (List.filter_map (fun key ->
       let kind, name = Hashtbl.find names key in if kind = what then Some name else None) heads) in
   let basic = int (field task "basic") in
@@ -131,9 +178,21 @@ let names_text problem task witness =
     Printf.sprintf "(%d %s)\n" i (list (fun (x, atom) -> Printf.sprintf "(%d %s)" x atom) (List.filter (fun (x, _) -> x < last) atoms)) in
   let variables = List.filteri (fun i _ -> i < basic) (List.mapi variable (array (field task "variables"))) in
   let fluents = List.mapi (fun i fluent -> Printf.sprintf "(%d %s)" i (string fluent)) (array (field task "fluents")) in
+  let derived_variable i values =
+    let last = List.length (array values) - 1 in
+    (* Variables for parts of conditions have no atom. *)
+    let is_atom x atom = x < last && (string atom).[0] = '(' in
+    List.mapi (fun x atom -> x, atom) (array values) |> List.filter (fun (x, atom) -> is_atom x atom)
+    |> List.map (fun (x, atom) -> Printf.sprintf "(%d ((%d %d) %s))" i x last (string atom)) in
+  let derived = List.concat (List.filteri (fun i _ -> i >= basic) (List.mapi derived_variable (array (field task "variables")))) in
+  let read_atom text = Evidence.atom (List.hd (R.expressions text)) in
+  let changing = List.filter (fun key -> fst (Hashtbl.find names key) = "predicate") heads_of_effects in
+  let may_hold = List.map string (items witness "atoms") in
+  let name key = snd (Hashtbl.find names key) in
+  let derivable = List.map (fun (p, arguments) -> list name (p :: arguments)) (derivable problem changing (List.map read_atom may_hold)) in
   let group item = list string (array item) in
-  Printf.sprintf "(names %s %s %s %s %s %s %s %s)\n" (list Fun.id variables) (list Fun.id fluents)
-    (list Fun.id (heads "predicate")) (list Fun.id (heads "function")) (list string (items witness "atoms")) (list group (items witness "exclusive"))
+  Printf.sprintf "(names %s %s %s %s %s %s %b %s %s %s %s)\n" (list Fun.id variables) (list Fun.id fluents)
+    (list Fun.id (heads "predicate")) (list Fun.id (heads "function")) (list Fun.id (may_hold @ derivable)) (list Fun.id derived) equivalent (list Fun.id invariants) (list group (items witness "exclusive"))
     (number (field task "number_scale")) (number (field (field task "objective") "scale"))
 
 let integer_text number =
@@ -168,15 +227,26 @@ type split = Atom of C.atom | Form of C.form
 
 (* Atoms and linear forms on which a formula or an effect depends. *)
 let splits_of problem names duration =
+  let visited = Hashtbl.create 20 in
   let rec formula env = function
     | C.Truth _ | C.Same _ -> []
-    | C.Atom (p, terms) -> (match C.ground env terms with Some arguments when names.C.changing p -> [Atom (p, arguments)] | _ -> [])
+    | C.Atom (p, terms) -> (match C.ground env terms with
+        | Some arguments when names.C.changing p -> Atom (p, arguments) :: bodies (p, arguments)
+        | _ -> [])
     | C.Compare (_, a, b) -> (match C.symbolic_expression problem names C.unchanged duration env (C.Minus (a, b)) with
         | C.Is ((_ :: _, _) as form) -> [Form form]
         | _ -> [])
     | C.Not f -> formula env f
     | C.And (f, g) -> formula env f @ formula env g
-    | C.Forall (kind, f) -> List.concat_map (fun o -> formula (env @ [o]) f) (problem.C.objects kind) in
+    | C.Forall (kind, f) -> List.concat_map (fun o -> formula (env @ [o]) f) (problem.C.objects kind)
+  (* What the rules of a derived atom without a variable depend on. *)
+  and bodies atom =
+    if Hashtbl.mem visited atom || not (C.is_derived problem (fst atom)) || C.find_atom names.C.derived_of atom <> None then []
+    else begin
+      Hashtbl.replace visited atom ();
+      List.concat_map (fun rule -> if C.is_rule_of problem atom rule then formula (snd atom) rule.C.body else [])
+        (List.concat problem.C.strata)
+    end in
   let rec effect env = function
     | C.Nothing | C.Put _ | C.Change _ -> []
     | C.Both (a, b) -> effect env a @ effect env b
@@ -188,10 +258,11 @@ let splits_of problem names duration =
 let splits_of_condition names condition =
   let atom (v, x) = match C.M.find v names.C.variables with
     | Some atoms -> (match List.assoc_opt x atoms with Some atom -> [Atom atom] | None -> List.map (fun (_, atom) -> Atom atom) atoms)
-    | None -> [] in
+    | None -> (match C.M.find v names.C.derived_atoms with Some ((_, _), atom) -> [Atom atom] | None -> []) in
   List.concat_map atom (condition.C.facts @ List.map fst (List.concat condition.C.clauses))
 
 exception No_tree
+exception No_invariant of string
 
 let max_splits = 14
 
@@ -200,7 +271,7 @@ let search problem task names leaf candidates splits knowledge =
   let rec tree depth (knowledge : C.knowledge) =
     match List.find_opt (leaf knowledge) candidates with
     | Some candidate -> C.Decided candidate
-    | None when C.impossible problem task names knowledge -> C.Impossible
+    | None when C.contradictory problem task names knowledge -> C.Impossible
     | None when depth = max_splits -> raise No_tree
     | None ->
       let negated form = C.plus_form (C.constant R.zero) { C.qnum = C.Zneg C.XH; qden = C.XH } form in
@@ -252,29 +323,43 @@ let claim_text manifest = match field manifest "claim" with
   | String "unsolvable" -> "unsolvable"
   | claim -> string (field (field claim "optimal") "metric")
 
-let prepare directory =
+(* The evidence with these invariants *)
+let prepare_with invariants_of directory =
+  let output = Buffer.create 100000 in
   let read name =
     let channel = open_in_bin (Filename.concat directory name) in
     Fun.protect ~finally:(fun () -> close_in channel) (fun () -> really_input_string channel (in_channel_length channel)) in
   let problem = R.problem (read "domain.pddl") (read "problem.pddl") in
   let task = json (read "task.json") in
   let argument = argument_text (json (read "argument.json")) in
-  let others =
-    "(claim " ^ claim_text (json (read "manifest.json")) ^ ")\n" ^ task_text task
-    ^ names_text problem.R.task task (json (read "witness.json")) in
-  let evidence = Evidence.read problem.R.action_names (others ^ "(argument () () ()) (goal-case (nothing)) (cases)") in
+  let claim_and_task = "(claim " ^ claim_text (json (read "manifest.json")) ^ ")\n" ^ task_text task in
+  let witness = json (read "witness.json") in
+  let with_names equivalent =
+    let others = claim_and_task ^ names_text (invariants_of witness) equivalent problem task witness in
+    others, Evidence.read problem.R.action_names (others ^ "(argument () () ()) (goal-case (nothing)) (cases)") in
+  let follows (_, evidence) =
+    let task = evidence.Evidence.ground_task in
+    fst (C.ground_rules_ok problem.R.task task evidence.names task.C.layers) in
+  let equivalent = with_names true in
+  let others, evidence = if follows equivalent then equivalent else with_names false in
   let ground_task = evidence.Evidence.ground_task and names = evidence.Evidence.names and pddl = problem.R.task in
   let keys = names_of_keys () in
+  let rules = C.ground_rules ground_task in
+  List.iteri (fun stratum here -> List.iter (fun ((p, arguments), body) ->
+    if not (C.rule_ok pddl ground_task names (R.nat stratum) rules ((p, arguments), body)) then
+      let name key = snd (Hashtbl.find keys key) in
+      R.reject "not covered: no rule of the task is found for the derived atom %s" (list name (p :: arguments)))
+    (C.rule_instances pddl here)) pddl.C.strata;
   let search = search pddl ground_task names in
   let formula_splits, _ = splits_of pddl names C.Undefined in
   let goal_case =
     try search (C.goal_leaf pddl ground_task names) [None]
         (formula_splits [] pddl.C.goal_formula @ splits_of_condition names ground_task.C.goal)
-        (C.conjuncts pddl names C.unchanged C.Undefined [] pddl.C.goal_formula)
+        (C.with_invariants names (C.conjuncts pddl names C.unchanged C.Undefined [] pddl.C.goal_formula))
     with No_tree -> R.reject "no case tree is found for the goal" in
-  print_string others;
-  print_string argument;
-  Printf.printf "(goal-case %s)\n(cases" (tree_text keys goal_case);
+  Buffer.add_string output others;
+  Buffer.add_string output argument;
+  Printf.bprintf output "(goal-case %s)\n(cases" (tree_text keys goal_case);
   let by_action = operators_by_action task in
   List.iter2 (fun name action ->
     let instances = C.instances pddl (C.pruned pddl names action) action.C.parameters [] in
@@ -295,14 +380,23 @@ let prepare directory =
       let splits = formula env action.C.at_start @ formula env action.C.over_all @ formula env action.C.at_end
                    @ effect env action.C.start_effect @ effect env action.C.end_effect @ operator_splits in
       match search (C.instance_leaf pddl ground_task names action env) (candidates @ [None]) splits
-              (C.gathered pddl ground_task names action env) with
+              (C.with_invariants names (C.gathered pddl ground_task names action env)) with
       | C.Decided None -> ()
-      | tree -> Printf.printf "\n((%s) %s)" (String.concat " " (name :: objects)) (tree_text keys tree)
-      | exception No_tree -> R.reject "no case tree is found for (%s)" (String.concat " " (name :: objects))) instances)
+      | tree -> Printf.bprintf output "\n((%s) %s)" (String.concat " " (name :: objects)) (tree_text keys tree)
+      | exception No_tree -> raise (No_invariant (String.concat " " (name :: objects)))) instances)
     problem.R.action_names pddl.C.actions;
-  print_string ")\n"
+  Buffer.add_string output ")\n";
+  output
+
+(* Most tasks need no ranges of numbers. *)
+let prepare directory =
+  print_string (Buffer.contents (
+    try prepare_with (fun _ -> []) directory
+    with No_invariant _ -> prepare_with ranges directory))
 
 let () =
   match Sys.argv with
-  | [| _; directory |] -> (try prepare directory with R.Rejected message -> prerr_endline ("rejected: " ^ message); exit 3)
+  | [| _; directory |] -> (try prepare directory with
+    | R.Rejected message -> prerr_endline ("rejected: " ^ message); exit 3
+    | No_invariant instance -> prerr_endline ("rejected: no case tree is found for (" ^ instance ^ ")"); exit 3)
   | _ -> prerr_endline "usage: prepare CERTIFICATE > EVIDENCE"; exit 2

@@ -108,14 +108,15 @@ type problem = { task : C.problem; maximizes : bool; action_names : string list;
 
 let negative q = C.qred (C.qminus zero q)
 
-let problem domain_text problem_text =
+(* [metric] replaces the metric of the problem: minimize or maximize, and an expression. *)
+let problem ?metric domain_text problem_text =
   let sections kind text = match expressions text with
     | [List (Word "define" :: List [Word other; Word _] :: sections)] when other = kind ->
       List.map (function List (Word name :: items) -> name, items | _ -> reject "a section is expected") sections
     | _ -> reject "(define (%s NAME) ...) is expected" kind in
   let domain = sections "domain" domain_text and problem = sections "problem" problem_text in
   let check_names allowed = List.iter (fun (name, _) -> if not (List.mem name allowed) then reject "not covered: %s" name) in
-  check_names [":requirements"; ":types"; ":constants"; ":predicates"; ":functions"; ":action"; ":durative-action"] domain;
+  check_names [":requirements"; ":types"; ":constants"; ":predicates"; ":functions"; ":derived"; ":action"; ":durative-action"] domain;
   check_names [":domain"; ":requirements"; ":objects"; ":init"; ":goal"; ":metric"] problem;
   let section sections name = match List.filter (fun (other, _) -> other = name) sections with
     | [] -> []
@@ -139,9 +140,16 @@ let problem domain_text problem_text =
   let is_object name = List.mem_assoc name objects in
   let known_object name = if is_object name then object_key name else reject "unknown object: %s" name in
 
+  let typed_variables =
+    let read (name, kind) = if is_variable name then name, type_key (known_type kind) else reject "a variable is expected: %s" name in
+    fun items -> List.map read (typed items) in
+  let variables items =
+    let variables = typed_variables items in
+    distinct "a variable" (List.map fst variables); variables in
+
   (* Predicates and functions with their numbers of arguments *)
   let rec declarations = function
-    | List (Word name :: arguments) :: others -> (name, List.length (typed arguments)) :: declarations others
+    | List (Word name :: arguments) :: others -> (name, List.length (typed_variables arguments)) :: declarations others
     | Word "-" :: Word "number" :: others -> declarations others
     | Word "-" :: Word kind :: _ -> reject "not covered: functions with values of type %s" kind
     | [] -> []
@@ -149,6 +157,7 @@ let problem domain_text problem_text =
   let predicates = declarations (section domain ":predicates") and functions = declarations (section domain ":functions") in
   distinct "a predicate" (List.map fst predicates);
   distinct "a function" (List.map fst functions);
+  let derived_names = List.filter_map (function ":derived", List (Word name :: _) :: _ -> Some name | _ -> None) domain in
   let applied what declared name arguments = match List.assoc_opt name declared with
     | Some arity when arity = List.length arguments -> ()
     | Some arity -> reject "%s has %d arguments: %s" what arity name
@@ -179,11 +188,6 @@ let problem domain_text problem_text =
       applied "function" functions name arguments;
       C.Fluent (function_key name, List.map (term scope) arguments)
     | List _ -> reject "an expression is expected" in
-  let variables items =
-    let variables = typed items in
-    List.iter (fun (name, _) -> if not (is_variable name) then reject "a variable is expected: %s" name) variables;
-    distinct "a variable" (List.map fst variables);
-    List.map (fun (name, kind) -> name, type_key (known_type kind)) variables in
   (* Applies [quantify] once for each variable, the first one outermost. *)
   let quantified quantify scope items body =
     let variables = variables items in
@@ -226,11 +230,42 @@ let problem domain_text problem_text =
     | Word _ | List (List _ :: _) -> reject "an effect is expected"
   and put scope holds name arguments =
     applied "predicate" predicates name arguments;
+    if List.mem name derived_names then reject "a derived predicate is in an effect: %s" name;
     C.Put (holds, predicate_key name, List.map (term scope) arguments)
   and both = function
     | [] -> C.Nothing
     | [only] -> only
     | first :: others -> C.Both (first, both others) in
+
+  (* Derived predicates. The stratum of one is that of what it refers to, or the next one if the
+     reference is negated. *)
+  let derived = List.filter_map (function
+    | ":derived", [List (Word name :: parameters); body] ->
+      let parameters = variables parameters in
+      applied "predicate" predicates name parameters;
+      Some (name, { C.head = predicate_key name; head_types = List.map snd parameters; body = condition (List.map fst parameters) body })
+    | ":derived", _ -> reject "(:derived (PREDICATE ...) CONDITION) is expected"
+    | _ -> None) domain in
+  let heads = List.sort_uniq compare (List.map (fun (_, rule) -> rule.C.head) derived) in
+  let rec references positive = function
+    | C.Atom (p, _) -> [p, positive]
+    | C.Not f -> references (not positive) f
+    | C.And (f, g) -> references positive f @ references positive g
+    | C.Forall (_, f) -> references positive f
+    | C.Truth _ | C.Same _ | C.Compare _ -> [] in
+  let level = Hashtbl.create 10 in
+  let level_of p = Option.value ~default:0 (Hashtbl.find_opt level p) in
+  let rec raise_levels rounds =
+    if rounds < 0 then reject "a derived predicate depends on its own negation";
+    let raised = List.filter (fun (_, rule) ->
+      let least (p, positive) = if List.mem p heads then level_of p + (if positive then 0 else 1) else 0 in
+      let most = List.fold_left (fun most reference -> max most (least reference)) (level_of rule.C.head) (references true rule.C.body) in
+      let is_raised = most > level_of rule.C.head in
+      Hashtbl.replace level rule.C.head most; is_raised) derived in
+    if raised <> [] then raise_levels (rounds - 1) in
+  raise_levels (List.length heads * List.length heads);
+  let strata = List.init (List.length heads) (fun i ->
+    List.filter_map (fun (_, rule) -> if level_of rule.C.head = i then Some rule else None) derived) in
 
   (* The parts at start, over all and at end of what a durative action requires or does. *)
   let rec timed times read join quantify scope = function
@@ -300,7 +335,10 @@ let problem domain_text problem_text =
      | Some other when not (C.qeq_bool other value) -> reject "two initial values: %s" name
      | _ -> ());
     initial_values := C.add_atom fluent value !initial_values in
-  let atom name arguments = applied "predicate" predicates name arguments; predicate_key name, ground arguments in
+  let atom name arguments =
+    applied "predicate" predicates name arguments;
+    if List.mem name derived_names then reject "a derived predicate is in :init: %s" name;
+    predicate_key name, ground arguments in
   let negated = ref [] in
   List.iter (function
     | List [Word "="; List (Word name :: arguments); Word value] -> set_value name arguments (decimal value)
@@ -327,7 +365,8 @@ let problem domain_text problem_text =
       let weight, value = weighted item in
       C.qred (C.qmult factor weight), C.Times (C.Constant factor, value)
     | item -> zero, expression [] item in
-  let maximizes, (per_time, metric), per_step = match section problem ":metric" with
+  let metric_items = match metric with Some items -> items | None -> section problem ":metric" in
+  let maximizes, (per_time, metric), per_step = match metric_items with
     | [Word "minimize"; item] -> false, weighted item, zero
     | [Word "maximize"; item] ->
       let weight, value = weighted item in
@@ -336,7 +375,7 @@ let problem domain_text problem_text =
     | [] -> false, (zero, C.Constant zero), one
     | _ -> reject "not covered: a metric other than minimize or maximize" in
   { task = { C.objects = (fun kind -> Option.value ~default:[] (Hashtbl.find_opt members kind));
-             actions = List.map snd actions; initial_atoms = !initial_atoms; initial_values = !initial_values;
+             actions = List.map snd actions; strata; initial_atoms = !initial_atoms; initial_values = !initial_values;
              goal_formula; metric; per_time; per_step };
     maximizes; action_names = List.map fst actions; object_names = List.map fst objects }
 

@@ -31,7 +31,12 @@ let rec expression depth scope timed =
   | 9 -> form "*" [deeper (); deeper ()]
   | _ -> form "/" [deeper (); deeper ()]
 
-let atom scope = match Random.int 4 with
+(* Predicates of atoms in conditions; [derived] of them are derived. *)
+let derived = ref 0
+let atom scope = match Random.int (4 + !derived) with
+  | 4 -> form "d0" [term scope]
+  | 5 -> "(d1)"
+  | 6 -> form "d2" [term scope; term scope]
   | 0 -> "(a)"
   | 1 -> "(b)"
   | 2 -> form "q" [term scope]
@@ -51,11 +56,28 @@ let rec condition depth scope timed =
     let variable = variable scope in
     form (pick ["forall"; "exists"]) ["(" ^ variable ^ " - " ^ pick kinds ^ ")"; deeper (scope @ [variable])]
 
+let changeable scope =
+  let number = !derived in
+  derived := 0;
+  let atom = atom scope in
+  derived := number; atom
+(* The rules of three derived predicates; the last one is recursive. *)
+let rules () =
+  let rule head body = form ":derived" [head; body] in
+  derived := 0;
+  let d0 = rule "(d0 ?x - t)" (condition 2 ["?x"] false) in
+  derived := 1;
+  let d1 = rule "(d1)" (condition 2 [] false) in
+  derived := 2;
+  let d2 = rule "(d2 ?x - t ?y - t1)" (condition 1 ["?x"; "?y"] false) in
+  let step = rule "(d2 ?x - t ?y - t)" ("(exists (?z - t) (and (d2 ?x ?z) (r ?z ?y)))") in
+  derived := 3;
+  [d0; d1; d2; step]
 let rec effect depth scope timed =
   let deeper scope = effect (depth - 1) scope timed in
   match Random.int (if depth = 0 then 7 else 10) with
-  | 0 | 1 -> atom scope
-  | 2 | 3 -> form "not" [atom scope]
+  | 0 | 1 -> changeable scope
+  | 2 | 3 -> form "not" [changeable scope]
   | 4 -> form "increase" ["(total-cost)"; pick ["1"; "2"; "0.5"]]
   | 5 | 6 -> form (pick ["increase"; "decrease"; "assign"]) [pick ["(f)"; "(u)"; form "g" [term scope]]; expression 1 scope timed]
   | 7 -> form "and" (several 3 (fun () -> deeper scope))
@@ -80,9 +102,11 @@ let action i =
     form ":durative-action" [name; ":duration"; form "=" ["?duration"; duration]; ":condition"; form "and" (several 3 timed_condition);
                              ":effect"; form "and" (several 4 timed_effect)]
 
-let domain () = form "define" [
+let domain () =
+  let rules = rules () in
+  form "define" ([
     "(domain d)"; "(:requirements :adl :numeric-fluents :durative-actions)"; "(:types t1 t2 - t)"; "(:constants c - t)";
-    "(:predicates (a) (b) (q ?x - t) (r ?x ?y - t))"; "(:functions (total-cost) (f) (u) (g ?x - t))"; action 0; action 1; action 2]
+    "(:predicates (a) (b) (q ?x - t) (r ?x ?y - t) (d0 ?x - t) (d1) (d2 ?x ?y - t))"; "(:functions (total-cost) (f) (u) (g ?x - t))"; ] @ rules @ [action 0; action 1; action 2])
 let problem () =
   let maybe text = if chance 50 then text else "" in
   let value name = if chance 20 then "" else (form "=" [name; pick ["0"; "1"; "1"; "2"; "0.5"; "-1"]]) in
@@ -102,7 +126,7 @@ let plan problem =
     if length = 0 then []
     else
       let successors = List.filter_map (fun (i, action, env) ->
-          Option.map (fun (world, _) -> (i, env), world) (C.step problem true world action env)) steps in
+          Option.map (fun (world, _) -> (i, env), world) (C.step problem true (C.derived_world problem world) action env)) steps in
       if successors = [] || chance 5 then
         let i, _, env = pick steps in
         (i, env) :: extend (length - 1) world
