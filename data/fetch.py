@@ -151,7 +151,7 @@ def fetch_source(source, directory, partial, errors):
 
 
 def publish(sources, directory, partial):
-    """Moves the fetched files to the directory that tests read, and removes what is left over of earlier runs."""
+    """Moves the fetched files to the directory that tests read, and removes the rest of earlier runs."""
     for source in sources:
         for _, target, expected in source["files"]:
             if digest(directory / target) != expected:
@@ -213,4 +213,8 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except OSError as error:
+        # Such as a full disk. The next run continues.
+        sys.exit(f"data: {error}; make room or choose another --directory, then run the command again")
