@@ -27,6 +27,14 @@ test:
 long:
     cargo test --release -- --ignored
 
+# Fetch the public files that tests read (`just data sources benchmarks`: also those of benchmarks).
+data *LISTS:
+    python3 data/fetch.py {{LISTS}}
+
+# Produce tables of the README and the book again (benches/tables.toml); without a name, list them.
+reproduce *TABLES:
+    python3 benches/reproduce.py {{TABLES}}
+
 # Measure: the UGV mission end to end, and the rule engine.
 bench:
     cargo bench --bench ugv

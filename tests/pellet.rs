@@ -20,7 +20,7 @@ use std::time::Instant;
 use ontology::runtime::{Mode, NewObjective, Runtime};
 use ontology::{ReadOptions, lower, read_files, vocab};
 use rules::{Engine, Literal, Symbols};
-use test_resources::{Resource, data, data_directory, program, python_with};
+use test_resources::{Resource, data, program, python_with};
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 const OURS: &str = env!("CARGO_BIN_EXE_metaplan");
@@ -42,20 +42,21 @@ struct Times {
 
 struct Peer {
     class_path: String,
-    shared: PathBuf,
+    /// Directory of the real knowledge bases.
+    owl: PathBuf,
 }
 
 impl Peer {
     /// Finds Pellet and the test data. Returns `None` if something is missing.
     fn find() -> Option<Self> {
-        data("real/owl")?;
+        let owl = data("real/owl")?;
         program(Resource::Java, &["java"])?;
         let python = python_with(Resource::Owlready2, "METAPLAN_PYTHON", "owlready2.reasoning")?;
         let script = "import owlready2.reasoning as r; print(r._PELLET_CLASSPATH)";
         let output = Command::new(python).args(["-c", script]).output().expect("Python starts");
         let class_path = String::from_utf8(output.stdout).expect("UTF-8").trim().to_owned();
         assert!(!class_path.is_empty(), "owlready2 contains no Pellet");
-        Some(Self { class_path, shared: data_directory() })
+        Some(Self { class_path, owl })
     }
 
     /// Returns the command line with which owlready2 starts Pellet on an N-Triples document. `class` is the
@@ -69,7 +70,7 @@ impl Peer {
     }
 
     fn owl(&self, file: &str) -> String {
-        self.shared.join("real/owl").join(file).display().to_string()
+        self.owl.join(file).display().to_string()
     }
 }
 
@@ -185,10 +186,10 @@ fn suave_deployed_and_resident() {
 #[test]
 #[ignore = "needs Java and owlready2, and takes minutes"]
 fn knowledge_bases_at_scale() {
-    let Some(peer) = Peer::find() else { return };
+    let (Some(peer), Some(generator)) = (Peer::find(), data("tools/scale_kb.py")) else { return };
     let directory = tempfile::tempdir().expect("temporary directory");
     let path = |name: &str| directory.path().join(name).display().to_string();
-    let generator = peer.shared.join("tools/scale_kb.py").display().to_string();
+    let generator = generator.display().to_string();
     let (tomasys, mros) = (peer.owl("mc_mdl_tomasys/tomasys.owl"), peer.owl("mros_ontology/mros.owl"));
     let real = peer.owl("");
     for (functions, designs) in [(2, 5), (10, 10), (100, 10), (50, 100)] {

@@ -6,8 +6,8 @@
     python3 benches/peers/field.py --table field.csv                       # coverage and times by suite, as Markdown
     python3 benches/peers/field.py --disagreements field.csv               # answers that cannot both be right
 
-The suites (classical, numeric, temporal, unsolvable) are those below `--tasks`, one directory for each domain, paired by the file
-`reference.csv` there; `ours` is `ours.py`. A planner runs on what it reads; temporal tasks are planned with overlapping actions. The
+The suites (classical, numeric, temporal, unsolvable) are those below `--tasks`, one directory for each domain (`data/fetch.py sources benchmarks`
+fetches them), paired by `tasks.csv`; `ours` is `ours.py`. A planner runs on what it reads; temporal tasks are planned with overlapping actions. The
 limit is on processor time of the planner with all its processes, so that other load on the machine harms nobody; wall clock may be
 ten times as long. Metaplan also gets that limit by its own option, on wall clock (`--slack` times as long on a loaded machine), and
 answers with the best plan so far.
@@ -30,6 +30,7 @@ from pathlib import Path
 
 import ours
 import report
+from ours import data_path
 from planners import CLASSICAL, NUMERIC, PACKAGES, ROOT, TEMPORAL, planners
 from process import PATIENCE, run
 
@@ -44,7 +45,7 @@ Task = namedtuple("Task", "suite name problem kind files optimum")
 
 def tasks(options, directory):
     """All tasks of the suites that are asked for."""
-    with open(options.tasks / "reference.csv", newline="") as file:
+    with open(Path(__file__).with_name("tasks.csv"), newline="") as file:
         for row in csv.DictReader(file):
             if row["mode"] in options.suites:
                 place = options.tasks / row["mode"] / row["task"]
@@ -151,7 +152,7 @@ def main():
     parser.add_argument("--venv", type=Path, help="virtual environment of the peers")
     parser.add_argument("--install", action="store_true", help="make it, and install the peers from PyPI")
     parser.add_argument("--program", type=Path, default=ROOT / "target" / "release" / "metaplan", help="Metaplan, which also validates")
-    parser.add_argument("--tasks", type=Path, default=ROOT.parent / "shared" / "real" / "ipc", help="the public suites")
+    parser.add_argument("--tasks", type=Path, default=data_path("real/ipc"), help="the public suites")
     parser.add_argument("--suites", type=words, default=list(SUITES), help="of " + ", ".join(SUITES))
     parser.add_argument("--planners", type=words, help="these only, in this order")
     parser.add_argument("--names", type=words, help="tasks whose name contains one of these only")

@@ -9,7 +9,10 @@ from pathlib import Path
 import factored
 from planners import CLASSICAL, NUMERIC, ROOT, TEMPORAL
 
-TOOLS = ROOT.parent / "shared" / "tools"
+sys.path.insert(0, str(ROOT / "data"))
+from fetch import data_path  # noqa: E402
+
+TOOLS = data_path("tools")
 # Rows of a table of costs, at most.
 ROWS = 300_000
 # Family, waypoints or pipelines, designs of each function, functions, seed.

@@ -29,8 +29,9 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-SHARED = ROOT.parent / "shared"
-REAL = SHARED / "real"
+sys.path.insert(0, str(ROOT / "data"))
+from fetch import data_path  # noqa: E402
+
 SPEED, GRID_LENGTH, SWITCH_TIME, SWITCH_ENERGY = 0.68, 10.0, 5.0, 100
 # Rate of energy, accuracy, light that it brings along: as in navigation.owl.
 DESIGNS = {
@@ -98,7 +99,7 @@ class CamaraMap:
     """Cámara's map: a corridor is dark where the least light measured is below half of the range, unsafe where there were bumps."""
 
     def __init__(self):
-        summary = json.loads((SHARED / "reference/p2cp3_summary.json").read_text())
+        summary = json.loads(data_path("reference/p2cp3_summary.json").read_text())
         self.requires, self.lengths, self.times = {}, {}, {}
         for arc in summary["arcs"]:
             light = DARK if arc.get("illum") and arc["illum"][0] < 40 else 0.0
@@ -207,16 +208,16 @@ def main():
         subprocess.run([sys.executable, "-m", "venv", str(arguments.venv)], check=True)
         subprocess.run([str(arguments.venv / "bin/pip"), "install", "--quiet", "up-fast-downward"], check=True)
         return
-    if not (REAL / "planta/grid").exists():
+    if not data_path("real/planta/grid").exists():
         sys.exit("skipped: PLANTA's problems are not there")
     found = list(arguments.venv.glob("lib/python3*/site-packages/up_fast_downward/downward/fast-downward.py"))
     if not found:
         sys.exit("Fast Downward is not there: run with --install first")
     python, program = str(arguments.venv / "bin/python"), str(found[0])
     metaplan = str(Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "release" / "metaplan")
-    base, kb = REAL / "pddl/navigation_planta", REAL / "owl/navigation_planta/navigation.owl"
-    knowledge = ["--kb", str(kb), "--directory", str(REAL / "owl"), "--quiet"]
-    maps = sorted((REAL / "planta/grid").iterdir(), key=lambda folder: int(folder.name.split("-")[1]))
+    base, kb = data_path("real/pddl/navigation_planta"), data_path("real/owl/navigation_planta/navigation.owl")
+    knowledge = ["--kb", str(kb), "--directory", str(data_path("real/owl")), "--quiet"]
+    maps = sorted(data_path("real/planta/grid").iterdir(), key=lambda folder: int(folder.name.split("-")[1]))
     header = ["map", "domain", "cost", "metaplan cpu", "wall", "export", "blind cpu", "wall", "ratio", "lama cpu", "cost"]
     rows, worth = [header], [["map", "plan", "seconds", "energy", "changes", "time +%", "energy +%"]]
     with tempfile.TemporaryDirectory() as scratch:

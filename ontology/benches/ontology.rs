@@ -10,10 +10,10 @@ use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use ontology::runtime::{Mode, NewObjective, Runtime};
 use ontology::{Ontology, ReadOptions, kb, lower, read_files, read_text, vocab};
 use rules::{Engine, Literal, Symbols};
-use test_resources::data_directory;
+use test_resources::data_path;
 
 fn suave() -> Ontology {
-    let real = data_directory().join("real/owl");
+    let real = data_path("real/owl");
     let file = real.join("suave/suave.owl");
     let options = ReadOptions { directories: vec![real], ..ReadOptions::default() };
     if file.is_file() {

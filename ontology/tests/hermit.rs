@@ -21,7 +21,7 @@ use std::process::{Command, Stdio};
 
 use ontology::{EntityKind, INTERNAL, OutputSyntax, ReadOptions, convert_files, lower, ntriples, read_files};
 use rules::{Engine, Fact, Symbols};
-use test_resources::data_directory;
+use test_resources::data_path;
 
 use crate::w3c::premises;
 
@@ -111,7 +111,7 @@ fn every_conclusion_is_entailed() {
     let directory = tempfile::tempdir().expect("a folder");
     let mut files = Vec::new();
     for folder in ["owl", "owl_field"] {
-        documents(&data_directory().join("real").join(folder), &mut files);
+        documents(&data_path("real").join(folder), &mut files);
     }
     files.sort();
     for (name, text) in premises() {

@@ -1,7 +1,7 @@
 //! Fenced blocks of a page, with the instructions in the comment before each block.
 
 use pulldown_cmark::{CodeBlockKind, Event, Options, Parser, Tag, TagEnd};
-use test_resources::{Resource, data_directory, in_path};
+use test_resources::{Resource, data_path, in_path};
 
 /// Kind of a block, which determines how the block is checked.
 #[derive(Debug, PartialEq, Eq)]
@@ -64,7 +64,7 @@ pub const FIXTURES: [Fixture; 1] = [Fixture {
 
 fn is_available(name: &str) -> bool {
     match FIXTURES.iter().find(|fixture| fixture.name == name) {
-        Some(fixture) => fixture.files.iter().all(|(source, _)| data_directory().join(source).exists()),
+        Some(fixture) => fixture.files.iter().all(|(source, _)| data_path(source).exists()),
         None => in_path(&[name]).is_some(),
     }
 }
@@ -72,7 +72,7 @@ fn is_available(name: &str) -> bool {
 /// Returns the resource that contains a program or fixture.
 pub fn resource(name: &str) -> Resource {
     if FIXTURES.iter().any(|fixture| fixture.name == name) {
-        return Resource::Data;
+        return Resource::PublicData;
     }
     let resource = if name == "python3" { Some(Resource::Python) } else { Resource::named(name) };
     resource.unwrap_or_else(|| panic!("`needs: {name}`: no resource of crates/test-resources has this name"))

@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 
 use snapbox::{Assert, IntoData as _};
 use tempfile::TempDir;
-use test_resources::data_directory;
+use test_resources::data_path;
 
 use crate::common::{copy_folder, root, verifier, without_progress};
 use crate::page::{Block, FIXTURES, Kind};
@@ -59,7 +59,7 @@ impl Session {
             .filter(|fixture| blocks.iter().any(|block| block.needs.iter().any(|name| name == fixture.name)))
         {
             for (source, target) in fixture.files {
-                let (source, target) = (data_directory().join(source), self.place().join(target));
+                let (source, target) = (data_path(source), self.place().join(target));
                 if source.is_dir() {
                     copy_folder(&source, &target);
                 } else {

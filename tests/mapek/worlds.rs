@@ -88,8 +88,7 @@ pub fn shipped() -> Vec<Place> {
     ["ugv", "uuv", "ugv_plain", "uuv_plain", "camara_like"].map(place).into()
 }
 
-/// Returns the mission with SUAVE's own knowledge base; `None` if the shared material is not installed next
-/// to the project.
+/// Returns the mission with SUAVE's own knowledge base; `None` without the public test data.
 pub fn suave() -> Option<Place> {
     let directory = crate::fleet::files()?;
     Some(Place::new("suave", &directory.path().join("m.toml"), Vec::new(), false))

@@ -4,11 +4,11 @@
 use serde_json::{Value, json};
 
 use crate::common::{Outcome, metaplan, metaplan_in};
-use crate::real::shared;
+use crate::real::real;
 
 /// Returns the files of the Metaplan paper and the options for SUAVE's knowledge base, if available.
 fn paper() -> Option<([String; 2], Vec<String>)> {
-    let real = shared()?.join("real").display().to_string();
+    let real = real()?.display().to_string();
     let file = |name: &str| format!("{real}/pddl/suave_metaplan/suave_extended_metaplan_{name}.pddl");
     let options =
         [("kb", "suave/suave.owl"), ("directory", "mros_ontology"), ("directory", "mc_mdl_tomasys")];

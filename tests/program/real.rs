@@ -5,18 +5,18 @@ use std::path::PathBuf;
 
 use crate::common::{metaplan, metaplan_in};
 use serde_json::Value;
-use test_resources::{data, data_directory};
+use test_resources::data;
 
-/// Returns the directory of the test data, if it contains the real files.
-pub fn shared() -> Option<PathBuf> {
-    data("real").map(|_| data_directory())
+/// Returns the directory of the real files, if the test data contains them.
+pub fn real() -> Option<PathBuf> {
+    data("real")
 }
 
 /// Compares the result of `metaplan reason` with that of the reference reasoner. The input is SUAVE's
 /// knowledge base with the assertions of a golden case.
 fn reason(case: &str) {
-    let Some(shared) = shared() else { return };
-    let text = std::fs::read_to_string(shared.join(format!("golden/kb/{case}.json"))).expect("the case");
+    let (Some(real), Some(file)) = (real(), data(format!("golden/kb/{case}.json"))) else { return };
+    let text = std::fs::read_to_string(file).expect("the case");
     let case: Value = serde_json::from_str(&text).expect("JSON");
     let triple = |triple: &Value| {
         let part = |index: usize| triple[index].as_str().expect("a string").to_owned();
@@ -30,16 +30,16 @@ fn reason(case: &str) {
     let added = directory.path().join("added.nt");
     let lines: Vec<_> = triples(&case["added"]).into_iter().collect();
     std::fs::write(&added, lines.join("\n")).expect("a file");
-    let shared = shared.display().to_string();
+    let real = real.display().to_string();
     let outcome = metaplan_in(
         directory.path(),
         &[
             "reason",
-            &format!("{shared}/real/owl/suave/suave.owl"),
+            &format!("{real}/owl/suave/suave.owl"),
             "--directory",
-            &format!("{shared}/real/owl/mros_ontology"),
+            &format!("{real}/owl/mros_ontology"),
             "--directory",
-            &format!("{shared}/real/owl/mc_mdl_tomasys"),
+            &format!("{real}/owl/mc_mdl_tomasys"),
             "--assert",
             "added.nt",
             "--format",
@@ -70,8 +70,8 @@ fn suave_has_the_inferences_of_the_reference_reasoner() {
 
 #[test]
 fn suave_has_27_rules() {
-    let Some(shared) = shared() else { return };
-    let owl = shared.join("real/owl").display().to_string();
+    let Some(real) = real() else { return };
+    let owl = real.join("owl").display().to_string();
     let outcome = metaplan(&[
         "reason",
         &format!("{owl}/suave/suave.owl"),
@@ -88,9 +88,8 @@ fn suave_has_27_rules() {
 
 #[test]
 fn problem_of_the_paper_gets_a_bounded_reading() {
-    let Some(shared) = shared() else { return };
-    let file =
-        |name: &str| shared.join(format!("real/pddl/suave_metaplan/{name}.pddl")).display().to_string();
+    let Some(real) = real() else { return };
+    let file = |name: &str| real.join(format!("pddl/suave_metaplan/{name}.pddl")).display().to_string();
     let (domain, problem) = (file("suave_extended_metaplan_domain"), file("suave_extended_metaplan_problem"));
     let outcome = metaplan(&["plan", &domain, &problem, "--format", "json"]);
     assert_eq!(outcome.status, 1, "{outcome:#?}");
@@ -102,9 +101,8 @@ fn problem_of_the_paper_gets_a_bounded_reading() {
 
 #[test]
 fn all_errors_of_the_mismatched_problem_are_reported() {
-    let Some(shared) = shared() else { return };
-    let file =
-        |name: &str| shared.join(format!("real/pddl/suave_metaplan/{name}.pddl")).display().to_string();
+    let Some(real) = real() else { return };
+    let file = |name: &str| real.join(format!("pddl/suave_metaplan/{name}.pddl")).display().to_string();
     let (domain, problem) = (file("inspect_pl_domain"), file("inspect_pl_problem"));
     let outcome = metaplan(&["plan", &domain, &problem, "--format", "json"]);
     assert_eq!(outcome.status, 3, "{outcome:#?}");

@@ -119,6 +119,7 @@ fn commands_that_install_from_a_path_respect_the_lock_file() {
     paths.push("integrations/ros/examples/deploy/metaplan-ros.service".into());
     paths.push("integrations/ros/examples/deploy/Containerfile".into());
     paths.push("integrations/fleet/examples/Containerfile".into());
+    paths.push("Containerfile".into());
     let mut violations = Vec::new();
     for path in paths {
         let text = text(&path.display().to_string());

@@ -9,7 +9,7 @@ use metaplan_pddl::{
     Diagnostic, Errors, Severity, Source, check_domain, has_errors, parse_domain, parse_problem,
     print_domain, print_problem, read,
 };
-use test_resources::{data, data_directory};
+use test_resources::{data, data_path};
 
 const REAL: &str = "real/pddl";
 
@@ -113,8 +113,7 @@ fn path_of(short: &str) -> String {
 }
 
 fn source(path: &str) -> Source {
-    let bytes = std::fs::read(data_directory().join(REAL).join(path))
-        .unwrap_or_else(|error| panic!("{path}: {error}"));
+    let bytes = std::fs::read(data_path(REAL).join(path)).unwrap_or_else(|error| panic!("{path}: {error}"));
     Source::from_bytes(path, &bytes)
 }
 

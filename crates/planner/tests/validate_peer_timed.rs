@@ -22,7 +22,7 @@ use num_traits::ToPrimitive;
 use pddl::ast::{ActionBody, Domain, Problem};
 use pddl::validate::{Options, PlanText, ViolationKind, validate};
 use pddl::{Source, print_domain, print_problem, read};
-use test_resources::{data, data_directory};
+use test_resources::{data, data_path};
 
 /// Domains and problems that the framework can read.
 const PAIRS: [(&str, &str); 8] = [
@@ -58,7 +58,7 @@ type Timed = (i128, Vec<String>, Option<i128>);
 
 fn file(name: &str) -> PathBuf {
     let folder = if name.starts_with("suave") { "suave_metaplan/" } else { "plansys2/plansys2_" };
-    data_directory().join(format!("real/pddl/{folder}{name}.pddl"))
+    data_path(format!("real/pddl/{folder}{name}.pddl"))
 }
 
 fn thousandths(value: i128) -> String {

@@ -6,7 +6,7 @@
 //!
 //! | environment variable | meaning |
 //! |---|---|
-//! | `METAPLAN_DATA` | Directory of the test data, by default `../shared`. A relative path begins at the root of the project. |
+//! | `METAPLAN_DATA` | Directory of the test data. A relative path begins at the root of the project. By default, each file is looked up in `$XDG_CACHE_HOME/metaplan/data`, to which `data/fetch.py` downloads public files, and then in `../shared`. |
 //! | `METAPLAN_REQUIRE` | Names of resources ([`Resource::name`]), separated by commas. A test that lacks one of them fails. `.ci/resources` prints the names of all resources of a machine. |
 //! | `METAPLAN_SKIPPED` | File to which a test that lacks any other resource appends a line: name of the resource, test, and detail, separated by tabs. `.ci/count` counts these lines. |
 //!
@@ -27,7 +27,7 @@ pub enum Resource {
     Bash,
     /// Chromium or Chrome.
     Browser,
-    /// Files that are not part of the project, in [`data_directory`].
+    /// Files that are neither part of the project nor public ([`data`]).
     Data,
     /// A Java runtime.
     Java,
@@ -39,6 +39,8 @@ pub enum Resource {
     Owlready2,
     /// The program `popf` of `metaplan-ros`.
     Popf,
+    /// Public files that are not part of the project, as listed in `data/sources.toml` ([`data`]).
+    PublicData,
     /// Python 3, with its standard library.
     Python,
     /// The proof checker `rate`.
@@ -59,7 +61,7 @@ pub enum Resource {
 
 impl Resource {
     /// All resources, each with its name and with a way to get it.
-    pub const ALL: [(Self, &str, &str); 16] = [
+    pub const ALL: [(Self, &str, &str); 17] = [
         (Self::Bash, "bash", "install bash"),
         (Self::Browser, "browser", "install Chromium (Debian: apt-get install chromium)"),
         (Self::Data, "data", "set METAPLAN_DATA to a directory with the test data"),
@@ -72,6 +74,11 @@ impl Resource {
             "python3 -m venv pellet && pellet/bin/pip install owlready2==0.47, and METAPLAN_PYTHON=$PWD/pellet/bin/python",
         ),
         (Self::Popf, "popf", "cargo build -p metaplan-ros --bins, and add target/debug to PATH"),
+        (
+            Self::PublicData,
+            "public-data",
+            "run data/fetch.py, or set METAPLAN_DATA to a directory with the test data",
+        ),
         (Self::Python, "python", "install Python 3 (Debian: apt-get install python3)"),
         (Self::Rate, "rate", "cargo install rate --locked"),
         (Self::Root, "root", "run the test as root, with the right to create devices"),
@@ -110,21 +117,54 @@ impl Resource {
     }
 }
 
-/// Returns the directory of the test data, which need not exist.
-pub fn data_directory() -> PathBuf {
-    from_root(std::env::var_os("METAPLAN_DATA").map_or_else(|| "../shared".into(), PathBuf::from))
+/// The list of public files, from which `data/fetch.py` downloads them.
+const PUBLIC_FILES: &str = include_str!("../../../data/sources.toml");
+
+/// Returns the directories in which test data is looked up, in this order. They need not exist.
+fn data_directories() -> Vec<PathBuf> {
+    let variable = |name| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    if let Some(directory) = variable("METAPLAN_DATA") {
+        return vec![from_root(directory)];
+    }
+    let cache = variable("XDG_CACHE_HOME").or_else(|| variable("HOME").map(|home| home.join(".cache")));
+    let downloads = cache.map(|cache| cache.join("metaplan").join("data"));
+    downloads.into_iter().chain([from_root("../shared".into())]).collect()
+}
+
+/// Returns the path of a file or directory of the test data. If it does not exist, returns where it is looked
+/// up first.
+pub fn data_path(relative: impl AsRef<Path>) -> PathBuf {
+    let mut paths = data_directories().into_iter().map(|directory| directory.join(relative.as_ref()));
+    let first = paths.next().unwrap_or_default();
+    if first.exists() {
+        return first;
+    }
+    paths.find(|path| path.exists()).unwrap_or(first)
+}
+
+/// Returns [`Resource::PublicData`] for files and directories that `data/fetch.py` downloads, and
+/// [`Resource::Data`] for others.
+fn data_resource(relative: &Path) -> Resource {
+    let parts: Vec<_> = relative.iter().map(|part| part.to_string_lossy()).collect();
+    let path = parts.join("/");
+    if PUBLIC_FILES.contains(&format!("\"{path}\"")) || PUBLIC_FILES.contains(&format!("\"{path}/")) {
+        Resource::PublicData
+    } else {
+        Resource::Data
+    }
 }
 
 /// Returns the path of a file or directory of the test data, or `None` if it does not exist.
 ///
 /// # Panics
-/// Panics if the file does not exist and [`Resource::Data`] is required.
+/// Panics if the file does not exist and its resource is required: [`Resource::PublicData`] if
+/// `data/sources.toml` lists the file or files of the directory, otherwise [`Resource::Data`].
 pub fn data(relative: impl AsRef<Path>) -> Option<PathBuf> {
-    let path = data_directory().join(relative);
+    let path = data_path(&relative);
     if path.exists() {
         return Some(path);
     }
-    missing(Resource::Data, &format!("{} does not exist", path.display()));
+    missing(data_resource(relative.as_ref()), &format!("{} does not exist", path.display()));
     None
 }
 

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use test_resources::{Resource, data, data_directory, missing_in, program, python_with};
+use test_resources::{Resource, data, data_path, missing_in, program, python_with};
 
 const ABSENT: &str = "no/such/file";
 
@@ -21,6 +21,7 @@ fn run(test: &str, variables: &[(&str, &str)]) -> Output {
         .args([test, "--exact", "--ignored", "--nocapture"])
         .env_remove("METAPLAN_DATA")
         .env_remove("METAPLAN_REQUIRE")
+        .env_remove("XDG_CACHE_HOME")
         .env_remove("METAPLAN_SKIPPED")
         .envs(variables.iter().copied())
         .output()
@@ -35,6 +36,16 @@ fn text(bytes: &[u8]) -> String {
 #[ignore = "part of the other tests"]
 fn lacks_data() {
     assert_eq!(data(ABSENT), None);
+}
+
+#[test]
+#[ignore = "part of the other tests"]
+fn lacks_public_data() {
+    for path in ["real/owl", "real/owl/suave/suave.owl", "real/owl_w3c/semantics-direct.rdf"] {
+        assert_eq!(data(path), None);
+    }
+    // Not a path of the list, but the beginning of one.
+    assert_eq!(data("real/ow"), None);
 }
 
 #[test]
@@ -140,9 +151,54 @@ fn data_are_read_from_the_named_directory() {
         let output = run("has_data", &[("METAPLAN_DATA", directory), ("METAPLAN_REQUIRE", "data")]);
         assert!(output.status.success(), "{directory}: {output:?}");
     }
-    if std::env::var_os("METAPLAN_DATA").is_none() {
-        assert!(data_directory().ends_with("shared") && data_directory().is_absolute());
+}
+
+#[test]
+#[ignore = "part of the other tests"]
+#[expect(clippy::print_stdout, reason = "another test reads the paths")]
+fn prints_paths() {
+    for path in ["Cargo.toml", ABSENT] {
+        println!("path: {}", data_path(path).display());
     }
+}
+
+/// Without `METAPLAN_DATA`, the cache has priority over the directory next to the project.
+#[test]
+fn data_are_looked_up_in_the_cache_and_next_to_the_project() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("the root");
+    let home = temporary("home");
+    let cache = home.join(".cache/metaplan/data");
+    std::fs::create_dir_all(&cache).expect("a directory");
+    std::fs::write(cache.join("Cargo.toml"), "").expect("a file");
+    let lines = |variables: &[(&str, &str)]| -> Vec<String> {
+        let output = text(&run("prints_paths", variables).stdout);
+        output.lines().filter_map(|line| line.strip_prefix("path: ")).map(ToOwned::to_owned).collect()
+    };
+    let (home_text, cache_text) = (home.display().to_string(), home.join(".cache").display().to_string());
+    let first = [cache.join("Cargo.toml"), cache.join(ABSENT)].map(|path| path.display().to_string());
+    assert_eq!(lines(&[("HOME", &home_text)]), first);
+    assert_eq!(lines(&[("HOME", "/"), ("XDG_CACHE_HOME", &cache_text)]), first);
+    // An empty variable counts as unset; a directory that the variable names is the only one.
+    assert_eq!(lines(&[("HOME", &home_text), ("METAPLAN_DATA", ""), ("XDG_CACHE_HOME", "")]), first);
+    let named = [root.join("Cargo.toml"), root.join(ABSENT)].map(|path| path.display().to_string());
+    assert_eq!(lines(&[("HOME", &home_text), ("METAPLAN_DATA", &root.display().to_string())]), named);
+    std::fs::remove_dir_all(home).expect("removed");
+}
+
+#[test]
+fn public_data_are_a_resource_of_their_own() {
+    let record = temporary("public");
+    let file = record.display().to_string();
+    let variables = [("METAPLAN_DATA", "/no/such/directory"), ("METAPLAN_SKIPPED", &file)];
+    let output = run("lacks_public_data", &variables);
+    assert!(output.status.success(), "{output:?}");
+    let lines = std::fs::read_to_string(&record).expect("a record");
+    let names: Vec<&str> = lines.lines().filter_map(|line| line.split('\t').next()).collect();
+    assert_eq!(names, ["public-data", "public-data", "public-data", "data"]);
+    let output = run("lacks_public_data", &[variables[0], ("METAPLAN_REQUIRE", "public-data")]);
+    assert!(!output.status.success(), "{output:?}");
+    assert!((text(&output.stderr) + &text(&output.stdout)).contains("run data/fetch.py"), "{output:?}");
+    std::fs::remove_file(record).expect("removed");
 }
 
 #[test]
@@ -169,7 +225,8 @@ fn the_script_of_ci_prints_known_names() {
     let names: Vec<&str> = line.trim().split(',').collect();
     assert!(names.contains(&"bash") && names.contains(&"shell"), "{names:?}");
     assert!(names.iter().all(|name| Resource::named(name).is_some()), "{names:?}");
-    assert_eq!(names.contains(&"data"), data_directory().is_dir());
+    assert_eq!(names.contains(&"data"), data_path("golden").is_dir());
+    assert_eq!(names.contains(&"public-data"), data_path("real").is_dir());
     assert_eq!(names.contains(&"python"), test_resources::in_path(&["python3"]).is_some());
 }
 

@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use ontology::runtime::Runtime;
 use serde_json::Value;
-use test_resources::{data, data_directory};
+use test_resources::{data, data_path};
 
 pub fn real_directory() -> PathBuf {
-    data_directory().join("real/owl")
+    data_path("real/owl")
 }
 
 /// Returns the JSON documents of a directory of the test data, ordered by file name. Returns no document if

@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[4]
 EXAMPLES = ROOT / "integrations/fleet/examples"
 BIN = Path(sys.executable).parent
 UNIT = ROOT / "integrations/ros/examples/deploy/metaplan-ros.service"
-CONTAINERFILES = [EXAMPLES / "Containerfile", ROOT / "integrations/ros/examples/deploy/Containerfile"]
+CONTAINERFILES = [ROOT / "Containerfile", EXAMPLES / "Containerfile", ROOT / "integrations/ros/examples/deploy/Containerfile"]
 
 RESOURCES = list(yaml.safe_load_all((EXAMPLES / "statefulset.yaml").read_text()))
 KINDS = {resource["kind"]: resource for resource in RESOURCES}
