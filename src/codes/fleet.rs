@@ -51,6 +51,12 @@ pub const CODES: &[[&str; 4]] = &[
         "Correct the lines in the messages. All other lines were stored.",
     ],
     [
+        "N315",
+        "An event was not stored.",
+        "It is longer than the servers accept (`max_payload`, 1 MB unless it is set).",
+        "Send a shorter event, or raise `max_payload`. All other events were stored.",
+    ],
+    [
         "N320",
         "An event was refused, or a robot is suspended.",
         "The robot is not enrolled, its mission is unknown or has changed, or the message has the id of another robot.",

@@ -73,6 +73,16 @@ impl Store for Crashing {
         self.through(self.inner.history(stream, partition, after)).await
     }
 
+    async fn of_subject(
+        &self,
+        stream: Stream,
+        subject: &str,
+        after: u64,
+        most: usize,
+    ) -> Result<Vec<Stored>, Fault> {
+        self.through(self.inner.of_subject(stream, subject, after, most)).await
+    }
+
     async fn end(&self, stream: Stream, partition: u32) -> Result<u64, Fault> {
         self.through(self.inner.end(stream, partition)).await
     }
