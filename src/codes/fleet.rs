@@ -16,8 +16,8 @@ pub const CODES: &[[&str; 4]] = &[
     ],
     [
         "N302",
-        "Signals cannot be handled.",
-        "The operating system refuses a handler.",
+        "Signals cannot be handled, or threads cannot be started.",
+        "The operating system refuses a handler or a thread.",
         "The message gives the reason. Without the handler a worker cannot shut down in order.",
     ],
     [

@@ -206,8 +206,7 @@ impl Work {
     }
 }
 
-#[tokio::main]
-async fn main() -> ExitCode {
+fn main() -> ExitCode {
     let arguments = Arguments::parse();
     tracing_subscriber::fmt()
         .with_writer(std::io::stderr)
@@ -215,7 +214,17 @@ async fn main() -> ExitCode {
         .with_max_level(arguments.log)
         .with_target(false)
         .init();
-    match Box::pin(run(arguments.command)).await {
+    let runtime = match tokio::runtime::Runtime::new() {
+        Ok(runtime) => runtime,
+        Err(error) => {
+            eprint!("{}", Message::error("N302", format!("threads cannot be started: {error}")).text());
+            return ExitCode::from(2);
+        }
+    };
+    let outcome = runtime.block_on(Box::pin(run(arguments.command)));
+    // A search that still runs has no effect any more.
+    runtime.shutdown_background();
+    match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(messages) => {
             for message in &messages {

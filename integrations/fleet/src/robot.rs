@@ -336,18 +336,15 @@ impl Robot {
         let (Some(migration), Control::Warm(control)) = (&self.migration, &self.control) else {
             return Ok(false);
         };
-        let template = match before {
-            Some(before) => match &before.digest {
-                Some(digest) => version(missions, name, digest)?,
-                None => return Ok(false),
-            },
-            None => {
-                let is_safe = control.is_between_actions()
-                    && (migration.at == SafePoint::ActionEnd || control.beliefs().reached());
-                match missions.version(name, &migration.target) {
-                    Some(template) if is_safe => template,
-                    _ => return Ok(false),
-                }
+        let template = if let Some(before) = before {
+            let Some(digest) = &before.digest else { return Ok(false) };
+            version(missions, name, digest)?
+        } else {
+            let is_safe = control.is_between_actions()
+                && (migration.at == SafePoint::ActionEnd || control.beliefs().reached());
+            match missions.version(name, &migration.target) {
+                Some(template) if is_safe => template,
+                _ => return Ok(false),
             }
         };
         let initial = version(missions, name, &self.digest)?;

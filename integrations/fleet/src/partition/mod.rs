@@ -35,8 +35,8 @@ use threads::Threads;
 /// Parameters with which a worker runs its partitions.
 #[derive(Debug, Clone, Copy)]
 pub struct Settings {
-    /// Maximum number of loops that search for long plans at the same time. As many loops may search for short
-    /// plans, and as many may work without a search.
+    /// Maximum number of loops that search for plans at the same time in each class of durations (to 25 ms, to
+    /// 400 ms, longer), and of loops that work without a search.
     pub threads: usize,
     /// Maximum number of idle robots loaded in memory. Others are kept as compressed snapshots and
     /// loaded on demand. Robots that are handling events may exceed this number.
@@ -52,6 +52,9 @@ pub struct Settings {
     /// Number of undecided events of a partition in memory from which robots with many of them get no more.
     /// Their later events are read again when these are decided.
     pub ahead: usize,
+    /// Maximum time that a partition waits for running loops when it is given back. Their events are decided by
+    /// the next owner.
+    pub drain: Duration,
 }
 
 impl Default for Settings {
@@ -63,6 +66,7 @@ impl Default for Settings {
             save_within: Duration::from_secs(30),
             look: Duration::from_millis(500),
             ahead: 1024,
+            drain: Duration::from_secs(5),
         }
     }
 }

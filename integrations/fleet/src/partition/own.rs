@@ -59,6 +59,7 @@ impl<S: Store> Partition<S> {
     pub(super) async fn run(mut self, mut orders: watch::Receiver<Order>) -> End {
         let (mut backoff, mut reached) = (0, 0);
         let mut events: Option<BoxStream<'static, Result<Stored, Fault>>> = None;
+        let mut drained: Option<Instant> = None;
         let mut look = tokio::time::interval(self.shared.settings.look);
         look.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
         let behind = self.slots.iter().filter(|(_, slot)| slot.behind.is_some());
@@ -73,6 +74,15 @@ impl<S: Store> Partition<S> {
             }
             let order = *orders.borrow_and_update();
             let is_draining = order == Order::Drain;
+            if is_draining {
+                let drained = drained.get_or_insert_with(|| {
+                    self.save(true);
+                    Instant::now()
+                });
+                if drained.elapsed() >= self.shared.settings.drain {
+                    return End::Ordered;
+                }
+            }
             if is_draining && self.jobs.is_empty() && !self.save(true) && !self.advance(true) {
                 return End::Ordered;
             }

@@ -85,10 +85,9 @@ impl<S: Store> Task<S> {
         match Decided::parse(&last.payload) {
             Some(decided) if decided.event >= event.sequence => return None,
             Some(decided) if decided.retired && robot.mission.is_none() => robot.ids = decided.ids,
-            Some(_) => {}
             // A message that is not a decision does not show whether this event is decided.
             None if last.sequence > self.recovered => return None,
-            None => {}
+            Some(_) | None => {}
         }
         Some(last.sequence)
     }

@@ -1,27 +1,29 @@
 //! Threads for the loops of robots, so that long searches do not delay short work.
 //!
-//! There are three pools, each with the configured number of threads: for work without a search, for short
-//! searches, and for long ones. The operating system shares the processors among them. A search counts as
-//! long if the robot's last searches took longer than [`SHORT`]; for a robot that has not searched, the last
-//! searches for its mission count. A search that turns out to be long leaves the pool of short searches.
+//! Work without a search has threads of its own. Searches have a pool of threads for each class of durations
+//! (a multilevel feedback queue): a search begins in the class of the robot's last searches, or, for a robot that
+//! has not searched, in the class of the last searches for its mission. It leaves the class when it exceeds the
+//! maximum duration. The operating system shares the processors among the pools.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use tokio::sync::Semaphore;
+use tokio::sync::{Semaphore, SemaphorePermit};
 use tokio::task::JoinError;
 
-/// Maximum duration of a short search.
-const SHORT: Duration = Duration::from_millis(25);
+/// Maximum durations of the searches of each class but the last one, which has no maximum. The second class is for
+/// short searches on a busy machine.
+const MAX_DURATIONS: [Duration; 2] = [Duration::from_millis(25), Duration::from_millis(400)];
+
+const CLASSES: usize = MAX_DURATIONS.len() + 1;
 
 #[derive(Debug)]
 pub(crate) struct Threads {
     quick: Semaphore,
-    short: Semaphore,
-    long: Semaphore,
-    /// Number of long searches that have left the pool of short searches while that of long ones was full.
+    searches: [Semaphore; CLASSES],
+    /// Number of searches that have left their class while the pools of longer ones were full.
     extra: AtomicUsize,
     max_extra: usize,
     /// Estimated duration of a search by mission.
@@ -39,11 +41,9 @@ impl Drop for Extra<'_> {
 
 impl Threads {
     pub(crate) fn new(count: usize) -> Self {
-        let pool = || Semaphore::new(count);
         Self {
-            quick: pool(),
-            short: pool(),
-            long: pool(),
+            quick: Semaphore::new(count),
+            searches: std::array::from_fn(|_| Semaphore::new(count)),
             extra: AtomicUsize::new(0),
             max_extra: count,
             costs: Mutex::default(),
@@ -78,42 +78,50 @@ impl Threads {
             let outcome = work();
             (outcome, begun.elapsed())
         };
-        let is_long = || estimate.unwrap_or_else(|| self.cost(mission)) > SHORT;
-        let mut short = None;
-        if !is_long() {
-            // The estimate may have changed in the meantime.
-            short = self.short.acquire().await.ok().filter(|_| !is_long());
-        }
-        let (outcome, duration) = if short.is_none() {
-            let _permit = self.long.acquire().await;
-            tokio::task::spawn_blocking(timed).await?
-        } else {
-            let mut task = tokio::task::spawn_blocking(timed);
-            match tokio::time::timeout(SHORT, &mut task).await {
-                Ok(outcome) => outcome?,
-                Err(_) => {
-                    // Robots of this mission that have not searched yet wait with the long searches.
-                    self.learn(mission, SHORT * 2);
-                    if let Ok(_long) = self.long.try_acquire() {
-                        drop(short);
-                        task.await?
-                    } else if let Some(_extra) = self.extra() {
-                        drop(short);
-                        task.await?
-                    } else {
-                        tokio::select! {
-                            outcome = &mut task => outcome?,
-                            _long = self.long.acquire() => {
-                                drop(short);
-                                (&mut task).await?
-                            }
-                        }
-                    }
+        let (mut class, mut permit) = self.enter(mission, estimate).await;
+        let mut task = tokio::task::spawn_blocking(timed);
+        let mut extra = None;
+        let (outcome, duration) = loop {
+            // Without a permit the search runs on an extra thread until it ends.
+            let Some(limit) = MAX_DURATIONS.get(class).filter(|_| permit.is_some()) else {
+                break task.await?;
+            };
+            if let Ok(outcome) = tokio::time::timeout(*limit, &mut task).await {
+                break outcome?;
+            }
+            class += 1;
+            // Robots of this mission that have not searched yet begin in the next class.
+            self.learn(mission, *limit * 2);
+            if let Ok(next) = self.searches[class].try_acquire() {
+                permit = Some(next);
+            } else if let Some(reserved) = self.extra() {
+                extra = Some(reserved);
+                permit = None;
+            } else {
+                tokio::select! {
+                    outcome = &mut task => break outcome?,
+                    next = self.searches[class].acquire() => permit = next.ok(),
                 }
             }
         };
+        drop(extra);
         self.learn(mission, duration);
         Ok((outcome, updated(estimate.unwrap_or_default(), duration)))
+    }
+
+    /// Waits for a thread of the class of a search. The class may change while the search waits.
+    async fn enter(&self, mission: &str, estimate: Option<Duration>) -> (usize, Option<SemaphorePermit<'_>>) {
+        loop {
+            let class = self.class_of(mission, estimate);
+            let permit = self.searches[class].acquire().await.ok();
+            if permit.is_none() || class >= self.class_of(mission, estimate) {
+                return (class, permit);
+            }
+        }
+    }
+
+    fn class_of(&self, mission: &str, estimate: Option<Duration>) -> usize {
+        class(estimate.unwrap_or_else(|| self.cost(mission)))
     }
 
     fn extra(&self) -> Option<Extra<'_>> {
@@ -132,6 +140,11 @@ impl Threads {
         let cost = costs.entry(mission.to_owned()).or_default();
         *cost = updated(*cost, duration);
     }
+}
+
+/// Returns the class of a search with this duration.
+fn class(duration: Duration) -> usize {
+    MAX_DURATIONS.partition_point(|limit| *limit < duration)
 }
 
 /// Returns the estimate after a search: its duration, or half of the former estimate if that is longer. So a
@@ -159,12 +172,12 @@ mod tests {
             long.spawn(async move { threads.search("slow", None, sleep(2_000)).await.map(|_| ()) });
         }
         // The first long searches are recognised.
-        tokio::time::sleep(Duration::from_millis(200)).await;
+        tokio::time::sleep(Duration::from_millis(600)).await;
         let mut worst = Duration::ZERO;
         for _ in 0..50 {
             let begun = Instant::now();
             threads.quick(sleep(0)).await.expect("no panic");
-            let (_, estimate) = threads.search("fast", None, sleep(1)).await.expect("no panic");
+            let ((), estimate) = threads.search("fast", None, sleep(1)).await.expect("no panic");
             worst = worst.max(begun.elapsed());
             assert!(estimate >= Duration::from_millis(1));
         }
@@ -182,6 +195,6 @@ mod tests {
         for _ in 0..9 {
             estimate = updated(estimate, Duration::from_millis(1));
         }
-        assert!(estimate < SHORT, "{estimate:?}");
+        assert_eq!(class(estimate), 0, "{estimate:?}");
     }
 }
