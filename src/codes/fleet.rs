@@ -16,8 +16,8 @@ pub const CODES: &[[&str; 4]] = &[
     ],
     [
         "N302",
-        "Signals cannot be handled.",
-        "The operating system refuses a handler.",
+        "Signals cannot be handled, or threads cannot be started.",
+        "The operating system refuses a handler or a thread.",
         "The message gives the reason. Without the handler a worker cannot shut down in order.",
     ],
     [
@@ -49,6 +49,12 @@ pub const CODES: &[[&str; 4]] = &[
         "A line cannot be parsed.",
         "A line has the form `ROBOT EVENT`. A name has up to 64 letters, digits, `-` and `_`.",
         "Correct the lines in the messages. All other lines were stored.",
+    ],
+    [
+        "N315",
+        "An event was not stored.",
+        "It is longer than the servers accept (`max_payload`, 1 MB unless it is set).",
+        "Send a shorter event, or raise `max_payload`. All other events were stored.",
     ],
     [
         "N320",

@@ -291,6 +291,12 @@ pub const CODES: &[[&str; 4]] = &[
         "Send seconds since the start of the mission, or no `time` at all.",
     ],
     [
+        "M309",
+        "A robot cannot have another version of its mission.",
+        "An action is under way, or facts or the goal of the robot do not exist in the new version.",
+        "The robot stays with its version. Retire and enrol it to begin with the new one.",
+    ],
+    [
         "M320",
         "A snapshot does not fit the mission.",
         "It is damaged or belongs to another mission.",

@@ -32,6 +32,7 @@ mod filter;
 mod interrupt;
 mod live;
 mod memo;
+mod migrate;
 mod monitor;
 mod plan;
 mod react;

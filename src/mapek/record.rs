@@ -285,7 +285,7 @@ pub(crate) fn statement_from_record(record: &Value) -> Option<Statement> {
 }
 
 /// Serialises an element of `:init`. Returns `None` for timed initial literals, which never change.
-fn element_to_record(element: &InitialElement) -> Option<Value> {
+pub(super) fn element_to_record(element: &InitialElement) -> Option<Value> {
     let words = |atom: &Atom| -> Vec<String> {
         let arguments = atom.arguments.iter().map(|term| match term {
             Term::Constant(identifier) | Term::Variable(identifier) => identifier.name.to_string(),
@@ -300,7 +300,7 @@ fn element_to_record(element: &InitialElement) -> Option<Value> {
     }
 }
 
-fn element_from_record(record: &Value) -> Option<InitialElement> {
+pub(super) fn element_from_record(record: &Value) -> Option<InitialElement> {
     let identifier =
         |value: &Value| Some(Identifier { name: Name::new(value.as_str()?), span: Span::default() });
     let words = record.get(0)?.as_array()?;

@@ -2,7 +2,7 @@
 //! stateless workers.
 //!
 //! Robots append events to the subject `ev.PARTITION.ROBOT`, and receive decisions on
-//! `dec.PARTITION.ROBOT`. A partition is a fixed group of robots. Both streams are persistent, and
+//! `dec.PARTITION.ROBOT`, in other fleets than the default one after the name of the fleet. A partition is a fixed group of robots. Both streams are persistent, and
 //! the stream of events is the journal. A worker leases partitions and runs the
 //! [loops](metaplan::mapek::Loop) of their robots. Every event that is not refused leads to exactly
 //! one decision, unless the robot is stopped because it cannot continue. A decision is appended
@@ -49,10 +49,14 @@
 //!
 //! - [`store`]: the interface of a log, which NATS JetStream and a local directory implement.
 //! - [`robot`]: a single robot, which turns events into decisions, without clock and network.
+//! - [`missions`]: current and former versions of missions; [`ids`]: recognition of repeated messages.
 //! - [`partition`]: the robots of a partition: recovery, order, snapshots.
 //! - [`worker`]: leases and their balance, metrics, shutdown.
+//! - [`health`]: state of a worker for liveness and readiness probes.
 //! - [`robots`](mod@robots): clients: append events, follow decisions, query the fleet.
 
+pub mod health;
+pub mod ids;
 pub mod missions;
 pub mod partition;
 pub mod robot;

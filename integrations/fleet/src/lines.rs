@@ -31,10 +31,10 @@ fn unwritten(error: &io::Error) -> Message {
 }
 
 /// Reads lines `ROBOT EVENT` from standard input until the end of input or until `stop` becomes true,
-/// and waits until the events are stored. Returns the number of stored events. Prints errors about
-/// single lines, and fails at the end if a line could not be parsed.
-async fn feed<S: Store>(store: &S, session: &str, mut stop: watch::Receiver<bool>) -> Result<u64, Message> {
-    let mut robots: BTreeMap<String, mpsc::Sender<String>> = BTreeMap::new();
+/// and waits until the events are stored. Prints errors about single lines, and fails at the end if a
+/// line could not be parsed or its event could not be stored.
+async fn feed<S: Store>(store: &S, session: &str, mut stop: watch::Receiver<bool>) -> Result<(), Message> {
+    let mut robots: BTreeMap<String, mpsc::Sender<(u64, String)>> = BTreeMap::new();
     let mut senders = tokio::task::JoinSet::new();
     let mut lines = BufReader::new(stdin()).split(b'\n');
     let mut number = 0_u64;
@@ -62,37 +62,52 @@ async fn feed<S: Store>(store: &S, session: &str, mut stop: watch::Receiver<bool
             continue;
         };
         if !robots.contains_key(robot) {
-            let (tell, mut told) = mpsc::channel::<String>(AHEAD);
+            let (tell, mut told) = mpsc::channel::<(u64, String)>(AHEAD);
             let mut sender = Sender::new(store.clone(), robot, session);
             senders.spawn(async move {
-                let mut stored = 0;
-                while let Some(event) = told.recv().await {
+                let (mut stored, mut lost) = (0_u64, 0_u64);
+                while let Some((number, event)) = told.recv().await {
                     match sender.send(&event).await {
                         Ok(_) => stored += 1,
-                        Err(own) => say(&fault(&own)),
+                        Err(own) => {
+                            lost += 1;
+                            let robot = &sender.address().robot;
+                            say(&unstored(format!("line {number}, robot `{robot}`: {own}")));
+                        }
                     }
                 }
-                stored
+                (stored, lost)
             });
             robots.insert(robot.to_owned(), tell);
         }
         if let Some(tell) = robots.get(robot) {
             // The receiving task ends only after this channel is closed.
-            let _ = tell.send(event.to_owned()).await;
+            let _ = tell.send((number, event.to_owned())).await;
         }
     }
     drop(robots);
-    let mut stored = 0;
-    while let Some(count) = senders.join_next().await {
-        stored += count.unwrap_or(0);
+    let (mut stored, mut lost) = (0, 0);
+    while let Some(counts) = senders.join_next().await {
+        let counts = counts.map_err(|error| unstored(format!("a sender has failed: {error}")))?;
+        (stored, lost) = (stored + counts.0, lost + counts.1);
     }
-    if wrong > 0 {
-        return Err(Message::error(
-            "N314",
-            format!("{wrong} lines were not understood; {stored} events were stored"),
-        ));
+    match (wrong, lost) {
+        (0, 0) => Ok(()),
+        (_, 0) => {
+            let text = format!("{wrong} lines were not understood; {stored} events were stored");
+            Err(Message::error("N314", text))
+        }
+        _ => {
+            let text = format!(
+                "{lost} events were not stored, {wrong} lines not understood; {stored} events were stored"
+            );
+            Err(unstored(text))
+        }
     }
-    Ok(stored)
+}
+
+fn unstored(text: String) -> Message {
+    Message::error("N315", text)
 }
 
 #[expect(clippy::print_stderr, reason = "it is said while the program goes on")]
@@ -103,7 +118,7 @@ fn say(message: &Message) {
 /// Stores the events in lines `ROBOT EVENT` from standard input, until the input ends.
 pub(crate) async fn send<S: Store>(store: S, session: &str) -> Result<(), Message> {
     let (_goes_on, stop) = watch::channel(false);
-    feed(&store, session, stop).await.map(|_| ())
+    feed(&store, session, stop).await
 }
 
 /// Converts a stored decision to the robot's name and the JSON text for the output line. Returns
@@ -114,6 +129,9 @@ fn line(message: &Stored) -> Option<(String, String)> {
     let mut line = json!({"decision": message.sequence, "event": decided.event, "answers": decided.answers});
     if let (Some(mission), Some(object)) = (decided.enrolled, line.as_object_mut()) {
         object.insert("enrolled".to_owned(), Value::String(mission));
+    }
+    if let (true, Some(object)) = (decided.migrated, line.as_object_mut()) {
+        object.insert("migrated".to_owned(), Value::Bool(true));
     }
     if let (true, Some(object)) = (decided.retired, line.as_object_mut()) {
         object.insert("retired".to_owned(), Value::Bool(true));
@@ -229,7 +247,7 @@ pub(crate) async fn up(
     if let Ok(outcome) = writing.await {
         outcome?;
     }
-    fed.map(|_| ())
+    fed
 }
 
 /// Returns `true` if all stored events are decided or refused, and all decisions are written.

@@ -1,6 +1,7 @@
 //! The program `metaplan-fleet`.
 #![expect(clippy::print_stderr, reason = "a program says there what is wrong")]
 
+use std::io::IsTerminal as _;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -9,16 +10,18 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
 use metaplan::message::{Errors, Message};
+use metaplan_fleet::health::Health;
 use metaplan_fleet::missions::Missions;
 use metaplan_fleet::partition::{Settings, Shared};
 use metaplan_fleet::robots::status;
 use metaplan_fleet::store::Store;
 use metaplan_fleet::store::local::Local;
-use metaplan_fleet::store::nats::{Access, Layout, Nats};
+use metaplan_fleet::store::nats::{Access, DEFAULT_FLEET, Layout, Nats};
 use metaplan_fleet::worker;
 use tokio::sync::watch;
 use tracing::level_filters::LevelFilter;
 
+mod endpoints;
 mod lines;
 
 /// The adaptation loops of many robots: on NATS JetStream, or in one directory without a server.
@@ -96,7 +99,10 @@ struct Work {
     /// A directory of manifests; a robot is enrolled with the name of one, without `.toml`.
     #[arg(long, value_name = "DIR")]
     missions: PathBuf,
-    /// Loops that work at the same time; as many as there are processors, unless it is given.
+    /// A directory of former manifests, with which robots finish that were enrolled with them. Repeatable.
+    #[arg(long, value_name = "DIR")]
+    former: Vec<PathBuf>,
+    /// Loops that search for plans at the same time; as many as there are processors, unless it is given.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
     /// Robots that are kept ready; others are kept as snapshots, and made ready when they are needed.
@@ -105,7 +111,7 @@ struct Work {
     /// Save a robot after so many decisions.
     #[arg(long, value_name = "N", default_value_t = Settings::default().save_every as u64, value_parser = clap::value_parser!(u64).range(1..))]
     save_every: u64,
-    /// Serve metrics for Prometheus at this address, as `HOST:PORT`.
+    /// Serve `/metrics` for Prometheus, `/live` and `/ready` at this address, as `HOST:PORT`.
     #[arg(long, value_name = "ADDRESS")]
     metrics: Option<SocketAddr>,
 }
@@ -128,8 +134,8 @@ struct Server {
     /// An own certificate, and its key.
     #[arg(long, value_names = ["CERTIFICATE", "KEY"], num_args = 2)]
     tls_cert: Vec<PathBuf>,
-    /// The name of the fleet; streams and buckets begin with it.
-    #[arg(long, value_name = "NAME", default_value = "fleet")]
+    /// The name of the fleet. Its streams, buckets and subjects begin with it, except for subjects of the fleet `fleet`.
+    #[arg(long, value_name = "NAME", default_value = DEFAULT_FLEET)]
     fleet: String,
     /// Partitions of a fleet that is made; they never change.
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=65536))]
@@ -177,27 +183,48 @@ impl Work {
         }
     }
 
-    fn shared<S: Store>(&self, store: S, name: String) -> Result<Arc<Shared<S>>, Errors> {
-        let missions = Missions::read(&self.missions)?;
+    /// Serves the endpoints for probes and metrics, unless they are disabled.
+    async fn open_endpoints(&self) -> Result<Arc<Health>, Errors> {
+        let health = Arc::<Health>::default();
         if let Some(address) = self.metrics {
-            metrics_exporter_prometheus::PrometheusBuilder::new()
-                .with_http_listener(address)
-                .install()
-                .map_err(|error| vec![Message::error("N301", format!("{address}: {error}"))])?;
+            endpoints::open(address, Arc::clone(&health)).await.map_err(|message| vec![message])?;
         }
-        Ok(Arc::new(Shared::new(store, missions, name, self.settings())))
+        Ok(health)
+    }
+
+    fn shared<S: Store>(
+        &self,
+        store: S,
+        name: String,
+        health: Arc<Health>,
+    ) -> Result<Arc<Shared<S>>, Errors> {
+        let mut missions = Missions::read(&self.missions)?;
+        for directory in &self.former {
+            missions = missions.with_former(directory)?;
+        }
+        Ok(Arc::new(Shared::new(store, missions, name, self.settings()).with_health(health)))
     }
 }
 
-#[tokio::main]
-async fn main() -> ExitCode {
+fn main() -> ExitCode {
     let arguments = Arguments::parse();
     tracing_subscriber::fmt()
         .with_writer(std::io::stderr)
+        .with_ansi(has_colours())
         .with_max_level(arguments.log)
         .with_target(false)
         .init();
-    match Box::pin(run(arguments.command)).await {
+    let runtime = match tokio::runtime::Runtime::new() {
+        Ok(runtime) => runtime,
+        Err(error) => {
+            eprint!("{}", Message::error("N302", format!("threads cannot be started: {error}")).text());
+            return ExitCode::from(2);
+        }
+    };
+    let outcome = runtime.block_on(Box::pin(run(arguments.command)));
+    // A search that still runs has no effect any more.
+    runtime.shutdown_background();
+    match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(messages) => {
             for message in &messages {
@@ -208,18 +235,26 @@ async fn main() -> ExitCode {
     }
 }
 
+/// Returns `true` if standard error is a terminal and `NO_COLOR` is not set.
+fn has_colours() -> bool {
+    std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
+}
+
 async fn run(command: Command) -> Result<(), Errors> {
     match command {
         Command::Worker { server, work, name } => {
+            // Probes distinguish a worker that waits for its servers from one that hangs.
+            let health = work.open_endpoints().await?;
             let store = server.open(60).await.map_err(|message| vec![message])?;
             let name = name.unwrap_or_else(own_name);
-            let shared = work.shared(store, name)?;
+            let shared = work.shared(store, name, health)?;
             worker::run(shared, signals()?).await;
         }
         Command::Up { local, after, work, partitions } => {
             let lease = Duration::from_secs(10);
             let store = Local::open(&local, partitions, lease).map_err(|message| vec![message])?;
-            let shared = work.shared(store, own_name())?;
+            let health = work.open_endpoints().await?;
+            let shared = work.shared(store, own_name(), health)?;
             lines::up(shared, after, signals()?).await.map_err(|message| vec![message])?;
         }
         Command::Send { server, session } => {

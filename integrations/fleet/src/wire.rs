@@ -6,6 +6,8 @@ use metaplan::mapek::Decision;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::ids::Ids;
+
 /// Version of the data format, which every decision contains.
 pub const FORMAT: &str = "metaplan-fleet/1";
 
@@ -75,6 +77,25 @@ pub struct Decided {
     /// `true` if this event has retired the robot.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub retired: bool,
+    /// `true` if with this event the robot has changed to another version of its mission.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub migrated: bool,
+    /// Checksum of the version of the mission with which this event has enrolled the robot, or to
+    /// which the robot was to change.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub digest: Option<String>,
+    /// Checksum of the version of the mission to which the robot changes at the next safe point, if this
+    /// event has requested that.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub target: Option<String>,
+    /// `true` if earlier events of the robot that have no decision are refused, because the robot was
+    /// suspended when this event retired it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub skips: bool,
+    /// Ids of decided events, if this event has retired the robot. Nothing else is stored about a
+    /// retired robot.
+    #[serde(default, skip_serializing_if = "Ids::is_empty")]
+    pub ids: Ids,
     /// Answers in the format of `metaplan run`.
     pub answers: Vec<Value>,
     /// Plans that were made for the decision, so that another worker can replay the decision
@@ -116,7 +137,7 @@ pub struct Progress {
 }
 
 /// Snapshot of a robot after an event.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Saved {
     /// Name of the robot's mission; `None` if the robot was retired.
     pub mission: Option<String>,
@@ -132,6 +153,36 @@ pub struct Saved {
     /// Snapshot of the robot's loop.
     #[serde(default)]
     pub known: Value,
+    /// Requested change to another version of the mission.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub migration: Option<Migration>,
+    /// Ids of decided events.
+    #[serde(default, skip_serializing_if = "Ids::is_empty")]
+    pub ids: Ids,
+    /// `true` if the progress of the partition does not wait for this robot. A new owner has to read
+    /// the later events and decisions of the robot separately.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub behind: bool,
+}
+
+/// Requested change of a robot to another version of its mission.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Migration {
+    /// Point at which the robot changes.
+    pub at: SafePoint,
+    /// Checksum of the version.
+    pub target: String,
+}
+
+/// Point at which a robot can change to another version of its mission.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SafePoint {
+    /// The end of the action under way; at once if there is none.
+    #[default]
+    ActionEnd,
+    /// The first event after the robot has reached its goal.
+    Goal,
 }
 
 /// Status that a worker publishes about itself.
@@ -177,6 +228,11 @@ mod tests {
             now: 12,
             enrolled: Some("ugv".to_owned()),
             retired: false,
+            migrated: false,
+            digest: Some("0a1b".to_owned()),
+            target: None,
+            skips: false,
+            ids: Ids::default(),
             answers: vec![serde_json::json!({"answer": "plan_kept"})],
             plans: Vec::new(),
             worker: "w".to_owned(),

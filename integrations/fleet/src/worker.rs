@@ -62,6 +62,7 @@ impl<S: Store> Worker<S> {
     /// unless `draining`, takes free partitions or gives partitions back, so that the worker has its share.
     /// Neither takes nor gives back partitions if the log cannot be read.
     async fn round(&mut self, draining: bool) {
+        self.shared.health.begin_round(draining);
         self.present(draining).await;
         self.renew().await;
         self.collect().await;
@@ -103,7 +104,12 @@ impl<S: Store> Worker<S> {
         metrics::counter!("metaplan_fleet_decided_total").absolute(presence.decided);
         let value = serde_json::to_vec(&presence).unwrap_or_default();
         let (store, name) = (&self.shared.store, &self.shared.worker);
-        self.presence = match store.put(Bucket::Workers, name, &value, self.presence).await {
+        let outcome = store.put(Bucket::Workers, name, &value, self.presence).await;
+        if !matches!(outcome, Err(Fault::Unreachable(_))) {
+            // A worker that reaches the log renews its leases at least as often.
+            self.shared.health.reach(self.lease);
+        }
+        self.presence = match outcome {
             Ok(revision) => revision,
             // The value had expired, or an unacknowledged write succeeded.
             Err(Fault::Conflict) => match store.get(Bucket::Workers, name).await {

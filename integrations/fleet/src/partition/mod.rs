@@ -1,6 +1,8 @@
 //! A partition, i.e. a fixed group of robots, run by the worker that leases it.
 //!
-//! Events are read in order. Each robot handles one event at a time, and robots run concurrently. A
+//! Events are read in order. Each robot handles one event at a time, and robots run concurrently. A robot
+//! that cannot keep up, or is suspended, does not delay the others: its events stay in the log, and are read
+//! again separately. A
 //! decision is appended only if the robot's last decision has the expected sequence number. So only
 //! one of two workers can decide an event. Robots are saved periodically; the stored progress of
 //! the partition gives the positions from which events and decisions must be read again. A crash is
@@ -13,24 +15,28 @@ mod own;
 mod slot;
 mod taking_over;
 mod task;
+mod threads;
 
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use tokio::sync::{Semaphore, watch};
+use tokio::sync::watch;
 
+use crate::health::Health;
 use crate::missions::Missions;
 use crate::store::Store;
 
 pub(crate) use asking::pause;
 use own::Partition;
+use threads::Threads;
 
 /// Parameters with which a worker runs its partitions.
 #[derive(Debug, Clone, Copy)]
 pub struct Settings {
-    /// Maximum number of loops that run at the same time.
+    /// Maximum number of loops that search for plans at the same time in each class of durations (to 25 ms, to
+    /// 400 ms, longer), and of loops that work without a search.
     pub threads: usize,
     /// Maximum number of idle robots loaded in memory. Others are kept as compressed snapshots and
     /// loaded on demand. Robots that are handling events may exceed this number.
@@ -43,8 +49,12 @@ pub struct Settings {
     pub save_within: Duration,
     /// Time between two checks whether robots have to be saved.
     pub look: Duration,
-    /// Maximum number of undecided events of a partition in memory.
+    /// Number of undecided events of a partition in memory from which robots with many of them get no more.
+    /// Their later events are read again when these are decided.
     pub ahead: usize,
+    /// Maximum time that a partition waits for running loops when it is given back. Their events are decided by
+    /// the next owner.
+    pub drain: Duration,
 }
 
 impl Default for Settings {
@@ -56,6 +66,7 @@ impl Default for Settings {
             save_within: Duration::from_secs(30),
             look: Duration::from_millis(500),
             ahead: 1024,
+            drain: Duration::from_secs(5),
         }
     }
 }
@@ -73,7 +84,9 @@ pub struct Shared<S> {
     pub settings: Settings,
     /// Counters over all partitions of the worker.
     pub counts: Counts,
-    threads: Semaphore,
+    /// Health of the worker, which probes can share.
+    pub health: Arc<Health>,
+    threads: Threads,
 }
 
 /// Counters of a worker: current numbers of robots and events, and totals since the start.
@@ -100,8 +113,15 @@ pub struct Counts {
 impl<S> Shared<S> {
     /// Creates the shared state of a worker, with all counters at zero.
     pub fn new(store: S, missions: Missions, worker: String, settings: Settings) -> Self {
-        let threads = Semaphore::new(settings.threads.max(1));
-        Self { store, missions, worker, settings, counts: Counts::default(), threads }
+        let threads = Threads::new(settings.threads.max(1));
+        let (counts, health) = (Counts::default(), Arc::default());
+        Self { store, missions, worker, settings, counts, health, threads }
+    }
+
+    /// Returns the shared state with this health, which the worker updates.
+    #[must_use]
+    pub fn with_health(self, health: Arc<Health>) -> Self {
+        Self { health, ..self }
     }
 }
 

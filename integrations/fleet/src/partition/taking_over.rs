@@ -10,7 +10,7 @@ use super::asking::{bytes, pause, persist};
 use super::own::Partition;
 use super::{End, Shared};
 use crate::robot::{Faulted, Robot};
-use crate::store::{Bucket, Store, Stream};
+use crate::store::{Bucket, Store, Stored, Stream};
 use crate::wire::{Address, Decided, Progress, Saved};
 
 impl<S: Store> Partition<S> {
@@ -49,47 +49,70 @@ impl<S: Store> Partition<S> {
             progress,
             revision,
             slots: BTreeMap::new(),
+            recovered: 0,
+            behind: 0,
             jobs: FuturesUnordered::new(),
             waiting: 0,
             is_progressing: false,
             clock: 0,
             recent: VecDeque::new(),
         };
+        let mut apart = Vec::new();
         for entry in saved {
             partition.snapshots = partition.snapshots.max(entry.revision);
-            partition.take_saved(&entry.key, &entry.value, entry.revision);
+            apart.extend(partition.take_saved(&entry.key, &entry.value, entry.revision));
+        }
+        for (address, event, decision) in apart {
+            let subject = address.to_string();
+            let decisions = persist(|| store.of_subject(Stream::Decisions, &subject, decision, usize::MAX));
+            for message in decisions.await.map_err(|_| End::Fenced)? {
+                partition.take_decision(&message);
+            }
+            let slot = partition.slot(&address.robot);
+            // A former owner may have retired a robot that is suspended here.
+            if slot.suspended.is_none() || !slot.before.is_empty() {
+                slot.behind = Some(event + 1);
+                partition.behind += 1;
+            }
         }
         for message in history {
-            partition.seen.1 = partition.seen.1.max(message.sequence);
-            let Some(address) = Address::parse(&message.subject) else { continue };
-            let slot = partition.slot(&address.robot);
-            if slot.chain >= message.sequence {
-                continue;
-            }
-            // The next decision has to follow this message, even if the message cannot be parsed.
-            slot.chain = message.sequence;
-            match Decided::parse(&message.payload) {
-                Some(decided) => slot.before.push_back((message.sequence, decided)),
-                None => partition.refuse(None, "not_a_decision"),
-            }
+            partition.take_decision(&message);
         }
+        partition.recovered = partition.seen.1;
         Ok(partition)
     }
 
-    fn take_saved(&mut self, key: &str, value: &[u8], revision: u64) {
+    /// Restores a robot from its snapshot, or suspends it. If later events and decisions have to be read
+    /// separately, returns the robot and the sequence numbers of the last ones that the snapshot contains.
+    fn take_saved(&mut self, key: &str, value: &[u8], revision: u64) -> Option<(Address, u64, u64)> {
         let (Some(address), Ok(saved)) = (Address::parse(key), serde_json::from_slice::<Saved>(value)) else {
             self.refuse(None, "not_a_snapshot");
-            return;
+            return None;
         };
-        let restored = Robot::restore(&saved, &self.shared.missions);
+        let (robot, fault) = Robot::restore(&saved, &self.shared.missions);
         let slot = self.slot(&address.robot);
-        (slot.chain, slot.revision) = (saved.decision, revision);
-        match restored {
-            Ok(robot) => slot.robot = Some(Box::new(robot)),
-            Err(Faulted(why)) => {
-                slot.robot = Some(Box::default());
-                self.fault(&address.robot, saved.event + 1, saved.decision + 1, &why);
-            }
+        slot.robot = Some(Box::new(robot));
+        (slot.is_apart, slot.revision) = (saved.behind, revision);
+        slot.chain = (!saved.behind).then_some(saved.decision);
+        if let Some(Faulted(why)) = fault {
+            self.fault(&address.robot, saved.event + 1, saved.decision + 1, &why);
+        }
+        saved.behind.then_some((address, saved.event, saved.decision))
+    }
+
+    /// Keeps a decision of a former owner for its replay.
+    fn take_decision(&mut self, message: &Stored) {
+        self.seen.1 = self.seen.1.max(message.sequence);
+        let Some(address) = Address::parse(&message.subject) else { return };
+        let slot = self.slot(&address.robot);
+        if slot.chain.is_some_and(|chain| chain >= message.sequence) {
+            return;
+        }
+        // The next decision has to follow this message, even if the message cannot be parsed.
+        slot.chain = Some(message.sequence);
+        match Decided::parse(&message.payload) {
+            Some(decided) => slot.before.push_back((message.sequence, decided)),
+            None => self.refuse(None, "not_a_decision"),
         }
     }
 }

@@ -366,6 +366,31 @@ impl Store for Local {
         self.page(stream, partition, after, usize::MAX)
     }
 
+    async fn of_subject(
+        &self,
+        stream: Stream,
+        subject: &str,
+        after: u64,
+        most: usize,
+    ) -> Result<Vec<Stored>, Fault> {
+        let partition = Address::parse(subject).map_or(0, |address| address.partition);
+        let (number, transaction) = (stream as u8, self.0.database.begin_read().map_err(failed)?);
+        let of_partition = transaction.open_table(OF_PARTITION).map_err(failed)?;
+        let messages = transaction.open_table(MESSAGES).map_err(failed)?;
+        let mut found = Vec::new();
+        for entry in of_partition
+            .range((number, partition, after + 1)..=(number, partition, u64::MAX))
+            .map_err(failed)?
+        {
+            let message = message(&messages, number, entry.map_err(failed)?.0.value().2)?;
+            found.extend(message.filter(|message| message.subject == subject));
+            if found.len() >= most {
+                break;
+            }
+        }
+        Ok(found)
+    }
+
     async fn end(&self, stream: Stream, partition: u32) -> Result<u64, Fault> {
         let transaction = self.0.database.begin_read().map_err(failed)?;
         let of_partition = transaction.open_table(OF_PARTITION).map_err(failed)?;

@@ -16,9 +16,9 @@ use futures::stream::BoxStream;
 /// The two streams of messages of a fleet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Stream {
-    /// Events of robots, with subjects `ev.PARTITION.ROBOT`.
+    /// Events of robots, with subjects `ev.PARTITION.ROBOT` after the prefix of the fleet.
     Events,
-    /// Decisions for robots, with subjects `dec.PARTITION.ROBOT`.
+    /// Decisions for robots, with subjects `dec.PARTITION.ROBOT` after the prefix of the fleet.
     Decisions,
 }
 
@@ -26,7 +26,7 @@ impl Stream {
     /// Both streams.
     pub const ALL: [Self; 2] = [Self::Events, Self::Decisions];
 
-    /// Returns the first token of the stream's subjects.
+    /// Returns the first token of the stream's subjects after the prefix of the fleet.
     pub fn prefix(self) -> &'static str {
         match self {
             Self::Events => "ev",
@@ -160,6 +160,16 @@ pub trait Store: Clone + Send + Sync + 'static {
         stream: Stream,
         partition: u32,
         after: u64,
+    ) -> impl Future<Output = Result<Vec<Stored>, Fault>> + Send;
+
+    /// Returns the messages of one subject after a sequence number that exist at the time of the call, in
+    /// ascending order, but at most the first `most`.
+    fn of_subject(
+        &self,
+        stream: Stream,
+        subject: &str,
+        after: u64,
+        most: usize,
     ) -> impl Future<Output = Result<Vec<Stored>, Fault>> + Send;
 
     /// Returns the sequence number of the last message of a partition, or 0 for an empty partition.

@@ -1,7 +1,9 @@
 //! NATS JetStream as a log.
 //!
 //! The streams are called `FLEET-events` and `FLEET-decisions`, and there is a bucket for each
-//! [`Bucket`]. All have the number of replicas with which they were created. The last message of a
+//! [`Bucket`]. The subjects of the fleet `fleet`, the default, have no prefix (`ev.PARTITION.ROBOT`),
+//! those of another fleet begin with its name (`FLEET.ev.PARTITION.ROBOT`), so that several fleets
+//! can share the servers. The subjects of an existing fleet are those with which it was created. All have the number of replicas with which they were created. The last message of a
 //! subject and the message with a sequence number are read from the leader of the stream. Values of
 //! a bucket may be read from a replica that lags behind; conditional writes then fail. Consumers may
 //! lag behind, too, so a caller passes the sequence number up to which a consumer has to read.
@@ -21,6 +23,7 @@ use futures::{StreamExt as _, TryStreamExt as _};
 use metaplan::message::Message as Diagnostic;
 
 use super::{Bucket, Entry, Fault, Message, Receipt, Store, Stored, Stream};
+use crate::wire::is_name;
 
 /// Settings for the connection to NATS servers.
 #[derive(Debug, Clone, Default)]
@@ -41,7 +44,7 @@ pub struct Access {
 /// partitions, replicas and lease.
 #[derive(Debug, Clone)]
 pub struct Layout {
-    /// Name of the fleet, a prefix of all names: letters, digits, `-` and `_`.
+    /// Name of the fleet, a prefix of all names: up to 64 letters, digits, `-` and `_`.
     pub fleet: String,
     /// Number of partitions, which never changes.
     pub partitions: u32,
@@ -50,6 +53,9 @@ pub struct Layout {
     /// Time after which leases expire unless they are renewed.
     pub lease: Duration,
 }
+
+/// Name of the fleet whose subjects have no prefix.
+pub const DEFAULT_FLEET: &str = "fleet";
 
 const BATCH: usize = 500;
 
@@ -70,6 +76,8 @@ pub struct Nats {
     partitions: u32,
     lease: Duration,
     fleet: String,
+    /// First tokens of all subjects of the fleet: empty, or `FLEET.`.
+    prefix: String,
     streams: [stream::Stream<()>; 2],
     buckets: [kv::Store; 4],
 }
@@ -131,11 +139,18 @@ impl Nats {
     /// JetStream leader, so failures are retried for the duration `patience`, each with a warning.
     ///
     /// # Errors
-    /// A file of `access` cannot be read, the servers refuse access, or a stream of this name does
-    /// not belong to a fleet. After `patience`: no server can be reached, or it has no JetStream.
+    /// The name of the fleet is invalid, a file of `access` cannot be read, the servers refuse access,
+    /// or a stream of this name does not belong to a fleet. After `patience`: no server can be reached, or it has no JetStream.
     pub async fn open(access: &Access, layout: &Layout, patience: Duration) -> Result<Self, Diagnostic> {
         let wrong =
             |error: &dyn std::fmt::Display| Diagnostic::error("N311", format!("{}: {error}", access.url));
+        if !is_name(&layout.fleet) {
+            let text = format!(
+                "`{}` is no name of a fleet: use up to 64 letters, digits, `-` and `_`",
+                layout.fleet
+            );
+            return Err(wrong(&text));
+        }
         let options = options(access).await.map_err(|error| wrong(&error))?;
         let urls: Vec<&str> = access.url.split(',').map(str::trim).collect();
         let deadline = Instant::now() + patience;
@@ -164,9 +179,10 @@ impl Nats {
     }
 
     async fn with(client: Client, context: Context, layout: &Layout) -> Result<Self, OpenError> {
+        let prefix = subject_prefix(&layout.fleet);
         let config = |kind: Stream| stream::Config {
             name: stream_name(&layout.fleet, kind),
-            subjects: vec![format!("{}.*.*", kind.prefix())],
+            subjects: vec![format!("{prefix}{}.*.*", kind.prefix())],
             num_replicas: layout.replicas,
             duplicate_window: WINDOW,
             // The number of partitions is stored in the description, so that all clients agree on
@@ -175,12 +191,18 @@ impl Nats {
             allow_direct: true,
             ..stream::Config::default()
         };
-        let mut partitions = layout.partitions;
+        let (mut partitions, mut prefix) = (layout.partitions, prefix.clone());
         for kind in Stream::ALL {
             let created = context.get_or_create_stream(config(kind)).await.map_err(failed)?;
-            let known = created.cached_info().config.description.as_deref();
-            let known = known.and_then(|text| text.strip_prefix("partitions=")?.parse().ok());
-            partitions = known.ok_or_else(|| OpenError::ForeignStream(stream_name(&layout.fleet, kind)))?;
+            let existing = &created.cached_info().config;
+            let layout_of = || {
+                let partitions =
+                    existing.description.as_deref()?.strip_prefix("partitions=")?.parse().ok()?;
+                let prefix = existing.subjects.first()?.strip_suffix(&format!("{}.*.*", kind.prefix()))?;
+                Some((partitions, prefix.to_owned()))
+            };
+            (partitions, prefix) =
+                layout_of().ok_or_else(|| OpenError::ForeignStream(stream_name(&layout.fleet, kind)))?;
         }
         let mut buckets = Vec::new();
         for kind in Bucket::ALL {
@@ -210,7 +232,7 @@ impl Nats {
         let leases: &kv::Store = &buckets[Bucket::Leases as usize];
         let lease = leases.status().await.map_err(failed)?.max_age();
         let buckets = buckets.try_into().map_err(|_| failed("a bucket is missing"))?;
-        Ok(Self { client, context, partitions, lease, fleet: layout.fleet.clone(), streams, buckets })
+        Ok(Self { client, context, partitions, lease, fleet: layout.fleet.clone(), prefix, streams, buckets })
     }
 
     /// Returns the number of messages of a stream.
@@ -226,12 +248,18 @@ impl Nats {
     /// # Errors
     /// The server cannot be reached.
     pub async fn notices(&self) -> Result<BoxStream<'static, (String, String)>, Fault> {
-        let subscriber = self.client.subscribe("err.*.*").await.map_err(failed)?;
-        let refusals = subscriber.map(|message| {
-            let subject = message.subject.strip_prefix("err.").unwrap_or_default().to_owned();
+        let prefix = format!("{}err.", self.prefix);
+        let subscriber = self.client.subscribe(format!("{prefix}*.*")).await.map_err(failed)?;
+        let refusals = subscriber.map(move |message| {
+            let subject = message.subject.strip_prefix(&prefix).unwrap_or_default().to_owned();
             (subject, String::from_utf8_lossy(&message.payload).into_owned())
         });
         Ok(refusals.boxed())
+    }
+
+    /// Returns the subject of a stream with this end (`PARTITION.ROBOT`), which may have wildcards.
+    fn subject(&self, stream: Stream, end: &str) -> String {
+        format!("{}{}.{end}", self.prefix, stream.prefix())
     }
 
     fn stream(&self, stream: Stream) -> &stream::Stream<()> {
@@ -242,15 +270,14 @@ impl Nats {
         &self.buckets[bucket as usize]
     }
 
-    /// Reads all messages of a stream that match `filter`, beginning as `from` requires. Reads to
-    /// the end, and at least to the sequence number `reach`. Calls `take` with each message and its
+    /// Reads the messages of a stream that match `filter`, beginning as `from` requires. Calls `take` with each message and its
     /// sequence number.
     async fn read(
         &self,
         name: &str,
         filter: String,
         from: DeliverPolicy,
-        reach: u64,
+        Extent { reach, most }: Extent,
         mut take: impl FnMut(jetstream::Message, u64),
     ) -> Result<(), Fault> {
         let config = pull::Config {
@@ -265,10 +292,11 @@ impl Nats {
         let consumer: jetstream::consumer::PullConsumer =
             self.context.create_consumer_on_stream(config, name).await.map_err(failed)?;
         let mut pending = consumer.cached_info().num_pending;
-        let (mut last, mut expected) = (0, 1);
-        while pending > 0 || last < reach {
+        let (mut last, mut expected, mut total) = (0, 1, 0);
+        while (pending > 0 || last < reach) && total < most {
+            let wanted = BATCH.min(most - total);
             let mut batch =
-                consumer.fetch().max_messages(BATCH).expires(PATIENCE).messages().await.map_err(failed)?;
+                consumer.fetch().max_messages(wanted).expires(PATIENCE).messages().await.map_err(failed)?;
             let mut got = 0;
             while let Some(message) = batch.try_next().await.map_err(failed)? {
                 let (sequence, number, rest) = {
@@ -284,6 +312,7 @@ impl Nats {
                 pending = rest;
                 take(message, sequence);
             }
+            total += got;
             if got == 0 {
                 return Err(failed("the server has no more messages, and should have"));
             }
@@ -294,6 +323,18 @@ impl Nats {
     }
 }
 
+/// Part of a stream to read: to the end, and at least to the sequence number `reach`, but at most `most` messages.
+struct Extent {
+    reach: u64,
+    most: usize,
+}
+
+impl Extent {
+    fn all(reach: u64) -> Self {
+        Self { reach, most: usize::MAX }
+    }
+}
+
 fn stream_name(fleet: &str, stream: Stream) -> String {
     match stream {
         Stream::Events => format!("{fleet}-events"),
@@ -301,13 +342,18 @@ fn stream_name(fleet: &str, stream: Stream) -> String {
     }
 }
 
-fn stored(stream: Stream, message: &jetstream::Message) -> Result<Stored, Fault> {
+/// Returns the first tokens of the subjects of a fleet that is created.
+fn subject_prefix(fleet: &str) -> String {
+    if fleet == DEFAULT_FLEET { String::new() } else { format!("{fleet}.") }
+}
+
+fn stored(message: &jetstream::Message) -> Result<Stored, Fault> {
     let info = message.info().map_err(failed)?;
     let time = micros(info.published.unix_timestamp_nanos());
     let id = message.headers.as_ref().and_then(|headers| headers.get("Nats-Msg-Id"));
     Ok(Stored {
         sequence: info.stream_sequence,
-        subject: tail(stream, &message.subject),
+        subject: tail(&message.subject),
         id: id.map(|id| id.as_str().to_owned()),
         time,
         payload: message.payload.to_vec(),
@@ -315,22 +361,20 @@ fn stored(stream: Stream, message: &jetstream::Message) -> Result<Stored, Fault>
 }
 
 /// Converts a message that was read from the stream leader.
-fn raw(stream: Stream, message: &StreamMessage) -> Stored {
+fn raw(message: &StreamMessage) -> Stored {
     Stored {
         sequence: message.sequence,
-        subject: tail(stream, &message.subject),
+        subject: tail(&message.subject),
         id: message.headers.get("Nats-Msg-Id").map(|id| id.as_str().to_owned()),
         time: micros(message.time.unix_timestamp_nanos()),
         payload: message.payload.to_vec(),
     }
 }
 
-fn tail(stream: Stream, subject: &str) -> String {
-    subject
-        .strip_prefix(stream.prefix())
-        .and_then(|rest| rest.strip_prefix('.'))
-        .unwrap_or_default()
-        .to_owned()
+/// Returns the last two tokens of a subject, `PARTITION.ROBOT`.
+fn tail(subject: &str) -> String {
+    let start = subject.rmatch_indices('.').nth(1).map_or(0, |(dot, _)| dot + 1);
+    subject[start..].to_owned()
 }
 
 fn micros(nanos: i128) -> u64 {
@@ -361,17 +405,17 @@ impl Store for Nats {
         after: u64,
     ) -> Result<BoxStream<'static, Result<Stored, Fault>>, Fault> {
         let config = pull::OrderedConfig {
-            filter_subject: format!("{}.{partition}.*", kind.prefix()),
+            filter_subject: self.subject(kind, &format!("{partition}.*")),
             deliver_policy: DeliverPolicy::ByStartSequence { start_sequence: after + 1 },
             ..pull::OrderedConfig::default()
         };
         let consumer = self.stream(kind).create_consumer(config).await.map_err(failed)?;
         let messages = consumer.messages().await.map_err(failed)?;
-        Ok(messages.map(move |message| stored(kind, &message.map_err(failed)?)).boxed())
+        Ok(messages.map(move |message| stored(&message.map_err(failed)?)).boxed())
     }
 
     async fn history(&self, kind: Stream, partition: u32, after: u64) -> Result<Vec<Stored>, Fault> {
-        let filter = format!("{}.{partition}.*", kind.prefix());
+        let filter = self.subject(kind, &format!("{partition}.*"));
         let reach = self.end(kind, partition).await?;
         if reach <= after {
             return Ok(Vec::new());
@@ -379,7 +423,27 @@ impl Store for Nats {
         let mut messages = Vec::new();
         let from = DeliverPolicy::ByStartSequence { start_sequence: after + 1 };
         let name = stream_name(&self.fleet, kind);
-        self.read(&name, filter, from, reach, |message, _| messages.push(stored(kind, &message))).await?;
+        self.read(&name, filter, from, Extent::all(reach), |message, _| messages.push(stored(&message)))
+            .await?;
+        messages.into_iter().collect()
+    }
+
+    async fn of_subject(
+        &self,
+        kind: Stream,
+        subject: &str,
+        after: u64,
+        most: usize,
+    ) -> Result<Vec<Stored>, Fault> {
+        let reach = self.last(kind, subject).await?.map_or(0, |last| last.sequence);
+        if reach <= after {
+            return Ok(Vec::new());
+        }
+        let mut messages = Vec::new();
+        let from = DeliverPolicy::ByStartSequence { start_sequence: after + 1 };
+        let (name, filter) = (stream_name(&self.fleet, kind), self.subject(kind, subject));
+        let limits = Extent { reach, most };
+        self.read(&name, filter, from, limits, |message, _| messages.push(stored(&message))).await?;
         messages.into_iter().collect()
     }
 
@@ -396,7 +460,7 @@ impl Store for Nats {
         if let Some(after) = message.after {
             publish = publish.expected_last_subject_sequence(after);
         }
-        let subject = format!("{}.{}", kind.prefix(), message.subject);
+        let subject = self.subject(kind, message.subject);
         let bytes = message.payload.len();
         let ack = self
             .context
@@ -409,9 +473,9 @@ impl Store for Nats {
     }
 
     async fn last(&self, kind: Stream, subject: &str) -> Result<Option<Stored>, Fault> {
-        let name = format!("{}.{subject}", kind.prefix());
+        let name = self.subject(kind, subject);
         match self.stream(kind).get_last_raw_message_by_subject(&name).await {
-            Ok(message) => Ok(Some(raw(kind, &message))),
+            Ok(message) => Ok(Some(raw(&message))),
             Err(error) if matches!(error.kind(), LastRawMessageErrorKind::NoMessageFound) => Ok(None),
             Err(error) => Err(failed(error)),
         }
@@ -419,7 +483,7 @@ impl Store for Nats {
 
     async fn at(&self, kind: Stream, sequence: u64) -> Result<Option<Stored>, Fault> {
         match self.stream(kind).get_raw_message(sequence).await {
-            Ok(message) => Ok(Some(raw(kind, &message))),
+            Ok(message) => Ok(Some(raw(&message))),
             Err(error) if matches!(error.kind(), LastRawMessageErrorKind::NoMessageFound) => Ok(None),
             Err(error) => Err(failed(error)),
         }
@@ -449,7 +513,11 @@ impl Store for Nats {
     }
 
     async fn remove(&self, bucket: Bucket, key: &str, revision: u64) -> Result<(), Fault> {
-        self.bucket(bucket).delete_expect_revision(key, Some(revision)).await.map_err(failed)
+        let removed = self.bucket(bucket).delete_expect_revision(key, Some(revision)).await;
+        removed.map_err(|error| match error.kind() {
+            UpdateErrorKind::WrongLastRevision => Fault::Conflict,
+            _ => failed(error),
+        })
     }
 
     async fn list(&self, bucket: Bucket, partition: Option<u32>, at_least: u64) -> Result<Vec<Entry>, Fault> {
@@ -458,7 +526,8 @@ impl Store for Nats {
         let filter =
             partition.map_or_else(|| format!("{prefix}>"), |partition| format!("{prefix}{partition}.*"));
         let mut entries = Vec::new();
-        self.read(&name, filter, DeliverPolicy::LastPerSubject, at_least, |message, revision| {
+        let extent = Extent::all(at_least);
+        self.read(&name, filter, DeliverPolicy::LastPerSubject, extent, |message, revision| {
             let is_gone = message.headers.as_ref().is_some_and(|headers| {
                 headers.get("KV-Operation").is_some() || headers.get("Nats-Marker-Reason").is_some()
             });
@@ -472,6 +541,19 @@ impl Store for Nats {
 
     async fn notice(&self, subject: &str, text: &str) {
         // The message is not persistent, and there may be no subscriber.
-        let _ = self.client.publish(format!("err.{subject}"), text.to_owned().into()).await;
+        let _ = self.client.publish(format!("{}err.{subject}", self.prefix), text.to_owned().into()).await;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_default_fleet_has_subjects_without_prefix() {
+        assert_eq!((subject_prefix("fleet").as_str(), subject_prefix("north").as_str()), ("", "north."));
+        for subject in ["ev.3.ugv-1", "north.ev.3.ugv-1", "3.ugv-1"] {
+            assert_eq!(tail(subject), "3.ugv-1");
+        }
     }
 }

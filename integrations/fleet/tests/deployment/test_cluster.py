@@ -223,3 +223,47 @@ def test_a_refused_user_is_an_error_at_once(tmp_path):
         assert time.monotonic() - begun < 40
     finally:
         own.stop()
+
+
+@pytest.fixture
+def server(tmp_path):
+    own = Cluster(tmp_path)
+    port = own.port("server", 4222)
+    own.start("server", [NATS, "--js", "--sd", f"{tmp_path}/server", "--addr", "127.0.0.1", "--port", str(port)])
+    try:
+        yield own, f"nats://127.0.0.1:{port}"
+    finally:
+        own.stop()
+
+
+def call(*words, text=""):
+    return subprocess.run([PROGRAM, *words], input=text, capture_output=True, text=True, timeout=SECONDS, check=False)
+
+
+def test_a_line_that_is_not_stored_is_an_error(server):
+    long = json.dumps({"event": "tick", "note": "x" * 1_200_000})
+    out = call("send", "--nats", server[1], text=f'r {{"event": "tick"}}\nr {long}\nr {{"event": "tick"}}\n')
+    assert out.returncode == 2 and "error[N315]: line 2, robot `r`" in out.stderr and "2 events were stored" in out.stderr, out.stderr
+
+
+def test_fleets_share_a_server(server, tmp_path):
+    cluster, url = server
+    image(tmp_path)
+    for fleet in ("fleet", "north"):
+        words = ["--nats", url, "--fleet", fleet, "--missions", f"{tmp_path}/image/missions", "--partitions", "1"]
+        cluster.start(fleet, [PROGRAM, "worker", *words])
+    for fleet in ("fleet", "north"):
+        out = call("send", "--nats", url, "--fleet", fleet, text='ugv-1 {"event": "enrol", "mission": "ugv"}\n')
+        assert out.returncode == 0, out.stderr
+    for fleet in ("fleet", "north"):
+        words = [PROGRAM, "follow", "ugv-1", "--after", "0", "--nats", url, "--fleet", fleet]
+        with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as following:
+            try:
+                os.set_blocking(following.stdout.fileno(), False)
+                decided = cluster.wait("a decision", following.stdout.readline)
+            finally:
+                following.kill()
+        # Each fleet counts its own events.
+        assert json.loads(decided.partition(" ")[2])["event"] == 1
+    out = call("status", "--nats", url, "--fleet", "no.name")
+    assert out.returncode == 2 and "is no name of a fleet" in out.stderr, out.stderr

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use futures::stream::BoxStream;
-use metaplan_fleet::partition::{Order, Settings, serve};
+use metaplan_fleet::partition::{End, Order, Settings, serve};
 use metaplan_fleet::store::local::Local;
 use metaplan_fleet::store::{Bucket, Entry, Fault, Message, Receipt, Store, Stored, Stream};
 use tokio::sync::{Notify, watch};
@@ -71,6 +71,16 @@ impl Store for Crashing {
 
     async fn history(&self, stream: Stream, partition: u32, after: u64) -> Result<Vec<Stored>, Fault> {
         self.through(self.inner.history(stream, partition, after)).await
+    }
+
+    async fn of_subject(
+        &self,
+        stream: Stream,
+        subject: &str,
+        after: u64,
+        most: usize,
+    ) -> Result<Vec<Stored>, Fault> {
+        self.through(self.inner.of_subject(stream, subject, after, most)).await
     }
 
     async fn end(&self, stream: Stream, partition: u32) -> Result<u64, Fault> {
@@ -249,5 +259,28 @@ async fn owners_that_are_gone_at_any_time_leave_what_is_needed() {
     for (robot, ((_, answers), sequences)) in scripts.iter().zip(&sequences).enumerate() {
         let robot = format!("r{robot}");
         assert_same(&robot, &made[&robot], sequences, answers);
+    }
+}
+
+/// A partition is given back in time, though a job does not end.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_drain_does_not_wait_for_jobs_without_end() {
+    let (events, answers) = scripts::play("ugv", "kinect_at_wp2", 3, 7);
+    let settings = Settings { drain: Duration::from_millis(100), ..Settings::default() };
+    for operations in 6..12 {
+        let folder = tempfile::tempdir().expect("a directory");
+        let store = open(folder.path(), 1);
+        let sequences = tell(&store, "r", &events).await;
+        let left = Arc::new(AtomicU64::new(operations));
+        let (inner, over) = (store.clone(), Arc::<Notify>::default());
+        let crashing = Crashing { inner, left, carries_out: true, fences: true, over: Arc::clone(&over) };
+        let (orders, heard) = watch::channel(Order::Go);
+        let task = tokio::spawn(serve(shared(crashing, "first", settings), 0, heard));
+        over.notified().await;
+        orders.send_replace(Order::Drain);
+        let end = tokio::time::timeout(Duration::from_secs(30), task).await;
+        assert_eq!(end.expect("it ends in time").expect("no panic"), End::Ordered);
+        work(&store, "second", settings, events.len()).await;
+        assert_same("r", &decisions(&store).await["r"], &sequences, &answers);
     }
 }

@@ -4,8 +4,12 @@
 
 mod crashes;
 mod hostile;
+mod isolation;
+mod program;
+mod repeated;
 mod scripts;
 mod shares;
+mod versions;
 
 use std::collections::BTreeMap;
 use std::path::Path;
