@@ -165,7 +165,7 @@ impl Graph {
                     && watching.state().participants.get(&prefix) == Some(&Vendor::FastDds)
                 {
                     let graph = Arc::clone(&watching);
-                    preemptive.request_endpoints(own_prefix, prefix, move |are_readers| {
+                    preemptive.request_endpoints(&participant, own_prefix, prefix, move |are_readers| {
                         graph.has_endpoint_of(prefix, are_readers)
                     });
                 }

@@ -21,19 +21,18 @@
 //! reader yet. Receivers ignore the repetitions by their counts.
 //!
 //! The built-in writers that announce endpoints have the same defect at the first contact: Fast DDS often sends
-//! its HEARTBEAT before the library has matched these writers, and the next one follows after 1 s. The library
-//! does not expose the address of these writers, so that no message can be sent to them. Instead, a
-//! HEARTBEAT with samples on behalf of the writer is sent to our own participant: the library then requests
-//! these samples from the writer.
+//! its HEARTBEAT before the library has matched these writers, and the next one follows after 1 s. They get the same
+//! ACKNACK. The library does not expose their address, so that the ACKNACK is sent to the default ports of the
+//! first participants of each known host. Other participants ignore it.
 //!
 //! # References
 //! OMG DDSI-RTPS 2.5: 8.3.8.1 (ACKNACK), 8.3.8.6 (HEARTBEAT), 9.4.5 (wire format).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
-use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, SocketAddrV4};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use ros2_client::dds::rustdds::DomainParticipant;
 use smol::net::UdpSocket;
@@ -43,13 +42,12 @@ use smol::{Task, Timer};
 /// a busy machine, Fast DDS may match seconds later than the library.
 const PAUSES: [u64; 10] = [5, 20, 75, 100, 200, 200, 400, 500, 2000, 5000];
 
-/// Times after the discovery of a participant at which its endpoints are requested unless they are known, in
-/// milliseconds. The library ignores the HEARTBEAT of the writer with the count 1 after the first request, with
-/// the count 2 after the second and so on. Therefore the first request waits for the HEARTBEAT.
-const ENDPOINT_REQUESTS: [u64; 3] = [30, 100, 300];
+/// Time after the discovery of a participant at which its endpoints are requested unless they are known. The
+/// library ignores the first HEARTBEAT of the writer after the request, so that the request waits for it.
+const ENDPOINT_DELAY: Duration = Duration::from_millis(30);
 
-/// Number of endpoints of one kind that are requested: the size of the set in an ACKNACK (RTPS 2.5, 9.4.2.6).
-const MAX_ENDPOINTS: u32 = 256;
+/// Number of participants of a host whose default ports get the ACKNACK.
+const PARTICIPANTS: u16 = 32;
 
 /// Entity ids of the built-in writers and readers of subscriptions and of publications (RTPS 2.5, table 9.2).
 const SUBSCRIPTIONS: [[u8; 4]; 2] = [[0, 0, 4, 0xC2], [0, 0, 4, 0xC7]];
@@ -133,28 +131,47 @@ impl Preemptive {
         .detach();
     }
 
-    /// Requests the endpoints of a participant of Fast DDS unless `is_known` returns `true` soon. Its argument is
+    /// Makes a participant of Fast DDS announce its endpoints unless `is_known` returns `true` soon. Its argument is
     /// `true` for readers and `false` for writers.
     pub(crate) fn request_endpoints(
         self: &Arc<Self>,
+        participant: &DomainParticipant,
         own: Prefix,
         other: Prefix,
         is_known: impl Fn(bool) -> bool + Send + 'static,
     ) {
-        let preemptive = Arc::clone(self);
+        let (preemptive, participant) = (Arc::clone(self), participant.clone());
         smol::spawn(async move {
-            let start = Instant::now();
-            for (after, count) in ENDPOINT_REQUESTS.into_iter().zip(1..) {
-                Timer::at(start + Duration::from_millis(after)).await;
-                for (are_readers, [writer, reader]) in [(true, SUBSCRIPTIONS), (false, PUBLICATIONS)] {
-                    if is_known(are_readers) {
-                        continue;
-                    }
-                    let matched = Match { reader: guid(own, reader), writer: guid(other, writer) };
-                    let message = heartbeat(matched, MAX_ENDPOINTS, count, None);
-                    // A message that cannot be sent is like a lost one.
-                    let _ = preemptive.socket.send_to(&message, preemptive.own_address).await;
+            Timer::after(ENDPOINT_DELAY).await;
+            let kinds =
+                [(true, SUBSCRIPTIONS), (false, PUBLICATIONS)].map(|(are_readers, [writer, reader])| {
+                    (are_readers, Match { reader: guid(own, reader), writer: guid(other, writer) })
+                });
+            let mut unknown: Vec<(bool, Match)> =
+                kinds.into_iter().filter(|(are_readers, _)| !is_known(*are_readers)).collect();
+            if unknown.is_empty() {
+                return;
+            }
+            let addresses = discovery_addresses(&participant);
+            for (_, matched) in &unknown {
+                let pending = Pending { addresses: addresses.clone(), acknack: None };
+                preemptive.matches().insert(*matched, pending);
+            }
+            for pause in PAUSES {
+                for (_, matched) in &unknown {
+                    preemptive.advance(*matched).await;
                 }
+                Timer::after(Duration::from_millis(pause)).await;
+                unknown.retain(|(are_readers, matched)| {
+                    let is_known = is_known(*are_readers);
+                    if is_known {
+                        preemptive.matches().remove(matched);
+                    }
+                    !is_known
+                });
+            }
+            for (_, matched) in unknown {
+                preemptive.matches().remove(&matched);
             }
         })
         .detach();
@@ -179,10 +196,7 @@ impl Preemptive {
             }
             None => {
                 if let Ok(SocketAddr::V4(reply_to)) = self.socket.local_addr() {
-                    let _ = self
-                        .socket
-                        .send_to(&heartbeat(matched, 0, 1, Some(reply_to)), self.own_address)
-                        .await;
+                    let _ = self.socket.send_to(&empty_heartbeat(matched, reply_to), self.own_address).await;
                 }
             }
         }
@@ -242,17 +256,30 @@ fn guid(prefix: Prefix, entity: [u8; 4]) -> Guid {
     guid
 }
 
-/// Encodes a HEARTBEAT of a writer with the samples from 1 to `last`, which is to be answered to `reply_to`,
-/// or to the writer itself. The lowest possible count is 1.
+/// Returns the addresses at which the first participants of this host, and of hosts with known endpoints, receive
+/// discovery messages by default.
+fn discovery_addresses(participant: &DomainParticipant) -> Vec<SocketAddr> {
+    let writers = participant.discovered_writers().into_iter();
+    let readers = participant.discovered_readers().into_iter();
+    let locators = writers
+        .flat_map(|data| data.writer_proxy.unicast_locator_list)
+        .chain(readers.flat_map(|data| data.reader_proxy.unicast_locator_list));
+    // A locator of another kind is converted to an IPv6 address.
+    let mut hosts: BTreeSet<IpAddr> =
+        locators.map(|locator| SocketAddr::from(locator).ip()).filter(IpAddr::is_ipv4).collect();
+    hosts.insert(Ipv4Addr::LOCALHOST.into());
+    let port = |index| discovery_port(participant.domain_id(), index);
+    hosts
+        .into_iter()
+        .flat_map(|host| (0..PARTICIPANTS).map(move |index| (host, port(index)).into()))
+        .collect()
+}
+
+/// Encodes a HEARTBEAT of a writer without samples, which is to be answered to `reply_to`.
 ///
 /// The sender of the message is our own participant, because the library notes the network
-/// interface on which a participant sends.
-fn heartbeat(
-    Match { reader, writer }: Match,
-    last: u32,
-    count: i32,
-    reply_to: Option<SocketAddrV4>,
-) -> Vec<u8> {
+/// interface on which a participant sends. The count is the lowest possible one.
+fn empty_heartbeat(Match { reader, writer }: Match, reply_to: SocketAddrV4) -> Vec<u8> {
     let mut message = b"RTPS".to_vec();
     message.extend(VERSION_AND_VENDOR);
     message.extend(&reader[..12]);
@@ -263,19 +290,13 @@ fn heartbeat(
         message.extend(content);
     };
     append(kind::INFO_SRC, &[&[0; 4], &VERSION_AND_VENDOR, &writer[..12]]);
+    // One locator of the kind UDPv4: kind, port, address. The library reads a byte after the list,
+    // also if the flag for a second list is not set; the padding is that byte.
+    let port = u32::from(reply_to.port()).to_le_bytes();
     let number_one = 1_u32.to_le_bytes();
-    if let Some(reply_to) = reply_to {
-        // One locator of the kind UDPv4: kind, port, address. The library reads a byte after the list,
-        // also if the flag for a second list is not set; the padding is that byte.
-        let port = u32::from(reply_to.port()).to_le_bytes();
-        append(
-            kind::INFO_REPLY,
-            &[&number_one, &number_one, &port, &[0; 12], &reply_to.ip().octets(), &[0; 4]],
-        );
-    }
-    // Reader and writer, first sequence number 1, last one, count.
-    let (last, count) = (last.to_le_bytes(), count.to_le_bytes());
-    append(kind::HEARTBEAT, &[&reader[12..], &writer[12..], &[0; 4], &number_one, &[0; 4], &last, &count]);
+    append(kind::INFO_REPLY, &[&number_one, &number_one, &port, &[0; 12], &reply_to.ip().octets(), &[0; 4]]);
+    // Readers and writers, first sequence number 1, last one 0, count 1.
+    append(kind::HEARTBEAT, &[&reader[12..], &writer[12..], &[0; 4], &number_one, &[0; 8], &number_one]);
     message
 }
 
@@ -329,7 +350,7 @@ fn preemptive_acknack(message: &[u8]) -> Option<(Match, Vec<u8>)> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Guid, Match, discovery_port, heartbeat, preemptive_acknack};
+    use super::{Guid, Match, discovery_port, empty_heartbeat, preemptive_acknack};
 
     const OWN: [u8; 12] = [1, 0x12, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12];
     const OTHER: [u8; 12] = [1, 0x0F, 23, 24, 25, 26, 27, 28, 29, 30, 31, 32];
@@ -349,8 +370,7 @@ mod tests {
 
     #[test]
     fn a_heartbeat_has_the_wire_format_of_rtps() {
-        let reply_to = "127.0.0.1:7411".parse().expect("an address");
-        let message = heartbeat(matched(), 0, 1, Some(reply_to));
+        let message = empty_heartbeat(matched(), "127.0.0.1:7411".parse().expect("an address"));
         let expected = [
             &b"RTPS\x02\x04\x01\x12"[..],
             &OWN,
@@ -366,9 +386,6 @@ mod tests {
             &[0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0],
         ];
         assert_eq!(message, expected.concat());
-        let message = heartbeat(matched(), 256, 3, None);
-        let numbers = [0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 3, 0, 0, 0];
-        assert_eq!(message, [&expected.concat()[..44], &expected.concat()[80..92], &numbers].concat());
     }
 
     /// Message with `INFO_DST` and an ACKNACK as the library sends it.

@@ -317,7 +317,7 @@ mod tests {
         for (rest, part) in [
             ("goal = { pose = \"{pose 2}\" }", "no field `position`"),
             ("goal = { post = 1 }", "no field `post`"),
-            ("expect = { error = 0 }", "did you mean `error_code`?"),
+            ("expect = { error_cod = 0 }", "did you mean `error_code`?"),
             ("goals = 1", "unknown field `goals`"),
         ] {
             let error = goal(&format!("{navigate}{rest}")).expect_err(rest);

@@ -329,7 +329,6 @@ fn decimal_fraction(number: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
     use std::time::Duration;
 
     use metaplan::mapek::FilterSettings;
