@@ -87,6 +87,12 @@ pub const CODES: &[[&str; 4]] = &[
         "Correct the name.",
     ],
     [
+        "N136",
+        "The definition of a type is wrong.",
+        "A definition in the table `[types]` of the settings cannot be read or parsed.",
+        "Use the text of the type's `.msg`, `.srv` or `.action` file.",
+    ],
+    [
         "N140",
         "There are no designs to choose from.",
         "The mission of a reasoner has no knowledge base.",

@@ -4,10 +4,12 @@ use std::collections::BTreeMap;
 use std::error::Error;
 use std::fmt::Write;
 
-use hiroz_codegen::types::{ArrayType, Constant, Field};
+use crate::definition::Definitions;
+use crate::types::definition::{Base, Constant, Count, Field, Interface, Part, Primitive};
+use crate::types::description::{self, Descriptions};
 
-use crate::definition::{Interface, Part};
-use crate::description::Hashes;
+/// Type hashes by variant (`None` for the default) and full name.
+pub type Hashes = BTreeMap<(Option<String>, String), String>;
 
 const KEYWORDS: [&str; 1] = ["type"];
 
@@ -46,25 +48,35 @@ pub fn modules(interfaces: &[Interface], hashes: &Hashes) -> Result<String, Box<
     Ok(text)
 }
 
-/// Returns the text of a list of message names, and of a function that visits a message type by its name.
-/// Both omit variants.
-pub fn dispatch(interfaces: &[Interface]) -> String {
-    let messages =
-        || interfaces.iter().filter(|interface| interface.folder == "msg" && interface.variant.is_none());
-    let arm = |interface: &Interface| {
-        let path = path(interface, &interface.parts[0]);
-        format!("{:?} => visitor.visit::<{path}>(),", interface.full_name())
-    };
-    let arms: Vec<String> = messages().map(arm).collect();
-    let names: Vec<String> = messages().map(|interface| format!("{:?},", interface.full_name())).collect();
-    format!(
-        "/// Names of all messages.\npub(crate) const MESSAGE_NAMES: &[&str] = &[{}];\n\
-         /// Visits a message type by its name, such as `std_msgs/msg/Bool`.\n\
-         pub(crate) fn visit_message<V: MessageVisitor>(name: &str, visitor: V) -> Option<V::Output> {{\n\
-         Some(match name {{\n{}\n_ => return None,\n}})\n}}\n",
-        names.join(" "),
-        arms.join("\n")
-    )
+/// Returns the hashes of all types of all interfaces, including the derived types of services and actions.
+pub fn hashes(interfaces: &[Interface]) -> Result<Hashes, Box<dyn Error>> {
+    let mut common = Descriptions::new();
+    for interface in interfaces.iter().filter(|interface| interface.variant.is_none()) {
+        description::describe(interface, &mut common);
+    }
+    let mut hashes = Hashes::new();
+    for name in common.keys() {
+        hashes.insert((None, name.clone()), description::hash(name, &common)?);
+    }
+    for interface in interfaces.iter().filter(|interface| interface.variant.is_some()) {
+        let mut own = Descriptions::new();
+        description::describe(interface, &mut own);
+        // A variant may refer to common types.
+        let mut all = common.clone();
+        all.extend(own.clone());
+        for name in own.keys() {
+            hashes.insert((interface.variant.clone(), name.clone()), description::hash(name, &all)?);
+        }
+    }
+    Ok(hashes)
+}
+
+/// Returns the text of a slice with the name and the definition of each interface that is no variant.
+pub fn texts(definitions: &Definitions) -> String {
+    let common = definitions.iter().filter(|(interface, _)| interface.variant.is_none());
+    let lines: Vec<String> =
+        common.map(|(interface, text)| format!("({:?}, {text:?}),", interface.full_name())).collect();
+    format!("&[\n{}\n]", lines.join("\n"))
 }
 
 /// Returns the text of a slice with one entry for each structure, `Entry::of::<T>(variant, name)`, and for
@@ -135,8 +147,8 @@ fn constants(text: &mut String, name: &str, constants: &[Constant]) -> Result<()
         return Ok(());
     }
     writeln!(text, "impl {name} {{")?;
-    for Constant { name, const_type, value } in constants {
-        let kind = primitive(const_type).ok_or_else(|| format!("{name}: a constant of type {const_type}"))?;
+    for Constant { name, kind, value } in constants {
+        let kind = primitive(*kind);
         writeln!(text, "/// The value `{name}`.\npub const {name}: {kind} = {value};")?;
     }
     writeln!(text, "}}")?;
@@ -180,48 +192,40 @@ fn whole(text: &mut String, interface: &Interface, hashes: &Hashes) -> Result<()
     Ok(())
 }
 
-fn primitive(name: &str) -> Option<&'static str> {
-    Some(match name {
-        "bool" => "bool",
-        "byte" | "char" | "uint8" => "u8",
-        "int8" => "i8",
-        "uint16" => "u16",
-        "int16" => "i16",
-        "uint32" => "u32",
-        "int32" => "i32",
-        "uint64" => "u64",
-        "int64" => "i64",
-        "float32" => "f32",
-        "float64" => "f64",
-        "string" => "::std::string::String",
-        _ => return None,
-    })
+fn primitive(kind: Primitive) -> &'static str {
+    match kind {
+        Primitive::Bool => "bool",
+        Primitive::Byte | Primitive::Char | Primitive::Uint8 => "u8",
+        Primitive::Int8 => "i8",
+        Primitive::Uint16 => "u16",
+        Primitive::Int16 => "i16",
+        Primitive::Uint32 => "u32",
+        Primitive::Int32 => "i32",
+        Primitive::Uint64 => "u64",
+        Primitive::Int64 => "i64",
+        Primitive::Float32 => "f32",
+        Primitive::Float64 => "f64",
+        Primitive::String => "::std::string::String",
+    }
 }
 
 /// Returns the Rust type of a field. The maximum length of a sequence or string changes neither the
 /// serialised bytes nor the Rust type.
 fn rust_type(field: &Field, interface: &Interface, all: &[Interface]) -> Result<String, Box<dyn Error>> {
-    let kind = &field.field_type;
-    let known = primitive(&kind.base_type).map(str::to_owned);
-    let single =
-        known.map_or_else(|| nested_type(&kind.base_type, kind.package.as_deref(), interface, all), Ok)?;
-    Ok(match kind.array {
-        ArrayType::Single => single,
-        ArrayType::Fixed(size) => format!("[{single}; {size}]"),
-        ArrayType::Bounded(_) | ArrayType::Unbounded => format!("::std::vec::Vec<{single}>"),
+    let single = match &field.kind.base {
+        Base::Primitive(kind) => primitive(*kind).to_owned(),
+        Base::Message(name) => nested_type(name, interface, all)?,
+    };
+    Ok(match field.kind.count {
+        Count::One => single,
+        Count::Fixed(size) => format!("[{single}; {size}]"),
+        Count::Bounded(_) | Count::Unbounded => format!("::std::vec::Vec<{single}>"),
     })
 }
 
 /// Returns the path of a message that an interface refers to: that of the variant, or the common
 /// one.
-fn nested_type(
-    name: &str,
-    package: Option<&str>,
-    interface: &Interface,
-    all: &[Interface],
-) -> Result<String, Box<dyn Error>> {
-    let package = package.unwrap_or(&interface.package);
-    let full_name = format!("{package}/msg/{name}");
+fn nested_type(full_name: &str, interface: &Interface, all: &[Interface]) -> Result<String, Box<dyn Error>> {
     let find = |variant: &Option<String>| {
         all.iter().find(|other| other.variant == *variant && other.full_name() == full_name)
     };

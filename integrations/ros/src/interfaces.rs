@@ -25,7 +25,6 @@
 
 mod traits;
 
-pub(crate) use traits::MessageVisitor;
 pub use traits::{Action, Msg, Service, ServiceHashes, Structure};
 
 include!(concat!(env!("OUT_DIR"), "/interfaces.rs"));

@@ -14,4 +14,5 @@ pub mod popf;
 mod procedure;
 pub mod reasoner;
 mod signals;
+mod types;
 mod validated;

@@ -28,6 +28,20 @@
 //! by = "recharge_battery"
 //! server = "/recharge_battery"
 //!
+//! [actions.dock]                    # an action server of any type: (dock r1 station_1)
+//! by = "action"
+//! server = "/dock_robot"
+//! type = "nav2_msgs/action/DockRobot"
+//! goal = { dock_id = "{2}" }        # with the name of its second argument
+//! expect = { success = true }
+//!
+//! [actions.load]                    # a service of any type
+//! by = "service"
+//! service = "/map_server/load_map"
+//! type = "nav2_msgs/srv/LoadMap"
+//! request = { map_url = "/maps/{1}.yaml" }
+//! expect = { result = "RESULT_SUCCESS" }
+//!
 //! [poses]                           # poses of objects
 //! frame = "map"
 //! hall = { x = 1.0, y = -2.5, yaw = 1.57 }

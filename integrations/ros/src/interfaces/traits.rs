@@ -23,13 +23,6 @@ pub trait Msg: Structure {
     const NAME: &'static str;
 }
 
-/// Operation on a message type that is known by its name only.
-pub(crate) trait MessageVisitor {
-    type Output;
-
-    fn visit<M: Msg>(self) -> Self::Output;
-}
-
 /// A service.
 pub trait Service {
     /// Request of the client.

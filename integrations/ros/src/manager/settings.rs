@@ -11,6 +11,7 @@ use crate::diagnostic_rules::DiagnosticRule;
 use crate::performer::{By, Offered, Poses};
 use crate::procedure::Procedure;
 use crate::signals::Signal;
+use crate::types::{Definition, Library};
 
 /// Default mode of a function that is not needed.
 const UNGROUND: &str = "fd_unground";
@@ -19,6 +20,10 @@ const UNGROUND: &str = "fd_unground";
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
+    /// Definitions of types that this package does not know, by their full names.
+    #[serde(default)]
+    #[expect(dead_code, reason = "read by `DefinitionsOnly`, before all other tables")]
+    types: BTreeMap<String, Definition>,
     /// Tasks by the names with which they are requested.
     #[serde(default)]
     pub tasks: BTreeMap<String, TaskSettings>,
@@ -44,6 +49,12 @@ pub struct Settings {
     /// The file, for errors that are found later.
     #[serde(skip)]
     source: Source,
+}
+
+#[derive(Debug, Deserialize)]
+struct DefinitionsOnly {
+    #[serde(default)]
+    types: BTreeMap<Spanned<String>, Definition>,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -118,11 +129,25 @@ impl Settings {
         let name = file.display().to_string();
         let text = std::fs::read_to_string(file)
             .map_err(|error| Message::at("N130", &name, None, format!("the file cannot be read: {error}")))?;
-        let settings: Result<Self, Message> = toml::from_str(&text).map_err(|error| {
-            let place = error.span().map(|span| position(&text, span.start));
-            Message::at("N130", &name, place, error.message()).with_source(&text)
-        });
-        Ok(Self { source: Source { name, text }, ..settings? })
+        let source = Source { name, text };
+        let invalid = |error: toml::de::Error| {
+            let place = error.span().map(|span| position(&source.text, span.start));
+            Message::at("N130", &source.name, place, error.message()).with_source(&source.text)
+        };
+        // The types come first, because all other tables are checked against them.
+        let definitions: DefinitionsOnly = toml::from_str(&source.text).map_err(invalid)?;
+        let directory = file.parent().unwrap_or(Path::new(""));
+        let mut library = Library::installed();
+        for (kind, definition) in &definitions.types {
+            let added = definition.text(directory).and_then(|text| library.add(kind.get_ref(), &text));
+            added.map_err(|because| {
+                source.error("N136", kind, format!("{}: {because}", kind.get_ref())).with_help(
+                    "give the text of the definition, or `{ file = \"…\" }` with the path of its file",
+                )
+            })?;
+        }
+        let settings: Result<Self, _> = library.while_current(|| toml::from_str(&source.text));
+        Ok(Self { source: source.clone(), ..settings.map_err(invalid)? })
     }
 
     pub(crate) fn rules(&self) -> Vec<DiagnosticRule> {

@@ -2,6 +2,7 @@
 
 mod caller;
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
@@ -22,6 +23,7 @@ use crate::interfaces::{Action, Service, ServiceHashes, Structure as _};
 use crate::node::graph::{Expected, Graph, Topics};
 use crate::node::reply_gate::ReplyGate;
 use crate::node::{Node, Severity, client_name, creation_error, dds_type, latched, qos};
+use crate::types::ActionType;
 
 pub use caller::{Accepted, ActionCaller, GoalError, Pursued};
 
@@ -323,32 +325,64 @@ impl<A: Action> Goals<A> {
 }
 
 /// Registers the expected types and hashes of all topics of an action in the graph.
-fn expect_action<A: Action>(graph: &Graph, full: &str) {
+/// Names and type hashes of the interfaces of an action.
+struct ActionNames<'n> {
+    package: &'n str,
+    name: &'n str,
+    /// Hashes of request and response.
+    send_goal: [Cow<'static, str>; 2],
+    get_result: [Cow<'static, str>; 2],
+    feedback: Cow<'static, str>,
+}
+
+impl ActionNames<'static> {
+    fn of<A: Action>() -> Self {
+        let hashes = |hashes: ServiceHashes| [Cow::Borrowed(hashes.request), Cow::Borrowed(hashes.response)];
+        Self {
+            package: A::PACKAGE,
+            name: A::NAME,
+            send_goal: hashes(A::SEND_GOAL_RIHS01),
+            get_result: hashes(A::GET_RESULT_RIHS01),
+            feedback: A::FEEDBACK_RIHS01.into(),
+        }
+    }
+}
+
+impl<'n> From<&'n ActionType> for ActionNames<'n> {
+    fn from(kind: &'n ActionType) -> Self {
+        Self {
+            package: &kind.package,
+            name: &kind.name,
+            send_goal: kind.send_goal.clone().map(Cow::Owned),
+            get_result: kind.get_result.clone().map(Cow::Owned),
+            feedback: kind.feedback.clone().into(),
+        }
+    }
+}
+
+fn expect_action(graph: &Graph, full: &str, names: ActionNames<'_>) {
     use crate::interfaces::action_msgs::srv::CancelGoal;
-    let part = |name: &str| format!("{}_{name}", A::NAME);
+    let ActionNames { package, name, send_goal, get_result, feedback } = names;
+    let part = |part: &str| format!("{name}_{part}");
+    let cancel = ServiceHashes::of::<CancelGoal>();
+    let cancel_goal = [cancel.request.into(), cancel.response.into()];
     let services = [
-        ("send_goal", A::PACKAGE, "action", part("SendGoal"), A::SEND_GOAL_RIHS01),
-        ("get_result", A::PACKAGE, "action", part("GetResult"), A::GET_RESULT_RIHS01),
-        (
-            "cancel_goal",
-            CancelGoal::PACKAGE,
-            "srv",
-            CancelGoal::NAME.to_owned(),
-            ServiceHashes::of::<CancelGoal>(),
-        ),
+        ("send_goal", package, "action", part("SendGoal"), send_goal),
+        ("get_result", package, "action", part("GetResult"), get_result),
+        ("cancel_goal", CancelGoal::PACKAGE, "srv", CancelGoal::NAME.to_owned(), cancel_goal),
     ];
-    for (service, package, folder, name, hashes) in services {
+    for (service, package, folder, name, [request_hash, response_hash]) in services {
         let topics = Topics::of(&format!("{full}/_action/{service}"));
         let request = dds_type(package, folder, &format!("{name}_Request"));
         let response = dds_type(package, folder, &format!("{name}_Response"));
-        graph.expect(topics.requests, Expected { type_name: request, hash: hashes.request });
-        graph.expect(topics.replies, Expected { type_name: response, hash: hashes.response });
+        graph.expect(topics.requests, Expected { type_name: request, hash: request_hash });
+        graph.expect(topics.replies, Expected { type_name: response, hash: response_hash });
     }
-    let type_name = dds_type(A::PACKAGE, "action", &part("FeedbackMessage"));
-    graph.expect(format!("rt{full}/_action/feedback"), Expected { type_name, hash: A::FEEDBACK_RIHS01 });
+    let type_name = dds_type(package, "action", &part("FeedbackMessage"));
+    graph.expect(format!("rt{full}/_action/feedback"), Expected { type_name, hash: feedback });
     let status = crate::interfaces::action_msgs::msg::GoalStatusArray::RIHS01;
     let type_name = dds_type("action_msgs", "msg", "GoalStatusArray");
-    graph.expect(format!("rt{full}/_action/status"), Expected { type_name, hash: status });
+    graph.expect(format!("rt{full}/_action/status"), Expected { type_name, hash: status.into() });
 }
 
 impl Node {
@@ -364,7 +398,7 @@ impl Node {
     ) -> Result<Arc<Goals<A>>, Message> {
         let full = self.resolve(name);
         let action_name = client_name(&full)?;
-        expect_action::<A>(&self.graph, &full);
+        expect_action(&self.graph, &full, ActionNames::of::<A>());
         let goals = Arc::new(Goals { server: OnceLock::new(), goals: Mutex::default() });
         let (graph, weak, served) = (Arc::clone(&self.graph), Arc::downgrade(self), Arc::clone(&goals));
         self.spawn(async move {

@@ -2,7 +2,7 @@
 //! that of the publisher and need not be known to this program.
 
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use futures::StreamExt as _;
 use metaplan::message::Message;
@@ -11,8 +11,9 @@ use ros2_client::MessageTypeName;
 use ros2_client::dds::Subscription;
 use smol::Timer;
 
-use crate::interfaces::Msg;
+use crate::node::graph::Graph;
 use crate::node::{Node, Severity, client_name, creation_error, qos};
+use crate::types::MessageType;
 
 const SEARCH_PERIOD: Duration = Duration::from_millis(100);
 
@@ -29,6 +30,14 @@ impl Arrivals {
 }
 
 impl Node {
+    /// Waits until a topic has a number of subscribers that are matched, at most for `within`. Returns the number.
+    pub(crate) async fn await_subscribers(&self, name: &str, count: usize, within: Duration) -> usize {
+        let topic = format!("rt{}", self.resolve(name));
+        let enough = |graph: &Graph| (graph.matched_readers(&topic) >= count).then_some(());
+        self.graph.wait(within, enough).await;
+        self.graph.matched_readers(&topic)
+    }
+
     /// Observes a topic from now on.
     ///
     /// # Errors
@@ -107,27 +116,28 @@ impl Node {
         inner.create_subscription(&topic, Some(profile))
     }
 
-    /// Subscribes to a topic once it has a publisher. If the publisher is latched, samples are received
+    /// Subscribes to a topic once it has a publisher; see [`Node::subscribe_raw`]. If the publisher is latched, samples are received
     /// reliably, beginning with the last one. Otherwise, only new samples are received, with best effort. A
     /// failed subscription is logged.
     ///
     /// # Errors
     /// The name is not a valid topic name.
-    pub(crate) fn subscribe_when_published<M: Msg>(
+    pub(crate) fn subscribe_when_published(
         self: &Arc<Self>,
         name: &str,
-        take: impl FnMut(M) + Send + 'static,
+        kind: &Arc<MessageType>,
+        take: impl FnMut(Vec<u8>, SystemTime) + Send + 'static,
     ) -> Result<(), Message> {
         let full = self.resolve(name);
         client_name(&full)?;
         let weak = Arc::downgrade(self);
-        let name = name.to_owned();
+        let (name, kind) = (name.to_owned(), Arc::clone(kind));
         self.spawn(async move {
             loop {
                 let Some(node) = weak.upgrade() else { return };
                 if let Some(writer) = node.graph.writer(&format!("rt{full}")) {
                     let profile = if writer.is_latched { qos::latched(1) } else { qos::sensor_data() };
-                    if let Err(error) = node.subscribe(&name, profile, take) {
+                    if let Err(error) = node.subscribe_raw(&name, &kind, profile, take) {
                         node.log(Severity::Error, &error.message);
                     }
                     return;

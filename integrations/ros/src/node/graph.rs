@@ -1,5 +1,6 @@
 //! ROS graph from DDS discovery: participants with their vendors, and endpoints with their types.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -48,7 +49,7 @@ pub(crate) struct Expected {
     /// DDS name of the type.
     pub(crate) type_name: String,
     /// `RIHS01_…`; compared only if the other side publishes its hash.
-    pub(crate) hash: &'static str,
+    pub(crate) hash: Cow<'static, str>,
 }
 
 /// DDS names of the two topics of a service.
@@ -155,7 +156,19 @@ impl Graph {
                 {
                     preemptive.request_heartbeat(&participant, bytes(local_reader), bytes(remote_writer));
                 }
+                let discovered = match &event {
+                    DomainParticipantStatusEvent::ParticipantDiscovered { dpd } => Some(prefix(dpd.guid)),
+                    _ => None,
+                };
                 watching.take(event);
+                if let Some(prefix) = discovered
+                    && watching.state().participants.get(&prefix) == Some(&Vendor::FastDds)
+                {
+                    let graph = Arc::clone(&watching);
+                    preemptive.request_endpoints(&participant, own_prefix, prefix, move |are_readers| {
+                        graph.has_endpoint_of(prefix, are_readers)
+                    });
+                }
             }
         });
         (graph, task)
@@ -167,6 +180,15 @@ impl Graph {
 
     fn is_fast_dds(&self, endpoint: GUID) -> bool {
         self.state().participants.get(&prefix(endpoint)) == Some(&Vendor::FastDds)
+    }
+
+    /// Returns `true` if a reader, or a writer, of a participant is known, or the participant has left.
+    fn has_endpoint_of(&self, participant: [u8; 12], is_reader: bool) -> bool {
+        let state = self.state();
+        let is_it = |(guid, endpoint): (&[u8; 16], &Endpoint)| {
+            guid[..12] == participant && endpoint.is_reader == is_reader
+        };
+        !state.participants.contains_key(&participant) || state.endpoints.iter().any(is_it)
     }
 
     fn take(&self, event: DomainParticipantStatusEvent) {
@@ -338,6 +360,13 @@ impl Graph {
         state.endpoints.iter().filter(|(_, endpoint)| fits(endpoint)).map(|(guid, _)| *guid).collect()
     }
 
+    /// Returns the number of readers of a topic, given by its DDS name, that a writer of ours has matched.
+    pub(crate) fn matched_readers(&self, topic: &str) -> usize {
+        let readers = self.readers(topic);
+        let state = self.state();
+        readers.iter().filter(|reader| state.matched_readers.contains(*reader)).count()
+    }
+
     /// Waits for the mapping of our own services: a fixed one, or that of a discovered participant that
     /// supports only a single one. Without such a participant, the enhanced mapping is selected
     /// [`DISCOVERY_WAIT`] after the first discovery.
@@ -433,11 +462,20 @@ fn is_reader(guid: [u8; 16]) -> bool {
 /// Parses the type hash that endpoints of ROS 2 Jazzy and later publish: `typehash=RIHS01_…;` in
 /// their user data (REP 2011).
 fn type_hash(user_data: &[u8]) -> Option<String> {
-    let text = String::from_utf8_lossy(user_data);
+    let text = String::from_utf8_lossy(without_length(user_data));
     let hash = text.split(';').find_map(|part| part.trim_matches('\0').strip_prefix("typehash="))?;
     // An unknown hash is all zero, and other versions are not comparable.
     let digits = hash.strip_prefix("RIHS01_")?;
     digits.bytes().any(|digit| digit != b'0').then(|| hash.to_owned())
+}
+
+/// Removes the length before user data and the padding after them, which the library does not remove.
+fn without_length(user_data: &[u8]) -> &[u8] {
+    let Some((length, content)) = user_data.split_first_chunk() else { return user_data };
+    // The byte order is that of the announcement, which the library does not expose.
+    let lengths = [u32::from_le_bytes(*length), u32::from_be_bytes(*length)];
+    let content = lengths.into_iter().find_map(|length| content.get(..length as usize));
+    content.unwrap_or(user_data)
 }
 
 fn bytes(guid: GUID) -> [u8; 16] {
@@ -481,7 +519,7 @@ mod tests {
 
     #[test]
     fn types_and_their_hashes_are_compared() {
-        let expected = Expected { type_name: "a::msg::dds_::B_".to_owned(), hash: "RIHS01_12" };
+        let expected = Expected { type_name: "a::msg::dds_::B_".to_owned(), hash: "RIHS01_12".into() };
         let endpoint = |type_name: &str, data: &str| Endpoint {
             is_reader: false,
             topic: "rt/t".to_owned(),
@@ -495,5 +533,9 @@ mod tests {
         assert!(!complaint("a::msg::dds_::B_", "enclave=/;typehash=RIHS01_00;"));
         assert!(complaint("a::msg::dds_::B_", "typehash=RIHS01_13;\0"));
         assert!(complaint("a::msg::dds_::C_", ""));
+        // As RustDDS 0.15.1 passes the user data of Fast DDS: with length and padding.
+        assert!(!complaint("a::msg::dds_::B_", "\x13\0\0\0typehash=RIHS01_12;\0"));
+        assert!(complaint("a::msg::dds_::B_", "\x13\0\0\0typehash=RIHS01_13;\0"));
+        assert!(complaint("a::msg::dds_::B_", "\0\0\0\x13typehash=RIHS01_13;\0"));
     }
 }

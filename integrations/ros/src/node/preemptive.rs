@@ -20,12 +20,17 @@
 //! Both messages are repeated, because they may be lost, and the writer may not have matched our
 //! reader yet. Receivers ignore the repetitions by their counts.
 //!
+//! The built-in writers that announce endpoints have the same defect at the first contact: Fast DDS often sends
+//! its HEARTBEAT before the library has matched these writers, and the next one follows after 1 s. They get the same
+//! ACKNACK. The library does not expose their address, so that the ACKNACK is sent to the default ports of the
+//! first participants of each known host. Other participants ignore it.
+//!
 //! # References
 //! OMG DDSI-RTPS 2.5: 8.3.8.1 (ACKNACK), 8.3.8.6 (HEARTBEAT), 9.4.5 (wire format).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
-use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, SocketAddrV4};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -36,6 +41,17 @@ use smol::{Task, Timer};
 /// Times between the repetitions of the messages for one match, in milliseconds: 8.5 s in total. On
 /// a busy machine, Fast DDS may match seconds later than the library.
 const PAUSES: [u64; 10] = [5, 20, 75, 100, 200, 200, 400, 500, 2000, 5000];
+
+/// Time after the discovery of a participant at which its endpoints are requested unless they are known. The
+/// library ignores the first HEARTBEAT of the writer after the request, so that the request waits for it.
+const ENDPOINT_DELAY: Duration = Duration::from_millis(30);
+
+/// Number of participants of a host whose default ports get the ACKNACK.
+const PARTICIPANTS: u16 = 32;
+
+/// Entity ids of the built-in writers and readers of subscriptions and of publications (RTPS 2.5, table 9.2).
+const SUBSCRIPTIONS: [[u8; 4]; 2] = [[0, 0, 4, 0xC2], [0, 0, 4, 0xC7]];
+const PUBLICATIONS: [[u8; 4]; 2] = [[0, 0, 3, 0xC2], [0, 0, 3, 0xC7]];
 
 /// Greatest length of a message that contains an ACKNACK, in bytes.
 const MAX_LENGTH: usize = 1500;
@@ -115,6 +131,52 @@ impl Preemptive {
         .detach();
     }
 
+    /// Makes a participant of Fast DDS announce its endpoints unless `is_known` returns `true` soon. Its argument is
+    /// `true` for readers and `false` for writers.
+    pub(crate) fn request_endpoints(
+        self: &Arc<Self>,
+        participant: &DomainParticipant,
+        own: Prefix,
+        other: Prefix,
+        is_known: impl Fn(bool) -> bool + Send + 'static,
+    ) {
+        let (preemptive, participant) = (Arc::clone(self), participant.clone());
+        smol::spawn(async move {
+            Timer::after(ENDPOINT_DELAY).await;
+            let kinds =
+                [(true, SUBSCRIPTIONS), (false, PUBLICATIONS)].map(|(are_readers, [writer, reader])| {
+                    (are_readers, Match { reader: guid(own, reader), writer: guid(other, writer) })
+                });
+            let mut unknown: Vec<(bool, Match)> =
+                kinds.into_iter().filter(|(are_readers, _)| !is_known(*are_readers)).collect();
+            if unknown.is_empty() {
+                return;
+            }
+            let addresses = discovery_addresses(&participant);
+            for (_, matched) in &unknown {
+                let pending = Pending { addresses: addresses.clone(), acknack: None };
+                preemptive.matches().insert(*matched, pending);
+            }
+            for pause in PAUSES {
+                for (_, matched) in &unknown {
+                    preemptive.advance(*matched).await;
+                }
+                Timer::after(Duration::from_millis(pause)).await;
+                unknown.retain(|(are_readers, matched)| {
+                    let is_known = is_known(*are_readers);
+                    if is_known {
+                        preemptive.matches().remove(matched);
+                    }
+                    !is_known
+                });
+            }
+            for (_, matched) in unknown {
+                preemptive.matches().remove(&matched);
+            }
+        })
+        .detach();
+    }
+
     fn matches(&self) -> MutexGuard<'_, BTreeMap<Match, Pending>> {
         self.matches.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -186,6 +248,32 @@ const FINAL: u8 = 0x02;
 
 /// Protocol version 2.4 and the vendor of the library.
 const VERSION_AND_VENDOR: [u8; 4] = [2, 4, 1, 0x12];
+
+fn guid(prefix: Prefix, entity: [u8; 4]) -> Guid {
+    let mut guid = [0; 16];
+    guid[..12].copy_from_slice(&prefix);
+    guid[12..].copy_from_slice(&entity);
+    guid
+}
+
+/// Returns the addresses at which the first participants of this host, and of hosts with known endpoints, receive
+/// discovery messages by default.
+fn discovery_addresses(participant: &DomainParticipant) -> Vec<SocketAddr> {
+    let writers = participant.discovered_writers().into_iter();
+    let readers = participant.discovered_readers().into_iter();
+    let locators = writers
+        .flat_map(|data| data.writer_proxy.unicast_locator_list)
+        .chain(readers.flat_map(|data| data.reader_proxy.unicast_locator_list));
+    // A locator of another kind is converted to an IPv6 address.
+    let mut hosts: BTreeSet<IpAddr> =
+        locators.map(|locator| SocketAddr::from(locator).ip()).filter(IpAddr::is_ipv4).collect();
+    hosts.insert(Ipv4Addr::LOCALHOST.into());
+    let port = |index| discovery_port(participant.domain_id(), index);
+    hosts
+        .into_iter()
+        .flat_map(|host| (0..PARTICIPANTS).map(move |index| (host, port(index)).into()))
+        .collect()
+}
 
 /// Encodes a HEARTBEAT of a writer without samples, which is to be answered to `reply_to`.
 ///

@@ -1,5 +1,6 @@
 //! Service servers and service clients.
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::fmt;
 use std::marker::PhantomData;
@@ -19,6 +20,7 @@ use crate::node::qos;
 use crate::node::reply_gate::ReplyGate;
 use crate::node::rmw::Mapping;
 use crate::node::{Node, Severity, client_name, creation_error, dds_type};
+use crate::types::{AnyService, ServiceType};
 
 /// Time for which the client waits after discovering a server, so that the server can discover the
 /// client. Earlier replies would be lost.
@@ -94,6 +96,7 @@ pub struct Caller<S: Service> {
     node: Arc<Node>,
     full: String,
     topics: Topics,
+    kind: ServiceTypeName,
     connection: smol::lock::Mutex<Option<Connection<S>>>,
     service: PhantomData<fn() -> S>,
 }
@@ -184,10 +187,9 @@ impl<S: Service> Caller<S> {
 
     fn client(&self, mapping: Mapping) -> Result<Client<S::Request, S::Response>, Message> {
         let name = client_name(&self.full)?;
-        let kind = ServiceTypeName::new(S::PACKAGE, S::NAME);
         self.node
             .inner()
-            .create_client(mapping.service_mapping(), &name, &kind, qos::service(), qos::service())
+            .create_client(mapping.service_mapping(), &name, &self.kind, qos::service(), qos::service())
             .map_err(|error| creation_error(&self.full, &error))
     }
 }
@@ -199,12 +201,29 @@ fn seconds(duration: Duration) -> String {
 impl Node {
     /// Creates a client of the service `name`.
     pub fn caller<S: Service>(self: &Arc<Self>, name: &str) -> Caller<S> {
+        let hashes = ServiceHashes::of::<S>();
+        self.caller_of(name, S::PACKAGE, S::NAME, [hashes.request.into(), hashes.response.into()])
+    }
+
+    /// Creates a client of the service `name`, whose type is known at run time.
+    pub(crate) fn any_caller(self: &Arc<Self>, name: &str, kind: &ServiceType) -> Caller<AnyService> {
+        self.caller_of(name, &kind.package, &kind.name, kind.hashes.clone().map(Cow::Owned))
+    }
+
+    fn caller_of<S: Service>(
+        self: &Arc<Self>,
+        name: &str,
+        package: &str,
+        kind: &str,
+        hashes: [Cow<'static, str>; 2],
+    ) -> Caller<S> {
         let full = self.resolve(name);
-        self.expect_service::<S>(&full);
+        self.expect_service(&full, package, kind, hashes);
         Caller {
             node: Arc::clone(self),
             topics: Topics::of(&full),
             full,
+            kind: ServiceTypeName::new(package, kind),
             connection: smol::lock::Mutex::new(None),
             service: PhantomData,
         }
@@ -222,7 +241,8 @@ impl Node {
     ) -> Result<(), Message> {
         let full = self.resolve(name);
         let service_name = client_name(&full)?;
-        self.expect_service::<S>(&full);
+        let hashes = ServiceHashes::of::<S>();
+        self.expect_service(&full, S::PACKAGE, S::NAME, [hashes.request.into(), hashes.response.into()]);
         let (graph, weak) = (Arc::clone(&self.graph), Arc::downgrade(self));
         self.spawn(async move {
             let mapping = graph.mapping().await;
@@ -278,12 +298,12 @@ impl Node {
         Ok(())
     }
 
-    fn expect_service<S: Service>(&self, full: &str) {
+    fn expect_service(&self, full: &str, package: &str, kind: &str, hashes: [Cow<'static, str>; 2]) {
         let topics = Topics::of(full);
-        let hashes = ServiceHashes::of::<S>();
-        let type_name = |part: &str| dds_type(S::PACKAGE, "srv", &format!("{}_{part}", S::NAME));
-        let request = Expected { type_name: type_name("Request"), hash: hashes.request };
-        let response = Expected { type_name: type_name("Response"), hash: hashes.response };
+        let type_name = |part: &str| dds_type(package, "srv", &format!("{kind}_{part}"));
+        let [request, response] = hashes;
+        let request = Expected { type_name: type_name("Request"), hash: request };
+        let response = Expected { type_name: type_name("Response"), hash: response };
         self.graph.expect(topics.requests, request);
         self.graph.expect(topics.replies, response);
     }

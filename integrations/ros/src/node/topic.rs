@@ -1,5 +1,6 @@
 //! Publishers and subscriptions.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -10,9 +11,10 @@ use ros2_client::message_info::MessageInfo;
 use ros2_client::qos::{Durability, QosProfile};
 use smol::Timer;
 
-use crate::interfaces::Msg;
+use crate::interfaces::{Msg, Structure};
 use crate::node::graph::Expected;
 use crate::node::{Node, Severity, client_name, creation_error, dds_type};
+use crate::types::{MessageType, Raw};
 
 /// A log message about invalid samples of a topic is written once per this number of invalid
 /// samples.
@@ -32,24 +34,41 @@ struct Old {
 
 impl Old {
     fn is_old(&self, info: &MessageInfo) -> bool {
-        let stamp = info.source_timestamp().and_then(|stamp| u64::try_from(stamp.to_nanos()).ok());
-        let published = stamp.map(|nanoseconds| UNIX_EPOCH + Duration::from_nanos(nanoseconds));
-        !self.is_wanted && published.is_some_and(|published| published < self.since)
+        !self.is_wanted && published(info).is_some_and(|published| published < self.since)
+    }
+}
+
+/// Returns the time at which a sample was published, by the clock of its writer.
+fn published(info: &MessageInfo) -> Option<SystemTime> {
+    let stamp = info.source_timestamp().and_then(|stamp| u64::try_from(stamp.to_nanos()).ok());
+    stamp.map(|nanoseconds| UNIX_EPOCH + Duration::from_nanos(nanoseconds))
+}
+
+/// Type of a topic.
+struct TopicType<'n> {
+    package: &'n str,
+    name: &'n str,
+    hash: Cow<'static, str>,
+}
+
+impl<'n> From<&'n MessageType> for TopicType<'n> {
+    fn from(kind: &'n MessageType) -> Self {
+        Self { package: &kind.package, name: &kind.name, hash: kind.hash.clone().into() }
     }
 }
 
 /// Publisher of messages on a topic.
-pub struct Publisher<M: Msg> {
+pub struct Publisher<M: Structure> {
     inner: ros2_client::dds::Publisher<M>,
 }
 
-impl<M: Msg> std::fmt::Debug for Publisher<M> {
+impl<M: Structure> std::fmt::Debug for Publisher<M> {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         formatter.debug_tuple("Publisher").field(&M::TYPE).finish()
     }
 }
 
-impl<M: Msg> Publisher<M> {
+impl<M: Structure> Publisher<M> {
     /// Publishes a message. A message that cannot be written is lost without an error.
     pub fn publish(&self, message: M) {
         // Slow readers lose samples, because the publisher does not wait for them.
@@ -63,15 +82,41 @@ impl Node {
     /// # Errors
     /// Fails if the name is invalid, or the topic exists with another type.
     pub fn publisher<M: Msg>(&self, name: &str, qos: QosProfile) -> Result<Publisher<M>, Message> {
+        self.publisher_as(
+            name,
+            &TopicType { package: M::PACKAGE, name: M::NAME, hash: M::RIHS01.into() },
+            qos,
+        )
+    }
+
+    /// Creates a publisher of encoded messages of a type that is known at run time.
+    ///
+    /// # Errors
+    /// Fails if the name is invalid, or the topic exists with another type.
+    pub(crate) fn raw_publisher(
+        &self,
+        name: &str,
+        kind: &MessageType,
+        qos: QosProfile,
+    ) -> Result<Publisher<Raw>, Message> {
+        self.publisher_as(name, &kind.into(), qos)
+    }
+
+    fn publisher_as<M: Structure>(
+        &self,
+        name: &str,
+        kind: &TopicType<'_>,
+        qos: QosProfile,
+    ) -> Result<Publisher<M>, Message> {
         let full = self.resolve(name);
         let topic_name = client_name(&full)?;
         let mut node = self.inner();
         let created = node
-            .create_topic(&topic_name, MessageTypeName::new(M::PACKAGE, M::NAME), &qos)
+            .create_topic(&topic_name, MessageTypeName::new(kind.package, kind.name), &qos)
             .and_then(|topic| node.create_publisher(&topic, Some(qos)));
         drop(node);
         let inner = created.map_err(|error| creation_error(&full, &error))?;
-        self.expect_message::<M>(&full);
+        self.expect_message(&full, kind);
         Ok(Publisher { inner })
     }
 
@@ -87,16 +132,43 @@ impl Node {
         qos: QosProfile,
         mut take: impl FnMut(M) + Send + 'static,
     ) -> Result<(), Message> {
+        let names = TopicType { package: M::PACKAGE, name: M::NAME, hash: M::RIHS01.into() };
+        self.subscribe_as(name, &names, qos, move |message, _| take(message))
+    }
+
+    /// Subscribes to a topic of a type that is known at run time, as [`Node::subscribe`] does. `take` receives
+    /// the encoded message and the time at which it was published.
+    ///
+    /// # Errors
+    /// Fails if the name is invalid, or the topic exists with another type.
+    pub(crate) fn subscribe_raw(
+        self: &Arc<Self>,
+        name: &str,
+        kind: &MessageType,
+        qos: QosProfile,
+        mut take: impl FnMut(Vec<u8>, SystemTime) + Send + 'static,
+    ) -> Result<(), Message> {
+        self.subscribe_as::<Raw>(name, &kind.into(), qos, move |Raw(bytes), published| take(bytes, published))
+    }
+
+    fn subscribe_as<M: Structure>(
+        self: &Arc<Self>,
+        name: &str,
+        kind: &TopicType<'_>,
+        qos: QosProfile,
+        mut take: impl FnMut(M, SystemTime) + Send + 'static,
+    ) -> Result<(), Message> {
         let full = self.resolve(name);
         let topic_name = client_name(&full)?;
         let qos_wants_old = qos.durability == Durability::TransientLocal;
         let mut node = self.inner();
         let created = node
-            .create_topic(&topic_name, MessageTypeName::new(M::PACKAGE, M::NAME), &qos)
+            .create_topic(&topic_name, MessageTypeName::new(kind.package, kind.name), &qos)
             .and_then(|topic| node.create_subscription::<M>(&topic, Some(qos)));
         drop(node);
         let subscription = created.map_err(|error| creation_error(&full, &error))?;
-        self.expect_message::<M>(&full);
+        self.expect_message(&full, kind);
+        let type_name = format!("{}/msg/{}", kind.package, kind.name);
         let (weak, start) = (Arc::downgrade(self), Instant::now());
         let old = Old { since: SystemTime::now(), is_wanted: qos_wants_old };
         self.spawn(async move {
@@ -107,10 +179,10 @@ impl Node {
                 match sample {
                     Ok((_, info)) if node.graph.is_unfit(info.publisher_gid()) => {}
                     Ok((_, info)) if start.elapsed() < AGE_CHECK_PERIOD && old.is_old(&info) => {}
-                    Ok((message, _)) => take(message),
+                    Ok((message, info)) => take(message, published(&info).unwrap_or_else(SystemTime::now)),
                     Err(error) => {
                         if invalid_count % INVALID_PER_LOG_MESSAGE == 0 {
-                            let text = format!("what was heard on {full} is not a {}: {error}", M::TYPE);
+                            let text = format!("what was heard on {full} is not a {type_name}: {error}");
                             node.log(Severity::Warn, &text);
                         }
                         invalid_count += 1;
@@ -124,8 +196,8 @@ impl Node {
         Ok(())
     }
 
-    fn expect_message<M: Msg>(&self, full: &str) {
-        let type_name = dds_type(M::PACKAGE, "msg", M::NAME);
-        self.graph.expect(format!("rt{full}"), Expected { type_name, hash: M::RIHS01 });
+    fn expect_message(&self, full: &str, kind: &TopicType<'_>) {
+        let type_name = dds_type(kind.package, "msg", kind.name);
+        self.graph.expect(format!("rt{full}"), Expected { type_name, hash: kind.hash.clone() });
     }
 }

@@ -2,6 +2,7 @@
 //! [`perform`](crate::perform).
 
 mod action;
+mod any;
 mod change_mode;
 mod execute_plan;
 mod hub;
@@ -21,10 +22,12 @@ use crate::node::Node;
 use crate::perform::{Perform, Progress};
 
 use action::Client;
+use any::{CallClient, GoalClient};
 use change_mode::ChangeMode;
 use hub::Hub;
 use topic::Awaited;
 
+pub use any::{AnyCall, AnyGoal};
 pub use execute_plan::{ExecutePlans, PlanVersion};
 pub use offer::{offer, offers};
 pub use settings::{By, Distribution, Offered, Pose, Poses};
@@ -70,6 +73,8 @@ fn performer(
         }
         By::Topic { topic } => Box::new(Awaited::new(node, topic)?),
         By::ChangeMode { function, design } => Box::new(ChangeMode::new(node, *function, *design)),
+        By::Action(settings) => Box::new(GoalClient::new(node, settings, poses)),
+        By::Service(settings) => Box::new(CallClient::new(node, settings, poses)),
         By::SpiralSearch { server } => Box::new(Client::<SpiralSearch>::new(node, server)),
         By::FollowPipeline { server } => Box::new(Client::<FollowPipeline>::new(node, server)),
         By::RecoverThrusters { server } => Box::new(Client::<RecoverThrusters>::new(node, server)),

@@ -10,6 +10,7 @@ use crate::interfaces::builtin_interfaces::msg::Time;
 use crate::interfaces::geometry_msgs::msg::Pose as PoseMessage;
 use crate::interfaces::geometry_msgs::msg::{Point, PoseStamped, Quaternion};
 use crate::interfaces::std_msgs::msg::Header;
+use crate::performer::{AnyCall, AnyGoal};
 
 /// Performer of an action, as configured in the settings.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -43,6 +44,10 @@ pub enum By {
         /// Position of the design, counted from 1; by default the last argument.
         design: Option<NonZeroUsize>,
     },
+    /// An action server of any type.
+    Action(AnyGoal),
+    /// A service of any type.
+    Service(AnyCall),
     /// SUAVE's search for a pipeline.
     SpiralSearch {
         /// Name of SUAVE's action.

@@ -1,9 +1,10 @@
 //! Clients of the nodes, services and topics that procedures use.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::process::Stdio;
-use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant, SystemTime};
 
 use metaplan::message::Message;
 use ros2_client::ParameterValue;
@@ -15,11 +16,11 @@ use crate::interfaces::rcl_interfaces::msg;
 use crate::interfaces::rcl_interfaces::srv::{
     GetParameters, GetParametersRequest, SetParametersAtomically, SetParametersAtomicallyRequest,
 };
-use crate::interfaces::std_srvs::srv::{
-    Empty, EmptyRequest, SetBool, SetBoolRequest, Trigger, TriggerRequest,
+use crate::node::{
+    Arrivals, CallError, Caller, Node, PrimaryState, Publisher, fitting, latched, parameter, raw,
 };
-use crate::node::{Arrivals, CallError, Caller, Node, PrimaryState, fitting, parameter, raw};
-use crate::procedure::settings::{Condition, Operation, Procedure, ServiceCall};
+use crate::procedure::settings::{Condition, Operation, Procedure};
+use crate::types::{AnyService, MessageType, Raw, ServiceCall, TopicMessage};
 
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
@@ -58,24 +59,32 @@ struct NodeClient {
     get_parameters: Caller<GetParameters>,
 }
 
-enum ServiceClient {
-    Empty(Caller<Empty>),
-    Trigger(Caller<Trigger>),
-    SetBool(Caller<SetBool>),
+/// Last message on a topic, with the time at which it was published.
+type LastMessage = Arc<Mutex<Option<(SystemTime, Vec<u8>)>>>;
+
+/// A topic whose last message is noted.
+struct Observed {
+    last: LastMessage,
+    /// Exists if a step publishes on the topic.
+    publisher: Option<Publisher<Raw>>,
 }
 
 pub(super) struct Clients {
     nodes: BTreeMap<String, NodeClient>,
-    services: BTreeMap<(String, &'static str), ServiceClient>,
+    node: Arc<Node>,
+    /// Clients by service and full name of the request.
+    services: BTreeMap<(String, String), Caller<AnyService>>,
     topics: BTreeMap<String, Arrivals>,
+    /// Topics by name and full name of the type.
+    observed: BTreeMap<(String, String), Observed>,
 }
 
-fn kind(call: ServiceCall) -> &'static str {
-    match call {
-        ServiceCall::Empty => "Empty",
-        ServiceCall::Trigger => "Trigger",
-        ServiceCall::SetBool(_) => "SetBool",
-    }
+fn service_key(service: &str, call: &ServiceCall) -> (String, String) {
+    (service.to_owned(), call.kind.request.name.clone())
+}
+
+fn topic_key(topic: &str, kind: &MessageType) -> (String, String) {
+    (topic.to_owned(), kind.structure.name.clone())
 }
 
 fn remaining(deadline: Instant) -> Duration {
@@ -91,7 +100,13 @@ impl Clients {
         node: &Arc<Node>,
         procedures: impl Iterator<Item = &'p Procedure>,
     ) -> Result<Self, Message> {
-        let mut clients = Self { nodes: BTreeMap::new(), services: BTreeMap::new(), topics: BTreeMap::new() };
+        let mut clients = Self {
+            nodes: BTreeMap::new(),
+            node: Arc::clone(node),
+            services: BTreeMap::new(),
+            topics: BTreeMap::new(),
+            observed: BTreeMap::new(),
+        };
         for procedure in procedures {
             for operation in procedure.operations() {
                 match operation {
@@ -99,12 +114,15 @@ impl Clients {
                         clients.add_node(node, name);
                     }
                     Operation::Service { service, call } => {
-                        let client = || match call {
-                            ServiceCall::Empty => ServiceClient::Empty(node.caller(service)),
-                            ServiceCall::Trigger => ServiceClient::Trigger(node.caller(service)),
-                            ServiceCall::SetBool(_) => ServiceClient::SetBool(node.caller(service)),
-                        };
-                        clients.services.entry((service.clone(), kind(*call))).or_insert_with(client);
+                        let client = || node.any_caller(service, &call.kind);
+                        clients.services.entry(service_key(service, call)).or_insert_with(client);
+                    }
+                    Operation::Publish { message, .. } => {
+                        let observed = clients.observe(&message.topic, &message.kind)?;
+                        if observed.publisher.is_none() {
+                            let publisher = node.raw_publisher(&message.topic, &message.kind, latched(1))?;
+                            observed.publisher = Some(publisher);
+                        }
                     }
                     Operation::Command(_) => {}
                 }
@@ -118,10 +136,26 @@ impl Clients {
                         clients.topics.insert(topic.clone(), node.arrivals(topic)?);
                     }
                     Condition::Topic(_) => {}
+                    Condition::Published(TopicMessage { topic, kind, .. })
+                    | Condition::Message { topic, kind, .. } => drop(clients.observe(topic, kind)?),
                 }
             }
         }
         Ok(clients)
+    }
+
+    /// Notes the last message on a topic.
+    fn observe(&mut self, topic: &str, kind: &Arc<MessageType>) -> Result<&mut Observed, Message> {
+        let key = topic_key(topic, kind);
+        if !self.observed.contains_key(&key) {
+            let last = LastMessage::default();
+            let noted = Arc::clone(&last);
+            self.node.subscribe_when_published(topic, kind, move |message, published| {
+                note_message(&noted, published, message);
+            })?;
+            self.observed.insert(key.clone(), Observed { last, publisher: None });
+        }
+        self.observed.get_mut(&key).ok_or_else(|| Message::error("N122", format!("{topic} is not observed")))
     }
 
     fn add_node(&mut self, node: &Arc<Node>, name: &str) {
@@ -155,11 +189,13 @@ impl Clients {
                 note(client.get_parameters.ready(within).await);
             }
             Operation::Service { service, call } => {
-                match self.services.get(&(service.clone(), kind(*call))) {
-                    Some(ServiceClient::Empty(client)) => note(client.ready(within).await),
-                    Some(ServiceClient::Trigger(client)) => note(client.ready(within).await),
-                    Some(ServiceClient::SetBool(client)) => note(client.ready(within).await),
-                    None => {}
+                if let Some(client) = self.services.get(&service_key(service, call)) {
+                    note(client.ready(within).await);
+                }
+            }
+            Operation::Publish { message, subscribers } => {
+                if let Err(failure) = self.await_subscribers(&message.topic, *subscribers, within).await {
+                    missing.push(failure.because().to_owned());
                 }
             }
             Operation::Command(_) => {}
@@ -178,10 +214,16 @@ impl Clients {
         }
     }
 
-    /// Returns the GUIDs of the servers that report the state or the parameters of a node. Empty for a topic.
+    /// Returns the GUIDs of the servers that report the state or the parameters of a node. Of a condition about
+    /// messages, the result is empty unless the condition holds: its change shows that the mode has changed.
     pub(super) fn servers(&self, condition: &Condition) -> BTreeSet<[u8; 16]> {
         let (Condition::State { node, .. } | Condition::Parameters { node, .. }) = condition else {
-            return BTreeSet::new();
+            let is_met = !matches!(condition, Condition::Topic(_)) && self.is_met(condition);
+            let mut hasher = DefaultHasher::new();
+            format!("{condition:?}").hash(&mut hasher);
+            let mut id = [0; 16];
+            id[..8].copy_from_slice(&hasher.finish().to_le_bytes());
+            return is_met.then_some(id).into_iter().collect();
         };
         let Ok(client) = self.node(node) else { return BTreeSet::new() };
         match condition {
@@ -305,29 +347,71 @@ impl Clients {
     pub(super) async fn call(
         &self,
         service: &str,
-        call: ServiceCall,
+        call: &ServiceCall,
         within: Duration,
     ) -> Result<(), Failure> {
-        let client = self.services.get(&(service.to_owned(), kind(call)));
-        let (success, message) = match (client, call) {
-            (Some(ServiceClient::Empty(client)), _) => {
-                client.call(EmptyRequest::default(), within).await?;
-                (true, String::new())
-            }
-            (Some(ServiceClient::Trigger(client)), _) => {
-                let answer = client.call(TriggerRequest::default(), within).await?;
-                (answer.success, answer.message)
-            }
-            (Some(ServiceClient::SetBool(client)), ServiceCall::SetBool(data)) => {
-                let answer = client.call(SetBoolRequest { data }, within).await?;
-                (answer.success, answer.message)
-            }
-            _ => (false, "there is no client".to_owned()),
-        };
-        if success { Ok(()) } else { Err(Failure::Refused(format!("{service} has refused: {message}"))) }
+        // Clients exist for all services of the settings.
+        let client = self.services.get(&service_key(service, call));
+        let client = client.ok_or_else(|| Failure::Refused(format!("{service} has no client")))?;
+        let Raw(answer) = client.call(Raw(call.request.clone()), within).await?;
+        call.check(&answer).map_err(|because| Failure::Refused(format!("{service} has refused: {because}")))
     }
 
-    /// Returns `true` if a node has the required state or parameters, and always for a topic. Fails if the
+    /// Publishes a message once the topic has enough subscribers, unless it is the last message already. Passes the
+    /// message before to `before`.
+    pub(super) async fn publish(
+        &self,
+        message: &TopicMessage,
+        subscribers: usize,
+        within: Duration,
+        before: impl FnOnce(Option<Vec<u8>>),
+    ) -> Result<(), Failure> {
+        let TopicMessage { topic, kind, message } = message;
+        let observed = self.observed.get(&topic_key(topic, kind));
+        let publisher = observed.and_then(|observed| Some((observed, observed.publisher.as_ref()?)));
+        let Some((observed, publisher)) = publisher else {
+            return Err(Failure::Refused(format!("{topic} has no publisher")));
+        };
+        self.await_subscribers(topic, subscribers, within).await?;
+        let last = last_message(&observed.last);
+        if last.as_ref() == Some(message) {
+            return Ok(());
+        }
+        before(last);
+        // Noted first, so that a message of another node that is published later replaces it.
+        note_message(&observed.last, SystemTime::now(), message.clone());
+        publisher.publish(Raw(message.clone()));
+        Ok(())
+    }
+
+    async fn await_subscribers(&self, topic: &str, count: usize, within: Duration) -> Result<(), Failure> {
+        let present = self.node.await_subscribers(topic, count, within).await;
+        if present >= count {
+            return Ok(());
+        }
+        Err(Failure::Silent(format!(
+            "{topic} has {present} of {count} subscribers after {:.1} s",
+            within.as_secs_f64()
+        )))
+    }
+
+    /// Returns `true` if a condition about messages holds.
+    fn is_met(&self, condition: &Condition) -> bool {
+        let last = |topic: &str, kind: &MessageType| {
+            self.observed.get(&topic_key(topic, kind)).and_then(|observed| last_message(&observed.last))
+        };
+        match condition {
+            Condition::Published(TopicMessage { topic, kind, message }) => {
+                last(topic, kind).as_ref() == Some(message)
+            }
+            Condition::Message { topic, kind, expectation } => last(topic, kind)
+                .is_some_and(|message| expectation.check(&kind.structure, &message, 0).is_ok()),
+            _ => true,
+        }
+    }
+
+    /// Returns `true` if a node has the required state or parameters, or the last message on a topic the required
+    /// values, and always for the arrival of a message. Fails if the
     /// node is silent or in a transition.
     pub(super) async fn holds(&self, condition: &Condition) -> Result<bool, Failure> {
         match condition {
@@ -343,7 +427,9 @@ impl Clients {
                 let present = self.parameters(node, values, OBSERVATION_TIMEOUT).await?;
                 Ok(fitted(values, &present) == present)
             }
-            Condition::Topic(_) => Ok(true),
+            Condition::Topic(_) | Condition::Published(_) | Condition::Message { .. } => {
+                Ok(self.is_met(condition))
+            }
         }
     }
 
@@ -374,6 +460,19 @@ impl Clients {
             }
         }
     }
+}
+
+fn note_message(last: &LastMessage, published: SystemTime, message: Vec<u8>) {
+    let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
+    // Latched messages of several publishers arrive in any order.
+    if last.as_ref().is_none_or(|(earlier, _)| *earlier <= published) {
+        *last = Some((published, message));
+    }
+}
+
+fn last_message(last: &LastMessage) -> Option<Vec<u8>> {
+    let last = last.lock().unwrap_or_else(PoisonError::into_inner);
+    last.as_ref().map(|(_, message)| message.clone())
 }
 
 /// Executes a program. Its output goes to standard error. It is killed at the deadline.

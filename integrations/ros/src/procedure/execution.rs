@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 use crate::node::{Node, Severity};
 use crate::procedure::clients::{Clients, Failure, OBSERVATION_TIMEOUT, execute};
 use crate::procedure::settings::{Condition, Operation, Procedure};
+use crate::types::TopicMessage;
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Outcome {
@@ -97,7 +98,7 @@ impl Procedures {
         let conditions = self.functions.get(function).into_iter().flat_map(FunctionProcedures::conditions);
         let node = |condition| match condition {
             Condition::State { node, .. } | Condition::Parameters { node, .. } => Some(node),
-            Condition::Topic(_) => None,
+            Condition::Topic(_) | Condition::Published(_) | Condition::Message { .. } => None,
         };
         conditions.filter_map(node).collect()
     }
@@ -179,7 +180,8 @@ impl Procedures {
     /// Returns `Some(true)` if a condition holds, and `None` if its node is silent. A node that does not
     /// exist meets no condition.
     async fn observed(&self, condition: &Condition) -> Option<bool> {
-        if self.clients.servers(condition).is_empty() && !matches!(condition, Condition::Topic(_)) {
+        let of_node = matches!(condition, Condition::State { .. } | Condition::Parameters { .. });
+        if of_node && self.clients.servers(condition).is_empty() {
             return Some(false);
         }
         self.clients.holds(condition).await.ok()
@@ -333,7 +335,19 @@ impl Run<'_> {
             }
             Operation::Service { service, call } => {
                 undos.push(undo_of(operation, undo));
-                clients.call(service, *call, within).await
+                clients.call(service, call, within).await
+            }
+            Operation::Publish { message, subscribers } => {
+                let note = |before: Option<Vec<u8>>| {
+                    undos.push(match (undo, before) {
+                        (None, Some(before)) => Undo::Operation(Operation::Publish {
+                            message: TopicMessage { message: before, ..message.clone() },
+                            subscribers: 0,
+                        }),
+                        _ => undo_of(operation, undo),
+                    });
+                };
+                clients.publish(message, *subscribers, within, note).await
             }
             Operation::Command(words) => {
                 undos.push(undo_of(operation, undo));

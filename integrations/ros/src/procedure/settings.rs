@@ -5,6 +5,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::sync::Arc;
 use std::time::Duration;
 
 use ros2_client::ParameterValue;
@@ -12,6 +13,7 @@ use serde::{Deserialize, Deserializer};
 use serde_yaml_ng::Value;
 
 use crate::node::{PrimaryState, parameter_value, valid_name};
+use crate::types::{Expectation, Library, MessageType, ServiceCall, TopicMessage};
 use crate::validated::validated;
 
 /// Ordered steps that put a design into effect, and the conditions that must hold afterwards.
@@ -50,15 +52,14 @@ pub(crate) enum Operation {
         service: String,
         call: ServiceCall,
     },
+    /// A message on a topic, which late subscribers receive too.
+    Publish {
+        message: TopicMessage,
+        /// Number of subscribers that must exist before the message is published.
+        subscribers: usize,
+    },
     /// A program with its arguments; no shell is involved.
     Command(Vec<String>),
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum ServiceCall {
-    Empty,
-    Trigger,
-    SetBool(bool),
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -73,6 +74,14 @@ pub(crate) enum Condition {
     },
     /// A message arrives on a topic.
     Topic(String),
+    /// The last message on a topic is this one.
+    Published(TopicMessage),
+    /// The last message on a topic has expected values.
+    Message {
+        topic: String,
+        kind: Arc<MessageType>,
+        expectation: Expectation,
+    },
 }
 
 /// A table `[functions.F.designs.D]`.
@@ -115,8 +124,13 @@ struct StepEntry {
     state: Option<PrimaryState>,
     parameters: Option<BTreeMap<String, Value>>,
     service: Option<String>,
+    publish: Option<String>,
     r#type: Option<String>,
     data: Option<bool>,
+    request: Option<serde_json::Value>,
+    expect: Option<serde_json::Value>,
+    message: Option<serde_json::Value>,
+    subscribers: Option<usize>,
     command: Option<Vec<String>>,
     undo: Option<UndoEntry>,
 }
@@ -125,8 +139,25 @@ struct StepEntry {
 #[serde(deny_unknown_fields)]
 struct UndoEntry {
     service: Option<String>,
+    publish: Option<String>,
     r#type: Option<String>,
     data: Option<bool>,
+    request: Option<serde_json::Value>,
+    expect: Option<serde_json::Value>,
+    message: Option<serde_json::Value>,
+    command: Option<Vec<String>>,
+}
+
+/// Keys of an operation that is not about a node.
+struct OperationEntry {
+    service: Option<String>,
+    publish: Option<String>,
+    kind: Option<String>,
+    data: Option<bool>,
+    request: Option<serde_json::Value>,
+    expect: Option<serde_json::Value>,
+    message: Option<serde_json::Value>,
+    subscribers: Option<usize>,
     command: Option<Vec<String>>,
 }
 
@@ -140,44 +171,34 @@ impl TryFrom<StepEntry> for Step {
     type Error = String;
 
     fn try_from(entry: StepEntry) -> Result<Self, Self::Error> {
-        let StepEntry { node, state, parameters, service, r#type, data, command, undo } = entry;
-        let operation = match (node, service, command) {
-            (Some(node), None, None) => {
-                if r#type.is_some() || data.is_some() {
-                    return Err("`type` and `data` belong to a `service`".to_owned());
-                }
-                if undo.is_some() {
-                    return Err(
-                        "`undo` belongs to a `service` or a `command`: states and parameters of a node \
-                                are restored by themselves"
-                            .to_owned(),
-                    );
-                }
-                match node_target(&node, state, parameters)? {
-                    Target::State(node, state) => Operation::State { node, state },
-                    Target::Parameters(node, values) => Operation::Parameters { node, values },
-                }
+        let StepEntry { node, state, parameters, service, publish, r#type, command, undo, .. } = entry;
+        let StepEntry { data, request, expect, message, subscribers, .. } = entry;
+        let kind = r#type;
+        let other =
+            OperationEntry { service, publish, kind, data, request, expect, message, subscribers, command };
+        let Some(node) = node else {
+            if state.is_some() || parameters.is_some() {
+                return Err("`state` and `parameters` belong to a `node`".to_owned());
             }
-            (None, service, command) if service.is_some() != command.is_some() => {
-                if state.is_some() || parameters.is_some() {
-                    return Err("`state` and `parameters` belong to a `node`".to_owned());
-                }
-                service_or_command(service, r#type.as_deref(), data, command)?
-            }
-            _ => {
-                return Err("a step needs exactly one of `node` (with `state` or `parameters`), `service` \
-                            (with `type`) and `command`"
-                    .to_owned());
-            }
+            let undo = undo.map(OperationEntry::from).map(OperationEntry::operation).transpose();
+            let undo = undo.map_err(|because| format!("`undo`: {because}"))?;
+            return Ok(Self { operation: other.operation()?, undo });
         };
-        let undo = undo.map(|undo| {
-            let UndoEntry { service, r#type, data, command } = undo;
-            if service.is_some() == command.is_some() {
-                return Err("`undo` needs either a `service` (with `type`) or a `command`".to_owned());
-            }
-            service_or_command(service, r#type.as_deref(), data, command)
-        });
-        Ok(Self { operation, undo: undo.transpose()? })
+        if undo.is_some() {
+            return Err(
+                "`undo` belongs to a `service`, `publish` or `command`: states and parameters of a node \
+                        are restored by themselves"
+                    .to_owned(),
+            );
+        }
+        if other.has_a_key() {
+            return Err(format!("{FORMS}. With a `node`, only `state` or `parameters` are possible"));
+        }
+        let operation = match node_target(&node, state, parameters)? {
+            Target::State(node, state) => Operation::State { node, state },
+            Target::Parameters(node, values) => Operation::Parameters { node, values },
+        };
+        Ok(Self { operation, undo: None })
     }
 }
 
@@ -188,6 +209,8 @@ struct ConditionEntry {
     state: Option<PrimaryState>,
     parameters: Option<BTreeMap<String, Value>>,
     topic: Option<String>,
+    r#type: Option<String>,
+    expect: Option<serde_json::Value>,
 }
 
 impl<'de> Deserialize<'de> for Condition {
@@ -200,17 +223,27 @@ impl TryFrom<ConditionEntry> for Condition {
     type Error = String;
 
     fn try_from(entry: ConditionEntry) -> Result<Self, Self::Error> {
-        let ConditionEntry { node, state, parameters, topic } = entry;
+        let ConditionEntry { node, state, parameters, topic, r#type, expect } = entry;
         match (node, topic) {
-            (Some(node), None) => Ok(match node_target(&node, state, parameters)? {
+            (Some(node), None) if r#type.is_none() && expect.is_none() => Ok(match node_target(&node, state, parameters)? {
                 Target::State(node, state) => Self::State { node, state },
                 Target::Parameters(node, values) => Self::Parameters { node, values },
             }),
             (None, Some(topic)) if state.is_none() && parameters.is_none() => {
-                Ok(Self::Topic(valid_name("topic", &topic)?))
+                let topic = valid_name("topic", &topic)?;
+                match (r#type, expect) {
+                    (None, None) => Ok(Self::Topic(topic)),
+                    (Some(kind), Some(expected)) => {
+                        let kind = Arc::new(Library::current().message(&kind)?);
+                        let expectation = Expectation::new(&kind.structure, &expected);
+                        let expectation = expectation.map_err(|because| format!("`expect`: {because}"))?;
+                        Ok(Self::Message { topic, kind, expectation })
+                    }
+                    _ => Err("`type` and `expect` of a `topic` belong together".to_owned()),
+                }
             }
             _ => {
-                Err("a condition needs either a `node` (with `state` or `parameters`) or a `topic`"
+                Err("a condition needs either a `node` (with `state` or `parameters`) or a `topic` (with `type` and `expect`, or alone)"
                     .to_owned())
             }
         }
@@ -247,44 +280,79 @@ fn node_target(
     }
 }
 
-fn service_or_command(
-    service: Option<String>,
-    kind: Option<&str>,
-    data: Option<bool>,
-    command: Option<Vec<String>>,
-) -> Result<Operation, String> {
-    let Some(service) = service else {
-        if kind.is_some() || data.is_some() {
-            return Err("`type` and `data` belong to a `service`".to_owned());
+const FORMS: &str = "a step needs exactly one of `node`, `service`, `publish` and `command`";
+
+impl From<UndoEntry> for OperationEntry {
+    fn from(undo: UndoEntry) -> Self {
+        let UndoEntry { service, publish, r#type, data, request, expect, message, command } = undo;
+        Self { service, publish, kind: r#type, data, request, expect, message, subscribers: None, command }
+    }
+}
+
+impl OperationEntry {
+    fn has_a_key(&self) -> bool {
+        self.service.is_some()
+            || self.publish.is_some()
+            || self.command.is_some()
+            || self.kind.is_some()
+            || self.has_service_keys()
+            || self.has_publish_keys()
+    }
+
+    fn has_service_keys(&self) -> bool {
+        self.data.is_some() || self.request.is_some() || self.expect.is_some()
+    }
+
+    fn has_publish_keys(&self) -> bool {
+        self.message.is_some() || self.subscribers.is_some()
+    }
+
+    fn operation(self) -> Result<Operation, String> {
+        if self.service.is_none() && self.has_service_keys() {
+            return Err("`data`, `request` and `expect` belong to a `service`".to_owned());
         }
-        let command = command.unwrap_or_default();
-        return match command.first() {
-            Some(program) if !program.is_empty() => Ok(Operation::Command(command)),
-            _ => Err("`command` is empty: name a program and its arguments".to_owned()),
-        };
-    };
-    let service = valid_name("service", &service)?;
-    let call = match (kind, data) {
-        (Some("std_srvs/srv/Empty"), None) => ServiceCall::Empty,
-        (Some("std_srvs/srv/Trigger"), None) => ServiceCall::Trigger,
-        (Some("std_srvs/srv/SetBool"), Some(data)) => ServiceCall::SetBool(data),
-        (Some("std_srvs/srv/SetBool"), None) => {
-            return Err("the type std_srvs/srv/SetBool needs `data`, which is true or false".to_owned());
+        if self.publish.is_none() && self.has_publish_keys() {
+            return Err("`message` and `subscribers` belong to `publish`".to_owned());
         }
-        (Some("std_srvs/srv/Empty" | "std_srvs/srv/Trigger"), Some(_)) => {
-            return Err("only the type std_srvs/srv/SetBool has `data`".to_owned());
+        match (self.service, self.publish, self.command) {
+            (Some(service), None, None) => {
+                let service = valid_name("service", &service)?;
+                let kind = self.kind.ok_or_else(|| {
+                    format!("the service {service} needs its `type`, such as std_srvs/srv/Trigger")
+                })?;
+                let request = match (self.data, self.request) {
+                    (Some(_), Some(_)) => {
+                        return Err("`data` is a short form of `request`: give one of them".to_owned());
+                    }
+                    (Some(data), None) => Some(serde_json::json!({"data": data})),
+                    (None, None) if kind == "std_srvs/srv/SetBool" => {
+                        return Err(
+                            "the type std_srvs/srv/SetBool needs `data`, which is true or false".to_owned()
+                        );
+                    }
+                    (None, request) => request,
+                };
+                let call = ServiceCall::new(&kind, request.as_ref(), self.expect.as_ref())?;
+                Ok(Operation::Service { service, call })
+            }
+            (None, Some(topic), None) => {
+                let topic = valid_name("topic", &topic)?;
+                let kind = self.kind.ok_or_else(|| {
+                    format!("the message on {topic} needs its `type`, such as std_msgs/msg/String")
+                })?;
+                let message = TopicMessage::new(topic, &kind, self.message.as_ref())?;
+                Ok(Operation::Publish { message, subscribers: self.subscribers.unwrap_or(0) })
+            }
+            (None, None, Some(_)) if self.kind.is_some() => {
+                Err("`type` belongs to a `service` or `publish`".to_owned())
+            }
+            (None, None, Some(command)) => match command.first() {
+                Some(program) if !program.is_empty() => Ok(Operation::Command(command)),
+                _ => Err("`command` is empty: name a program and its arguments".to_owned()),
+            },
+            _ => Err(FORMS.to_owned()),
         }
-        (Some(other), _) => {
-            return Err(format!(
-                "services of the type `{other}` cannot be called; std_srvs/srv/Trigger, std_srvs/srv/SetBool and \
-                 std_srvs/srv/Empty can"
-            ));
-        }
-        (None, _) => {
-            return Err(format!("the service {service} needs its `type`, such as std_srvs/srv/Trigger"));
-        }
-    };
-    Ok(Operation::Service { service, call })
+    }
 }
 
 impl Operation {
@@ -295,6 +363,7 @@ impl Operation {
             Self::Parameters { node, values } => {
                 Some(Condition::Parameters { node: node.clone(), values: values.clone() })
             }
+            Self::Publish { message, .. } => Some(Condition::Published(message.clone())),
             Self::Service { .. } | Self::Command(_) => None,
         }
     }
@@ -302,7 +371,7 @@ impl Operation {
 
 impl Procedure {
     /// Returns all conditions that hold while the design is in effect and that can be observed at any time. A
-    /// node that occurs in several steps has only its last state.
+    /// node that occurs in several steps has only its last state, a topic its last message.
     pub(crate) fn lasting(&self) -> Vec<Condition> {
         let steps = self.steps.iter().filter_map(|step| step.operation.condition());
         let conditions = self.conditions.iter().filter(|condition| !matches!(condition, Condition::Topic(_)));
@@ -311,6 +380,11 @@ impl Procedure {
             if let Condition::State { node, .. } = &condition {
                 lasting.retain(
                     |earlier| !matches!(earlier, Condition::State { node: other, .. } if other == node),
+                );
+            }
+            if let Condition::Published(TopicMessage { topic, .. }) = &condition {
+                lasting.retain(
+                    |earlier| !matches!(earlier, Condition::Published(other) if other.topic == *topic),
                 );
             }
             if let Condition::Parameters { node, values } = &condition {
@@ -345,10 +419,8 @@ impl fmt::Display for Operation {
         match self {
             Self::State { node, state } => write!(formatter, "{node} {state}"),
             Self::Parameters { node, values } => write!(formatter, "{node} {}", names(values)),
-            Self::Service { service, call: ServiceCall::SetBool(data) } => {
-                write!(formatter, "{service} {data}")
-            }
             Self::Service { service, .. } => formatter.write_str(service),
+            Self::Publish { message, .. } => write!(formatter, "a message to {}", message.topic),
             Self::Command(words) => formatter.write_str(&words.join(" ")),
         }
     }
@@ -360,6 +432,10 @@ impl fmt::Display for Condition {
             Self::State { node, state } => write!(formatter, "{node} {state}"),
             Self::Parameters { node, values } => write!(formatter, "{node} {}", names(values)),
             Self::Topic(topic) => write!(formatter, "a message on {topic}"),
+            Self::Published(TopicMessage { topic, .. }) => {
+                write!(formatter, "the published message as the last one on {topic}")
+            }
+            Self::Message { topic, .. } => write!(formatter, "the expected values on {topic}"),
         }
     }
 }
@@ -374,8 +450,9 @@ mod tests {
 
     use ros2_client::ParameterValue;
 
-    use super::{Condition, Operation, Procedure, ServiceCall};
+    use super::{Condition, Operation, Procedure};
     use crate::node::PrimaryState;
+    use crate::types::ServiceCall;
 
     fn read(text: &str) -> Result<Procedure, String> {
         toml::from_str(text).map_err(|error| error.message().to_owned())
@@ -407,7 +484,8 @@ mod tests {
             procedure.steps[1].operation,
             Operation::Parameters { node: "/server".to_owned(), values }
         );
-        let call = ServiceCall::SetBool(false);
+        let data = serde_json::json!({"data": false});
+        let call = ServiceCall::new("std_srvs/srv/SetBool", Some(&data), None).expect("a call");
         assert_eq!(procedure.steps[2].operation, Operation::Service { service: "/lamp".to_owned(), call });
         assert!(matches!(&procedure.steps[2].undo, Some(Operation::Command(words)) if words.len() == 2));
         assert!(procedure.has_command());
@@ -450,10 +528,36 @@ mod tests {
             (r#"[{ node = "/a", state = "active", undo = { command = ["x"] } }]"#, "restored by themselves"),
             (r#"[{ service = "/a" }]"#, "needs its `type`"),
             (r#"[{ service = "/a", type = "std_srvs/srv/SetBool" }]"#, "needs `data`"),
-            (r#"[{ service = "/a", type = "std_srvs/srv/Trigger", data = true }]"#, "has `data`"),
-            (r#"[{ service = "/a", type = "nav2_msgs/srv/LoadMap" }]"#, "cannot be called"),
+            (
+                r#"[{ service = "/a", type = "std_srvs/srv/Trigger", data = true }]"#,
+                "has no fields: remove `data`",
+            ),
+            (r#"[{ service = "/a", type = "nav2_msgs/srv/LoadMap" }]"#, "is not known"),
+            (
+                r#"[{ service = "/a", type = "std_srvs/srv/SetBool", data = true, request = { data = true } }]"#,
+                "give one of them",
+            ),
+            (
+                r#"[{ service = "/a", type = "std_srvs/srv/SetBool", request = { date = true } }]"#,
+                "did you mean `data`?",
+            ),
+            (
+                r#"[{ service = "/a", type = "std_srvs/srv/Trigger", expect = { success = 1 } }]"#,
+                "`expect`: `success`: 1 is neither true nor false",
+            ),
+            (r#"[{ service = "/a", type = "std_srvs/srv/Trigger", message = {} }]"#, "belong to `publish`"),
+            (r#"[{ publish = "/a" }]"#, "needs its `type`"),
+            (r#"[{ publish = "/a", type = "std_srvs/srv/Trigger" }]"#, "package/msg/Name"),
+            (
+                r#"[{ publish = "/a", type = "std_msgs/msg/String", message = { data = 1 } }]"#,
+                "is not a text",
+            ),
+            (r#"[{ publish = "/a", type = "std_msgs/msg/String", data = true }]"#, "belong to a `service`"),
+            (r#"[{ publish = "/a", service = "/b" }]"#, "exactly one of"),
+            (r#"[{ node = "/a", state = "active", type = "x" }]"#, "With a `node`"),
+            (r#"[{ command = ["a"], type = "x" }]"#, "`type` belongs"),
             (r"[{ command = [] }]", "`command` is empty"),
-            (r#"[{ command = ["a"], undo = {} }]"#, "`undo` needs either"),
+            (r#"[{ command = ["a"], undo = {} }]"#, "`undo`: a step needs exactly one of"),
             (r#"[{ comand = ["a"] }]"#, "unknown field `comand`"),
         ] {
             let message = read(&format!("steps = {steps}")).expect_err(steps);
@@ -464,6 +568,11 @@ mod tests {
             ("timeout = nan", "greater than 0"),
             (r#"verify = [{ topic = "/a", state = "active" }]"#, "either a `node`"),
             (r#"verify = [{ topic = "a b" }]"#, "not the name of a topic"),
+            (r#"verify = [{ topic = "/a", type = "std_msgs/msg/Bool" }]"#, "belong together"),
+            (
+                r#"verify = [{ topic = "/a", type = "std_msgs/msg/Bool", expect = { date = true } }]"#,
+                "did you mean `data`?",
+            ),
         ] {
             let text = format!("steps = [{{ command = [\"a\"] }}]\n{rest}");
             let message = read(&text).expect_err(rest);

@@ -9,7 +9,6 @@
 //!
 //! Each signal becomes a status of the loop, as if a monitor of MROS had published it.
 
-mod field;
 mod settings;
 mod watch;
 

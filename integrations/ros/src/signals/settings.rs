@@ -1,16 +1,15 @@
 //! Settings of signals: the tables `[[signals]]` of `ros.toml`.
 
 use std::cmp::Ordering;
+use std::sync::Arc;
 use std::time::Duration;
 
 use metaplan::mapek::{ComponentTimes, FilterSettings, MeasuredSettings, Stale};
-use metaplan::message::did_you_mean;
 use serde::{Deserialize, Deserializer};
 use serde_json::Value;
 
-use crate::interfaces::{MESSAGE_NAMES, MessageVisitor, Msg, visit_message};
 use crate::node::{PrimaryState, valid_name};
-use crate::signals::field::FieldPath;
+use crate::types::{FieldPath, Library, MessageType};
 use crate::validated::validated;
 
 /// Default of the least time between two reports of a field or a rate.
@@ -41,7 +40,7 @@ pub(crate) enum Source {
     /// Field of the messages on a topic. Silence after `period` is a failure of a component.
     Field {
         topic: String,
-        kind: String,
+        kind: Arc<MessageType>,
         field: FieldPath,
         period: Option<Duration>,
     },
@@ -211,14 +210,11 @@ fn source(entry: &Entry, period: Option<Duration>) -> Result<Source, String> {
                 (None, None) => Ok(Source::Rate { topic, period: period.unwrap_or(SILENCE) }),
                 (Some(kind), Some(field)) => {
                     let field = FieldPath::parse(field)?;
-                    let Some(default) = visit_message(kind, DefaultMessage) else {
-                        let suggestion = did_you_mean(kind, MESSAGE_NAMES.iter().copied());
-                        return Err(format!(
-                            "the type `{kind}` is not known{suggestion}; without `type` and `field` the signal is the rate of the topic"
-                        ));
-                    };
-                    field.check(kind, &default)?;
-                    Ok(Source::Field { topic, kind: kind.clone(), field, period })
+                    let kind = Library::current().message(kind).map_err(|error| {
+                        format!("{error}. Without `type` and `field`, the signal is the rate of the topic")
+                    })?;
+                    field.is_text(&kind.structure)?;
+                    Ok(Source::Field { topic, kind: Arc::new(kind), field, period })
                 }
                 _ => Err(
                     "`type` and `field` belong together; without both the signal is the rate of the topic"
@@ -263,8 +259,7 @@ fn target(entry: &Entry, source: &Source) -> Result<Target, String> {
         }
         (None, Some(attribute)) => {
             if let Source::Field { kind, field, .. } = source
-                && let Some(default) = visit_message(kind, DefaultMessage)
-                && field.find(&default).is_some_and(Value::is_string)
+                && field.is_text(&kind.structure)?
             {
                 return Err("the field is a text, which is no value of an attribute".to_owned());
             }
@@ -277,17 +272,6 @@ fn target(entry: &Entry, source: &Source) -> Result<Target, String> {
         (Some(_), Some(_)) | (None, None) => {
             Err("name either a `component` or an `attribute` of the knowledge base".to_owned())
         }
-    }
-}
-
-struct DefaultMessage;
-
-impl MessageVisitor for DefaultMessage {
-    type Output = Value;
-
-    fn visit<M: Msg>(self) -> Value {
-        // Serialisation cannot fail: messages consist of texts, numbers and lists.
-        serde_json::to_value(M::default()).unwrap_or_default()
     }
 }
 

@@ -14,7 +14,6 @@ use crate::interfaces::lifecycle_msgs::msg::{State, TransitionEvent};
 use crate::interfaces::lifecycle_msgs::srv::{GetState, GetStateRequest};
 use crate::interfaces::lyrical::lifecycle_msgs::msg as lyrical;
 use crate::interfaces::rcl_interfaces::srv::GetParameters;
-use crate::interfaces::{MessageVisitor, Msg, visit_message};
 use crate::node::{Caller, Clock, Node, PrimaryState, depth, is_lyrical};
 use crate::signals::settings::{Condition, Signal, Source, Target, number};
 
@@ -49,19 +48,21 @@ pub(crate) fn watch(node: &Arc<Node>, signals: &[Signal], report: &Report) -> Re
                 let (noted, field, every) = (Arc::clone(&last), field.clone(), *every);
                 let of_message = reporter.clone();
                 let mut reported: Option<Duration> = None;
-                let take = move |message: &dyn Fn() -> Value| {
+                let structure = Arc::clone(&kind.structure);
+                let take = move |message: Vec<u8>, _| {
                     let now = clock.elapsed();
                     *noted.lock().unwrap_or_else(PoisonError::into_inner) = Some(now);
-                    // Messages between two reports are not even converted.
+                    // Messages between two reports are not read.
                     if reported.is_some_and(|reported| now.saturating_sub(reported) < every) {
                         return;
                     }
                     reported = Some(now);
-                    if let Some(value) = field.find(&message()) {
-                        of_message.value(value);
+                    // Data of another definition measure nothing; their type hash has been reported.
+                    if let Ok(Some(value)) = structure.find(&field, &message, 0) {
+                        of_message.value(&value);
                     }
                 };
-                visit_message(kind, Subscribe { node, topic, take: Box::new(take) }).transpose()?;
+                node.subscribe_when_published(topic, kind, take)?;
                 if let (Some(period), Target::Component { .. }) = (period, target) {
                     let last_message = move || *last.lock().unwrap_or_else(PoisonError::into_inner);
                     tasks.push(watch_silence(node.clock(), started, last_message, *period, reporter));
@@ -120,26 +121,6 @@ impl Reporter {
             values: vec![KeyValue { key: key.to_owned(), value }],
             ..DiagnosticStatus::default()
         });
-    }
-}
-
-type Take = Box<dyn FnMut(&dyn Fn() -> Value) + Send>;
-
-struct Subscribe<'n> {
-    node: &'n Arc<Node>,
-    topic: &'n str,
-    take: Take,
-}
-
-impl MessageVisitor for Subscribe<'_> {
-    type Output = Result<(), Message>;
-
-    fn visit<M: Msg>(self) -> Self::Output {
-        let mut take = self.take;
-        self.node.subscribe_when_published::<M>(self.topic, move |message| {
-            // Serialisation cannot fail: messages consist of texts, numbers and lists.
-            take(&|| serde_json::to_value(&message).unwrap_or_default());
-        })
     }
 }
 

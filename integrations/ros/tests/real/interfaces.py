@@ -1,4 +1,4 @@
-"""Builds ROS 2 interface packages from `integrations/ros/interfaces` with the generators of rosidl.
+"""Builds ROS 2 interface packages with the generators of rosidl: from `definitions`, or else from `integrations/ros/interfaces`.
 
     python interfaces.py PREFIX PACKAGE...
 
@@ -15,7 +15,8 @@ import subprocess
 import sys
 import tempfile
 
-DEFINITIONS = pathlib.Path(__file__).resolve().parents[2] / "interfaces"
+HERE = pathlib.Path(__file__).resolve().parent
+ROOTS = (HERE / "definitions", HERE.parents[1] / "interfaces")
 
 CMAKE = """cmake_minimum_required(VERSION 3.16)
 project({name})
@@ -40,14 +41,22 @@ PACKAGE = """<?xml version="1.0"?>
 
 # Packages that the definitions refer to, beside their own.
 DEPENDENCIES = {
+    "controller_manager_msgs": ["builtin_interfaces"],
+    "nav2_msgs": ["action_msgs", "builtin_interfaces", "geometry_msgs", "nav_msgs"],
+    "nav_msgs": ["builtin_interfaces", "geometry_msgs", "std_msgs"],
     "suave_msgs": ["action_msgs", "geometry_msgs"],
     "system_modes_msgs": [],
 }
 
 
+def root(name: str) -> pathlib.Path:
+    """Directory of a package."""
+    return next(directory / name for directory in ROOTS if (directory / name).is_dir())
+
+
 def definitions(name: str) -> list[pathlib.Path]:
     """Definition files of a package, sorted."""
-    folders = [DEFINITIONS / name / kind for kind in ("msg", "srv", "action")]
+    folders = [root(name) / kind for kind in ("msg", "srv", "action")]
     return sorted(file for folder in folders if folder.is_dir() for file in folder.iterdir())
 
 
@@ -76,7 +85,7 @@ def build(prefix: pathlib.Path, name: str) -> None:
         for file in files:
             (source / file.parent.name).mkdir(exist_ok=True)
             shutil.copy(file, source / file.parent.name / file.name)
-        relative = " ".join(str(file.relative_to(DEFINITIONS / name)) for file in files)
+        relative = " ".join(str(file.relative_to(root(name))) for file in files)
         found = "\n".join(f"find_package({dependency} REQUIRED)" for dependency in dependencies)
         clause = f"DEPENDENCIES {' '.join(dependencies)}" if dependencies else ""
         text = CMAKE.format(name=name, files=relative, dependencies=found, clause=clause)

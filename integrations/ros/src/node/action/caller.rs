@@ -12,10 +12,11 @@ use ros2_client::request_id::RmwRequestId;
 use smol::{Timer, channel};
 
 use crate::interfaces::Action;
-use crate::node::action::{GoalEnd, POLL_INTERVAL, expect_action};
+use crate::node::action::{ActionNames, GoalEnd, POLL_INTERVAL, expect_action};
 use crate::node::graph::{Graph, Server, Topics};
 use crate::node::rmw::Mapping;
 use crate::node::{Node, client_name, creation_error, latched, qos};
+use crate::types::{ActionType, AnyAction};
 
 /// Time for which the client waits after discovering a server, so that the server can discover the
 /// client.
@@ -57,6 +58,7 @@ pub enum GoalError {
 pub struct ActionCaller<A: Action> {
     node: Arc<Node>,
     full: String,
+    kind: ActionTypeName,
     connection: smol::lock::Mutex<Option<Arc<Connection<A>>>>,
 }
 
@@ -172,10 +174,9 @@ impl<A: Action + 'static> ActionCaller<A> {
             feedback_subscription: qos::depth(10),
             status_subscription: latched(1),
         };
-        let kind = ActionTypeName::new(A::PACKAGE, A::NAME);
         self.node
             .inner()
-            .create_action_client(mapping.service_mapping(), &name, &kind, policies)
+            .create_action_client(mapping.service_mapping(), &name, &self.kind, policies)
             .map_err(|error| creation_error(&self.full, &error))
     }
 }
@@ -253,8 +254,22 @@ fn goal_topics(action: &str) -> Topics {
 impl Node {
     /// Creates a client of the action `name`.
     pub fn action_caller<A: Action>(self: &Arc<Self>, name: &str) -> ActionCaller<A> {
+        self.action_caller_of(name, ActionNames::of::<A>())
+    }
+
+    /// Creates a client of the action `name`, whose type is known at run time.
+    pub(crate) fn any_action_caller(
+        self: &Arc<Self>,
+        name: &str,
+        kind: &ActionType,
+    ) -> ActionCaller<AnyAction> {
+        self.action_caller_of(name, kind.into())
+    }
+
+    fn action_caller_of<A: Action>(self: &Arc<Self>, name: &str, names: ActionNames<'_>) -> ActionCaller<A> {
         let full = self.resolve(name);
-        expect_action::<A>(&self.graph, &full);
-        ActionCaller { node: Arc::clone(self), full, connection: smol::lock::Mutex::new(None) }
+        let kind = ActionTypeName::new(names.package, names.name);
+        expect_action(&self.graph, &full, names);
+        ActionCaller { node: Arc::clone(self), full, kind, connection: smol::lock::Mutex::new(None) }
     }
 }

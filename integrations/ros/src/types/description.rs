@@ -4,55 +4,27 @@
 //! topic are derived here in the same way as by rosidl [1]. The hash of a type is the SHA-256 of
 //! the JSON description of the type and of all types that it refers to [2].
 //!
-//! The resolver of `hiroz_codegen` is not used, because it describes `CancelGoal` as a part of an
-//! action and omits a field.
-//!
 //! [1] REP-2011, Evolving Message Types. [2] REP-2016, ROS 2 Interface Type Descriptions.
 
 use std::collections::BTreeMap;
-use std::error::Error;
 
-use hiroz_codegen::hashing::{
+use hiroz_schema::{
     FieldDescription, FieldTypeDescription, TypeDescription, TypeDescriptionMsg, TypeId, calculate_hash,
-    get_type_id, is_primitive_type,
 };
-use hiroz_codegen::types::{ArrayType, Field};
 
-use crate::definition::Interface;
+use super::definition::{Base, Count, Field, Interface, Primitive};
 
-/// Type hashes by variant (`None` for the default) and full name.
-pub type Hashes = BTreeMap<(Option<String>, String), String>;
-
-type Descriptions = BTreeMap<String, TypeDescription>;
+/// Descriptions by full name.
+pub type Descriptions = BTreeMap<String, TypeDescription>;
 
 const TIME: &str = "builtin_interfaces/msg/Time";
 const UUID: &str = "unique_identifier_msgs/msg/UUID";
 
-/// Returns the hashes of all types of all interfaces, including the derived types of services and
-/// actions.
-pub fn hashes(interfaces: &[Interface]) -> Result<Hashes, Box<dyn Error>> {
-    let mut common = Descriptions::new();
-    for interface in interfaces.iter().filter(|interface| interface.variant.is_none()) {
-        describe(interface, &mut common)?;
-    }
-    let mut hashes = Hashes::new();
-    for name in common.keys() {
-        hashes.insert((None, name.clone()), hash(name, &common)?);
-    }
-    for interface in interfaces.iter().filter(|interface| interface.variant.is_some()) {
-        let mut own = Descriptions::new();
-        describe(interface, &mut own)?;
-        // A variant may refer to common types.
-        let mut all = common.clone();
-        all.extend(own.clone());
-        for name in own.keys() {
-            hashes.insert((interface.variant.clone(), name.clone()), hash(name, &all)?);
-        }
-    }
-    Ok(hashes)
-}
-
-fn hash(name: &str, all: &Descriptions) -> Result<String, Box<dyn Error>> {
+/// Returns the type hash, `RIHS01_…`, of a type.
+///
+/// # Errors
+/// The description of the type, or of a type that it refers to, is missing.
+pub fn hash(name: &str, all: &Descriptions) -> Result<String, String> {
     let mut referenced = Descriptions::new();
     collect(name, all, &mut referenced)?;
     let own = referenced.remove(name).ok_or("no description")?;
@@ -65,7 +37,7 @@ fn hash(name: &str, all: &Descriptions) -> Result<String, Box<dyn Error>> {
 
 /// Adds the description of a type and of all types that it refers to, directly or indirectly, to
 /// `found`.
-fn collect(name: &str, all: &Descriptions, found: &mut Descriptions) -> Result<(), Box<dyn Error>> {
+fn collect(name: &str, all: &Descriptions, found: &mut Descriptions) -> Result<(), String> {
     if found.contains_key(name) {
         return Ok(());
     }
@@ -75,35 +47,57 @@ fn collect(name: &str, all: &Descriptions, found: &mut Descriptions) -> Result<(
     nested.filter(|name| !name.is_empty()).try_for_each(|name| collect(name, all, found))
 }
 
-fn describe(interface: &Interface, all: &mut Descriptions) -> Result<(), Box<dyn Error>> {
+/// Adds the descriptions of an interface and of its derived types.
+pub fn describe(interface: &Interface, all: &mut Descriptions) {
     let name = interface.full_name();
     for part in &interface.parts {
-        let fields = part.fields.iter().map(|field| described(field, &interface.package));
-        add(all, format!("{name}{}", part.suffix), fields.collect::<Result<_, _>>()?);
+        add(all, format!("{name}{}", part.suffix), part.fields.iter().map(described).collect());
     }
     match interface.folder {
         "srv" => service(all, &name),
         "action" => action(all, &name),
         _ => {}
     }
-    Ok(())
 }
 
-fn described(field: &Field, package: &str) -> Result<FieldDescription, Box<dyn Error>> {
-    let kind = &field.field_type;
-    let capacity = match kind.array {
-        ArrayType::Fixed(size) | ArrayType::Bounded(size) => size as u64,
-        ArrayType::Single | ArrayType::Unbounded => 0,
+fn described(field: &Field) -> FieldDescription {
+    let kind = &field.kind;
+    let (base, nested_type_name) = match &kind.base {
+        Base::Primitive(primitive) => (type_id(*primitive, kind.string_bound.is_some()), String::new()),
+        Base::Message(name) => (TypeId::NESTED_TYPE, name.clone()),
     };
-    let package = kind.package.as_deref().unwrap_or(package);
-    let nested = !is_primitive_type(&kind.base_type);
+    let (offset, capacity) = match kind.count {
+        Count::One => (0, 0),
+        Count::Fixed(size) => (TypeId::ARRAY_OFFSET, size),
+        Count::Bounded(size) => (TypeId::BOUNDED_SEQUENCE_OFFSET, size),
+        Count::Unbounded => (TypeId::UNBOUNDED_SEQUENCE_OFFSET, 0),
+    };
     let field_type = FieldTypeDescription {
-        type_id: get_type_id(kind)?,
-        capacity,
-        string_capacity: kind.string_bound.unwrap_or(0) as u64,
-        nested_type_name: if nested { format!("{package}/msg/{}", kind.base_type) } else { String::new() },
+        type_id: base + offset,
+        capacity: capacity.into(),
+        string_capacity: kind.string_bound.unwrap_or(0).into(),
+        nested_type_name,
     };
-    Ok(described_as(&field.name, field_type))
+    described_as(&field.name, field_type)
+}
+
+fn type_id(primitive: Primitive, is_bounded: bool) -> u8 {
+    match primitive {
+        Primitive::Bool => TypeId::BOOL,
+        Primitive::Byte => TypeId::BYTE,
+        Primitive::Char | Primitive::Uint8 => TypeId::UINT8,
+        Primitive::Int8 => TypeId::INT8,
+        Primitive::Int16 => TypeId::INT16,
+        Primitive::Uint16 => TypeId::UINT16,
+        Primitive::Int32 => TypeId::INT32,
+        Primitive::Uint32 => TypeId::UINT32,
+        Primitive::Int64 => TypeId::INT64,
+        Primitive::Uint64 => TypeId::UINT64,
+        Primitive::Float32 => TypeId::FLOAT32,
+        Primitive::Float64 => TypeId::FLOAT64,
+        Primitive::String if is_bounded => TypeId::BOUNDED_STRING,
+        Primitive::String => TypeId::STRING,
+    }
 }
 
 fn described_as(name: &str, field_type: FieldTypeDescription) -> FieldDescription {

@@ -1,0 +1,110 @@
+//! Service calls and messages of any type, as the settings give them.
+
+use std::sync::Arc;
+
+use serde_json::{Map, Value, json};
+
+use super::{Expectation, Library, MessageType, ServiceType};
+
+/// A service call with the answer that counts as success.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ServiceCall {
+    pub(crate) kind: Arc<ServiceType>,
+    /// Encoded request.
+    pub(crate) request: Vec<u8>,
+    pub(crate) answer: Answer,
+}
+
+/// Answer of a service that counts as success.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Answer {
+    Any,
+    /// The truth value `success` of the answer must be true.
+    Success,
+    Expected(Expectation),
+}
+
+impl ServiceCall {
+    /// Reads a service call. Without an expectation, a truth value `success` of the answer must be true.
+    ///
+    /// # Errors
+    /// The type is unknown, or a field does not exist or cannot have its value.
+    pub(crate) fn new(kind: &str, request: Option<&Value>, expected: Option<&Value>) -> Result<Self, String> {
+        let kind = Arc::new(Library::current().service(kind)?);
+        let request = kind.request.encode(request.unwrap_or(&Value::Object(Map::new())));
+        let request = request.map_err(|because| format!("`request`: {because}"))?;
+        let answer = Answer::new(&kind, expected)?;
+        Ok(Self { kind, request, answer })
+    }
+
+    /// Checks an encoded answer.
+    ///
+    /// # Errors
+    /// The answer is not the expected one.
+    pub(crate) fn check(&self, answer: &[u8]) -> Result<(), String> {
+        self.answer.check(&self.kind, answer)
+    }
+}
+
+impl Answer {
+    /// Reads the expected answer of a service.
+    ///
+    /// # Errors
+    /// A field does not exist or cannot have its value.
+    pub(crate) fn new(kind: &ServiceType, expected: Option<&Value>) -> Result<Self, String> {
+        Ok(match expected {
+            Some(expected) => {
+                let expectation = Expectation::new(&kind.response, expected);
+                Self::Expected(expectation.map_err(|because| format!("`expect`: {because}"))?)
+            }
+            None if kind.response.has_truth_value("success") => Self::Success,
+            None => Self::Any,
+        })
+    }
+
+    /// Checks an encoded answer.
+    ///
+    /// # Errors
+    /// The answer is not the expected one.
+    pub(crate) fn check(&self, kind: &ServiceType, answer: &[u8]) -> Result<(), String> {
+        let response = &kind.response;
+        let message = || {
+            let text = if response.has_text("message") { response.text("message", answer) } else { None };
+            text.filter(|text| !text.is_empty())
+        };
+        match self {
+            Self::Any => Ok(()),
+            Self::Success => {
+                let success = Expectation::new(response, &json!({"success": true}))?;
+                success.check(response, answer, 0).map_err(|because| message().unwrap_or(because))
+            }
+            Self::Expected(expectation) => {
+                expectation.check(response, answer, 0).map_err(|because| match message() {
+                    Some(message) => format!("{because}; {message}"),
+                    None => because,
+                })
+            }
+        }
+    }
+}
+
+/// A message of a topic of any type.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct TopicMessage {
+    pub(crate) topic: String,
+    pub(crate) kind: Arc<MessageType>,
+    /// Encoded message.
+    pub(crate) message: Vec<u8>,
+}
+
+impl TopicMessage {
+    /// Reads a message.
+    ///
+    /// # Errors
+    /// The type is unknown, or a field does not exist or cannot have its value.
+    pub(crate) fn new(topic: String, kind: &str, message: Option<&Value>) -> Result<Self, String> {
+        let kind = Arc::new(Library::current().message(kind)?);
+        let message = kind.structure.encode(message.unwrap_or(&Value::Object(Map::new())));
+        Ok(Self { topic, kind, message: message.map_err(|because| format!("`message`: {because}"))? })
+    }
+}
