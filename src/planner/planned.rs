@@ -90,8 +90,8 @@ impl Planned<'_> {
     }
 
     /// Returns the numeric fluents of the metric that the search did not minimise, in PDDL: actions change them by
-    /// state-dependent amounts, and may improve the metric, or a horizon, the SAT solver alone or overlapping actions are
-    /// requested.
+    /// state-dependent amounts, and may improve the metric, or a horizon, the SAT solver alone or overlapping actions
+    /// are requested.
     pub fn not_minimised(&self) -> Vec<String> {
         // The search states a bound on the metric if it minimises the whole metric.
         if self.solution.lower_bound.is_some() || self.solution.status != Status::Feasible {
