@@ -65,7 +65,7 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "M119",
         "The metric was not minimised.",
-        "Actions change a fluent of the metric by amounts that depend on the state, and may improve the metric. The plan is valid, but plans with lower values may exist.",
+        "Actions change a fluent of the metric by amounts that depend on the state, and may improve the metric, or overlapping actions or the SAT solver alone were requested. The plan is valid, but plans with lower values may exist.",
         "Add an upper bound on the fluent to the goal, or give each amount an action of its own.",
     ],
     [

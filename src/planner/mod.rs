@@ -222,7 +222,8 @@ impl<'m, 'r> Planner<'m, 'r> {
             solution.plan = Some(lean(self.mission, &problem, plan, &reading, &limits.extended().half()));
         }
         let point = valued(solution, &objectives);
-        self.planned(point, objectives, Ground::Concurrent, reading, ground)
+        let ground_task = Ground::Concurrent { not_minimised: task.not_minimised() };
+        self.planned(point, objectives, ground_task, reading, ground)
     }
 
     fn sequential(mut self, objectives: Objectives) -> Result<Planned<'m>, Errors> {

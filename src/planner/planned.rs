@@ -21,7 +21,8 @@ pub(super) enum Ground {
     Integers(Task),
     /// Sequential steps, with costs and values that are rationals of any size.
     Exact(ExactTask),
-    Concurrent,
+    /// Overlapping actions. `not_minimised` are the numeric fluents of the metric that were not minimised.
+    Concurrent { not_minimised: Vec<String> },
 }
 
 /// Result of planning a mission.
@@ -89,7 +90,8 @@ impl Planned<'_> {
     }
 
     /// Returns the numeric fluents of the metric that the search did not minimise, in PDDL: actions change them by
-    /// state-dependent amounts, and may improve the metric. Always empty for overlapping actions.
+    /// state-dependent amounts, and may improve the metric, or a horizon, the SAT solver alone or overlapping actions
+    /// are requested.
     pub fn not_minimised(&self) -> Vec<String> {
         // The search states a bound on the metric if it minimises the whole metric.
         if self.solution.lower_bound.is_some() || self.solution.status != Status::Feasible {
@@ -98,14 +100,14 @@ impl Planned<'_> {
         let (fluents, names) = match &self.task {
             Ground::Integers(task) => (&task.objective.rest, &task.number_names),
             Ground::Exact(ExactTask(task)) => (&task.objective.rest, &task.number_names),
-            Ground::Concurrent => return Vec::new(),
+            Ground::Concurrent { not_minimised } => return not_minimised.clone(),
         };
         fluents.iter().map(|(fluent, _)| names[fluent.0 as usize].clone()).collect()
     }
 
     /// Returns `true` if the mission was planned with overlapping actions.
     pub fn overlaps(&self) -> bool {
-        matches!(self.task, Ground::Concurrent)
+        matches!(self.task, Ground::Concurrent { .. })
     }
 
     /// Returns the plan with the arguments as in the domain's file, i.e. without the designs that
@@ -144,7 +146,7 @@ impl Planned<'_> {
         let task = match &self.task {
             Ground::Integers(task) => certificate::Ground::Integers(task),
             Ground::Exact(task) => certificate::Ground::Exact(task),
-            Ground::Concurrent => {
+            Ground::Concurrent { .. } => {
                 return Err(Message::error("M107", "plans whose actions overlap have no certificate"));
             }
         };

@@ -216,4 +216,6 @@ fn a_metric_that_is_not_minimised_is_named() {
     assert!(outcome.stdout.contains("cost 5000: a plan, not proved optimal"), "{outcome:#?}");
     assert!(outcome.stderr.contains("warning[M119]: the metric was not minimised"), "{outcome:#?}");
     assert!(outcome.stderr.contains("total-cost"), "{outcome:#?}");
+    let outcome = metaplan_in(directory.path(), &["plan", "domain.pddl", "problem.pddl", "--concurrent"], "");
+    assert!(outcome.stderr.contains("warning[M119]: the metric was not minimised"), "{outcome:#?}");
 }

@@ -5,7 +5,11 @@ use std::collections::{BTreeMap, BinaryHeap};
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use metaplan_planner::{Config, GroundConfig, Limits, Proof, Solution, Status, Thresholds, ground, optimize};
+use metaplan_planner::{
+    Config, Engine, Exact, GroundConfig, Limits, Proof, Solution, Status, Thresholds, ground,
+    ground_concurrent, optimize, optimize_concurrent,
+};
+use num_rational::BigRational;
 use testing::random::Random;
 
 use crate::concurrent::parse;
@@ -23,6 +27,9 @@ const DOMAIN: &str = "(define (domain market) (:requirements :typing :numeric-fl
   (:action buy :parameters (?p - place) :precondition (and (at ?p) (>= (amount) (need ?p)))
     :effect (and (bought ?p) (decrease (amount) (need ?p))
       (increase (spent) (+ (* (price ?p) (amount)) (* (share ?p) (rate)))))))";
+
+/// Place, amount, rate and purchases.
+type Explicit = (usize, i64, i64, Vec<bool>);
 
 struct Market {
     roads: Vec<(usize, usize)>,
@@ -73,38 +80,72 @@ impl Market {
         )
     }
 
+    fn start(&self) -> Explicit {
+        (0, 0, self.rate, vec![false; self.places.len()])
+    }
+
+    fn is_goal(&self, (at, _, _, bought): &Explicit) -> bool {
+        *at == 0 && self.goals.iter().all(|goal| bought[*goal])
+    }
+
+    /// Costs of the steps from a state, with the next states.
+    fn successors(&self, (at, amount, rate, bought): &Explicit) -> Vec<(i64, Explicit)> {
+        let (at, amount, rate) = (*at, *amount, *rate);
+        let mut next = Vec::new();
+        if amount < self.cap {
+            next.push((0, (at, amount + self.lot, rate, bought.clone())));
+        }
+        if rate >= self.discount {
+            next.push((self.fee, (at, amount, rate - self.discount, bought.clone())));
+        }
+        for (_, to) in self.roads.iter().filter(|(from, _)| *from == at) {
+            next.push((self.places[*to][0], (*to, amount, rate, bought.clone())));
+        }
+        let [_, price, share, need] = self.places[at];
+        if amount >= need {
+            let mut bought = bought.clone();
+            bought[at] = true;
+            next.push((price * amount + share * rate, (at, amount - need, rate, bought)));
+        }
+        next
+    }
+
+    /// Least cost of a plan with at most `horizon` steps, layer by layer.
+    fn cheapest_within(&self, horizon: usize) -> Option<i64> {
+        let mut layer = BTreeMap::from([(self.start(), 0)]);
+        let mut best = None;
+        for step in 0..=horizon {
+            let goals = layer.iter().filter(|(state, _)| self.is_goal(state)).map(|(_, cost)| *cost);
+            best = best.into_iter().chain(goals).min();
+            if step < horizon {
+                let mut next: BTreeMap<Explicit, i64> = BTreeMap::new();
+                for (state, cost) in &layer {
+                    for (more, state) in self.successors(state) {
+                        let least = next.entry(state).or_insert(i64::MAX);
+                        *least = (*least).min(cost + more);
+                    }
+                }
+                layer = next;
+            }
+        }
+        best
+    }
+
     /// Least cost, by Dijkstra's algorithm over explicit states.
     fn cheapest(&self) -> Option<i64> {
-        // Place, amount, rate and purchases.
-        type State = (usize, i64, i64, Vec<bool>);
-        let start: State = (0, 0, self.rate, vec![false; self.places.len()]);
-        let mut costs: BTreeMap<State, i64> = BTreeMap::new();
+        let start = self.start();
+        let mut costs: BTreeMap<Explicit, i64> = BTreeMap::new();
         let mut open = BinaryHeap::from([Reverse((0, start))]);
         while let Some(Reverse((cost, state))) = open.pop() {
             if costs.contains_key(&state) {
                 continue;
             }
-            costs.insert(state.clone(), cost);
-            let (at, amount, rate, bought) = state;
-            if at == 0 && self.goals.iter().all(|goal| bought[*goal]) {
+            if self.is_goal(&state) {
                 return Some(cost);
             }
-            let mut push = |more: i64, state: State| open.push(Reverse((cost + more, state)));
-            if amount < self.cap {
-                push(0, (at, amount + self.lot, rate, bought.clone()));
-            }
-            if rate >= self.discount {
-                push(self.fee, (at, amount, rate - self.discount, bought.clone()));
-            }
-            for (_, to) in self.roads.iter().filter(|(from, _)| *from == at) {
-                push(self.places[*to][0], (*to, amount, rate, bought.clone()));
-            }
-            let [_, price, share, need] = self.places[at];
-            if amount >= need {
-                let mut bought = bought;
-                bought[at] = true;
-                push(price * amount + share * rate, (at, amount - need, rate, bought));
-            }
+            let next = self.successors(&state).into_iter();
+            open.extend(next.map(|(more, state)| Reverse((cost + more, state))));
+            costs.insert(state, cost);
         }
         None
     }
@@ -135,6 +176,77 @@ fn state_dependent_costs_are_as_low_as_by_brute_force() {
         solved += usize::from(expected.is_some());
     }
     assert!(solved * 3 > seeds as usize, "{solved} of {seeds} are solvable");
+}
+
+/// Within a horizon, the metric is minimised over the plans with at most this number of steps.
+#[test]
+fn state_dependent_costs_within_a_horizon_are_as_low_as_by_brute_force() {
+    let (mut proved, mut longer_is_cheaper) = (0, 0);
+    for seed in 0..60 {
+        let market = Market::sample(&mut Random(seed));
+        let (domain, problem) = parse(DOMAIN, &market.problem());
+        let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");
+        for horizon in [0, 2, 4, 7] {
+            let expected = market.cheapest_within(horizon);
+            let limits = Limits::none().with_time(Duration::from_secs(10));
+            let config = Config::default().with_limits(limits).with_horizon(horizon);
+            let solution = optimize(&task, &config, &mut |_| {});
+            let context = || format!("seed {seed}, {horizon} steps: {solution:?}\n{}", market.problem());
+            let cost = solution.plan.as_ref().map(|plan| plan.cost.to_string());
+            let Some(expected) = expected else {
+                assert!(cost.is_none(), "{}", context());
+                let is_solvable = market.cheapest().is_some();
+                assert!(solution.status != Status::Unsolvable || !is_solvable, "{}", context());
+                continue;
+            };
+            assert_eq!(cost, Some(expected.to_string()), "{}", context());
+            assert_eq!(solution.status, Status::Optimal, "{}", context());
+            assert!(solution.plan.as_ref().is_some_and(|plan| plan.steps.len() <= horizon));
+            proved += 1;
+            longer_is_cheaper += usize::from(market.cheapest() < Some(expected));
+        }
+    }
+    assert!(
+        proved > 30 && longer_is_cheaper > 5,
+        "{proved} proved, {longer_is_cheaper} with cheaper longer plans"
+    );
+}
+
+/// With the SAT solver alone and with overlapping actions, no plan that costs more than the optimum is called optimal.
+#[test]
+fn state_dependent_costs_that_are_not_minimised_are_not_called_optimal() {
+    let mut planned = 0;
+    for seed in 0..30 {
+        let market = Market::sample(&mut Random(seed));
+        let (domain, problem) = parse(DOMAIN, &market.problem());
+        let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");
+        let is_dependent = !task.objective.rest.is_empty();
+        let limits = Limits::none().with_time(Duration::from_millis(300));
+        let config = Config::default().with_limits(limits.clone()).with_engine(Engine::Sat);
+        let by_formulas = optimize(&task, &config, &mut |_| {});
+        let separation = BigRational::new(1.into(), 1000.into());
+        let overlapping = ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation);
+        let overlapping = overlapping.expect("a task");
+        assert_eq!(
+            overlapping.not_minimised().is_empty(),
+            !is_dependent,
+            "seed {seed}: {}",
+            market.problem()
+        );
+        let limits = Limits::none().with_time(Duration::from_millis(300));
+        let overlapping = optimize_concurrent(&overlapping, &limits, &mut |_| {});
+        let best = market.cheapest().map(|best| BigRational::from_integer(best.into()));
+        for solution in [by_formulas, overlapping] {
+            let Some(plan) = &solution.plan else { continue };
+            planned += 1;
+            let is_best = Some(plan.cost.to_rational()) == best;
+            assert!(solution.status != Status::Optimal || is_best, "seed {seed}: {solution:?}");
+            let bound = solution.lower_bound.as_ref().map(Exact::to_rational);
+            assert!(bound.is_none() || bound <= best, "seed {seed}: {solution:?}");
+            assert!(solution.status != Status::Optimal || !is_dependent, "seed {seed}: {solution:?}");
+        }
+    }
+    assert!(planned > 20, "{planned} plans");
 }
 
 /// The purchaser problem of IPC 2006: the cost of a purchase is a price times what is on sale, or what is needed.

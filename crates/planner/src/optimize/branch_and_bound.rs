@@ -3,7 +3,8 @@
 //! The portfolio for constant costs finds a first plan. Then a satisficing search for the task with lower bounds as
 //! costs runs in turns with A\*, and its plans are upper bounds. A path dominates another one if it costs no more and
 //! reaches a state that is as good: less (or more) of a number is no worse if no condition, cost or other number
-//! depends on it in the other direction.
+//! depends on it in the other direction. With a horizon, longer paths are pruned, and a path dominates only paths that
+//! are at least as long.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -41,18 +42,20 @@ const WORK: u64 = 1_000;
 /// Approximate memory use of a node, without its state.
 const OVERHEAD: usize = size_of::<Node>() + 80;
 
-/// Minimises a metric that depends on the state. Returns `None` if the method is not applicable: with a horizon or
-/// with the SAT solver only, if an operator may improve the metric, or if operators have too many combinations of
-/// designs.
+/// Minimises a metric that depends on the state. Returns `None` if the method is not applicable: with the SAT solver
+/// only, if an operator may improve the metric, or if operators have too many combinations of designs. Also returns
+/// `None` if no plan within the horizon was found.
 pub(super) fn minimise(
     task: &Task,
     config: &Config,
     report: &mut dyn FnMut(Improvement),
 ) -> Option<Solution> {
-    let is_open = task.unreachable.is_none() && config.horizon.is_none() && config.engine != Engine::Sat;
+    let is_open = task.unreachable.is_none() && config.engine != Engine::Sat;
     if !is_open || task.objective.rest.is_empty() {
         return None;
     }
+    let horizon = config.horizon;
+    let config = &config.clone().with_horizon(None);
     let _span = info_span!("optimize", operators = task.operators.len()).entered();
     let statistics = Statistics { operators: task.operators.len(), ..Statistics::default() };
     let started = Instant::now();
@@ -60,7 +63,7 @@ pub(super) fn minimise(
     let costs = StateDependentCosts::new(task, limits).ok()??;
     let choices = choices(task)?;
     let bounds = Bounds::new(Context::new(&costs.priced, limits)).ok()?;
-    let mut search = Search::new(task, &costs, &bounds, choices);
+    let mut search = Search::new(task, &costs, &bounds, choices, horizon);
     let (mut statistics, mut priced_cost) = (statistics, None);
     if let Some(first) = first_plan(task, config) {
         if first.status == Status::Unsolvable {
@@ -101,7 +104,8 @@ pub(super) fn minimise(
         }
         turn = turn.saturating_mul(2);
     };
-    Some(progress.solution(search, end, limits))
+    let is_found = search.best.is_some();
+    (is_found || horizon.is_none()).then(|| progress.solution(search, end, limits))
 }
 
 /// Searches for a first plan by the portfolio for the part of the metric that operator costs represent. Returns
@@ -195,6 +199,7 @@ struct Node {
     paid: Int,
     /// Cost of the path, including the measured fluents.
     total: Int,
+    steps: usize,
     /// Parent node and step; `None` for the initial state.
     origin: Option<(u32, GroundStep)>,
     /// Whether a cheaper path to the same state is known.
@@ -202,10 +207,17 @@ struct Node {
 }
 
 impl Node {
-    /// Returns the state and the cost of the path.
-    fn path(&self) -> (&State, Int) {
-        (&self.state, self.total)
+    fn path(&self) -> Path<'_> {
+        Path { state: &self.state, total: self.total, steps: self.steps }
     }
+}
+
+/// A path to a state, with its cost and its number of steps.
+#[derive(Clone, Copy)]
+struct Path<'n> {
+    state: &'n State,
+    total: Int,
+    steps: usize,
 }
 
 /// Sort key of an open node: lower bound on the cost of plans, estimate, and node.
@@ -216,6 +228,8 @@ struct Search<'a> {
     costs: &'a StateDependentCosts,
     bounds: &'a Bounds,
     choices: Vec<Vec<Vec<u32>>>,
+    /// Maximum number of steps of a plan; `None` for no limit.
+    horizon: Option<usize>,
     generator: SuccessorGenerator,
     nodes: Vec<Node>,
     /// Nodes that no other node dominates, by the hash of the parts of their states that must be equal.
@@ -234,12 +248,14 @@ impl<'a> Search<'a> {
         costs: &'a StateDependentCosts,
         bounds: &'a Bounds,
         choices: Vec<Vec<Vec<u32>>>,
+        horizon: Option<usize>,
     ) -> Self {
         let mut search = Self {
             task,
             costs,
             bounds,
             choices,
+            horizon,
             generator: SuccessorGenerator::new(task),
             nodes: Vec::new(),
             table: FxHashMap::default(),
@@ -316,13 +332,15 @@ impl<'a> Search<'a> {
     fn add(&mut self, state: State, (paid, total): (Int, Int), origin: Option<(u32, GroundStep)>) {
         let Some(estimate) = self.bounds.estimate(&state) else { return };
         let bound = total.saturating_add(estimate);
-        if !self.is_better(bound) {
+        let parent = origin.as_ref().map(|(parent, _)| &self.nodes[*parent as usize]);
+        let steps = parent.map_or(0, |parent| parent.steps.saturating_add(1));
+        if !self.is_better(bound) || self.exceeds_horizon(steps) {
             return;
         }
         let id = dense(self.nodes.len());
         let hash = self.hash(&state);
         let mut front = self.table.remove(&hash).unwrap_or_default();
-        let path = (&state, total);
+        let path = Path { state: &state, total, steps };
         let is_dominated = front.iter().any(|id| self.dominates(self.nodes[*id as usize].path(), path));
         if !is_dominated {
             let worse = front.extract_if(.., |id| self.dominates(path, self.nodes[*id as usize].path()));
@@ -339,7 +357,7 @@ impl<'a> Search<'a> {
         let size = size_of_val(&*state.values).saturating_add(size_of_val(&*state.numbers));
         self.bytes = self.bytes.saturating_add(size).saturating_add(OVERHEAD);
         let is_goal = self.task.is_goal(&state);
-        self.nodes.push(Node { state, paid, total, origin, is_dominated: false });
+        self.nodes.push(Node { state, paid, total, steps, origin, is_dominated: false });
         if is_goal {
             // No continuation of the plan is cheaper.
             self.adopt(id);
@@ -350,6 +368,10 @@ impl<'a> Search<'a> {
 
     fn is_full(&self, limits: &Limits) -> bool {
         self.bytes.saturating_mul(4) / 3 > limits.room() || self.nodes.len() >= MAX_NODES
+    }
+
+    fn exceeds_horizon(&self, steps: usize) -> bool {
+        self.horizon.is_some_and(|horizon| steps > horizon)
     }
 
     fn is_better(&self, bound: Int) -> bool {
@@ -368,8 +390,11 @@ impl<'a> Search<'a> {
         self.offer(steps);
     }
 
-    /// Makes a plan the best one if it is better.
+    /// Makes a plan the best one if it is better and not longer than the horizon.
     fn offer(&mut self, steps: Vec<GroundStep>) {
+        if self.exceeds_horizon(steps.len()) {
+            return;
+        }
         let Some(cost) = cost(self.task, &steps) else { return };
         let plan = GroundPlan { steps, cost };
         if let Some(total) = self.costs.total(self.task, &plan).filter(|total| self.is_better(*total)) {
@@ -388,12 +413,14 @@ impl<'a> Search<'a> {
         FxBuildHasher.hash_one((&state.values, numbers))
     }
 
-    /// Returns `true` if every continuation of a path of cost `other.1` to `other.0` is possible after a path of cost
-    /// `path.1` to `path.0`, at no higher cost.
-    fn dominates(&self, path: (&State, Int), other: (&State, Int)) -> bool {
-        let mut numbers = path.0.numbers.iter().zip(&other.0.numbers).zip(&self.costs.preferences);
-        path.1 <= other.1
-            && path.0.values == other.0.values
+    /// Returns `true` if every continuation of the path `other` that is within the horizon is possible after `path`,
+    /// also within the horizon and at no higher cost.
+    fn dominates(&self, path: Path<'_>, other: Path<'_>) -> bool {
+        let numbers = path.state.numbers.iter().zip(&other.state.numbers);
+        let mut numbers = numbers.zip(&self.costs.preferences);
+        path.total <= other.total
+            && (self.horizon.is_none() || path.steps <= other.steps)
+            && path.state.values == other.state.values
             && numbers.all(|((first, second), preference)| {
                 first == second || preference.less && first <= second || preference.more && first >= second
             })

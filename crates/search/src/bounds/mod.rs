@@ -130,6 +130,14 @@ impl Bounds {
     /// Returns a lower bound on the cost from a state to the goal, or `None` if the goal is proved
     /// unreachable from the state.
     pub fn estimate(&self, state: &State) -> Option<Int> {
+        let cost = self.cost_estimate(state)?;
+        let enough = |resource: &Resource| resource.has_enough_resources(state, &self.projections);
+        self.resources.iter().all(enough).then_some(cost)
+    }
+
+    /// Returns a lower bound like [`Bounds::estimate`] that ignores resources. It depends only on the
+    /// finite-domain variables of the state.
+    pub(crate) fn cost_estimate(&self, state: &State) -> Option<Int> {
         let mut best = 0;
         if self.partitions.is_empty() {
             for projection in &self.projections {
@@ -144,8 +152,7 @@ impl Bounds {
             }
             best = self.partitions.iter().map(|partition| partition.estimate(&states)).fold(best, Int::max);
         }
-        let enough = |resource: &Resource| resource.has_enough_resources(state, &self.projections);
-        self.resources.iter().all(enough).then_some(best)
+        Some(best)
     }
 
     /// Returns lower bounds on the resources that a state must have to reach the goal or a replenishment.

@@ -18,10 +18,11 @@ use std::collections::BinaryHeap;
 use std::sync::OnceLock;
 
 use rustc_hash::{FxHashMap, FxHashSet};
+use smallvec::SmallVec;
 use task::context::Context;
 use task::lifted::ObjectId;
 use task::limits::{Interrupted, LimitPoll, Limits};
-use task::number::Int;
+use task::number::{Int, dense};
 use task::plan::ground::{GroundPlan, GroundStep};
 use task::plan::resolve;
 use task::task::{OperatorId, State, Task};
@@ -47,11 +48,55 @@ struct Label {
 }
 
 impl Label {
-    /// Returns the key of the Pareto front to which the label belongs. Numbers that must be equal for
-    /// dominance are part of the key.
-    fn place(&self, task: &Task, monotone: bool) -> Place {
-        let numbers = if monotone { Vec::new() } else { self.state.numbers.clone() };
-        (self.state.values[..task.basic].into(), self.designs.clone(), numbers)
+    /// Writes the key of the Pareto front to which the label belongs: the values of the basic variables, the
+    /// last design of each function, and the numbers that must be equal for dominance.
+    fn write_front_key(&self, task: &Task, monotone: bool, key: &mut Vec<u32>) {
+        key.clear();
+        key.extend(&self.state.values[..task.basic]);
+        key.extend(self.designs.iter().map(|design| design.map_or(u32::MAX, |design| dense(design.index()))));
+        if !monotone {
+            for number in &self.state.numbers {
+                let bytes = number.to_le_bytes();
+                let words = bytes.chunks_exact(4).map(|word| word.iter().map(|byte| u32::from(*byte)));
+                key.extend(words.map(|bytes| bytes.fold(0, |word, byte| (word << 8) | byte)));
+            }
+        }
+    }
+
+    fn merits(&self) -> Merits {
+        Merits {
+            cost: self.cost,
+            steps: self.steps,
+            changes: self.changes,
+            numbers: SmallVec::from_slice(&self.state.numbers),
+        }
+    }
+}
+
+/// The parts of a label by which labels of one Pareto front are compared.
+struct Merits {
+    cost: Int,
+    steps: usize,
+    changes: Changes,
+    numbers: SmallVec<[Int; 1]>,
+}
+
+impl Merits {
+    /// Returns `true` if a label with these merits is at least as good as another label of its Pareto front.
+    /// If `monotone`, higher values of all numeric variables are never worse; otherwise they must be equal.
+    fn is_no_worse(&self, other: &Self, monotone: bool) -> bool {
+        self.cost <= other.cost
+            && self.steps <= other.steps
+            && self.changes <= other.changes
+            && if monotone {
+                self.numbers.iter().zip(&other.numbers).all(|(own, other)| own >= other)
+            } else {
+                self.numbers == other.numbers
+            }
+    }
+
+    fn measures(&self) -> (Int, usize, Changes) {
+        (self.cost, self.steps, self.changes)
     }
 }
 
@@ -71,14 +116,11 @@ struct Choice {
 /// Combinations of designs of an operator, in ascending order; `None` if there are too many.
 type Choices = Option<Vec<Choice>>;
 
-/// Key of a Pareto front: the values of the basic variables, the last design of each function, and the values
-/// of the numeric variables. The last are omitted if a higher value is never worse (the task is monotone).
-type Place = (Box<[u32]>, Vec<Option<ObjectId>>, Vec<Int>);
-
 #[derive(Default)]
 struct Labels {
     all: Vec<Label>,
-    fronts: FxHashMap<Place, Vec<usize>>,
+    /// Pareto fronts of the labels by key, see [`Label::write_front_key`].
+    fronts: FxHashMap<Box<[u32]>, Vec<Merits>>,
 }
 
 /// Situation in which the plan begins: the state, and preferences for the remaining plan.
@@ -176,6 +218,10 @@ struct Ties<'a> {
     made: Cell<usize>,
     compared: Cell<usize>,
     pulse: RefCell<LimitPoll<'a>>,
+    /// Buffer for the state of a successor, most of which are rejected.
+    next: RefCell<State>,
+    /// Buffer for the key of a Pareto front.
+    key: RefCell<Vec<u32>>,
 }
 
 /// Returns the canonical plan among all plans with the cost and the number of steps of `plan`. Returns `plan`
@@ -221,6 +267,8 @@ pub fn choose_from(
         made: Cell::new(0),
         compared: Cell::new(0),
         pulse: RefCell::new(limits.pulse()),
+        next: RefCell::new(beginning.state.clone()),
+        key: RefCell::default(),
     };
     let start = Label { state: beginning.state.clone(), designs, cost: 0, steps: 0, changes: (0, 0) };
     match ties.first(start, max_changes) {
@@ -232,8 +280,9 @@ pub fn choose_from(
 struct Branch<'a> {
     label: usize,
     operators: std::vec::IntoIter<OperatorId>,
-    /// Current operator, and its untried combinations of designs.
-    current: Option<(OperatorId, std::slice::Iter<'a, Choice>)>,
+    /// Current operator, the lower bound on the cost after it (see [`Ties::cost_to_go_after`]), and its untried
+    /// combinations of designs.
+    current: Option<(OperatorId, Int, std::slice::Iter<'a, Choice>)>,
 }
 
 impl Ties<'_> {
@@ -260,34 +309,62 @@ impl Ties<'_> {
         choices.get()?.as_deref()
     }
 
+    /// Returns a lower bound on the cost from the states after an operator to the goal, whatever its designs.
+    /// Returns `None` if the goal is unreachable within the number of steps of the known plan.
+    ///
+    /// The finite-domain variables of all these states are equal unless the operator has conditional effects,
+    /// in which case the bound is 0.
+    fn cost_to_go_after(&self, label: &Label, operator: OperatorId) -> Option<Int> {
+        let operator = &self.task.operators[operator.index()];
+        let remaining_steps = self.steps.checked_sub(label.steps)?.checked_sub(1)?;
+        if !operator.conditional.is_empty() {
+            return Some(0);
+        }
+        let mut next = self.next.borrow_mut();
+        next.values.clone_from(&label.state.values);
+        for effect in &operator.effects {
+            next.values[effect.variable.index()] = effect.value;
+        }
+        if !self.is_in_time(&next, remaining_steps) {
+            return None;
+        }
+        self.bounds.cost_estimate(&next)
+    }
+
+    /// Returns `true` unless a projection proves that the goal is more than `remaining_steps` steps away.
+    fn is_in_time(&self, state: &State, remaining_steps: usize) -> bool {
+        let in_time = |(projection, to_go): (&Projection, &Vec<Option<Int>>)| {
+            to_go[projection.state(state) as usize].is_some_and(|more| more <= remaining_steps as Int)
+        };
+        self.bounds.projections.iter().zip(&self.prepared.steps_to_go).all(in_time)
+    }
+
     /// Returns the label (partial plan) after a step. Returns `None` if the step is inapplicable or cannot
-    /// lead to a plan within the cost and number of steps of the known plan.
+    /// lead to a plan within the cost and number of steps of the known plan. `to_go` is the result of
+    /// [`Self::cost_to_go_after`].
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "costs are not negative and those of labels at most that of a known plan, so that sums with an operator and an estimate fit"
     )]
-    fn successor(&self, label: &Label, operator: OperatorId, choice: &Choice) -> Option<Label> {
+    fn successor(&self, label: &Label, operator: OperatorId, to_go: Int, choice: &Choice) -> Option<Label> {
         let operator = &self.task.operators[operator.index()];
         let (cost, steps) = (label.cost + choice.cost, label.steps + 1);
-        let sizes = operator.sizes();
-        if cost > self.cost
+        if cost + to_go > self.cost
             || steps > self.steps
-            || !operator.condition.holds_numerically(&label.state.numbers, &choice.designs, &sizes)
+            || !operator.condition.holds_numerically(&label.state.numbers, &choice.designs, &operator.sizes())
         {
             return None;
         }
-        let state = self.task.successor(operator, &label.state, &choice.designs)?;
-        if cost + self.bounds.estimate(&state)? > self.cost {
+        let mut next = self.next.borrow_mut();
+        next.clone_from(&label.state);
+        operator.apply(&label.state, &choice.designs, &mut next)?;
+        // The bounds read only basic variables.
+        if cost + self.bounds.estimate(&next)? > self.cost || !self.is_in_time(&next, self.steps - steps) {
             return None;
         }
-        let remaining_steps = (self.steps - steps) as Int;
-        let in_time = |(projection, to_go): (&Projection, &Vec<Option<Int>>)| {
-            to_go[projection.state(&state) as usize].is_some_and(|more| more <= remaining_steps)
-        };
-        if !self.bounds.projections.iter().zip(&self.prepared.steps_to_go).all(in_time) {
-            return None;
-        }
-        let mut next = Label { state, designs: label.designs.clone(), cost, steps, changes: label.changes };
+        self.task.evaluate_axioms(&mut next);
+        let (state, designs) = (next.clone(), label.designs.clone());
+        let mut next = Label { state, designs, cost, steps, changes: label.changes };
         next.changes.0 += usize::from(!choice.is_kept);
         for (function, design) in &choice.configuration {
             let last = next.designs[*function].replace(*design);
@@ -307,9 +384,12 @@ impl Ties<'_> {
                 return Some((changes, labels));
             }
             for operator in self.prepared.index.applicable(self.task, &labels.all[id].state) {
-                for choice in self.choices(operator)? {
+                let choices = self.choices(operator)?;
+                let Some(to_go) = self.cost_to_go_after(&labels.all[id], operator) else { continue };
+                for choice in choices {
                     self.beat()?;
-                    let Some(next) = self.successor(&labels.all[id], operator, choice) else { continue };
+                    let next = self.successor(&labels.all[id], operator, to_go, choice);
+                    let Some(next) = next else { continue };
                     // Labels are popped by ascending changes and then by descending depth, so the first goal
                     // label has the minimum changes.
                     if next.changes <= max_changes && !self.is_beaten(&labels, &next, false) {
@@ -347,22 +427,25 @@ impl Ties<'_> {
         let mut steps: Vec<GroundStep> = Vec::new();
         let mut labels = Labels { all: vec![start], ..Labels::default() };
         while let Some(last) = branches.last_mut() {
-            let Some((operator, choices)) = &mut last.current else {
+            let Some((operator, to_go, choices)) = &mut last.current else {
                 if let Some(operator) = last.operators.next() {
-                    last.current = Some((operator, self.choices(operator)?.iter()));
+                    let choices = self.choices(operator)?.iter();
+                    let to_go = self.cost_to_go_after(&labels.all[last.label], operator);
+                    last.current = to_go.map(|to_go| (operator, to_go, choices));
                 } else {
                     branches.pop();
                     steps.pop();
                 }
                 continue;
             };
-            let operator = *operator;
+            let (operator, to_go) = (*operator, *to_go);
             self.beat()?;
             let Some(choice) = choices.next() else {
                 last.current = None;
                 continue;
             };
-            let Some(next) = self.successor(&labels.all[last.label], operator, choice) else { continue };
+            let next = self.successor(&labels.all[last.label], operator, to_go, choice);
+            let Some(next) = next else { continue };
             if next.changes <= changes
                 && !self.is_beaten(first_labels, &next, true)
                 && !self.is_beaten(&labels, &next, false)
@@ -381,12 +464,14 @@ impl Ties<'_> {
     /// Returns `true` if a stored label of the Pareto front of `next` is at least as good as `next`. If
     /// `strictly`, the label must also be better in cost, steps or changes.
     fn is_beaten(&self, labels: &Labels, next: &Label, strictly: bool) -> bool {
-        let is_better =
-            |label: &Label| (label.cost, label.steps, label.changes) != (next.cost, next.steps, next.changes);
-        labels.fronts.get(&next.place(self.task, self.prepared.monotone)).is_some_and(|front| {
+        let (merits, monotone) = (next.merits(), self.prepared.monotone);
+        let mut key = self.key.borrow_mut();
+        next.write_front_key(self.task, monotone, &mut key);
+        labels.fronts.get(key.as_slice()).is_some_and(|front| {
             self.compared.set(self.compared.get().saturating_add(front.len()));
-            let mut labels_of_front = front.iter().map(|position| &labels.all[*position]);
-            labels_of_front.any(|label| self.no_worse(label, next) && (!strictly || is_better(label)))
+            front.iter().any(|label| {
+                label.is_no_worse(&merits, monotone) && (!strictly || label.measures() != merits.measures())
+            })
         })
     }
 
@@ -397,26 +482,131 @@ impl Ties<'_> {
     /// Stores a label (partial plan). Returns `None` if the limit on labels or comparisons is reached.
     #[expect(clippy::arithmetic_side_effects, reason = "labels are counted up to their limit")]
     fn keep(&self, labels: &mut Labels, label: Label) -> Option<()> {
-        labels
-            .fronts
-            .entry(label.place(self.task, self.prepared.monotone))
-            .or_default()
-            .push(labels.all.len());
+        let (merits, monotone) = (label.merits(), self.prepared.monotone);
+        let mut key = self.key.borrow_mut();
+        label.write_front_key(self.task, monotone, &mut key);
+        match labels.fronts.get_mut(key.as_slice()) {
+            Some(front) => {
+                // Whatever a removed label beats, the new label beats, too.
+                front.retain(|other| !merits.is_no_worse(other, monotone));
+                front.push(merits);
+            }
+            None => {
+                labels.fronts.insert(key.as_slice().into(), vec![merits]);
+            }
+        }
         labels.all.push(label);
         let label_count = self.made.get() + 1;
         self.made.set(label_count);
         (label_count < LABEL_LIMIT && self.compared.get() < PAIR_LIMIT).then_some(())
     }
+}
 
-    fn no_worse(&self, a: &Label, b: &Label) -> bool {
-        let numbers = a.state.numbers.iter().zip(&b.state.numbers);
-        a.cost <= b.cost
-            && a.steps <= b.steps
-            && a.changes <= b.changes
-            && if self.prepared.monotone {
-                numbers.into_iter().all(|(a, b)| a >= b)
-            } else {
-                a.state.numbers == b.state.numbers
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::search::{SearchOutcome, search};
+    use testing::ground_text;
+    use testing::missions::Mission;
+
+    /// Maximum number of partial plans that are enumerated for one task.
+    const ENUMERATION_LIMIT: usize = 300_000;
+
+    /// Enumerates all plans with the cost and the number of steps of a known plan in model order.
+    struct Enumeration<'a> {
+        task: &'a Task,
+        choices: Vec<Vec<(Vec<u32>, Int)>>,
+        cost: Int,
+        steps: usize,
+        prefix: Vec<GroundStep>,
+        /// The first plan with the fewest reconfigurations, and their number.
+        best: Option<(usize, Vec<GroundStep>)>,
+        visited: usize,
+    }
+
+    impl Enumeration<'_> {
+        fn extend(
+            &mut self,
+            state: &State,
+            cost: Int,
+            designs: &FxHashMap<ObjectId, ObjectId>,
+            changes: usize,
+        ) {
+            self.visited += 1;
+            if self.task.is_goal(state) {
+                let is_better = self.best.as_ref().is_none_or(|(fewest, _)| changes < *fewest);
+                if is_better && (cost, self.prefix.len()) == (self.cost, self.steps) {
+                    self.best = Some((changes, self.prefix.clone()));
+                }
+                return;
             }
+            if self.prefix.len() == self.steps || self.visited > ENUMERATION_LIMIT {
+                return;
+            }
+            for id in OperatorId::all(self.task.operators.len()) {
+                let operator = &self.task.operators[id.index()];
+                if !operator.condition.holds_propositionally(&state.values) {
+                    continue;
+                }
+                for (choice, price) in self.choices[id.index()].clone() {
+                    let is_possible =
+                        operator.condition.holds_numerically(&state.numbers, &choice, &operator.sizes());
+                    let next = self.task.successor(operator, state, &choice).filter(|_| is_possible);
+                    let Some(next) = next.filter(|_| cost + price <= self.cost) else { continue };
+                    let (mut designs, mut changes) = (designs.clone(), changes);
+                    for (function, argument) in &operator.configuration {
+                        let design = resolve(self.task, operator, &choice, *argument);
+                        changes +=
+                            usize::from(designs.insert(*function, design).is_some_and(|last| last != design));
+                    }
+                    self.prefix.push(GroundStep { operator: id, choice });
+                    self.extend(&next, cost + price, &designs, changes);
+                    self.prefix.pop();
+                }
+            }
+        }
+    }
+
+    /// Compares the canonical plan of a random mission with the enumeration. Returns `true` if the mission has
+    /// a plan and is small enough.
+    fn check(seed: u64) -> bool {
+        let mission = Mission::random(seed);
+        let task = ground_text((mission.domain(), mission.problem()));
+        let limits = Limits::none();
+        let context = Context::new(&task, &limits);
+        let bounds = Bounds::new(context).expect("no limit");
+        let SearchOutcome::Optimal(plan) = search(context, &bounds) else { return false };
+        let monotone = is_monotone(&task);
+        let choices = task.operators.iter().map(|operator| {
+            let choices = pareto_optimal_combinations(operator, monotone, true, &limits).expect("no limit");
+            let mut choices = choices.expect("few combinations");
+            choices.sort();
+            choices
+        });
+        let choices = choices.collect();
+        let (cost, steps) = (plan.cost, plan.steps.len());
+        let (prefix, best, visited) = (Vec::new(), None, 0);
+        let mut enumeration = Enumeration { task: &task, choices, cost, steps, prefix, best, visited };
+        enumeration.extend(&task.initial, 0, &FxHashMap::default(), 0);
+        if enumeration.visited > ENUMERATION_LIMIT {
+            return false;
+        }
+        let canonical = select_canonical_plan(context, &bounds, plan);
+        let (_, expected) = enumeration.best.expect("the known plan is among the plans");
+        assert_eq!(canonical.steps, expected, "seed {seed}: {mission:?}");
+        true
+    }
+
+    #[test]
+    fn the_canonical_plan_is_the_first_with_the_fewest_reconfigurations() {
+        let compared = (0..60).filter(|seed| check(*seed)).count();
+        assert!(compared > 15, "{compared}");
+    }
+
+    #[test]
+    #[ignore = "takes minutes"]
+    fn the_canonical_plans_of_many_missions_are_the_first() {
+        let compared = (60..2_000).filter(|seed| check(*seed)).count();
+        assert!(compared > 500, "{compared}");
     }
 }

@@ -30,6 +30,19 @@ use crate::concurrent::unit::{StaticDurations, Unit};
 #[derive(Debug, Clone)]
 pub struct ConcurrentTask(pub(super) Width);
 
+impl ConcurrentTask {
+    /// Returns the numeric fluents of the metric that are not minimised, in PDDL: actions change them by amounts
+    /// that depend on the state.
+    pub fn not_minimised(&self) -> Vec<String> {
+        let (task, is_whole) = match &self.0 {
+            Width::Narrow(narrow) => (&narrow.task, narrow.is_whole),
+            Width::Wide(wide) => (&wide.task, wide.is_whole),
+        };
+        let fluents = task.objective.rest.iter().filter(|_| !is_whole);
+        fluents.map(|(fluent, _)| task.number_names[fluent.index()].clone()).collect()
+    }
+}
+
 #[cfg(test)]
 impl ConcurrentTask {
     /// The task with times of 128 bits.
