@@ -394,9 +394,9 @@ impl<'a> Maintenance<'a> {
         }
         for matches in matches {
             if retracting {
-                self.retract(&matches)
+                self.retract(&matches);
             } else {
-                self.conclude(&matches)
+                self.conclude(&matches);
             }
             self.buffers.put(matches.bindings);
         }

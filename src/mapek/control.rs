@@ -88,7 +88,7 @@ pub(super) struct Checkpoint {
 pub struct Loop {
     settings: Settings,
     pub(super) beliefs: Beliefs,
-    monitor: Monitor,
+    pub(super) monitor: Monitor,
     pub(super) planner: Planner,
     agenda: Option<Agenda>,
     /// Number of changes of the planning problem since the start, which identifies the current problem.

@@ -43,6 +43,8 @@ impl Loop {
             let waiting = former.mission.knowledge().map(Knowledge::waiting);
             base.set_waiting(waiting.cloned().unwrap_or_default());
         }
+        // The filters continue from what the robot has reported.
+        beliefs.filters = self.monitor.filters().states(beliefs.mission.knowledge());
         let init = merged(
             &initial.beliefs.mission.problem().init,
             &former.mission.problem().init,
