@@ -346,8 +346,8 @@ fn comparison_agrees_with_that_of_rationals() {
         BigRational::new(random.i128(-wide..=wide).into(), random.i128(1..=wide).into())
     };
     for _ in 0..20_000 {
-        let left = number(&mut random);
-        let right = if random.u8(0..4) == 0 { left.clone() } else { number(&mut random) };
-        assert_eq!(super::attribute::compare(&left, &right), left.cmp(&right), "{left} {right}");
+        let first = number(&mut random);
+        let second = if random.u8(0..4) == 0 { first.clone() } else { number(&mut random) };
+        assert_eq!(super::attribute::compare(&first, &second), first.cmp(&second), "{first} {second}");
     }
 }

@@ -174,7 +174,7 @@ impl TryFrom<StepEntry> for Step {
         let StepEntry { node, state, parameters, service, publish, r#type, command, undo, .. } = entry;
         let StepEntry { data, request, expect, message, subscribers, .. } = entry;
         let kind = r#type;
-        let other =
+        let operation =
             OperationEntry { service, publish, kind, data, request, expect, message, subscribers, command };
         let Some(node) = node else {
             if state.is_some() || parameters.is_some() {
@@ -182,7 +182,7 @@ impl TryFrom<StepEntry> for Step {
             }
             let undo = undo.map(OperationEntry::from).map(OperationEntry::operation).transpose();
             let undo = undo.map_err(|because| format!("`undo`: {because}"))?;
-            return Ok(Self { operation: other.operation()?, undo });
+            return Ok(Self { operation: operation.operation()?, undo });
         };
         if undo.is_some() {
             return Err(
@@ -191,7 +191,7 @@ impl TryFrom<StepEntry> for Step {
                     .to_owned(),
             );
         }
-        if other.has_a_key() {
+        if operation.has_a_key() {
             return Err(format!("{FORMS}. With a `node`, only `state` or `parameters` are possible"));
         }
         let operation = match node_target(&node, state, parameters)? {

@@ -161,9 +161,9 @@ fn parts(text: &str, suffixes: &[&'static str], package: &str) -> Result<Vec<Par
         }
     }
     if parts.len() < suffixes.len() {
-        let (found, wanted) = (parts.len(), suffixes.len());
+        let (count, expected) = (parts.len(), suffixes.len());
         return Err(format!(
-            "the definition has {found} instead of {wanted} parts, which lines `---` separate"
+            "the definition has {count} instead of {expected} parts, which lines `---` separate"
         ));
     }
     for part in parts.iter_mut().filter(|part| part.fields.is_empty()) {
@@ -192,15 +192,15 @@ fn without_comment(line: &str) -> &str {
 
 fn add_line(line: &str, part: &mut Part, package: &str) -> Result<(), String> {
     let wrong = || format!("`{line}` is neither a field (`uint8 level`) nor a constant (`uint8 OK=0`)");
-    let (kind, rest) = line.split_once(char::is_whitespace).ok_or_else(wrong)?;
-    let rest = rest.trim_start();
-    let end = rest.find(|character: char| !is_name_character(character)).unwrap_or(rest.len());
-    let (name, rest) = (&rest[..end], rest[end..].trim());
+    let (kind, declaration) = line.split_once(char::is_whitespace).ok_or_else(wrong)?;
+    let declaration = declaration.trim_start();
+    let end = declaration.find(|character: char| !is_name_character(character)).unwrap_or(declaration.len());
+    let (name, value) = (&declaration[..end], declaration[end..].trim());
     if !is_name(name) {
         return Err(wrong());
     }
     let kind = field_type(kind, package)?;
-    if let Some(value) = rest.strip_prefix('=') {
+    if let Some(value) = value.strip_prefix('=') {
         let FieldType { base: Base::Primitive(kind), count: Count::One, .. } = kind else {
             return Err(format!("the constant `{name}` is no single value"));
         };
@@ -209,7 +209,7 @@ fn add_line(line: &str, part: &mut Part, package: &str) -> Result<(), String> {
         if part.fields.iter().any(|field| field.name == name) {
             return Err(format!("there are two fields `{name}`"));
         }
-        let default = (!rest.is_empty()).then(|| rest.to_owned());
+        let default = (!value.is_empty()).then(|| value.to_owned());
         part.fields.push(Field { name: name.to_owned(), kind, default });
     }
     Ok(())

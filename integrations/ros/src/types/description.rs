@@ -27,9 +27,9 @@ const UUID: &str = "unique_identifier_msgs/msg/UUID";
 pub fn hash(name: &str, all: &Descriptions) -> Result<String, String> {
     let mut referenced = Descriptions::new();
     collect(name, all, &mut referenced)?;
-    let own = referenced.remove(name).ok_or("no description")?;
+    let type_description = referenced.remove(name).ok_or("no description")?;
     let message = TypeDescriptionMsg {
-        type_description: own,
+        type_description,
         referenced_type_descriptions: referenced.into_values().collect(),
     };
     Ok(calculate_hash(&message).to_rihs_string())
@@ -41,9 +41,9 @@ fn collect(name: &str, all: &Descriptions, found: &mut Descriptions) -> Result<(
     if found.contains_key(name) {
         return Ok(());
     }
-    let own = all.get(name).ok_or_else(|| format!("there is no definition of {name}"))?;
-    found.insert(name.to_owned(), own.clone());
-    let nested = own.fields.iter().map(|field| &field.field_type.nested_type_name);
+    let description = all.get(name).ok_or_else(|| format!("there is no definition of {name}"))?;
+    found.insert(name.to_owned(), description.clone());
+    let nested = description.fields.iter().map(|field| &field.field_type.nested_type_name);
     nested.filter(|name| !name.is_empty()).try_for_each(|name| collect(name, all, found))
 }
 

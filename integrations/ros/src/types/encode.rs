@@ -266,8 +266,8 @@ fn of_seconds(structure: &Structure, value: &Value) -> Result<serde_json::Map<St
         ["builtin_interfaces/msg/Duration", "builtin_interfaces/msg/Time"].contains(&&*structure.name);
     let number = value.as_f64().filter(|number| number.abs() < f64::from(i32::MAX));
     let (true, Some(number)) = (is_time, number) else {
-        let more = if is_time { ", or a number of seconds" } else { "" };
-        return Err(format!("{value} is not a table with the fields of {}{more}", structure.name));
+        let hint = if is_time { ", or a number of seconds" } else { "" };
+        return Err(format!("{value} is not a table with the fields of {}{hint}", structure.name));
     };
     // The nanoseconds are never negative.
     let nanoseconds = (number * 1e9).round() as i64;

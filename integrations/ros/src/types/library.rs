@@ -134,9 +134,9 @@ impl Library {
                 }
             }
         }
-        let known = self.given.keys().map(String::as_str).chain(DEFINITIONS.iter().map(|(known, _)| *known));
+        let names = self.given.keys().map(String::as_str).chain(DEFINITIONS.iter().map(|(name, _)| *name));
         let folder = name.split('/').nth(1).map(|folder| format!("/{folder}/")).unwrap_or_default();
-        let suggestion = did_you_mean(name, known.filter(|known| known.contains(&folder)));
+        let suggestion = did_you_mean(name, names.filter(|known| known.contains(&folder)));
         Err(format!(
             "the type `{name}` is not known{suggestion}; give its definition in the table `[types]`, or set \
              AMENT_PREFIX_PATH to an installation of ROS that has it"
