@@ -229,22 +229,25 @@ impl BeliefUpdate<'_> {
             self.changes.base.max(if was_known && is_known { Base::Stated } else { Base::Watched });
         let engine = knowledge.engine();
         let name = |fact: &Fact| engine.symbols().value(fact.predicate).as_name().map_or("", local_name);
-        for fact in delta.insert.iter().chain(&delta.delete) {
-            let name = name(fact);
-            if WATCHED.contains(&name) {
-                self.changes.base = Base::Watched;
-            }
-            self.changes.facts |= PLANNED.contains(&name);
-        }
-        // A derived value is an estimation, which plans depend on. A reported value is a measurement.
-        let is_concluded = |fact: &Fact| VALUES.contains(&name(fact)) && !engine.is_asserted(fact);
         let is_replaced = |gone: &Fact| {
             let is_successor =
                 |new: &Fact| new.predicate == gone.predicate && new.arguments[0] == gone.arguments[0];
             delta.insert.iter().any(is_successor)
         };
-        let is_lost = |fact: &Fact| VALUES.contains(&name(fact)) && !is_replaced(fact);
-        self.changes.facts |= delta.insert.iter().any(is_concluded) || delta.delete.iter().any(is_lost);
+        let insert = delta.insert.iter().map(|fact| (fact, true));
+        let delete = delta.delete.iter().map(|fact| (fact, false));
+        for (fact, is_insertion) in insert.chain(delete) {
+            let name = name(fact);
+            if WATCHED.contains(&name) {
+                self.changes.base = Base::Watched;
+            }
+            self.changes.facts |= PLANNED.contains(&name);
+            if VALUES.contains(&name) {
+                // A derived value is an estimation, which plans depend on. A reported value is a measurement.
+                self.changes.facts |=
+                    if is_insertion { !engine.is_asserted(fact) } else { !is_replaced(fact) };
+            }
+        }
     }
 
     fn running(&mut self, action: u64) -> Result<&mut Running, Refusal> {

@@ -3,7 +3,7 @@
 //!
 //! An id is a text followed by a number, as in `ugv-1:17` and `ugv-1:7f3a.17`. For each text, the
 //! numbers are stored as ranges; numbers that grow by one are a single range. If there are more ranges than
-//! [`MAX_RANGES`], the lowest ones count as one range. The [`MAX_SESSIONS`] texts that were used last are
+//! `MAX_RANGES`, the lowest ones count as one range. The `MAX_SESSIONS` texts that were used last are
 //! kept.
 
 use serde::{Deserialize, Serialize};

@@ -98,8 +98,12 @@ impl Catalogue {
         let subject = name(individual);
         if AVAILABILITY.contains(&property) {
             if let Ok(place) = self.designs.binary_search_by(|own| own.individual.iri.as_str().cmp(subject)) {
+                let value = engine.symbols().find_literal(&Literal::Boolean(false));
                 let is_false = |property: &&str| {
-                    values(engine, individual, property).any(|value| *value == Literal::Boolean(false))
+                    let fact = engine.symbols().find_name(property).zip(value);
+                    fact.is_some_and(|(property, value)| {
+                        engine.holds(&Fact::new(property, [individual, value]))
+                    })
                 };
                 self.designs[place].available = !AVAILABILITY.iter().any(is_false);
             }
