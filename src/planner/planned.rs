@@ -89,9 +89,9 @@ impl Planned<'_> {
         self.limits.reached()
     }
 
-    /// Returns the numeric fluents of the metric that the search did not minimise, in PDDL: actions change them by
-    /// state-dependent amounts, and may improve the metric, or a horizon, the SAT solver alone or overlapping actions
-    /// are requested.
+    /// Returns the numeric fluents of the metric that the search did not minimise, in PDDL. Actions change them by
+    /// state-dependent amounts, which the search does not minimise if an action may improve the metric, with the SAT
+    /// solver alone, or with overlapping actions.
     pub fn not_minimised(&self) -> Vec<String> {
         // The search states a bound on the metric if it minimises the whole metric.
         if self.solution.lower_bound.is_some() || self.solution.status != Status::Feasible {

@@ -178,7 +178,7 @@ pub struct Migration {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SafePoint {
-    /// The end of the action under way; at once if there is none.
+    /// The end of the action under way, or at once between actions.
     #[default]
     ActionEnd,
     /// The first event after the robot has reached its goal.

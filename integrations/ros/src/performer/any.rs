@@ -7,6 +7,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Deserializer};
 use serde_json::{Map, Value};
 
+use crate::interfaces::geometry_msgs::msg::PoseStamped;
 use crate::node::{ActionCaller, Caller, Node, valid_name};
 use crate::perform::{Call, End, Perform, Running};
 use crate::performer::action::{SERVER_TIMEOUT, pursue_on};
@@ -120,10 +121,13 @@ impl Values for OfCall<'_> {
     fn pose(&self, number: usize, is_stamped: bool) -> Result<Value, String> {
         let object = self.argument(number)?;
         let stamped = self.poses.find(&object).ok_or_else(|| self.poses.lacking(&object))?;
-        let value =
-            if is_stamped { serde_json::to_value(stamped) } else { serde_json::to_value(stamped.pose) };
-        value.map_err(|error| error.to_string())
+        pose_value(stamped, is_stamped)
     }
+}
+
+fn pose_value(stamped: PoseStamped, is_stamped: bool) -> Result<Value, String> {
+    let value = if is_stamped { serde_json::to_value(stamped) } else { serde_json::to_value(stamped.pose) };
+    value.map_err(|error| error.to_string())
 }
 
 /// Values that have the types of all later ones, to check the fields when the settings are read.
@@ -135,10 +139,7 @@ impl Values for Sample {
     }
 
     fn pose(&self, _: usize, is_stamped: bool) -> Result<Value, String> {
-        let stamped = crate::interfaces::geometry_msgs::msg::PoseStamped::default();
-        let value =
-            if is_stamped { serde_json::to_value(stamped) } else { serde_json::to_value(stamped.pose) };
-        value.map_err(|error| error.to_string())
+        pose_value(PoseStamped::default(), is_stamped)
     }
 }
 
