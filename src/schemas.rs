@@ -1,5 +1,5 @@
-//! JSON Schemas of manifests and of all JSON inputs and outputs, derived from the types that read
-//! and write them.
+//! JSON Schemas of manifests and of the JSON inputs and outputs. Most of them are derived from the types that read and
+//! write the documents.
 
 use schemars::{Schema, schema_for};
 use serde_json::{Map, Value, json};

@@ -21,7 +21,8 @@ pub enum Answer {
         /// Objectives whose status has changed.
         objectives: Vec<ObjectiveChange>,
     },
-    /// The knowledge has become inconsistent, or consistent again. Observed statements and their conclusions are kept.
+    /// The set of violated axioms and rules has changed: the knowledge has become inconsistent, consistent again, or
+    /// inconsistent in another way. Observed statements and their conclusions are kept.
     Contradicted {
         /// All current contradictions; empty if the knowledge is consistent again.
         contradictions: Vec<Contradiction>,
@@ -118,7 +119,7 @@ pub enum Answer {
         /// Description of the fault and its consequences.
         message: String,
     },
-    /// The line, or a part of it, was refused and has changed nothing.
+    /// The line, or a part of it, was refused and has changed nothing; or the knowledge base could not be updated.
     Error {
         /// Stable code of the error, such as `M305`.
         code: String,
@@ -142,14 +143,15 @@ pub enum OverdueOutcome {
     Waiting,
 }
 
-/// A design whose availability has changed.
+/// Availability of a design, usually reported because it has changed.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct DesignChange {
     /// Local name of the design.
     pub design: String,
     /// Whether the design is available from now on.
     pub available: bool,
-    /// Rules and facts that make the design unavailable; empty if the design is available.
+    /// Rules and facts that make the design unavailable, or a message that conclusions are missing; empty if the design
+    /// is available.
     pub because: Vec<String>,
 }
 
@@ -175,7 +177,8 @@ pub struct Effect {
     pub command: Command,
     /// Whether the effect is a repetition, so that the robot may have received it before.
     pub repeated: bool,
-    /// Numbers of unacknowledged effects that this effect replaces. The replaced effects need not be carried out.
+    /// Numbers of unacknowledged earlier effects that are obsolete once this effect has arrived, at most 64. The robot
+    /// need not carry them out.
     pub supersedes: Vec<u64>,
 }
 
@@ -226,7 +229,7 @@ impl Command {
         }
     }
 
-    /// Returns `true` if this command makes the command `earlier` obsolete. `same_action` says whether both commands
+    /// Returns `true` if this command makes the command `earlier` obsolete. `same_action` is `true` if both commands
     /// belong to the same action.
     pub(super) fn replaces(&self, earlier: &Self, same_action: bool) -> bool {
         match (self, earlier) {

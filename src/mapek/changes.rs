@@ -43,7 +43,8 @@ impl Changes {
         self.base > Base::Nothing || self.facts || self.predicates || !self.reasons.is_empty()
     }
 
-    /// Returns `true` if the planning problem may differ from the previous one.
+    /// Returns `true` if the next deliberation may need a plan, because the planning problem has changed or an action
+    /// has ended.
     pub(super) fn is_news(&self) -> bool {
         self.facts || self.goal || self.ended || !self.interruptions.is_empty() || !self.reasons.is_empty()
     }

@@ -110,7 +110,8 @@ impl AdaptationSection {
     /// Returns the settings, with defaults for missing keys.
     ///
     /// # Errors
-    /// A value is not a number, is negative, or is too long for a duration.
+    /// The first value that is not a number, is negative where it must not be, or is too long for a duration; or a
+    /// `maximum` below its `minimum`.
     pub fn settings(&self, origin: &ManifestPath) -> Result<Settings, Message> {
         let filters = filters(&self.confirm_time, &self.heal_time, &self.components, &self.measured, origin)?;
         let (stay_close, safe_reaction, unrecorded) = (self.stay_close, self.safe_reaction, self.unrecorded);
@@ -157,9 +158,11 @@ pub struct Settings {
     /// Minimum benefit of a new plan over a valid current plan, in the metric's unit. With 0, any benefit is
     /// sufficient.
     pub minimum_benefit: BigRational,
-    /// Time for which a design must be available again before a better plan is sought. Default: 5 s.
+    /// Time for which a design must be available again, or changed facts must have been stable, before a better plan is
+    /// sought. Default: 5 s.
     pub settle: Duration,
-    /// Time limit of one search for a plan. At the limit, the incumbent is used. Default: 10 s.
+    /// Time limit of one search for a plan. At the limit, the best plan found is used. Each repetition after a search
+    /// without a proved outcome has twice the limit, up to 8 times. Default: 10 s.
     pub time_limit: Option<Duration>,
     /// Whether to prefer, among optimal plans of equal length, one that shares most steps with the current plan. The
     /// choice then depends on the history, and not only on the situation.
@@ -301,5 +304,5 @@ const SETTLE: Duration = Duration::from_secs(5);
 
 const DEADLINE: Duration = Duration::from_secs(10);
 
-/// Default time limit of one search for a plan. The robot waits during planning.
+/// Default time limit of one search for a plan. The robot may wait during planning.
 const TIME_LIMIT: Duration = Duration::from_secs(10);

@@ -1,5 +1,4 @@
-//! Converts plans to the format of PlanSys2: actions with start and duration in seconds, as the
-//! planner POPF writes them.
+//! Converts plans to the format of PlanSys2: actions with start and duration, as the planner POPF writes them.
 //!
 //! PlanSys2 orders actions only by their times. So an action has to begin strictly after the end of
 //! its predecessor, and no action may have the duration 0. As in POPF, the smallest difference

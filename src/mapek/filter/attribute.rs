@@ -251,7 +251,8 @@ impl AttributeFilter {
         self.is_confirmed(state, confirmed).then_some(confirmed)
     }
 
-    /// Starts the period of silence at `now`, unless it was started before or a sample has arrived.
+    /// Starts to measure the sensor's silence at `now`, unless the measurement has started before or a sample has
+    /// arrived.
     pub(crate) fn begin(state: &mut AttributeState, now: Micros) {
         state.last_sample_time.get_or_insert(now);
     }

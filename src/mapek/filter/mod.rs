@@ -1,4 +1,5 @@
-//! Noise filters between the robot's reports and the beliefs. The output depends only on the reports and their times.
+//! Noise filters between the robot's reports and the beliefs. For given settings and bounds, the output depends only on
+//! the reports and their times.
 //!
 //! [`Filters`] is the configuration, from the section `adaptation` of a manifest and the bounds of the knowledge base.
 //! [`FilterStates`] is the state, a part of the beliefs and of snapshots. Filters have no clock: observations provide
@@ -75,7 +76,7 @@ pub(crate) struct FilterStates {
 pub(crate) enum Accepted {
     /// Value of an attribute, by local name.
     Value(String, BigRational),
-    /// Status of a component, by local name or IRI.
+    /// Status of a component, by local name.
     Status(String, Status),
     /// An attribute whose value has become unknown.
     Unknown(String),
