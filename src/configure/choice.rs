@@ -41,7 +41,7 @@ pub struct Wishes {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Configuration {
-    /// The choice for each objective that needs a design, sorted by name.
+    /// The choice for each objective that needs a design, sorted by the IRI of the objective.
     pub choices: Vec<Choice>,
     /// Sum of the utilities of the chosen designs.
     pub utility: BigRational,

@@ -24,11 +24,11 @@ use crate::message::Message;
 pub enum KeeperAnswer {
     /// An answer that the planning loop of [`crate::mapek`] gives, too.
     Loop(Answer),
-    /// A new design for an objective, or the report that no design can serve it.
+    /// A requested change of an objective's design, or the report that no design was chosen for it.
     Service(Service),
 }
 
-/// A new design for an objective, or the report that no design can serve it.
+/// A requested change of an objective's design, or the report that no design was chosen for it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "answer")]
 #[non_exhaustive]

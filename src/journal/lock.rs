@@ -11,7 +11,7 @@ use fs4::{FileExt, TryLockError};
 use super::directory::{broken, open_private};
 use crate::message::Message;
 
-/// Number of attempts to lock; a killed process may still hold the lock for a short time.
+/// Number of further attempts to lock after a failed one; a killed process may still hold the lock for a short time.
 const LOCK_RETRIES: u32 = 10;
 const RETRY_INTERVAL: Duration = Duration::from_millis(20);
 /// Width in characters of the process number, which is in the first line of the lock file.

@@ -8,9 +8,9 @@
 //! beginning. It then replays the later observations with the recorded plans. The answers must equal the recorded ones,
 //! except for explanations; otherwise the journal is rejected.
 //!
-//! A crash may leave the last record incomplete. This record is cut off, kept in a separate file,
-//! and reported. A complete record is never cut off: any other fault in a needed file is an error,
-//! and a fault in a file that is not needed is a warning.
+//! A crash may leave the last record incomplete. This record is cut off, kept in a separate file, and reported. A
+//! complete record is never cut off. A missing line break or `end` record at the end of a segment is added. Any other
+//! fault in a needed segment is an error, and a fault in a file that is not needed is a warning.
 //!
 //! A checkpoint creates the new segment first, then writes the `end` record of the old segment,
 //! then the snapshot. So a missing segment is detected, and a crash during a checkpoint is not
@@ -92,8 +92,8 @@ pub struct Journal {
     lock: Lock,
     /// Number of observations in the current segment, i.e. since its snapshot.
     observations: u64,
-    /// Work that the previous process began and did not finish, until [`Journal::begin`] completes
-    /// it.
+    /// Work that the previous process began and did not finish, until [`Journal::begin`] or [`Journal::begin_reacting`]
+    /// handles it.
     unfinished: Option<Unfinished>,
     digest: String,
     unrecorded: Unrecorded,
@@ -279,8 +279,8 @@ impl Journal {
         Ok(answers)
     }
 
-    /// Writes the answers that [`Journal::observe`] returned as a reaction. If the loop continues
-    /// without the journal after a failed write, adds an answer with this message.
+    /// Writes the answers that [`Journal::observe`] returned as a reaction. If a write fails and the loop continues
+    /// without the journal, adds an answer about this.
     ///
     /// # Errors
     /// The journal cannot be written; the answers must not leave the program.
@@ -299,8 +299,8 @@ impl Journal {
     }
 
     /// Writes `answers` as a decision: the answers of a deliberation, preceded by those of [`Journal::observe`] if they
-    /// were not written. Writes a snapshot if one is due. If the loop continues without the journal after a failed
-    /// write, adds an answer with this message.
+    /// were not written. Writes a snapshot if one is due. If a write fails and the loop continues without the journal,
+    /// adds an answer about this.
     ///
     /// # Errors
     /// The journal cannot be written; the answers must not leave the program.

@@ -6,10 +6,10 @@
 //! last line for each part of the current state, so that later clients also receive the state. A client that reads too
 //! slowly is disconnected; a browser then reconnects automatically.
 //!
-//! | path | has |
+//! | path | content |
 //! |---|---|
 //! | `/`, `/live.css`, `/live.js` | the page |
-//! | `/plan` | the plan as it was when it was made: timeline, numbers, map |
+//! | `/plan` | picture of the current plan as it was when it was made: timeline, numbers, map |
 //! | `/events` | the current state, the retained lines, then all new lines |
 //!
 //! On a loopback address, local clients need no token unless one is configured. Without a token, a request is rejected

@@ -28,8 +28,8 @@ use crate::number;
 /// Number of consecutive failures of one step after which planning pauses until something else changes.
 const MAX_FAILURES: u32 = 3;
 
-/// Base of the pause before a search that hit its time limit is repeated, unless the time limit is greater and replaces
-/// it. The first pause is twice the base, and each further pause is twice the previous one.
+/// Lower limit on the base of the pauses before a search that hit its time limit is repeated. The base is the time
+/// limit of a search. The first pause is twice the base, and each further pause is twice the previous one.
 const MIN_RETRY: Duration = Duration::from_secs(10);
 
 /// Upper limit on the pause before a search that hit its time limit is repeated.

@@ -52,7 +52,7 @@ pub enum Answer {
         /// Reason, as a sentence.
         because: String,
     },
-    /// Planning has found no plan.
+    /// Planning has found no plan, or pauses because an action has failed repeatedly.
     PlanNone {
         /// `unsolvable` if the absence of a plan is proved, `failed` if an action has failed repeatedly, and `unknown`
         /// otherwise.
@@ -78,8 +78,8 @@ pub enum Answer {
     },
     /// The goal holds, and no further action is required.
     GoalReached,
-    /// A filter holds a report back. Reported for the first, tenth, hundredth … held report since the last change of
-    /// value or status.
+    /// A filter holds a report back. This answer is given if the number of held reports in `held` is 1, 10, 100 and so
+    /// on.
     Filtered {
         /// The attribute or component, by local name.
         name: String,
@@ -87,7 +87,8 @@ pub enum Answer {
         value: Value,
         /// Reason for holding the report: `range`, `jump`, `hysteresis`, `debounce`, `confirm` or `heal`.
         because: &'static str,
-        /// Number of held reports since the last change.
+        /// Number of held reports since the last believed crossing of a bound, or since the last believed change of the
+        /// component's status.
         held: u64,
         /// Time at which the report will be believed unless another report arrives; `None` if the passage of time does
         /// not confirm the report.

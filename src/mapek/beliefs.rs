@@ -115,7 +115,8 @@ pub(super) struct Wait {
 pub struct Outlook {
     /// Domain of the mission. If an action is under way, the domain forces plans to begin with its remainder.
     pub domain: Domain,
-    /// The believed problem, filled from the knowledge base, with the goal.
+    /// The believed problem, filled from the knowledge base, with the current goal. If an action is under way, the goal
+    /// also requires the end of its remainder.
     pub problem: Problem,
     /// The action under way, if any, followed by the remaining steps of the plan.
     pub steps: Vec<PlannedStep>,

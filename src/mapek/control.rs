@@ -37,8 +37,8 @@ const MAX_REASONING_STEPS: u64 = 100_000_000;
 /// base lacks those that are not used any more.
 const MAX_GROWTH: usize = 1024;
 
-/// Upper limit on the lead of a line's own time over the later of the previous line's time and the clock. A line with a
-/// greater lead is refused. The number of seconds equals the limit on gaps between sequence numbers.
+/// A line is refused if its own time is later than the clock and also later than the previous line's time, both by more
+/// than this time. The number of seconds equals the limit on gaps between sequence numbers.
 const MAX_TIME_STEP: Duration = Duration::from_secs(1_000_000);
 
 /// Returns the time at which a line is handled, and an error if the line's own time skips too much. Such a time is
@@ -317,7 +317,8 @@ impl Loop {
     /// releases a report, a sensor becomes silent, a search is due, or a deadline passes. The caller should handle a
     /// tick or a [timer](Observation::timer) at that time. Returns `None` if nothing is scheduled.
     pub fn due(&self) -> Option<Duration> {
-        // A refused line advances the time, but decides nothing that has become due.
+        // Times are compared with `considered` instead of `now`: a refused line advances the time, but decides nothing
+        // that has become due.
         let improvement = self.beliefs.improvement_since.saturating_add(self.settings.settle);
         let improvement = (!self.beliefs.improvement_causes.is_empty()
             && improvement > self.beliefs.considered)

@@ -155,8 +155,8 @@ fn check_action(beliefs: &mut Beliefs, settings: &Settings, answers: &mut Vec<An
     answers.push(Answer::Overdue { effect: is_unacknowledged.then_some(request), action, seconds, outcome });
     match outcome {
         OverdueOutcome::Repeated => {
-            // A robot that has never acknowledged anything gets no other repetitions. Therefore, reconfigurations
-            // before the request are repeated here.
+            // A robot that has never acknowledged an effect by its number gets no other repetitions of these effects.
+            // Therefore, reconfigurations before the request are repeated here.
             let from = if beliefs.receipts.are_sent() { request } else { 0 };
             let effects = beliefs.outstanding.range(from..=request).map(|(_, effect)| effect.clone());
             answers.extend(effects.map(|effect| Answer::Effect(Effect { repeated: true, ..effect })));

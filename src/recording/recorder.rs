@@ -1,4 +1,4 @@
-//! Writes a recording on a separate thread, so that the loop does not wait for the disk.
+//! Writes a recording on a separate thread, so that the loop waits for the disk only while the queue is full.
 
 use std::fs::{File, OpenOptions};
 use std::io;

@@ -33,7 +33,7 @@ use crate::number;
 
 impl FilterSettings {
     /// Returns warnings, for `lint`, about settings with which noise causes reconfigurations: attributes without
-    /// hysteresis and debounce, and a default `heal_time` of 0 if the knowledge base has components.
+    /// hysteresis and debounce, and a general `heal_time` of 0 if the knowledge base has components.
     pub(crate) fn doubts(&self, knowledge: Option<&Knowledge>) -> Vec<Message> {
         let filters = Filters::new(self, knowledge);
         let is_noisy = |(_, filter): &(&String, &AttributeFilter)| {
