@@ -45,8 +45,9 @@ pub struct Configuration {
     pub choices: Vec<Choice>,
     /// Sum of the utilities of the chosen designs.
     pub utility: BigRational,
-    /// `true` if it is proved that no other choice serves more functions, or serves equally many and misses fewer
-    /// requirements, or agrees in both numbers and has more utility. `false` if a limit was reached before the proof.
+    /// `true` if it is proved that no other choice is better, `false` if a limit was reached before the proof. A choice
+    /// is better if it serves more functions; with equally many, if it misses fewer requirements; then if it has more
+    /// utility.
     pub optimal: bool,
 }
 

@@ -176,8 +176,8 @@ impl Adaptation<'_> {
         self.beliefs.running = Some(running);
     }
 
-    /// Searches for a better plan if the reasons why one may exist have lasted for the settle time, or if the
-    /// repetition of an unfinished search is due.
+    /// Searches for a better plan if the repetition of an unfinished search is due, or if the settle time has passed
+    /// since the last reason why a better plan may exist.
     fn improve(&mut self, answers: &mut Vec<Answer>) {
         let has_plan = self.beliefs.plan.is_some() && !self.beliefs.reached;
         if !has_plan {
@@ -262,9 +262,9 @@ impl Adaptation<'_> {
         self.beliefs.running = Some(running);
     }
 
-    /// Cancels or suspends the action under way if it cannot continue, or if this is better than `going_on`, the plan
-    /// that starts with the remainder of the action. Returns `true` if the action was interrupted, or if the decision
-    /// needs a plan that the planner may not search for.
+    /// Cancels or suspends the action under way if it cannot continue, or if this is better than `going_on`. The plan
+    /// `going_on` starts with the remainder of the action. Returns `true` if the action was interrupted, or if the
+    /// decision needs a plan that the planner may not search for.
     fn interrupt(&mut self, reason: &str, need: Need, going_on: &Outcome, answers: &mut Vec<Answer>) -> bool {
         let Some(running) = self.beliefs.running.clone() else { return false };
         let can_go_on = goes_on_with(&running, going_on) || self.can_go_on(&running);

@@ -2,11 +2,11 @@
 //! remainder of this action, under any designs.
 //!
 //! The paper (see [`crate::mapek`]) plans from the state in which the action has ended. Here, planning starts in the
-//! current state, with the remainder of the action as the first step, so that the designs of all remaining steps are
-//! chosen together. A copy of the action's schema fixes all arguments except designs. Its duration, increases and
-//! decreases are scaled to the remainder. The copy adds a gate fact that all other actions require. A condition of the
-//! action may mention a value that the action changes. In such conditions, except those at the end, the past changes
-//! are subtracted from the value, which restores the value before the action.
+//! current state, with the remainder of the action as the first step. So the designs of all remaining steps are chosen
+//! together. A copy of the action's schema fixes all arguments except designs. Its duration, increases and decreases
+//! are scaled to the remainder. The copy adds a gate fact that all other actions require. A condition of the action may
+//! mention a value that the action changes. In such conditions, except those at the end, the past changes are
+//! subtracted from the value, which restores the value before the action.
 
 use num_rational::BigRational;
 use pddl::ast::{

@@ -67,8 +67,8 @@ pub struct Run {
     pub reconfigurations: usize,
     /// Number of distinct configurations with which actions were requested.
     pub distinct: usize,
-    /// Reaction times: for each stall of the running action, the time until the next effect of the
-    /// controller.
+    /// Reaction times: the time from each stall of the running action to the next effect of the controller, if there
+    /// was one.
     pub reactions: Vec<f64>,
     /// Time at which the pipeline was found. `None` if it was not found.
     pub found: Option<f64>,
