@@ -15,8 +15,8 @@ use crate::number::decimal;
 /// Definition of a design's utility.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub enum Worth {
-    /// Utility as in MROS: the value that the knowledge base infers, otherwise the estimated
-    /// `performance`, otherwise 0.001.
+    /// Utility as in MROS: the value that the knowledge base infers; otherwise the design's only estimation of
+    /// `performance`; otherwise, also with several estimations, 0.001.
     #[default]
     Mros,
     /// The design's estimation of the given attribute type (local name), 0 if the design has none; larger is better.

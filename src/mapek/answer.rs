@@ -27,8 +27,9 @@ pub enum Answer {
         /// All current contradictions; empty if the knowledge is consistent again.
         contradictions: Vec<Contradiction>,
     },
-    /// The conclusions are incomplete because a rule has exceeded its budget, or they are complete again. Observed
-    /// statements are kept. With incomplete conclusions, no design counts as available, and no action is requested.
+    /// The conclusions are incomplete because reasoning has exceeded its budget or was interrupted, or they are
+    /// complete again. Observed statements are kept. With incomplete conclusions, no design counts as available, and no
+    /// action is requested.
     Unconcluded {
         /// Fault that stopped the reasoning; `None` once the conclusions are complete.
         fault: Option<Fault>,
@@ -59,8 +60,8 @@ pub enum Answer {
         status: &'static str,
         /// Reason, as a sentence.
         because: String,
-        /// Minimal set of unavailable designs that blocks every plan, if computed. A plan would exist with any one of them
-        /// and with all designs outside the set.
+        /// Minimal set of unavailable designs that blocks every plan, if computed. A plan would exist with any one of
+        /// them and with all designs outside the set. Empty also if there is no plan even with all designs.
         blocking: Vec<String>,
     },
     /// A request to the managed system.

@@ -17,7 +17,8 @@ pub(crate) struct Outcome {
     pub proved: bool,
     /// Reason for the absence of a plan.
     pub because: String,
-    /// Unavailable designs that block every plan, if computed; see [`planner::Replanner::blocking`].
+    /// Unavailable designs that block every plan. Empty if not computed, or if there is no plan even with all designs;
+    /// see [`planner::Replanner::blocking`].
     pub blocking: Vec<String>,
 }
 

@@ -276,8 +276,8 @@ impl Beliefs {
         self.reached
     }
 
-    /// Returns `true` if a design is believed to be available, or if the problem itself states that it is. Without a
-    /// knowledge base, all designs are.
+    /// Returns `true` if a design is believed to be available. For a design that the knowledge base lacks, the problem
+    /// has to state this. Without a knowledge base, all designs are available.
     pub(super) fn is_available(&self, design: &str) -> bool {
         self.mission.knowledge().is_none() || self.available.contains(design) || self.mission.provides(design)
     }

@@ -116,9 +116,9 @@ pub(super) fn effect(beliefs: &mut Beliefs, action: u64, command: Command, answe
 }
 
 /// Makes the functions of a step, and no others, the objectives of the knowledge base, grounded by the step's designs.
-/// Designs on whose availability the problem itself decides are omitted with their functions. Without a step, removes
-/// all objectives. Then analyzes the knowledge base and adds changes to `answers`, and also an error of the knowledge
-/// base. Does nothing without a knowledge base.
+/// Omits functions with a design that the knowledge base lacks, i.e. on whose availability the problem itself decides.
+/// Without a step, removes all objectives. Then analyzes the knowledge base and adds changes to `answers`, and also an
+/// error of the knowledge base. Does nothing without a knowledge base.
 pub(super) fn objectives(beliefs: &mut Beliefs, step: Option<&PlannedStep>, answers: &mut Vec<Answer>) {
     let mission = &beliefs.mission;
     let mut objectives_with_designs = step.map_or_else(Vec::new, |step| step.configuration.clone());

@@ -104,7 +104,7 @@ impl Live {
 }
 
 /// Returns the outcome that proves the absence of a plan. `blocking` is a set of unavailable designs that blocks every
-/// plan, or empty if none was computed.
+/// plan. It is empty if not computed, or if there is no plan even with all designs.
 fn none(blocking: Vec<String>) -> Outcome {
     Outcome {
         steps: None,
