@@ -1,5 +1,5 @@
-//! Reads the segment files and snapshot files of a journal's directory, and reports all their
-//! faults.
+//! Reads the segment files and snapshot files of a journal's directory, each with its first fault, and opens files that
+//! only their user can access.
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
@@ -24,7 +24,7 @@ pub(super) struct Segment {
     pub(super) after: Link,
     /// Sound records of the segment, without its header.
     pub(super) records: Vec<Record>,
-    /// Number of bytes of the complete records at the beginning of the file.
+    /// Number of bytes of the header and the sound records at the beginning of the file.
     pub(super) sound: u64,
     pub(super) end: End,
 }
@@ -37,7 +37,7 @@ pub(super) enum End {
     Unbroken,
     /// The segment ends with this number of bytes of an incomplete record.
     Incomplete(u64),
-    /// The line with this number, from 1, is damaged.
+    /// The line with this number, from 1, is damaged. The lines after it are not read.
     Damaged(usize),
 }
 
@@ -51,7 +51,8 @@ impl Segment {
 
 #[derive(Debug)]
 pub(super) struct SnapshotFile {
-    /// Link at which the snapshot was taken; the segment with the same number begins at this link.
+    /// Link (position in the chain of records) at which the snapshot was taken. The segment with the same number begins
+    /// at this link.
     pub(super) before: Link,
     pub(super) data: Value,
 }
@@ -162,7 +163,7 @@ impl JournalFiles {
 }
 
 /// Returns `true` if `after` begins at the link (position in the chain of records) where `before` ends. If a crash has
-/// prevented the `end` record of `before`, the check assumes this record.
+/// prevented the `end` record of `before`, the check assumes this record, and `after` must have no records yet.
 pub(super) fn follows(before: &Segment, after: &Segment) -> bool {
     if before.is_closed() {
         return before.end == End::Whole && before.after == after.before;
@@ -265,17 +266,17 @@ pub(super) fn broken(place: &Path, text: &str) -> Message {
     Message::at("M321", &place.display().to_string(), None, format!("the journal cannot be used: {text}"))
 }
 
-/// Reads a regular file. Pipes and links are rejected, since a pipe may never end, and a link may
-/// lead outside the directory.
+/// Reads a regular file. Rejects pipes and symbolic links, since a pipe may never end, and a link may lead outside the
+/// directory.
 fn read_private(path: &Path) -> io::Result<Vec<u8>> {
     require_file(path)?;
     std::fs::read(path)
 }
 
-/// Checks that a path is a regular file or does not exist.
+/// Checks that a path is a regular file or does not exist. A symbolic link is not a regular file.
 ///
 /// # Errors
-/// The name belongs to something that is not a regular file.
+/// The path is something else, or cannot be examined.
 pub(super) fn require_file(path: &Path) -> io::Result<()> {
     match std::fs::symlink_metadata(path) {
         Ok(found) if !found.is_file() => Err(io::Error::other("is not a regular file")),
@@ -299,7 +300,7 @@ pub(super) fn open_private(path: &Path, options: &mut OpenOptions) -> io::Result
     options.open(path)
 }
 
-/// Creates a directory and its missing parents. On Unix, only their user can access them.
+/// Creates a directory and its missing parents. On Unix, only their user can access the created ones.
 pub(super) fn make_directory(path: &Path) -> io::Result<()> {
     let mut builder = std::fs::DirBuilder::new();
     builder.recursive(true);

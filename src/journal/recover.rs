@@ -1,5 +1,5 @@
-//! Restores a loop from a journal: selects the usable records, replays them, and completes the
-//! records that a crash has cut off.
+//! Restores a loop from a journal: selects the usable segments, replays their records, and repairs the ends of segments
+//! after a crash.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, Seek as _, Write as _};
@@ -12,13 +12,13 @@ use super::recovery::Recovery;
 use crate::mapek::{Observation, Recoverable};
 use crate::message::Message;
 
-/// Work that a crash has interrupted and that the loop completes when the journal is opened.
+/// Work that the previous process did not finish. It is completed after the journal is opened.
 #[derive(Debug)]
 pub(super) enum Unfinished {
     /// The loop has a pending deliberation: it has reacted to an observation, or has just been
     /// created.
     Agenda,
-    /// An observation without a recorded reaction or decision: its line, and its time in
+    /// An observation without a recorded reaction or decision: its line, and its time since the start of the mission in
     /// microseconds.
     Observation(String, u64),
 }
@@ -41,7 +41,7 @@ pub(super) fn usable<'a>(
         let start = if from == 0 { Ok(()) } else { contents.start(from).map(|_| ()) };
         match start.and_then(|()| contents.chain(from)) {
             Ok(segments) => {
-                // Older generations are not needed, so their damage is only a warning.
+                // Older segments and snapshots are not needed, so their damage is only a warning.
                 let older = (first..from).filter(|&number| number > 0);
                 problems.extend(older.filter_map(|number| contents.start(number).err()));
                 problems.extend(contents.chain(first).err());
@@ -78,7 +78,7 @@ pub(super) struct Replay<'a, C> {
 impl<C: Recoverable> Replay<'_, C> {
     pub(super) fn segment(&mut self, segment: &Segment) -> Result<(), Message> {
         self.observations = 0;
-        // The end record only links segments.
+        // The `end` record only links segments.
         let mut records = segment.records.iter().filter(|record| record.kind != "end").peekable();
         while let Some(record) = records.next() {
             let wrong =
@@ -143,8 +143,8 @@ impl<C: Recoverable> Replay<'_, C> {
     }
 }
 
-/// Repairs the ends of segments after a crash, and opens the last segment for appending. Returns
-/// its file and the link at its end.
+/// Repairs the ends of segments after a crash: removes an incomplete record, and adds a missing line break or `end`
+/// record. Opens the last segment for appending. Returns its file and the link at its end.
 pub(super) fn settle(
     directory: &Path,
     segments: &[&Segment],

@@ -30,14 +30,15 @@ use crate::mapek::watch::Watch;
 use crate::message::{Errors, Message};
 use crate::mission::Mission;
 
-/// Limit on reasoning steps per observation; see [`rules::Limits`]. The robot waits during reasoning.
+/// Limit on reasoning steps per update of the knowledge base; see [`rules::Limits`]. The robot waits during reasoning.
 const MAX_REASONING_STEPS: u64 = 100_000_000;
 
-/// Number of unused interned names and values above which the knowledge base is rebuilt without them.
+/// Number of names and values interned since the start above which the knowledge base is rebuilt. The rebuilt knowledge
+/// base lacks those that are not used any more.
 const MAX_GROWTH: usize = 1024;
 
-/// Upper limit on the lead of a line's own time over the later of the previous line's time and the clock. A line with a
-/// greater lead is refused. The number of seconds equals the limit on gaps between sequence numbers.
+/// A line is refused if its own time is later than the clock and also later than the previous line's time, both by more
+/// than this time. The number of seconds equals the limit on gaps between sequence numbers.
 const MAX_TIME_STEP: Duration = Duration::from_secs(1_000_000);
 
 /// Returns the time at which a line is handled, and an error if the line's own time skips too much. Such a time is
@@ -148,7 +149,7 @@ impl Loop {
         self.planner.watch.clone()
     }
 
-    /// Makes the first plan and requests the first action.
+    /// Runs the first deliberation: makes the first plan and requests its first action.
     pub fn start(&mut self) -> Vec<Answer> {
         self.deliberate()
     }
@@ -240,7 +241,8 @@ impl Loop {
     }
 
     /// Searches for a plan if the changes since the last call require one, adopts the plan, and requests the next
-    /// action. Can take several times the time limit of plans. Without changes, this does nothing.
+    /// action. Can take several times the time limit of plans. Does nothing if no deliberation is
+    /// [pending](Self::has_agenda).
     pub fn deliberate(&mut self) -> Vec<Answer> {
         let _span = info_span!("deliberate", line = self.beliefs.lines).entered();
         let mut answers = Vec::new();
@@ -273,7 +275,7 @@ impl Loop {
             return;
         };
         let failed = Event::ReconfigurationFailed { effect };
-        // Without a knowledge base, the design cannot be marked as unrealisable.
+        // The event is refused without a knowledge base, where the design cannot be marked as not realisable.
         let _ = self.monitor.apply(&mut self.beliefs, &failed, changes);
         self.beliefs.outstanding.remove(&effect);
         self.beliefs.waits.remove(&effect);
@@ -315,7 +317,8 @@ impl Loop {
     /// releases a report, a sensor becomes silent, a search is due, or a deadline passes. The caller should handle a
     /// tick or a [timer](Observation::timer) at that time. Returns `None` if nothing is scheduled.
     pub fn due(&self) -> Option<Duration> {
-        // A refused line advances the time, but decides nothing that has become due.
+        // Times are compared with `considered` instead of `now`: a refused line advances the time, but decides nothing
+        // that has become due.
         let improvement = self.beliefs.improvement_since.saturating_add(self.settings.settle);
         let improvement = (!self.beliefs.improvement_causes.is_empty()
             && improvement > self.beliefs.considered)
@@ -352,8 +355,8 @@ fn refused(Refusal { code, message }: Refusal) -> Answer {
 
 /// Recording and replay of decisions, for the journal.
 impl Loop {
-    /// Returns the journal's record of a step: the answers, and the plans computed for them. Must be called once after
-    /// each step.
+    /// Returns the journal's record of a reaction or deliberation: its answers, and the plans computed for them. A
+    /// second call returns no plans.
     pub fn decision(&mut self, answers: &[Answer]) -> Decision {
         let plans = std::mem::take(&mut self.planner.computed);
         Decision {
@@ -378,7 +381,8 @@ impl Loop {
         answers
     }
 
-    /// Returns a snapshot of the beliefs. Must be called only after deliberation.
+    /// Returns a snapshot of the beliefs. Must be called only after deliberation, because a pending deliberation is not
+    /// part of the snapshot.
     pub fn snapshot(&self) -> Snapshot {
         record::snapshot(&self.beliefs)
     }
@@ -396,7 +400,7 @@ impl Loop {
 
 /// Single stages, for strategies of a simulation that observe, plan and request actions separately.
 impl Loop {
-    /// Applies an observation to the beliefs without a reaction.
+    /// Applies an observation to the beliefs without a reaction. Discards a pending deliberation.
     pub(crate) fn observe(&mut self, observation: &Observation, now: Duration) {
         self.beliefs.lines += 1;
         self.beliefs.now = self.beliefs.now.max(now);
@@ -432,7 +436,8 @@ impl Loop {
         request(&mut self.beliefs, step, answers);
     }
 
-    /// Requests the designs of `step` for the action under way. Does nothing without an action under way.
+    /// Replaces the step of the action under way by `step`, and requests those of its designs that must be sent. Does
+    /// nothing without an action under way.
     pub(crate) fn reconfigure_now(&mut self, step: PlannedStep, answers: &mut Vec<Answer>) {
         if let Some(mut running) = self.beliefs.running.take() {
             running.step = step;

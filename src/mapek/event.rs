@@ -1,7 +1,7 @@
 //! Events: reports of the managed system, one JSON object per line, in the format `metaplan-events/1`.
 //!
 //! Objects in the form of `diagnostic_msgs/DiagnosticArray`, as published by the MROS observers \[1\], are accepted,
-//! too. Other input is a [`Refusal`], which changes nothing.
+//! too. Other input is refused (see [`Refusal`]) and changes nothing.
 //!
 //! \[1\] Bozhinoski et al., MROS: Runtime Adaptation For Robot Control Architectures, Advanced Robotics 36, 2022.
 
@@ -381,7 +381,8 @@ fn status(text: &str) -> Option<Status> {
     }
 }
 
-/// Returns the measurements and component statuses of a diagnostic array. Other statuses are ignored.
+/// Returns the measurements and component statuses of a diagnostic array. Malformed values become refusals in the
+/// result. Other statuses, and repetitions of a key within one status, are ignored.
 fn diagnostics(fields: &Map<String, Value>) -> Result<Vec<Result<Event, Refusal>>, Refusal> {
     let Some(statuses) = fields.get("status").and_then(Value::as_array) else {
         return Err(Refusal::new("M304", "`status` of a diagnostic array is a list"));

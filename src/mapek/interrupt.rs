@@ -22,13 +22,14 @@ pub(super) enum Interruption {
         /// `unsolvable` if the absence of a plan is proved, and `unknown` otherwise.
         status: &'static str,
         because: String,
-        /// Minimal set of unavailable designs that blocks every plan.
+        /// Minimal set of unavailable designs that blocks every plan. Empty if not computed, or if there is no plan
+        /// even with all designs.
         blocking: Vec<String>,
     },
 }
 
 /// Decides about the action under way, given the `reason` why it may have to be interrupted. `going_on` is the plan
-/// that continues the action, and `without` the plan after its cancellation. `can_go_on` says whether the current
+/// that continues the action, and `without` the plan after its cancellation. `can_go_on` is `true` if the current
 /// designs of the action are available and its remainder is executable. `gained` is the benefit of cancelling, if it is
 /// sufficient.
 pub(super) fn weigh(

@@ -66,8 +66,8 @@ impl Monitor {
         &self.filters
     }
 
-    /// Applies reports that filters have held back and that are due now. Returns refusals of reports that do not fit
-    /// the mission.
+    /// Applies the changes of belief that filters make because of the time, e.g. reports that were held back and are
+    /// due now. Returns refusals of changes that do not fit the mission.
     pub(super) fn elapse(&mut self, beliefs: &mut Beliefs, changes: &mut Changes) -> Vec<Refusal> {
         let due = self.filters.elapse(&mut beliefs.filters, beliefs.now, &mut changes.filtered);
         let mut update = BeliefUpdate { monitor: self, beliefs, changes };
@@ -220,7 +220,7 @@ impl BeliefUpdate<'_> {
     }
 
     /// Records in `changes` which conclusions and plan inputs are affected by a delta of the knowledge base.
-    /// `was_known` says whether the conclusions were complete before.
+    /// `was_known` is `true` if the conclusions were complete before.
     fn record_delta(&mut self, delta: &Delta, was_known: bool) {
         let Some(knowledge) = self.beliefs.mission.knowledge() else { return };
         let is_known = knowledge.fault().is_none();
@@ -267,8 +267,9 @@ impl BeliefUpdate<'_> {
         Ok(running)
     }
 
-    /// Removes and returns the action under way, or returns a refusal if it has another number. The effects of this
-    /// action and of earlier ones are no longer outstanding, except reconfigurations, which belong to functions.
+    /// Removes and returns the action under way, or returns a refusal if no action with this number is under way. The
+    /// effects of this action and of earlier ones are no longer outstanding, except reconfigurations, which belong to
+    /// functions.
     fn end(&mut self, action: u64) -> Result<Running, Refusal> {
         self.running(action)?;
         let is_moot = |effect: &Effect| {
@@ -384,7 +385,8 @@ impl BeliefUpdate<'_> {
         self.beliefs.mission.problem().init.iter().filter_map(words).collect()
     }
 
-    /// Sets a fact or a value of the problem. The previous state is restored if the result does not fit the domain.
+    /// Sets a fact or a value of the problem. If the result does not fit the domain, restores the previous state and
+    /// returns a refusal.
     fn set(&mut self, name: &str, value: &str) -> Result<(), Refusal> {
         let mission = &mut self.beliefs.mission;
         let before = mission.problem().init.clone();

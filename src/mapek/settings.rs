@@ -110,7 +110,8 @@ impl AdaptationSection {
     /// Returns the settings, with defaults for missing keys.
     ///
     /// # Errors
-    /// A value is not a number, is negative, or is too long for a duration.
+    /// The first value that is not a number, is negative where it must not be, or is too long for a duration; or a
+    /// `maximum` below its `minimum`.
     pub fn settings(&self, origin: &ManifestPath) -> Result<Settings, Message> {
         let filters = filters(&self.confirm_time, &self.heal_time, &self.components, &self.measured, origin)?;
         let (stay_close, safe_reaction, unrecorded) = (self.stay_close, self.safe_reaction, self.unrecorded);
@@ -157,9 +158,11 @@ pub struct Settings {
     /// Minimum benefit of a new plan over a valid current plan, in the metric's unit. With 0, any benefit is
     /// sufficient.
     pub minimum_benefit: BigRational,
-    /// Time for which a design must be available again before a better plan is sought. Default: 5 s.
+    /// Time for which a design must be available again, or that must pass after a change of facts, before a better plan
+    /// is sought. Default: 5 s.
     pub settle: Duration,
-    /// Time limit of one search for a plan. At the limit, the incumbent is used. Default: 10 s.
+    /// Time limit of one search for a plan. At the limit, the best plan found is used. A repetition after a search
+    /// without a proved outcome has twice the limit of that search, at most 8 times this limit. Default: 10 s.
     pub time_limit: Option<Duration>,
     /// Whether to prefer, among optimal plans of equal length, one that shares most steps with the current plan. The
     /// choice then depends on the history, and not only on the situation.
@@ -189,8 +192,8 @@ impl Settings {
     /// in the file must occur in `knowledge`.
     ///
     /// # Errors
-    /// The file cannot be read or contains errors. Unknown keys and unknown names are all returned; of the wrong
-    /// numbers, only the first.
+    /// The file cannot be read or contains errors. Either all unknown keys, or the first wrong value, or all unknown
+    /// names are returned.
     pub fn read(file: &Path, knowledge: Option<&Knowledge>) -> Result<Self, Errors> {
         let (section, origin) = manifest::read::<Section>(file)?;
         let settings = section.adaptation.settings(&origin)?;
@@ -301,5 +304,5 @@ const SETTLE: Duration = Duration::from_secs(5);
 
 const DEADLINE: Duration = Duration::from_secs(10);
 
-/// Default time limit of one search for a plan. The robot waits during planning.
+/// Default time limit of one search for a plan. The robot may wait during planning.
 const TIME_LIMIT: Duration = Duration::from_secs(10);

@@ -71,8 +71,8 @@ pub fn blocking(mission: &Mission, problem: &Problem, config: &Config) -> Option
     Some(Blocking::Other)
 }
 
-/// Returns `true` if there is a plan when the designs in `available` are available in addition to the present ones.
-/// `None` if the planner cannot decide this within the limits.
+/// Returns `true` if there is a plan when the designs in `available` are available in addition to those that are
+/// available now. `None` if the planner cannot decide this within the limits.
 fn solvable_with(
     mission: &Mission,
     problem: &Problem,

@@ -1,5 +1,4 @@
-//! Baseline strategies for comparison with the adaptation loop. Each baseline lacks one capability
-//! of the loop.
+//! Baseline strategies for comparison with the adaptation loop. Each baseline lacks a capability of the loop.
 //!
 //! All strategies receive the same observations as the loop, request actions in the same way, and
 //! use the same planner. They differ in when they plan and in how they choose designs:
@@ -234,7 +233,7 @@ impl Controller {
     }
 }
 
-/// Returns the design with which the action alone has the lowest cost, even if the action is not possible with it. Of
+/// Returns the design with which the action alone has the best metric, even if the action is not possible with it. Of
 /// equal designs, returns the first. Returns `None` if no cost is defined.
 fn cheapest(
     mission: &Mission,

@@ -1,4 +1,5 @@
-//! Noise filters between the robot's reports and the beliefs. The output depends only on the reports and their times.
+//! Noise filters between the robot's reports and the beliefs. For given settings and bounds, the output depends only on
+//! the reports and their times.
 //!
 //! [`Filters`] is the configuration, from the section `adaptation` of a manifest and the bounds of the knowledge base.
 //! [`FilterStates`] is the state, a part of the beliefs and of snapshots. Filters have no clock: observations provide
@@ -32,7 +33,7 @@ use crate::number;
 
 impl FilterSettings {
     /// Returns warnings, for `lint`, about settings with which noise causes reconfigurations: attributes without
-    /// hysteresis and debounce, and a default `heal_time` of 0 if the knowledge base has components.
+    /// hysteresis and debounce, and a general `heal_time` of 0 if the knowledge base has components.
     pub(crate) fn doubts(&self, knowledge: Option<&Knowledge>) -> Vec<Message> {
         let filters = Filters::new(self, knowledge);
         let is_noisy = |(_, filter): &(&String, &AttributeFilter)| {
@@ -75,7 +76,7 @@ pub(crate) struct FilterStates {
 pub(crate) enum Accepted {
     /// Value of an attribute, by local name.
     Value(String, BigRational),
-    /// Status of a component, by local name or IRI.
+    /// Status of a component, by local name.
     Status(String, Status),
     /// An attribute whose value has become unknown.
     Unknown(String),

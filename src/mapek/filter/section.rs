@@ -85,7 +85,7 @@ pub struct MeasuredSection {
 /// Parses the settings of all filters, with defaults for missing keys.
 ///
 /// # Errors
-/// The first value that is not a number, or out of range.
+/// The first value that is not a number or out of range, or a `maximum` below the `minimum`.
 pub(crate) fn filters(
     confirm_time: &Number,
     heal_time: &Number,
