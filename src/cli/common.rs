@@ -23,7 +23,7 @@ pub(super) enum Exit {
     Fault = 70,
 }
 
-/// Exit status and messages of a command that ends without an answer.
+/// Exit status and messages of a command that fails.
 pub(super) struct Failure {
     pub(super) exit: Exit,
     pub(super) messages: Errors,

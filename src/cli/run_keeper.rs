@@ -1,5 +1,6 @@
-//! Session of the configuration loop: connects it with its input and output, in two modes, for lines of a file and for
-//! lines as they arrive. A choice of designs needs no search, so each line is answered completely in both modes.
+//! Session of the configuration loop: connects the loop with its input and output, in two modes, for lines of a
+//! file and for lines as they arrive. Designs are chosen without planning, so each line is answered completely
+//! in both modes.
 
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::time::{Duration, Instant};

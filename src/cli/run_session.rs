@@ -1,10 +1,9 @@
 //! Session of `metaplan run`: connects the adaptation loop with its input and output, in two modes.
 //!
-//! If all input is available, as in a file, each line is answered completely before the next one is
-//! read, so the same lines give the same answers. If lines arrive as they happen, from a pipe or a
-//! terminal, the loop reacts to all waiting lines before it deliberates. Plans are then computed on
-//! another thread while the loop keeps reacting. A line that changes the planning problem cancels
-//! the search.
+//! If all input is available, as in a file, each line is answered completely before the next one is read, so
+//! the same lines give the same answers. If lines arrive as they happen, from a pipe or a terminal, the loop
+//! reacts to all waiting lines before it deliberates. Plans are then computed on another thread while the loop
+//! keeps reacting. A line that changes the planning problem cancels the search, but only a few times in a row.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -20,8 +19,8 @@ use crate::cli::common::{Common, Failure};
 use crate::cli::run_lines::{Line, Lines};
 use crate::cli::run_outlet::{Outlet, is_over, unwritten, warn_if_unrecorded};
 
-/// Capacity of the channel of read lines, and maximum number of inputs that are moved from it to the queue of waiting
-/// inputs.
+/// Capacity of the channel of inputs, and number of waiting inputs up to which the queue is filled from the
+/// channel.
 pub(super) const MAX_WAITING: usize = 1024;
 
 /// Maximum number of consecutive cancelled searches. The next search runs to its end; otherwise

@@ -1,5 +1,5 @@
-//! Evaluates both approaches exactly in one Markov decision process: policies computed by model
-//! checking, and plans with and without replanning.
+//! Evaluates all candidates exactly in one Markov decision process: policies computed by model checking, plans
+//! with and without replanning, the published procedure, and the shortest route.
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -56,12 +56,13 @@ pub struct Comparison {
     /// Vertices of the Pareto front, each with expected time and probability of success without
     /// collision. Only vertices with a finite time are included.
     pub front: Vec<[f64; 2]>,
-    /// Lower bounds on time and on energy of every decision rule, even a clairvoyant one.
+    /// Lower bounds on the time and on the energy that any decision rule needs to reach the goal, even a
+    /// clairvoyant one.
     pub hindsight: [Hindsight; 2],
     /// Time added for a failed mission.
     pub penalty: f64,
-    /// Reason why the plan with replanning cannot be worse than the best policy, if this follows
-    /// without computation.
+    /// Reason why the plan with replanning cannot be worse than the best policy, if this follows without
+    /// computation. `None` also if the computed price of determinism is not 0.
     pub no_price: Option<&'static str>,
     /// Total times if the component is lost, for each number of moves before the loss. `None` if the mission
     /// defines no loss or has no plan.

@@ -22,7 +22,7 @@ const MAX_MESSAGE_CHARACTERS: usize = 2000;
 /// towards the time limit of the run.
 ///
 /// # Errors
-/// The program, or the generator of its files, cannot be executed.
+/// The program cannot be executed, or the generator of its files cannot be executed or fails.
 pub fn perform(
     program: &Path,
     study: &Study,

@@ -439,7 +439,6 @@ fn places(mission: &Path, most: Option<usize>) -> Result<Vec<Value>, Errors> {
         })
         .collect();
     let count = most.unwrap_or(pairs.len()).clamp(1, pairs.len().max(1)).min(pairs.len());
-    // A limited number of pairs is spread evenly over all pairs.
     Ok((0..count).map(|number| json!(pairs[number * pairs.len() / count])).collect())
 }
 
