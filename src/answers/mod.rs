@@ -1,5 +1,5 @@
 //! JSON answers of the commands, except `sweep`: a type for each answer, whose fields have the order of the
-//! format. `docs/reference/json.md` describes all formats.
+//! format. `docs/reference/json.md` describes them.
 //!
 //! The types are built from results of the library. The command line only writes them.
 

@@ -114,7 +114,8 @@ pub(super) enum Format {
     Turtle,
 }
 
-/// Converts an error about a model and a property to a failure. Both are given by name and text, for the messages.
+/// Converts an error about a model and a property to a failure. Both are given as pairs of file name and text,
+/// which messages quote.
 pub(super) fn process_failure(error: Error, model: (&str, &str), property: (&str, &str)) -> Failure {
     match error {
         Error::Model(problems) => in_file(&problems, model),

@@ -58,7 +58,7 @@ impl Guard {
     /// Starts to measure time and memory.
     ///
     /// # Errors
-    /// The platform does not report the memory of the process.
+    /// There is a memory limit, but the platform does not report the memory of the process.
     pub(super) fn new(time: Option<Duration>, memory: Option<u64>, common: &Common) -> Result<Self, Failure> {
         let mut limits = Limits::none();
         if let Some(time) = time {

@@ -97,8 +97,9 @@ impl Questions {
     }
 }
 
-/// Answers a query about each assertion. Returns the answers as text and as JSON, and the exit status. `answer` returns
-/// the reason, and `true` if the query has an answer.
+/// Answers a query about each assertion. Returns the answers as text and as JSON, and the exit status. `answer`
+/// returns the text for one assertion, and `true` if the query applies: the assertion holds (`--why`) or does
+/// not hold (`--why-not`).
 fn reasons(
     knowledge: &mut Knowledge,
     assertions: &[String],

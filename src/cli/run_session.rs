@@ -189,8 +189,8 @@ impl<'a> Session<'a> {
         now
     }
 
-    /// Reacts to a line, and deliberates if `is_last` is `true` and no search is necessary. `is_last` says that no
-    /// further line is waiting.
+    /// Reacts to a line, and also deliberates if no further line is waiting (`is_last`) and no search is
+    /// necessary. A line of a recording is answered completely.
     fn line(&mut self, line: &Line, read: Instant, is_last: bool) -> Result<Flow, Failure> {
         if self.close()? == Flow::Over {
             return Ok(Flow::Over);
@@ -252,9 +252,9 @@ impl<'a> Session<'a> {
         self.say(&answers)
     }
 
-    /// Returns `true` if deliberation is pending, no action under way might need a reaction, and the line is about an
-    /// action or effect that was not requested yet. The writer of such a line knows the loop's answers in advance, as
-    /// in a file that is piped.
+    /// Returns `true` if deliberation is pending, no action is under way (it might need a reaction), and the
+    /// line is about an action or effect that was not requested yet. Such lines were written for answers that
+    /// the loop has not given yet, as in a file that is piped.
     fn is_early(&self, line: &Line) -> bool {
         let is_idle = self.control.has_agenda() && self.control.beliefs().running().is_none();
         is_idle && self.control.is_ahead(&Observation::parse(&line.text))

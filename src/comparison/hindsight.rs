@@ -175,8 +175,8 @@ pub struct Hindsight {
     pub expected: Option<f64>,
 }
 
-/// Computes the lower bounds for time or energy. Neglects collisions, failures and the battery,
-/// which can only decrease the bounds.
+/// Computes the lower bounds for time or energy. Collisions, failures and the battery are neglected. This can
+/// only decrease the bounds, so they stay valid.
 pub fn hindsight(mission: &Coadaptation, risk: Risk, penalty: f64, spent: Spent) -> Hindsight {
     let start = mission.start * mission.configurations.len() + mission.initial;
     let never = relaxed(mission, spent, false, None);

@@ -80,7 +80,7 @@ pub struct Measures {
     pub penalised_time: Option<f64>,
     /// Expected number of states in which a new plan is needed.
     pub replans: f64,
-    /// Number of reachable states.
+    /// Number of states that are reachable with the decision rule.
     pub states: usize,
 }
 

@@ -168,8 +168,8 @@ impl Referee<'_> {
         play(&self.exact(), true, self.penalty, self.reserve(), &|_| false, &mut decide)
     }
 
-    /// Returns the reason why determinism has no price, if there is one. If only the collision flag
-    /// is uncertain, and no transition depends on it, the fastest plan is an optimal policy.
+    /// Returns the reason why the price of determinism is 0, if there is one. If only the collision flag is
+    /// uncertain, and no transition depends on it, the fastest plan is an optimal policy.
     pub fn no_price(&self) -> Option<&'static str> {
         use num_traits::One;
         let certain = |probability: &BigRational| probability.is_one();

@@ -191,8 +191,8 @@ fn repairs(
     minimal_sets.into_iter().map(|set| set.into_iter().cloned().collect()).collect()
 }
 
-/// Returns the non-empty subsets of the positions 0 to `count` − 1: smaller subsets first, then in
-/// lexicographic order.
+/// Returns the non-empty subsets of the positions 0 to `count` − 1: smaller subsets first, and subsets of one
+/// size in lexicographic order.
 fn subsets(count: usize) -> impl Iterator<Item = Vec<usize>> {
     (1..=count).flat_map(move |size| {
         std::iter::successors(Some((0..size).collect::<Vec<usize>>()), move |last| {

@@ -1,5 +1,5 @@
-//! Differences between two situations of a mission (as its files define it, and now). Changes of the
-//! availability of designs have their reasons.
+//! Differences between two situations of a mission (as its files define it, and now). Reasons are given for
+//! changes of the availability of designs.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -49,8 +49,8 @@ pub fn perform(
         }
     }
     let mut command = Command::new(program);
-    // This program handles Ctrl-C and ends the run. An interrupted run would give a partial answer,
-    // which would falsify the study.
+    // Ctrl-C must reach only this program, which then kills the run. A run that is interrupted itself would
+    // give a partial answer, which would falsify the study.
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
     let mut child = command

@@ -125,8 +125,8 @@ pub struct Study {
     sections: Sections,
     /// Directory of the study's file, which is the working directory of the runs.
     pub directory: PathBuf,
-    /// Checksum of the study's command, generator, time limit and values, of the files that the command names, and of
-    /// the program's version.
+    /// Checksum of the study's command, generator, time limit and values, of the files whose paths are words of
+    /// the command, and of the program's version.
     pub digest: String,
     /// Varied keys with their values. The value of the last key changes from each run to the next.
     keys: Vec<(String, Vec<Value>)>,

@@ -51,8 +51,8 @@ pub struct Group {
 
 impl Table {
     /// Builds the table. `rows` is the JSON pointer to an object, or a list of objects, in each answer; each
-    /// object becomes a row. A run without anything there has a row without fields. With `measured`, includes
-    /// the fields that depend on the machine, such as times.
+    /// object becomes a row. A run whose answer has nothing there gives one row without fields of an answer.
+    /// With `measured`, includes the fields that depend on the machine, such as times.
     pub fn new(lines: &[Line], rows: &str, measured: bool) -> Self {
         let mut rows_of_lines: Vec<(&Line, Map<String, Value>)> = Vec::new();
         for line in lines {
