@@ -69,7 +69,8 @@ pub struct Contents<'c> {
     pub task: Ground<'c>,
     /// The solution of the task, whose status the certificate proves.
     pub solution: &'c Solution,
-    /// The plan in terms of the mission's domain: one line per action, with start and duration.
+    /// The plan in terms of the mission's domain: one line per action, with start and duration if actions take
+    /// time. Empty without a plan.
     pub plan: &'c str,
 }
 

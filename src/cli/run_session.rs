@@ -58,7 +58,8 @@ pub(super) struct Session<'a> {
     journal: Option<Journal>,
     outlet: &'a Outlet,
     clock: SystemClock,
-    /// Time of the last line of the resumed journal, since the start of the mission; 0 without such a line.
+    /// Time of the last line or timer event of the resumed journal, since the start of the mission; 0 without
+    /// such an event.
     begun: Duration,
     /// Number of the current line, shared with the thread that reports the progress of planning.
     line: Arc<AtomicU64>,
@@ -158,7 +159,8 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// Makes the first decision, or completes the decision that the journal left unfinished.
+    /// Makes the first decision. If a journal is resumed, completes unfinished work instead, and repeats
+    /// effects that were not acknowledged.
     fn begin(&mut self, read: Instant) -> Result<Flow, Failure> {
         let answers = match &mut self.journal {
             None => self.control.start(),

@@ -134,8 +134,8 @@ impl<'m, 'r> Planner<'m, 'r> {
         self
     }
 
-    /// Requests up to `most` further plans of the optimal cost, or none if `most` is `None`.
-    /// Requires sequential plans and a single objective.
+    /// Requests up to `most` further plans of the optimal cost, or none if `most` is `None`. Requires
+    /// sequential plans, a single objective, and numbers that are not too large for integers.
     #[must_use]
     pub fn alternatives(mut self, most: impl Into<Option<usize>>) -> Self {
         self.alternatives = most.into();

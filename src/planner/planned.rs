@@ -33,8 +33,8 @@ pub struct Planned<'m> {
     /// knowledge base has added as parameters to a plain domain; [`Planned::written`] omits these
     /// arguments.
     pub solution: Solution,
-    /// Value of each objective for the plan. Empty if there is no plan, or if the problem's own
-    /// metric is minimised.
+    /// Value of the plan under each objective that replaces the problem's metric. Without such objectives, the
+    /// list is empty or contains only the cost of the plan. Empty if there is no plan.
     pub values: Vec<Exact>,
     /// Further optimal plans, if requested and if the plan is proved optimal.
     pub alternatives: Option<Alternatives>,
