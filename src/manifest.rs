@@ -83,7 +83,7 @@ pub fn parse<S: DeserializeOwned>(
 
 impl ManifestPath {
     /// Resolves a path that is relative to the manifest's directory. Removes `dir/..` from the result, unless
-    /// this would lead to another existing file.
+    /// the result would then name another file.
     pub fn path(&self, path: &Path) -> PathBuf {
         let whole = self.directory.join(path);
         let short = shortened(&whole);

@@ -29,7 +29,7 @@ pub(super) struct Lines {
 type Reader = Box<dyn BufRead + Send>;
 
 enum Source {
-    /// Input whose format is not determined yet. This needs its first byte, and waiting for the byte may block.
+    /// Input whose format is not determined yet: this needs the first byte, and reading it may block.
     Fresh(Option<Reader>),
     Text(Reader),
     Recorded(Box<Replay<Reader>>),

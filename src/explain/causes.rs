@@ -128,7 +128,7 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
             altered(knowledge, [alteration]).is_some_and(|knowledge| !is_available(&knowledge, design))
         };
         let candidates = candidates(knowledge, design).into_iter();
-        // Each alteration of the design's components and measurements is listed that alone makes it
+        // Lists those alterations of the design's components and measurements each of which makes it
         // unavailable.
         availability.ways = candidates.filter(loses).map(|alteration| vec![alteration]).collect();
         return availability;

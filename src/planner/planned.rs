@@ -118,8 +118,8 @@ impl Planned<'_> {
         self.solution.plan.clone().map(|plan| self.mission.written(plan))
     }
 
-    /// Returns the plan with the gaps between actions that PlanSys2 needs, or without gaps if they would make
-    /// the plan invalid. The arguments are as in the domain's file, see [`Planned::written`].
+    /// Returns the plan with the gaps between actions that PlanSys2 needs, or unchanged if gaps would make the
+    /// plan invalid or a limit is reached. The arguments are as in the domain's file, see [`Planned::written`].
     pub fn spaced(&self) -> Option<Plan> {
         let plan = self.solution.plan.clone()?;
         let limits = self.limits.extended();
