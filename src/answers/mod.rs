@@ -1,5 +1,5 @@
-//! JSON answers of the commands: a type for each answer, whose fields have the order of the format.
-//! `docs/reference/json.md` lists them.
+//! JSON answers of the commands, except `sweep`: a type for each answer, whose fields have the order of the
+//! format. `docs/reference/json.md` describes them.
 //!
 //! The types are built from results of the library. The command line only writes them.
 

@@ -82,11 +82,13 @@ impl Wanted {
             && self.least.is_none()
     }
 
-    /// Creates the configurator for a knowledge base, with the required functions as objectives.
+    /// Creates the configurator for a knowledge base, with the functions of `--objective` as additional
+    /// objectives. Without this option and without objectives in the knowledge base, all functions are
+    /// objectives.
     ///
     /// # Errors
-    /// All names in the options that are not in the knowledge base, and requirements for functions without an
-    /// objective.
+    /// All names in the options that are not in the knowledge base, and requirements for functions that this
+    /// method does not add as objectives.
     pub(super) fn configurator(&self, knowledge: Knowledge) -> Result<Configurator, Failure> {
         let worth = match (&self.most, &self.least) {
             (Some(attribute), _) => Worth::Most(attribute.clone()),
@@ -184,8 +186,8 @@ fn text(configuration: &Configuration, wishes: &Wishes) -> String {
     text
 }
 
-/// Formats the reasons why better designs were not chosen or cannot be used, and the requirements that the chosen
-/// design misses.
+/// Formats the reasons why designs are ruled out or cannot be chosen together with the other choices, and the
+/// requirements that the chosen design misses.
 fn reasons(choice: &Choice) -> String {
     let mut text = String::new();
     for considered in &choice.considered {

@@ -154,7 +154,7 @@ fn cost_text(answer: &BestPlan, best: &BestPlan) -> String {
     }
 }
 
-/// Formats a change of a measurement or of a component's status. `about` marks the bound as approximate.
+/// Formats a change of a value or of a component's status. `about` marks the bound as approximate.
 fn alteration_text(alteration: &Alteration, about: bool) -> String {
     let Alteration { name, from, to } = alteration;
     let now = from.as_ref().map(|from| format!(" (now {})", decimal(from))).unwrap_or_default();

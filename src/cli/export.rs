@@ -85,8 +85,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-/// Writes the co-adaptation process (Markov decision process) of a mission, with all its uncertain parts, as a PRISM or
-/// JANI model.
+/// Writes the co-adaptation process (Markov decision process) of a mission as a PRISM or JANI model, with all
+/// its uncertain parts or in the published setting.
 fn process(
     arguments: &Arguments,
     common: &Common,

@@ -19,7 +19,7 @@ use crate::cli::common::{Common, Failure, Format};
 
 static ANSWER_LOST: AtomicBool = AtomicBool::new(false);
 
-/// Set once an answer, or a part of one, is being written.
+/// Set once an answer, a part of one, or a file is being written.
 static HAS_BEGUN: AtomicBool = AtomicBool::new(false);
 
 /// Maximum number of messages shown; further messages are only counted.
@@ -54,8 +54,8 @@ pub fn answer_lost() -> bool {
     ANSWER_LOST.load(Ordering::Relaxed)
 }
 
-/// Returns `true` if an answer, or a part of one, is being written or has been written. The result
-/// stays valid while the caller holds the lock of standard output.
+/// Returns `true` if an answer, a part of one, or a file is being written or has been written. The result stays
+/// valid while the caller holds the lock of standard output.
 pub fn has_begun() -> bool {
     HAS_BEGUN.load(Ordering::Relaxed)
 }

@@ -177,7 +177,7 @@ fn keep_going(
     if events.is_file() { session.replay(events) } else { session.live(events) }
 }
 
-/// Time of planning before the first heartbeat, and between two heartbeats.
+/// Time of planning before the first heartbeat (line with the progress), and between two heartbeats.
 const HEARTBEAT: Duration = Duration::from_secs(1);
 
 /// Starts a thread that reports the progress every second while a plan is being computed. It runs until the program

@@ -139,7 +139,7 @@ pub fn subject(arguments: &Arguments) -> String {
 /// Checks whether the scenario of a command line can be simulated. Paths are relative to `directory`.
 ///
 /// # Errors
-/// All mistakes in the scenario.
+/// All mistakes in the mission's files, or in the scenario.
 pub fn check(arguments: &Arguments, directory: &Path, common: &Common) -> Result<(), Failure> {
     experiment(&directory.join(&arguments.mission), &arguments.scenario, common).map(drop)
 }

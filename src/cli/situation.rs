@@ -79,8 +79,8 @@ impl Situation {
         Self { knowledge, rules, imports, names, scenario, set, fail }
     }
 
-    /// Returns the options without scenario, set values and failed components, which select the mission as its files
-    /// define it. Returns `None` if there are no such changes.
+    /// Returns these options without scenario, set values and failed components. The result selects the mission
+    /// as its files define it. Returns `None` if the options contain no such changes.
     pub(super) fn before(&self) -> Option<Self> {
         let (scenario, set, fail) = (None, Vec::new(), Vec::new());
         let differs = self.scenario.is_some() || !self.set.is_empty() || !self.fail.is_empty();

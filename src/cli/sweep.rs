@@ -1,4 +1,4 @@
-//! The command `metaplan sweep`, which executes the runs of a parameter study.
+//! The command `metaplan sweep`, which executes the runs of a parameter study or merges their results.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -160,7 +160,8 @@ fn merge(arguments: &Arguments, study: &Study, common: &Common) -> Result<Exit, 
     Ok(say(&SweepAnswer::new(&lines, 0..study.len(), &groups), &groups, common))
 }
 
-/// Writes the answer. Returns [`Exit::NotProved`] if runs are missing, and [`Exit::Done`] otherwise.
+/// Writes the answer. Returns [`Exit::NotProved`] if runs are missing or have no answer, and [`Exit::Done`]
+/// otherwise.
 fn say(answer: &SweepAnswer, groups: &[Group], common: &Common) -> Exit {
     if common.format == Format::Json {
         output::json_answer(answer);

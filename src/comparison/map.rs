@@ -166,8 +166,8 @@ impl<'t> Map<'t> {
     }
 }
 
-/// Converts the name of a place or design to a PDDL name: lower case, with `_` in place of special
-/// characters.
+/// Converts the name of a place or design to a PDDL name: lower case, with `_` in place of each character that
+/// is not an ASCII letter or digit.
 pub(super) fn object(name: &str) -> String {
     let safe: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
     safe.to_ascii_lowercase()

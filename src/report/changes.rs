@@ -1,5 +1,5 @@
-//! Differences between two situations of a mission (as its files define it, and now), with their
-//! causes.
+//! Differences between two situations of a mission (as its files define it, and now). Reasons are given for
+//! changes of the availability of designs.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -24,9 +24,9 @@ pub enum Cost {
     NotFound,
 }
 
-/// Returns the differences between two situations of a mission, each with its plan. The order is
-/// from causes to effects: components and measurements, the task, availability of designs, and
-/// costs of the plans.
+/// Returns the differences between two situations of a mission, each with its plan. The order is from causes to
+/// effects: components and measurements, the task, availability of designs, and the plans (costs, designs and
+/// common actions).
 pub fn changes(before: (&Mission, &Plan), after: (&Mission, &Plan), costs: &[Cost; 2]) -> Vec<Change> {
     let mut changes = Vec::new();
     let mut say = |text: String| changes.push(Change { text, because: Vec::new() });

@@ -65,8 +65,8 @@ fn front(comparison: &Comparison) -> Points {
     }
 }
 
-/// Returns sentences about the costs of deviating from the best policy, with the compared values as
-/// reasons.
+/// Returns sentences about differences of penalised time between candidates, with the compared values as
+/// reasons, and about the loss of a component.
 fn prices(comparison: &Comparison) -> Vec<Change> {
     let leaf = |text: String| Reason { text, supports: Vec::new() };
     let price = |name: &str, value: Option<f64>, because: Vec<Reason>| Change {
@@ -122,8 +122,8 @@ fn table(rows: &[Row]) -> Part {
     Part::Table("measures".to_owned(), header.collect(), rows.iter().zip(labels(&kinds)).map(line).collect())
 }
 
-/// Returns the picture of simulated missions: distributions of costs, reaction times and
-/// reconfigurations over the seeds, for each strategy.
+/// Returns the picture of simulated missions: for each strategy, the distributions of costs (of accomplished
+/// missions), reaction times and reconfigurations over the seeds, and a table of figures.
 pub fn simulation_sheet(mission: &str, scenario: &str, strategies: &[Strategy], runs: &[Run]) -> Sheet {
     let cost = |run: &Run| run.accomplished.then_some(run.cost);
     let changes = |run: &Run| Some(run.reconfigurations as f64);
