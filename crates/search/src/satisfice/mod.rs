@@ -43,7 +43,8 @@ const SEARCH_SEQUENCE: [(bool, HeuristicWeight); 6] = [
     (true, HeuristicWeight::Times(1)),
 ];
 
-/// A search may use 1/`MEMORY_SHARE` of the available memory. If it needs more, the next search begins.
+/// The next search begins if the search needs more 64-bit words than the memory limit in bytes, divided by this
+/// number. So a search may use half of the available memory.
 const MEMORY_SHARE: usize = 16;
 
 /// Result of one turn of the satisficing search.

@@ -1,10 +1,13 @@
 //! Scheduling of searches: a first plan, an optimal plan, and the closed states that prove its optimality.
 //!
-//! A\* with pattern databases runs first. If it finds no plan soon, a greedy best-first search looks for some
-//! plan. Then two A\* searches alternate: one uses only pattern databases, the other also LM-cut. The LM-cut
-//! search gets a quarter of the work of the other one at first, and then as much. A search that lags behind
-//! gets half. The result of the search that finishes first is returned. Work is counted in units instead of
-//! time, so the result is deterministic.
+//! `search` alternates several searches; `search_states` and `search_from` run only A\* with pattern databases,
+//! and a greedy search if A\* finds no plan soon.
+//!
+//! In `search`, A\* with pattern databases runs first. If it finds no plan soon, a greedy best-first search
+//! looks for some plan. Then two A\* searches alternate: one uses only pattern databases, the other also
+//! LM-cut. The LM-cut search gets a quarter of the work of the other one at first, and then as much. A search
+//! that lags behind gets half. The result of the search that finishes first is returned. Work is counted in
+//! units instead of time, so the result is deterministic.
 
 use std::sync::Arc;
 
@@ -89,7 +92,7 @@ pub fn search_states<N: TaskNumber>(
 
 /// Searches with A\* from the state `initial` for an optimal plan with a cost of at most `limit`; `Int::MAX`
 /// means no limit. Ends without a proof, with the best plan found, once A\* has stored more than `max_states`
-/// states. If A\* finds no plan soon and there is no limit, a greedy search provides one.
+/// states. If A\* finds no plan soon and there is no limit, a greedy search provides an upper bound.
 pub fn search_from(
     space: &SearchProblem<'_, Int, Bounds>,
     initial: &State,

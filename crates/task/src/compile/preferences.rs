@@ -64,8 +64,8 @@ pub(super) fn install(
     }
 }
 
-/// Adds hidden actions that are executed after a sequential plan and evaluate the preferences in a fixed
-/// order.
+/// Adds hidden actions that are executed after a sequential plan and evaluate the preferences in a fixed order.
+/// The new goal requires that all preferences are evaluated.
 fn follow(domain: &mut Domain, problem: &mut Problem, wanted: Vec<PreferenceInstance>) {
     declare(domain, GOING_ON);
     problem.init.push(InitialElement::Fact(flag(GOING_ON)));

@@ -20,7 +20,8 @@ use super::semantics::PlanSemantics;
 use super::simplify::{all, any, assume, flag, holds, is_false, is_true, not, ways};
 use super::syntax_edits::{PreferenceInstance, declare, happen, require, unsupported};
 
-/// Limit on the total number of ground instances of trajectory constraints, including those of preferences.
+/// Limit on the number of ground trajectory constraints, including those of preferences. A conjunction or
+/// quantifier counts in addition to its parts.
 const INSTANCES: usize = 20_000;
 
 pub(super) struct Monitors<'t> {
@@ -95,8 +96,9 @@ impl<'t> Monitors<'t> {
         Ok(())
     }
 
-    /// Adds the monitor of a ground trajectory constraint and returns its condition on the last state. Only a
-    /// `hard` constraint may add preconditions to actions.
+    /// Adds the monitor of a trajectory constraint whose variables have the objects in `binding`, and returns
+    /// its condition on the last state. Preconditions that prevent violations are added to actions only if
+    /// `hard` is `true`.
     fn trajectory(
         &mut self,
         trajectory: &Trajectory,

@@ -99,9 +99,9 @@ pub struct Schema {
     /// Condition on the state after the start effects: `over all` and `at end` conditions of a durative
     /// action.
     pub middle_condition: Formula,
-    /// The `over all` condition. Used only in tasks with timed events.
+    /// The `over all` condition, which is a part of `middle_condition`.
     pub over_all: Formula,
-    /// The `at end` condition.
+    /// The `at end` condition, which is a part of `middle_condition`.
     pub at_end: Formula,
     pub end_effects: Vec<Effect>,
     /// Duration in the domain's time unit; `None` for an instantaneous action.

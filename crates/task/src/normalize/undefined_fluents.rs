@@ -1,5 +1,5 @@
 //! Numeric functions without an initial value, which are undefined until an action assigns a value. An action
-//! that reads an undefined function is inapplicable.
+//! is inapplicable if an effect that occurs reads an undefined function.
 //!
 //! Each such function gets a guard predicate, which is true where the function has a value. A comparison
 //! becomes the conjunction of itself and the guards of its functions. A formula in negation normal form is

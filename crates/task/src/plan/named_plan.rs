@@ -148,7 +148,8 @@ pub struct Step {
 pub struct Plan {
     /// Actions in order of execution.
     pub steps: Vec<Step>,
-    /// Value of the plan under the metric of the problem file.
+    /// Value of the plan under the metric of the problem file, or under the first objective if others replace
+    /// the metric.
     pub cost: Exact,
 }
 
@@ -200,7 +201,8 @@ pub fn measured<'s, N: TaskNumber>(
     let (mut state, mut added) = (task.initial.clone(), Vec::new());
     let mut before = rest(task, &state);
     for (operator, choice) in steps {
-        // A step may be inapplicable if it is examined outside its plan; the state then does not change.
+        // On overflow, the state does not change. A step may also be inapplicable if it is examined outside its
+        // plan; its effects are then applied nevertheless.
         if let Some(next) = task.successor(&task.operators[operator.index()], &state, choice) {
             state = next;
         }

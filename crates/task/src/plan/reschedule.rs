@@ -54,8 +54,8 @@ fn same_action<N: TaskNumber>(task: &Task<N>, id: OperatorId) -> impl Iterator<I
     operators.filter(move |(other, other_id)| *other_id != id && is_same_action(other)).map(|(_, id)| id)
 }
 
-/// Replaces the operator at `position` and inserts the necessary waits. Returns `None` if the result is not a
-/// plan or costs more than `plan`.
+/// Replaces the operator at `position` by `other`, drops all waits and inserts the necessary waits again.
+/// Returns `None` if the result is not a plan or costs more than `plan`.
 fn with<N: TaskNumber>(
     task: &Task<N>,
     plan: &GroundPlan<N>,

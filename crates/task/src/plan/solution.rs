@@ -162,8 +162,8 @@ pub struct Solution {
     pub horizon: usize,
     /// Justification of the status.
     pub proof: Option<Proof>,
-    /// Set if the metric may have no best value. The plan then has the fewest steps, and the best metric
-    /// among the plans with this number of steps.
+    /// Set if the metric may have no best value. The plan then has the fewest steps, and the best metric that
+    /// was found among plans with this number of steps.
     pub unbounded: Option<MetricUnbounded>,
     /// Statistics of the run.
     pub statistics: Statistics,

@@ -38,7 +38,8 @@ pub trait TaskNumber: Number + std::fmt::Debug + std::hash::Hash + Default {
     /// Returns the product, or `None` on overflow.
     fn times(&self, other: &Self) -> Option<Self>;
 
-    /// Returns `true` if the magnitude is within the limit for fluents and sums of costs.
+    /// Returns `true` if the magnitude (for rationals: the number of bits) is within the limit for fluents and
+    /// sums of costs.
     fn is_moderate(&self) -> bool;
 
     /// Returns a lower bound on n such that n·`part` ≥ this number, where `part` > 0. Returns 0 if no bound

@@ -17,7 +17,8 @@ pub type SlotSet = SmallVec<[u32; 2]>;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Table<N> {
     pub slots: SlotSet,
-    /// Values in row-major order: the last slot varies fastest. Operators of a schema share the values.
+    /// Values in row-major order: the last slot varies fastest. Several operators of a schema may share the
+    /// values.
     pub values: Arc<[N]>,
 }
 

@@ -1,12 +1,12 @@
 //! Mutex groups: sets of atoms at most one of which is true in each reachable state. They become
 //! finite-domain variables.
 //!
-//! Invariant synthesis after Helmert [1]. A candidate is a set of predicates with key arguments; at most one
-//! further argument of each predicate is counted, i.e. ignored (more for atoms of running actions). An
-//! instance of the candidate fixes the objects of the key. The candidate is an invariant if no operator
-//! increases the number of true atoms of any instance. If an operator violates a candidate, the candidate is
-//! extended by a predicate that the operator deletes. The check uses ground operators, so statically
-//! impossible instances do not violate candidates.
+//! Invariant synthesis after Helmert \[1\]. A candidate is a set of predicates with key arguments; at most one
+//! further argument of each predicate is counted, i.e. ignored (more for atoms of running actions). An instance
+//! of the candidate fixes the objects of the key. The candidate is an invariant if no operator increases the
+//! number of true atoms of any instance. If an operator violates a candidate, the candidate is extended by a
+//! predicate that the operator deletes. The check uses ground operators, so statically impossible instances do
+//! not violate candidates.
 //!
 //! \[1\] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial
 //! Intelligence 173, 2009, section 5.
@@ -169,8 +169,9 @@ impl Change<'_> {
     }
 }
 
-/// Returns the operator and the key of an instance whose number of true atoms it may increase. Returns `None`
-/// if the operator preserves the candidate.
+/// Returns the operator with the key of an instance that it violates, or `None` if the operator preserves the
+/// candidate. The operator violates an instance if it may increase the number of true atoms, or deletes an atom
+/// without requiring it.
 #[expect(clippy::arithmetic_side_effects, reason = "atoms of one operator are counted")]
 fn broken_by<'o>(
     task: &GroundTask<'_>,

@@ -105,8 +105,8 @@ impl<N: TaskNumber> Numbers<N> {
         multiples
     }
 
-    /// Converts an expression over original values to the stored multiples of the variables, and multiplies
-    /// the result by `times`.
+    /// Converts an expression over original values to the stored multiples of the variables, and multiplies the
+    /// result by `times`. Without multiples, the expression is returned unchanged; `times` is then 1.
     pub(super) fn stored<'l>(&self, linear: &'l Linear<Rational>, times: Int) -> Cow<'l, Linear<Rational>> {
         if self.multiples.is_empty() {
             return Cow::Borrowed(linear);

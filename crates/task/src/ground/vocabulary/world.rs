@@ -178,7 +178,8 @@ impl<'a> World<'a> {
         Ok(NumericId(dense(self.numerics.insert_full((function, arguments.into()), ()).0)))
     }
 
-    /// Returns the id of the clock variable, which is 0 initially.
+    /// Returns the id of an auxiliary numeric variable for time (the clock or the moment), which is 0
+    /// initially.
     pub(crate) fn clock(&mut self, function: FunctionId) -> NumericId {
         NumericId(dense(self.numerics.insert_full((function, Box::default()), ()).0))
     }
