@@ -3,7 +3,7 @@
 use crate::limits::Interrupted;
 use pddl::ast::Span;
 
-/// The PDDL file that contains a place.
+/// The PDDL file that contains a source location.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum File {
     /// The domain file.
@@ -70,7 +70,7 @@ pub enum Error {
     Overflow {
         /// Description of the quantity that contains the number.
         what: String,
-        /// The action or metric that contains the number, if known.
+        /// Source location of the action that contains the number, if known.
         place: Option<Place>,
     },
     /// The deadline passed or the run was interrupted before grounding was complete.

@@ -98,7 +98,7 @@ impl Limits {
         &self.thresholds
     }
 
-    /// Returns the memory limit of a search in bytes, which has a default.
+    /// Returns the memory limit of a search in bytes; 2 GiB if none was set.
     pub fn room(&self) -> usize {
         self.room.unwrap_or(DEFAULT_MEMORY)
     }

@@ -34,8 +34,8 @@ pub struct Thresholds {
     /// Number of nodes in the first turn of the greedy search. The turns of the other searches are
     /// proportional.
     pub turn: usize,
-    /// Number of sequences after which the exhaustive search with chosen durations alternates with other
-    /// searches. Also the length of its first turn.
+    /// Number of sequences (partial plans) that the exhaustive search with chosen durations evaluates before
+    /// other searches alternate with it.
     pub chosen: u64,
 }
 

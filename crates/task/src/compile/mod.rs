@@ -127,7 +127,8 @@ pub fn compile<'t>(
         name_violations(&mut metric.expression);
     }
     if !used_preferences.is_empty() {
-        // The separation of happenings applies to the conditions of action preferences as to all conditions.
+        // Conditions of action preferences keep happenings apart like all other conditions, although the
+        // original task does not require this.
         let mut preferences = task.0.actions.iter().flat_map(|action| &action.preferences);
         is_exact &= !preferences.any(|preference| used_preferences.contains(&preference.name.name));
         preferences::install(&mut task.0, &mut task.1, (wanted, &used_preferences), course);

@@ -119,8 +119,8 @@ impl Monitors<'_> {
         }
         let deadline = Deadline::new(within.clone(), hard, self.deadlines.len());
         let begun = self.remember("has begun", self.initial.holds(first) && !self.initial.holds(second));
-        // Happenings that may start the deadline are separated from happenings that may end it, so that a
-        // start can be delayed until after an end.
+        // The added effects read both conditions. So happenings that may start the deadline are separated from
+        // happenings that may end it, and a start can be delayed until after an end.
         self.after_each(&[first, second], place, |touched, after| {
             let begins = all([touched, after[0].clone(), not(after[1].clone())]);
             Addition::notes(begins, Effect::Add(flag(&begun)))

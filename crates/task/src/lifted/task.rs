@@ -64,8 +64,8 @@ pub struct Lifted {
     pub metrics: Vec<Metric>,
 }
 
-/// A predicate. It is a fluent if an action or timed event changes it or if it is derived from fluents;
-/// otherwise it is static.
+/// A predicate. It is a fluent if an action or timed event changes it, or if it is derived from fluents or
+/// cannot be evaluated in advance; otherwise it is static.
 #[derive(Debug, Clone)]
 pub struct Predicate {
     pub name: Name,

@@ -250,8 +250,8 @@ impl Step {
         }
     }
 
-    /// Adds the functions whose design differs from their design in `current` to `reconfigured`, and updates
-    /// `current`.
+    /// Adds the functions whose design changes in this step to `reconfigured`. `current` holds the last design
+    /// of each function before this step, and is updated.
     fn note_reconfigured(&mut self, current: &mut Vec<(String, String)>) {
         for (function, design) in &self.configuration {
             match current.iter_mut().find(|(name, _)| name == function) {

@@ -57,7 +57,7 @@ impl Start {
     }
 }
 
-/// Conditions between the start and end of an instance, and timed events in between.
+/// Conditions of an instance over all and at its end, and the timed events between its start and end.
 pub(super) struct Middle<'m> {
     pub(super) over_all: &'m [Residual],
     pub(super) at_end: &'m [Residual],

@@ -33,7 +33,8 @@ pub struct World<'a> {
     values: IndexMap<(FunctionId, Arguments), Rational, FxBuildHasher>,
     pub atoms: AtomIndex<PredicateId>,
     pub numerics: AtomIndex<FunctionId>,
-    /// Indices of relations. The key holds the predicate and the set of indexed columns (bit i for column i).
+    /// Tuples of a predicate, indexed by their values in some columns. The key holds the predicate and the set
+    /// of these columns (bit i for column i).
     joins: FxHashMap<(PredicateId, u64), Rows>,
     visited: Wrapping<u32>,
 }
