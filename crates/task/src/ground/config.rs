@@ -1,4 +1,5 @@
-//! Configuration of grounding: the roles of the domain's symbols, and generality beyond the given problem.
+//! Configuration of grounding: the roles of the domain's predicates, objectives, limits, and generality beyond
+//! the given problem.
 
 use crate::limits::Limits;
 use crate::number::Int;
@@ -47,8 +48,8 @@ impl GroundConfig {
     }
 }
 
-/// Requirements on a ground task that must stay valid for changed initial values, not only for the given
-/// problem.
+/// Requirements on a ground task beyond the given problem, for example that it stays valid for changed initial
+/// values.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Generality {
     /// If set to n, each initial number may be replaced by any multiple of 1/n. Grounding then infers nothing

@@ -82,7 +82,8 @@ pub struct Predicate {
 pub struct Function {
     pub name: Name,
     pub fluent: bool,
-    /// `true` if the function may be undefined for some arguments. Guard conditions then precede its uses.
+    /// `true` if the function may be undefined for some arguments and thus needs no initial value. Its uses are
+    /// guarded by conditions, or come after an assignment.
     pub partial: bool,
 }
 

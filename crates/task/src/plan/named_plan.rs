@@ -66,7 +66,7 @@ impl From<BigRational> for Exact {
     }
 }
 
-/// Parses a decimal or a fraction: `2.5`, `-7/3`.
+/// Parses an integer, a decimal or a fraction: `3`, `2.5`, `-7/3`.
 impl FromStr for Exact {
     type Err = NotANumber;
 

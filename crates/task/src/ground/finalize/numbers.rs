@@ -91,7 +91,8 @@ impl<N: TaskNumber> Numbers<N> {
         self.multiples.get(&variable).copied().unwrap_or(1)
     }
 
-    /// Returns the multiple of each numeric variable by id. Empty if all multiples are 1.
+    /// Returns the multiple of each numeric variable (factor of its stored value) by id. Empty if all multiples
+    /// are 1.
     pub(super) fn multiples(&self) -> Vec<Int> {
         if self.multiples.is_empty() {
             return Vec::new();

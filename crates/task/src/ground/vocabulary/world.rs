@@ -1,4 +1,4 @@
-//! Static facts and values of a task, and the tables of fluent atoms and numeric variables that grounding
+//! Initial facts and values of a task, and the tables of fluent atoms and numeric variables that grounding
 //! creates.
 
 use std::num::Wrapping;
