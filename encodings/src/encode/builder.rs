@@ -27,8 +27,8 @@ pub(super) struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
-    /// Creates a formula without clauses. `allowed[step][operator]` is `true` if the operator may
-    /// occur at the step.
+    /// Creates a formula with the variables of the task, but without clauses except that of the constant true.
+    /// `allowed[step][operator]` is `true` if the operator may occur at the step.
     pub(super) fn new(
         context: Context<'a>,
         allowed: &[Vec<bool>],

@@ -67,7 +67,7 @@ pub(super) struct Cost {
 }
 
 enum Spent {
-    /// Literal that is implied by "at least this amount is spent", for every positive amount that
+    /// Literal that is implied by "at least this amount is spent", for every positive amount up to the gap that
     /// can occur.
     Order(BTreeMap<Int, Lit>),
     Binary(Bits),

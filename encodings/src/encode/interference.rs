@@ -1,11 +1,11 @@
 //! Clauses that exclude interference between operators of the same step.
 //!
-//! In ∀-step semantics \[1\] the operators of a step can be executed in any order with the same
-//! result. In ∃-step semantics \[2\] they can be executed in at least one order; here this is the
-//! order of the ground task. In both semantics, all conditions hold before the step and all effects
-//! hold after the step. For each fact, let E be the operators that change the fact, and R the
-//! operators that need the fact. For a variable that is read in another way than by a plain
-//! condition, E contains all its writers:
+//! In ∀-step semantics \[1\] the operators of a step can be executed in any order with the same result. In
+//! ∃-step semantics \[2\] they can be executed in at least one order; here this is the order of the ground
+//! task. In both semantics, all conditions hold before the step and all effects hold after the step. For each
+//! fact, let E be the operators that change the fact, and R the operators that need the fact. For a variable
+//! that is read in another way than by a plain condition (e.g. in a clause), R contains these readers and E all
+//! writers of the variable:
 //!
 //! - ∃-step: `¬o@t ∨ ¬p@t` for o ∈ E before p ∈ R in the order, by a ladder: `o@t → a@t`,
 //!   `a@t → a'@t`, `a@t → ¬p@t`;

@@ -1,6 +1,6 @@
 //! Encoding of ground tasks: the formula is satisfiable if there is a plan of at most `horizon` steps with a
-//! cost of at most `limit`. In sequential semantics, a satisfiable formula also has such a plan; in parallel
-//! semantics, the plan may have several operators per step.
+//! cost of at most `limit`. In sequential semantics and with summed costs, there is such a plan if the formula
+//! is satisfiable; in parallel semantics, the plan may have several operators per step.
 //!
 //! The encoding has finite-domain variables and explanatory frame axioms \[1\], with one or several
 //! operators per step. Unused steps are idle and come at the end. The designs of an operator's

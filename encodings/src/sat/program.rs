@@ -20,7 +20,7 @@ use task::limits::Limits;
 
 use crate::sat::solver::{Answer, Lit, Solver};
 
-/// Time limit of a run of the external program. It takes the place of a conflict budget.
+/// Time limit of a run of the external program if there is a conflict budget, which it replaces.
 const BUDGET_TIME: Duration = Duration::from_secs(2);
 /// Time between two checks of the limits while the program runs.
 const INTERVAL: Duration = Duration::from_millis(5);

@@ -1,5 +1,5 @@
 //! Optimal search in the state space: A\*, its open list, state registry, heuristic interface and pruning
-//! methods.
+//! methods. Also selects a canonical plan among plans of equal cost (`plan_tiebreak`).
 
 mod astar;
 pub mod design_combinations;

@@ -10,7 +10,7 @@
 //!
 //! The cost and length of the known plan bound two searches: the first minimises reconfigurations, and the
 //! second is a depth-first search in model order that stops at the first plan. If these searches exceed their
-//! limits, the known plan is returned; the result is still deterministic, but not canonical.
+//! limits, the known plan is returned, which need not be canonical.
 
 use std::cell::{Cell, RefCell};
 use std::cmp::Reverse;

@@ -1,12 +1,13 @@
 //! Compiles preferences and trajectory constraints of PDDL 3 to PDDL 2. Works on the syntax tree before names
 //! are resolved.
 //!
-//! Each instance of a constraint is an automaton. Auxiliary atoms store its state, and additional effects of
-//! the actions update these atoms. A condition on the state *after* an action is regressed to the state
-//! before the action (`regress`) \[1\], so plans have no additional states. Hard constraints become conditions
-//! of actions and of the goal. Preferences are evaluated after the plan by hidden actions (`preferences`)
-//! \[2\]: each preference is satisfied or costs what the metric specifies \[3\]. If actions may overlap, the
-//! hidden actions are never executed; their conditions are evaluated in the last state.
+//! Each instance of a constraint is monitored by an automaton. Auxiliary atoms store its state, and additional
+//! effects of the actions update these atoms. A condition on the state *after* an action is regressed to the
+//! state before the action (`regress`) \[1\], so the automata need no actions of their own. Hard constraints
+//! become conditions of actions and of the goal. Preferences on the goal and on trajectories are evaluated
+//! after the plan by hidden actions (`preferences`) \[2\]: each preference is satisfied or costs what the
+//! metric specifies \[3\]. Violated preferences in preconditions are counted by additional effects. If actions
+//! may overlap, the hidden actions are never executed; their conditions are evaluated in the last state.
 //!
 //! \[1\] L. Bonassi et al.: On planning with qualitative state-trajectory constraints in PDDL3 by compiling
 //! them away, ICAPS 2021.
@@ -45,8 +46,8 @@ pub struct CompiledTask<'t> {
     pub objectives: Cow<'t, [Metric]>,
     /// Deadlines (`always-within`), which are checked once the times of a plan are known.
     pub deadlines: Vec<Deadline>,
-    /// `true` if the compilation does not constrain the times of happenings beyond the original task.
-    /// Irrelevant for sequential plans.
+    /// `false` if the compilation may constrain the times of happenings beyond the original task. Irrelevant
+    /// for sequential plans.
     pub is_exact: bool,
 }
 
@@ -126,7 +127,8 @@ pub fn compile<'t>(
         name_violations(&mut metric.expression);
     }
     if !used_preferences.is_empty() {
-        // The separation of happenings applies to the conditions of action preferences as to all conditions.
+        // Conditions of action preferences keep happenings apart like all other conditions, although the
+        // original task does not require this.
         let mut preferences = task.0.actions.iter().flat_map(|action| &action.preferences);
         is_exact &= !preferences.any(|preference| used_preferences.contains(&preference.name.name));
         preferences::install(&mut task.0, &mut task.1, (wanted, &used_preferences), course);

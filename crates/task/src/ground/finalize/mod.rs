@@ -1,4 +1,5 @@
-//! Last grounding stage: converts atoms to finite-domain variables, and rationals to integers.
+//! Last grounding stage: converts atoms to finite-domain variables, and rationals to the number type of the
+//! task (usually integers).
 
 mod conditions;
 mod integers;

@@ -1,8 +1,8 @@
 //! Pruning: removes irrelevant and unreachable operators, rules and effects.
 //!
 //! Forward pruning uses relaxed reachability over the ground operators and interval analysis of numbers.
-//! Backward pruning removes effects on atoms that no condition reads, and then operators that neither change
-//! the state nor reduce the cost.
+//! Backward pruning removes effects on atoms and numbers that nothing reads, and then operators that neither
+//! change the state nor reduce the cost.
 
 mod forward;
 mod intervals;
