@@ -378,7 +378,7 @@ fn built_in_step(built_in: BuiltIn, sources: &[Source], bound: &mut Bound) -> St
     }
 }
 
-/// Returns `true` if a condition can be evaluated without an enumeration of rows.
+/// Returns `true` if a condition can be evaluated without extending the match by rows of a relation.
 fn is_ready(condition: &Condition, bound: &Bound) -> bool {
     match condition {
         Condition::Same(left, right) => bound.is_bound(*left) || bound.is_bound(*right),

@@ -73,8 +73,8 @@ fn uses(rule: &Rule, equality: bool, same_as: Symbol, different: Symbol) -> Uses
                 body.extend(inner.iter().filter_map(relation).map(|used| (used, 1)));
             }
             Atom::Same(..) if equality => body.push(((same_as, 2), 0)),
-            // Under equality, only literals differ by this atom, and literals are never equal to anything
-            // else.
+            // These atoms depend on no relation. Under equality, `differentFrom` holds only for literals, which never
+            // equal anything else.
             Atom::Same(..) | Atom::Different(..) | Atom::BuiltIn { .. } => {}
         }
     }
