@@ -1,8 +1,7 @@
 //! PDDL parser, checker and printer, and a plan validator.
 //!
 //! The parser accepts the extensions of real files, with a warning where they deviate from the standard, and
-//! reports all errors of a file at once. [`validate`] executes plans on the syntax tree with exact rational
-//! numbers.
+//! continues after an error. [`validate`] executes plans on the syntax tree with exact rational numbers.
 //!
 //! Absent: grounding, solvers, and the file system.
 //!

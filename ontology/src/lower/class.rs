@@ -112,9 +112,9 @@ fn some_value(
 /// use auxiliary relations.
 pub(crate) const MAX_ALTERNATIVES: usize = 16;
 
-/// Replaces the alternative conjunctions for `x` in `class` by one atom of an auxiliary relation. A rule for
-/// each alternative derives the relation. Fewer than two alternatives are returned unchanged; if one is
-/// empty, `x` is always in `class`, and the result is the empty conjunction.
+/// Replaces the alternative conjunctions for `x` in `class` by one atom of an auxiliary relation. A rule for each
+/// alternative derives the relation. Fewer than two alternatives are returned unchanged. If one of several
+/// alternatives is empty, `x` is always in `class`, and the result is the empty conjunction.
 pub(crate) fn abbreviated(
     context: &mut Context,
     class: &ClassExpression,
