@@ -85,8 +85,8 @@ pub fn read_objective(
 ///
 /// # Errors
 ///
-/// Returns all errors and warnings if a file has an error. Diagnostics about the domain come first; those
-/// about one file are sorted by position.
+/// Returns the errors and warnings of both files if a file has an error. Diagnostics about the domain come first;
+/// those about one file are sorted by position.
 pub fn read(domain: &Source, problem: &Source) -> Result<(Domain, Problem, Vec<Diagnostic>), Errors> {
     let parsed_domain = parse::domain(domain);
     let parsed_problem = match &parsed_domain.tree {
