@@ -39,7 +39,7 @@ impl fmt::Display for Position {
     }
 }
 
-/// All errors of a knowledge base.
+/// Errors of a knowledge base.
 pub type Errors = diagnostics::Errors<Error>;
 
 /// The reason why a knowledge base cannot be used.

@@ -38,9 +38,11 @@ impl Engine {
     /// Creates an engine and derives all facts that follow from stated facts.
     ///
     /// # Errors
-    /// Returns the first invalid fact (R302, R303); otherwise the errors of all rules (R2xx, R302), where a
-    /// missing stratification (R206, R208) is reported only if there is no other error; otherwise R301 if the
-    /// derivation exceeds the step budget.
+    /// Returns one of the following:
+    /// - the first invalid fact (R302, R303);
+    /// - otherwise the errors of all rules (R2xx, R302), of which R206 and R208 (no stratification) are reported only
+    ///   if there is no other error;
+    /// - otherwise R301, if the derivation exceeds the step budget.
     pub fn new(
         symbols: Symbols,
         program: Program,

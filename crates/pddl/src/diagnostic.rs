@@ -10,7 +10,7 @@ use super::ast::Span;
 use super::excerpt::{Excerpt, Shown};
 use super::source::Source;
 
-/// All diagnostics about PDDL files or a plan, including warnings.
+/// Diagnostics about PDDL files or a plan, including warnings.
 pub type Errors = diagnostics::Errors<Diagnostic>;
 
 /// Severity of a diagnostic.

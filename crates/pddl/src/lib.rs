@@ -53,7 +53,7 @@ use ast::{Direction, Domain, Metric, Problem};
 ///
 /// # Errors
 ///
-/// Returns all errors and warnings about the objective if there is an error.
+/// Returns the errors and warnings about the objective if there is an error.
 pub fn read_objective(
     direction: Direction,
     expression: &Source,

@@ -265,8 +265,8 @@ fn all_values(
     inner.into_iter().map(|(body, head)| (with_atom(edge.clone(), body), head)).collect()
 }
 
-/// Concludes that `x` is in the auxiliary relation of the restriction `class`, if a restriction that is a
-/// condition of an axiom or rule includes `class`.
+/// Returns the conclusion that `x` is in the auxiliary relation of the restriction that follows from `class`. Empty
+/// if no condition of an axiom or rule includes this restriction.
 fn included(context: &mut Context, class: &ClassExpression, x: Term) -> Conclusions {
     let restriction = context.inclusions.conclusion(class);
     let atom = restriction.map(|restriction| context.relation(&relation_of(&restriction), [x]));

@@ -26,7 +26,7 @@ struct Use {
     individual: bool,
     data: bool,
     object: bool,
-    /// Used in a restriction of unknown kind.
+    /// Used in a restriction that may be about an object property or about a data property.
     restricted: bool,
     /// Used with a subject that is not an individual, as annotation properties are.
     entity: bool,

@@ -15,8 +15,8 @@ use crate::fact::{Arguments, Fact};
 use crate::rule::RuleIdentity;
 use crate::symbol::Symbol;
 
-/// A derivation step: a fact with its reason. A derived equality has the reason of a stated fact in a step, because
-/// its edge records its derivation.
+/// A derivation step: a fact with its reason. A derived equality counts as a stated fact in a step, because its own
+/// derivation is recorded in its edge.
 pub(super) type Step = DerivationStep;
 
 /// Number of an edge (recorded equality of two names), in the order of creation.

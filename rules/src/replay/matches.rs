@@ -244,7 +244,8 @@ impl Matcher<'_> {
     }
 }
 
-/// Returns the aggregate function, applied to the only column of the rows.
+/// Returns the aggregate with the variable 0 as its term: the only column of the rows to which the aggregate is
+/// applied.
 fn column(aggregate: Aggregate) -> Aggregate {
     aggregate.map(&|_| Term::Variable(Variable(0)))
 }
