@@ -39,7 +39,7 @@ impl fmt::Display for Position {
     }
 }
 
-/// All errors of a knowledge base.
+/// Errors of a knowledge base.
 pub type Errors = diagnostics::Errors<Error>;
 
 /// The reason why a knowledge base cannot be used.
@@ -97,7 +97,7 @@ pub enum Error {
     /// O105: the merged documents do not form an OWL ontology.
     #[error("{}: error[O105]: the documents do not form an OWL ontology: {reason}", place(file, position.as_ref()))]
     NotAnOntology {
-        /// The first document.
+        /// First of the merged documents.
         file: String,
         /// Position of the faulty statement in its document, if found.
         position: Option<Position>,

@@ -62,7 +62,7 @@ impl Stated {
     /// `retracted`. A statement in both lists is asserted. Imports of these documents are not followed.
     ///
     /// # Errors
-    /// Returns all errors of the documents, and O114 for a retracted statement with an anonymous individual.
+    /// Returns the errors of the documents, and O114 for a retracted statement with an anonymous individual.
     pub fn change<P: AsRef<Path>>(
         &self,
         asserted: &[P],

@@ -3,10 +3,10 @@
 use crate::builtin::{BuiltIn, SWRLB};
 use crate::rule::RuleIdentity;
 
-/// All errors of a set of rules or of an update.
+/// Errors of a set of rules or of an update.
 pub type Errors = diagnostics::Errors<Error>;
 
-/// An error. R1xx: rule text; R2xx: a rule; R3xx: an update.
+/// An error. R1xx: rule text; R2xx: a rule; R3xx: facts, or an evaluation that was stopped.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {

@@ -19,8 +19,8 @@ pub(crate) struct Scope {
     pub group: Vec<u16>,
     /// Other variables of the aggregate, in ascending order.
     pub locals: Vec<u16>,
-    /// Positions of the atoms outside the aggregate that bind the group variables that its own atoms do
-    /// not bind.
+    /// Positions of atoms outside the aggregate. They bind the group variables that the aggregate's own atoms leave
+    /// unbound.
     pub context: Vec<usize>,
 }
 

@@ -1,5 +1,4 @@
-//! Builds the abstract syntax tree from S-expressions. The parser reports every problem and continues after
-//! it.
+//! Builds the abstract syntax tree from S-expressions. The parser reports problems and continues after each of them.
 //!
 //! Parts that cannot be read are omitted, so a tree with errors is incomplete.
 

@@ -36,8 +36,8 @@ impl PlanText {
     ///
     /// # Errors
     ///
-    /// Returns an error for each other line that is neither empty nor a comment, or a single error if the
-    /// text exceeds 4 GB.
+    /// Returns an error for each other line that is neither empty nor a comment, but at most 201 errors. A text of
+    /// more than 4 GB gives a single error.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions in a text in memory, which are at most its length"
