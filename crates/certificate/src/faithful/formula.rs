@@ -122,8 +122,8 @@ impl Known {
         groups.iter().any(|group| self.holding.contains_key(group)).then_some(false)
     }
 
-    /// Returns the truth value of a condition, or `None` if the partial state is not found to imply
-    /// one. The test is incomplete: each comparison is tested against single known comparisons.
+    /// Returns the truth value that the partial state implies for a condition, or `None` if neither value is found to
+    /// follow. The test is incomplete: each comparison is tested against single known comparisons.
     pub(super) fn decide(&self, structure: &Structure, formula: &Formula) -> Option<bool> {
         match formula {
             Formula::All(parts) => self.junction(structure, parts, true),

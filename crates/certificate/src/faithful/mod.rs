@@ -7,14 +7,13 @@
 //! the task also holds for plans of the files. The task may permit more than the files and omit
 //! irrelevant parts.
 //!
-//! The check visits all instances of all actions. `instances` enumerates them by joins over static
-//! atoms. `reader` and `action` compute their conditions and effects case by case. `compare`
+//! The check visits all action instances whose static conditions hold. `instances` enumerates them by joins over static
 //! searches for the operator, and `effects` compares its effects. `translation` expresses the task
 //! in terms of the files. A variable of the task represents atoms of which at most one holds; this
 //! is checked initially and for every instance.
 //!
-//! An instance needs no operator if it does not change the task state. Neither does an instance
-//! whose conditions contradict static facts, each other, the variables or the witness. The witness
+//! An instance needs no operator if it does not change the task state and its cost is not negative. Neither does an
+//! instance
 //! (`invariant`) over-approximates the possible atoms and the ranges of numbers; the check proves
 //! that no instance leaves it.
 //!

@@ -395,8 +395,8 @@ impl Knowledge {
         }
     }
 
-    /// Resets the knowledge to the documents and applies the differences. All other changes since
-    /// reading are discarded, such as names of former measured values.
+    /// Resets the knowledge to the documents and applies the differences. Everything else that was added since is
+    /// discarded, e.g. interned names of former measured values.
     ///
     /// # Errors
     /// Inference exceeds its limits; the knowledge is then unchanged.
@@ -414,7 +414,7 @@ impl Knowledge {
         Ok(())
     }
 
-    /// Number of names and values that were interned since the documents were read.
+    /// Number of names and values that were interned since the documents were read or revised.
     pub fn growth(&self) -> usize {
         let count = |runtime: &Runtime| runtime.engine().symbols().len();
         count(&self.runtime).saturating_sub(count(&self.origin))

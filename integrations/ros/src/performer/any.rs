@@ -98,7 +98,7 @@ impl TryFrom<CallEntry> for AnyCall {
     }
 }
 
-/// Values for which a text of the settings stands.
+/// Values that replace the placeholders in texts of the settings, e.g. `{2}` and `{pose 2}`.
 trait Values {
     /// Value of an argument, counted from 1.
     fn argument(&self, number: usize) -> Result<String, String>;

@@ -17,7 +17,7 @@ use super::structure::{Layout, Structure, StructureField};
 /// Names and definitions of the interfaces of this package.
 static DEFINITIONS: &[(&str, &str)] = include!(concat!(env!("OUT_DIR"), "/definitions.rs"));
 
-/// Upper limit on the number of single values that a message has at least.
+/// Upper limit on the number of single values that the shortest message of a type has, without elements of sequences.
 const MAX_VALUES: u64 = 1_000_000;
 
 /// A definition in the settings.
