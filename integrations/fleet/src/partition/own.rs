@@ -198,8 +198,8 @@ impl<S: Store> Partition<S> {
         Some(event)
     }
 
-    /// Starts to handle the next queued event of a robot, if the robot is idle. Starts to read more events
-    /// of the robot if the queue lacks some.
+    /// Starts to handle the next queued event of a robot, if the robot is idle. Drops events of a suspended robot, and
+    /// refuses events that a former owner has skipped. Starts to read more events of the robot if the queue lacks some.
     fn begin(&mut self, name: &str) {
         let last_decision = self.seen.1;
         loop {
