@@ -49,8 +49,8 @@ pub struct Settings {
     pub save_within: Duration,
     /// Time between two checks whether robots have to be saved.
     pub look: Duration,
-    /// Twice the number of undecided events of a partition in memory from which robots with many of them get no more.
-    /// Their later events are read again when these are decided.
+    /// Limit on the undecided events of a partition in memory. From half of this number on, robots with many undecided
+    /// events get no more; their later events are read again when these are decided.
     pub ahead: usize,
     /// Maximum time that a partition waits for running loops when it is given back. Their events are decided by
     /// the next owner.
