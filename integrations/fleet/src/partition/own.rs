@@ -40,7 +40,7 @@ pub(super) struct Partition<S> {
     pub(super) recent: VecDeque<(u64, String)>,
 }
 
-/// Number of undecided events that each robot can have in memory, however many other robots have.
+/// Number of undecided events that each robot can have in memory, regardless of other robots.
 const FEW: usize = 16;
 
 /// Maximum number of events of a robot that are read again at once.

@@ -130,7 +130,7 @@ fn pose_value(stamped: PoseStamped, is_stamped: bool) -> Result<Value, String> {
     value.map_err(|error| error.to_string())
 }
 
-/// Values that have the types of all later ones, to check the fields when the settings are read.
+/// Sample values with the types of the later values, to check the fields when the settings are read.
 struct Sample;
 
 impl Values for Sample {

@@ -143,7 +143,8 @@ impl Library {
         ))
     }
 
-    /// Resolves an interface of a folder. Returns its structures, and the descriptions for hashes.
+    /// Resolves an interface, which must be in the folder `folder` (`msg`, `srv` or `action`). Returns it with its
+    /// structures, and the descriptions from which hashes are computed.
     fn resolve(
         &self,
         name: &str,
