@@ -35,8 +35,8 @@ impl Mission {
         doubts
     }
 
-    /// Warns about bindings to classes, attributes or actions that the knowledge base does not
-    /// have.
+    /// Warns about bindings to classes without individuals, to attributes without an estimation or measurement, and to
+    /// unknown actions.
     fn idle_bindings(&self, knowledge: &Knowledge) -> Vec<Message> {
         let (view, catalogue) = (knowledge.view(), knowledge.catalogue());
         let estimated: BTreeSet<&str> = catalogue.designs().iter().flat_map(estimates).collect();
@@ -170,8 +170,8 @@ fn stated(engine: &Engine, iri: &str) -> (Vec<Fact>, Vec<Fact>) {
     facts.partition(|fact| fact.arguments.first() == Some(&symbol))
 }
 
-/// Warns about components without facts of their own, and about components that no design requires. A
-/// component counts as unrequired only if other components are required and no other fact links it.
+/// Warns about components that occur only as values in facts about other individuals, and about components that no
+/// design requires. A component counts as unrequired only if other components are required and no other fact links it.
 fn components(knowledge: &Knowledge) -> Vec<Message> {
     let (engine, view) = (knowledge.engine(), knowledge.view());
     let designs = view.function_designs();

@@ -12,10 +12,11 @@ const MAX_SESSIONS: usize = 16;
 
 const MAX_RANGES: usize = 16;
 
-/// Maximum length of a text in bytes. Longer ids are not stored.
+/// Maximum length of a text in bytes. Ids with longer texts are not stored.
 const MAX_LENGTH: usize = 128;
 
-/// Set of message ids, which errs on the side of forgetting old texts.
+/// Approximate set of message ids. It forgets texts that have not been used for a long time, and also contains the
+/// numbers between merged ranges.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Ids(Vec<Session>);
 

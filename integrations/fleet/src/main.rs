@@ -183,7 +183,7 @@ impl Work {
         }
     }
 
-    /// Serves the endpoints for probes and metrics, unless they are disabled.
+    /// Starts the endpoints for probes and metrics if `--metrics` is given. Returns the health that the probes report.
     async fn open_endpoints(&self) -> Result<Arc<Health>, Errors> {
         let health = Arc::<Health>::default();
         if let Some(address) = self.metrics {

@@ -41,8 +41,7 @@ pub(super) struct Comparison<'c> {
     /// length.
     metric: Option<Linear>,
     timed: bool,
-    /// If there are timed events, a number of which all times of events and all durations are
-    /// multiples.
+    /// If there are timed events, a common divisor of all their times and of all durations.
     unit: BigRational,
 }
 

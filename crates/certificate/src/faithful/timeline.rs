@@ -145,8 +145,7 @@ impl Timeline {
         (!range.is_empty()).then_some(Passage { from, to, at_start, at_end, latest: range.high, end })
     }
 
-    /// Returns the greatest unit of the form 1/n of which the times of events and the given
-    /// durations are multiples.
+    /// Returns the greatest fraction 1/n that divides the times of all events and the given durations.
     pub(super) fn unit<'d>(&'d self, durations: impl Iterator<Item = &'d BigRational>) -> BigRational {
         let times = self.events.iter().map(|event| &event.time);
         let common = times.chain(durations).fold(BigInt::one(), |common, time| common.lcm(time.denom()));

@@ -6,10 +6,9 @@
 //! the knowledge base suggest that the two files do not belong together. The availability of a
 //! design is stated by the problem if the knowledge base has neither the design nor its functions.
 //!
-//! A required function can be solved only by a design that occurs in both the problem and the
-//! knowledge base, or by a design whose availability is stated by the problem. A required function
-//! without such a design is an error, because it makes every plan impossible for a reason that is
-//! not about the robot.
+//! A required function can be solved only by a design that occurs in both the problem and the knowledge base, or by a
+//! design whose availability is stated by the problem. If different names are the reason that a required function has
+//! no such design, this is an error: it makes every plan impossible for a reason that is not about the robot.
 
 use std::collections::BTreeSet;
 
@@ -35,10 +34,9 @@ pub(crate) struct Meeting {
     pub(crate) never_named: NeverNamed,
 }
 
-/// Set if the problem declares designs, all of which the knowledge base has, but not every design of the
-/// knowledge base that solves a function of the problem: the IRI of the first missing one, and the text of the
-/// warning. Designs that the knowledge base lacks cause another warning instead, and required functions
-/// without a design an error.
+/// Warning about designs that the problem omits although it declares other designs: the IRI of the first omitted
+/// design, and the text. Set only if the knowledge base has all designs that the problem declares, and every required
+/// function has a design. Otherwise, another message lists the omitted designs, too.
 pub(crate) type NeverNamed = Option<(String, String)>;
 
 pub(crate) fn meet(

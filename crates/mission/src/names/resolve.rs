@@ -21,9 +21,9 @@ pub(crate) type Resolved = (CalledNames, Vec<Message>);
 /// precedence over patterns.
 ///
 /// # Errors
-/// All malformed entries; entries without a matching individual, without an object, or with an object of
-/// another type; individuals that would have two object names; and objects that several individuals would
-/// share.
+/// All malformed entries; entries without a matching individual; entries without an object, or with an object of
+/// another type (for a pattern: only if this holds for all its individuals); individuals that would have two object
+/// names; and objects that several individuals would share.
 pub(crate) fn resolve(
     domain: &Domain,
     problem: &Problem,

@@ -4,14 +4,16 @@
 //! A domain is plain if it declares no type of function designs. An action that the knowledge base has as
 //! well (`move` as `move` or `a_move`, or by a binding) gets a parameter for the design of each function that
 //! the action requires. It also gets conditions: the design solves the function, is available, and meets the
-//! quality bounds of the action (`t:requiresQuality`). A quality bound with a context applies only in this
-//! context. A numeric function without parameters that is named like an estimated attribute, but is neither
-//! measured nor has an initial value, is replaced by the sum over the chosen designs. So is a function that
-//! is bound to `chosen:ATTRIBUTE`. A function that is bound to `reconfigured:ATTRIBUTE` is replaced by the
-//! sum over the newly chosen designs, i.e. those that replace another design of their function; the first
-//! design of a function is not counted. As in an explicit domain, the planner chooses the designs for these
-//! parameters without grounding them into actions, unless reconfiguration costs make the designs part of the
-//! state.
+//! quality bounds of the action (`t:requiresQuality`). A quality bound with a context, which is a predicate of the
+//! domain, applies only while this predicate holds for the action's parameters.
+//!
+//! A numeric function without parameters that is named like an estimated attribute, but is neither measured nor has an
+//! initial value, is replaced by the sum over the chosen designs. So is a function that is bound to `chosen:ATTRIBUTE`.
+//! A function that is bound to `reconfigured:ATTRIBUTE` is replaced by the sum over the newly chosen designs, i.e.
+//! those that replace another design of their function; the first design of a function is not counted.
+//!
+//! As in an explicit domain, the planner chooses the designs for these parameters without grounding them into actions,
+//! unless reconfiguration costs make the designs part of the state.
 
 mod spoken;
 mod walk;
@@ -61,7 +63,7 @@ struct Needs {
     parameters: usize,
 }
 
-/// A required function, with the attributes that at least one of its designs has an estimate of.
+/// A required function, with the attributes for which at least one of its designs has an estimate.
 #[derive(Debug, Clone)]
 struct Needed {
     name: String,
@@ -159,8 +161,8 @@ impl CoAdaptation {
         errors
     }
 
-    /// Returns the functions of newly chosen designs that an action uses where changes of designs
-    /// cannot be counted.
+    /// Returns the functions bound to `reconfigured:ATTRIBUTE` that an action uses where changes of designs cannot be
+    /// counted, e.g. in a condition.
     fn not_counted(&self, action: &Action) -> BTreeSet<Name> {
         let uncounted = RefCell::new(BTreeSet::new());
         let see = |part: &mut Expression| {
@@ -329,8 +331,8 @@ impl CoAdaptation {
         }
     }
 
-    /// Replaces a function of chosen designs in a leaf expression by the sum of its attribute over
-    /// `designs`. A function of newly chosen designs becomes 0.
+    /// If a leaf expression is a function bound to the chosen designs, replaces it by the sum of the function's
+    /// attribute over `designs`. A function bound to the newly chosen designs becomes 0.
     fn sum(&self, expression: &mut Expression, designs: &[(Identifier, &Needed)]) {
         let Expression::Fluent(fluent) = expression else { return };
         if let Some(attribute) = self.chosen.get(&fluent.predicate.name) {
@@ -343,9 +345,8 @@ impl CoAdaptation {
         }
     }
 
-    /// Appends to `out`, for each `increase` and `decrease` effect that uses functions of newly chosen
-    /// designs, a conditional effect for each design. It adds the design's share if the design replaces
-    /// another one.
+    /// Appends to `out`, for each `increase` and `decrease` effect whose amount contains a sum over the newly chosen
+    /// designs, a conditional effect for each design. It adds the design's share if the design replaces another one.
     fn changes(&self, effect: &Effect, designs: &[(Identifier, &Needed)], out: &mut Vec<Effect>) {
         match effect {
             Effect::And(parts) => parts.iter().for_each(|part| self.changes(part, designs, out)),

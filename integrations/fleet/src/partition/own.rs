@@ -40,7 +40,7 @@ pub(super) struct Partition<S> {
     pub(super) recent: VecDeque<(u64, String)>,
 }
 
-/// Number of undecided events that each robot can have in memory, however many other robots have.
+/// Number of undecided events that each robot can have in memory, regardless of other robots.
 const FEW: usize = 16;
 
 /// Maximum number of events of a robot that are read again at once.
@@ -198,8 +198,8 @@ impl<S: Store> Partition<S> {
         Some(event)
     }
 
-    /// Starts to handle the next queued event of a robot, if the robot is idle. Starts to read more events
-    /// of the robot if the queue lacks some.
+    /// Starts to handle the next queued event of a robot, if the robot is idle. Drops events of a suspended robot, and
+    /// refuses events that a former owner has skipped. Starts to read more events of the robot if the queue lacks some.
     fn begin(&mut self, name: &str) {
         let last_decision = self.seen.1;
         loop {

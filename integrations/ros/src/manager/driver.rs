@@ -32,8 +32,8 @@ const MAX_DELAYED_INPUTS: usize = 100_000;
 
 const SEARCH_TIME: Duration = Duration::from_millis(200);
 
-/// Time after which a task that is requested while functions are missing is refused. SUAVE's
-/// mission node waits for five seconds.
+/// Time after which a task that is requested while functions are missing is refused. SUAVE's mission node waits five
+/// seconds for the reply.
 const TASK_WAIT: Duration = Duration::from_secs(4);
 
 const GRAPH_LOG_PERIOD: Duration = Duration::from_secs(5);
@@ -139,8 +139,9 @@ struct Driver {
 }
 
 impl Driver {
-    /// Waits until the functions are present or `stop` is set, and logs the missing ones periodically.
-    /// Requests to start or end a task wait for at most [`TASK_WAIT`]; a start is then refused.
+    /// Waits until the functions are present or `stop` is set, and logs the missing ones periodically. Then checks the
+    /// designs and passes the current modes of the functions to the state machine. Requests to start or end a task wait
+    /// for at most [`TASK_WAIT`]; a start is then refused.
     fn wait_for_functions(
         &mut self,
         sender: &Sender<Input>,
@@ -252,8 +253,8 @@ impl Driver {
         Ok(())
     }
 
-    /// While the node is inactive, refuses tasks and keeps other inputs. They are handled when the node is
-    /// active, or when [`MAX_DELAYED_INPUTS`] are kept.
+    /// While the node is inactive, refuses requests to start or end a task, and keeps other inputs. The kept inputs are
+    /// handled when the node is active, or when there are [`MAX_DELAYED_INPUTS`].
     fn wait_for_activation(&mut self, inputs: &Receiver<Input>) -> Result<(), Message> {
         let mut delayed = Vec::new();
         while !self.active.load(Ordering::Relaxed) && delayed.len() < MAX_DELAYED_INPUTS {

@@ -296,8 +296,8 @@ impl Lifecycle {
 
     fn change_state(&self, requested: &Transition) -> bool {
         let from = self.phase();
-        // As in rcl_lifecycle, a label is used if there is no id, and every id of a shutdown has
-        // the label of the current state.
+        // As in rcl_lifecycle, a label is used if there is no id. The label `shutdown` has a different id in each
+        // state.
         let is_requested = |phase_change: &&PhaseChange| {
             phase_change.from == from
                 && if requested.id == 0 {

@@ -79,7 +79,8 @@ pub enum CallError {
         /// Value of the option `--rmw` that selects the other mapping.
         other: &'static str,
     },
-    /// The reply is not a message of the service's type, or the request could not be written.
+    /// The reply is not a message of the service's type, the request could not be written, or the client could not be
+    /// created.
     #[error("{service}: {because}")]
     Broken {
         /// Full name of the service.

@@ -201,7 +201,8 @@ impl Machine {
         because
     }
 
-    /// Handles a requested mode that is reported after the timeout of its call.
+    /// Handles a mode that was requested, but is reported only after the timeout of its call: its design is realisable
+    /// again.
     pub(super) fn changed_late(&mut self, function: &str, mode: &str) {
         let designs = self.control.beliefs().mission().designs_of(function);
         let Some(design) = self.settings.functions.design(function, mode, &designs) else { return };

@@ -136,7 +136,7 @@ impl Machine {
         designs.iter().map(|design| self.settings.functions.mode(function, design).to_owned()).collect()
     }
 
-    /// Handles an input at a time since the start. Returns the outputs.
+    /// Handles an input at the time `now` of the adaptation loop. Returns the outputs.
     ///
     /// # Errors
     /// The journal cannot be written. No outputs may then be executed.
