@@ -14,8 +14,8 @@ pub(super) struct RelevanceContext<'k, T: TimeNumber = Int> {
     /// known.
     pub(super) most: &'k [u32],
     pub(super) separation: T,
-    /// Per variable: whether a fact with a value other than 0 may be needed, i.e. the falsity of a
-    /// single atom.
+    /// Per variable: whether a fact with a value other than 0 may be needed. For a variable of a single
+    /// atom, this fact is the falsity of the atom.
     pub(super) needed: &'k [bool],
     /// Polarity of each number, i.e. whether larger or smaller values can help. Numbers beyond the
     /// end of the list have unknown polarity.
