@@ -1,4 +1,4 @@
-//! Anytime planning: prints every improvement, then the verdict (e.g. that the plan is optimal) and the plan
+//! Anytime planning: prints every reported improvement, then the verdict (e.g. that the plan is optimal) and the plan
 //! in the standard format. Without files, a built-in task is planned.
 //!
 //! `cargo run -p metaplan-planner --example anytime -- DOMAIN PROBLEM`

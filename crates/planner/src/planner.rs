@@ -99,8 +99,8 @@ impl<'a> Planner<'a> {
         self
     }
 
-    /// Calls `report` for every better plan and lower bound. If `report` returns `Break`, planning ends with
-    /// the best known plan. `report` is not called if the task is solved in exact rationals (see
+    /// Calls `report` for better plans, and if the SAT solver raises the lower bound. If `report` returns `Break`,
+    /// planning ends with the best known plan. `report` is not called if the task is solved in exact rationals (see
     /// [`Planner::plan`]), if actions can reduce the cost, or if only a part of the metric is minimised.
     #[must_use]
     pub fn on_improvement(mut self, report: impl FnMut(&Improvement) -> ControlFlow<()> + 'a) -> Self {

@@ -282,7 +282,7 @@ fn measures(effect: &ast::Effect) -> bool {
 
 /// Searches for an optimal plan with overlapping actions, until a limit is reached. Among optimal plans it
 /// returns one with the least makespan, if the search proves it and no duration is chosen. Calls `report` for
-/// every improvement.
+/// every better plan, unless only a part of the metric is minimised.
 pub fn optimize_concurrent(
     concurrent: &ConcurrentTask,
     limits: &Limits,
