@@ -54,7 +54,7 @@ impl<'a> Planner<'a> {
     }
 
     /// Sets a time limit, counted from now and including grounding. At the limit, the best known plan is
-    /// returned.
+    /// returned, or during grounding an error.
     #[must_use]
     pub fn time_limit(self, time: Duration) -> Self {
         let limits = self.config.limits.clone().with_time(time);

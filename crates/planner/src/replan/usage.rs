@@ -1,5 +1,5 @@
 //! Usage of the symbols of a domain and problem: which symbols conditions read, which symbols effects change,
-//! and which parameters must be available.
+//! and which parameters need available objects.
 //!
 //! The analysis is syntactic: if a symbol is read anywhere, all its atoms count as read. Only the goal is
 //! more precise: outside quantifiers, it reads just the atoms that it mentions.

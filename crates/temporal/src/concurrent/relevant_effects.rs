@@ -78,7 +78,7 @@ pub(super) fn asked<T: TimeNumber>(task: &Task, instances: &[Instance<T>]) -> Ve
 }
 
 /// Per variable: whether the falsity of its atoms may be needed. `false` only for a variable of a
-/// single atom that occurs positively in conditions and the goal, and neither in axioms nor in
+/// single atom that occurs only positively in conditions and the goal, and neither in axioms nor in
 /// conditions of conditional effects.
 pub(super) fn needed(task: &Task) -> Vec<bool> {
     let mut falsity_needed: Vec<bool> =

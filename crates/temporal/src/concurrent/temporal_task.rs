@@ -45,7 +45,7 @@ impl ConcurrentTask {
 
 #[cfg(test)]
 impl ConcurrentTask {
-    /// The task with times of 128 bits.
+    /// The task with times of 128 bits. Panics if the times are wide.
     pub(super) fn narrow(self) -> TemporalTask {
         let Width::Narrow(task) = self.0 else { panic!("the times are wide") };
         *task
