@@ -58,7 +58,7 @@ type Line = (Point, Point);
 struct Leg {
     from: usize,
     to: usize,
-    /// The numbers of the steps that are these moves, from 1.
+    /// The numbers of the steps that move from `from` to `to`, from 1.
     steps: Vec<usize>,
     names: Vec<String>,
     shape: Shape,

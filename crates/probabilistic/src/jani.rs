@@ -355,7 +355,8 @@ impl Writer<'_> {
     }
 }
 
-/// Converts a rational to JANI: a decimal as a number literal, another fraction as a division.
+/// Converts a rational to JANI: a decimal as a number literal, another fraction as a division. A fraction whose
+/// parts do not fit into 64 bits is rounded.
 fn number(value: &num_rational::BigRational) -> Value {
     let (text, _) = crate::prism::decimal(value);
     text.parse::<serde_json::Number>().map_or_else(

@@ -118,8 +118,8 @@ pub(super) fn solve(
     ReplanOutcome::Optimal { first, steps: decode(context, &plan).steps, metric }
 }
 
-/// Returns the current plan of the query if it is still valid, and otherwise no plan. Used if there is no
-/// time for a search.
+/// Returns the current plan of the query if it is still valid. Otherwise, the outcome is `Unknown`, or `Misfit`
+/// if the task does not support a first step of the query. Used if there is no time for a search.
 pub(super) fn reuse_previous_plan(
     base: &GroundBase,
     task: &Task,

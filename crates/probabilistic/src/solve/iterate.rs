@@ -12,8 +12,8 @@ use crate::solve::quotient::Quotient;
 use crate::solve::users::{Users, owners};
 use crate::solve::work::Work;
 
-/// Upper limit on the number of rounds of policy iteration. If it is reached, the certificate
-/// bounds the error of the last policy.
+/// Upper limit on the number of rounds of policy iteration. If it is reached, the last policy may
+/// not be optimal; in doubles, the certificate bounds its error.
 const MAX_ROUNDS: usize = 1000;
 /// Least and greatest number of improvement sweeps before the chain is solved again, in large
 /// components.

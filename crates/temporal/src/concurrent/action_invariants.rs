@@ -9,8 +9,8 @@ use crate::concurrent::happening::{Happening, Instance, Role};
 use crate::concurrent::simple_temporal_network::Key;
 use crate::concurrent::time_number::TimeNumber;
 
-/// Work limit of an analysis, in visits of operators. Actions that are not analysed before the
-/// limit get no bounds.
+/// Work limit of an analysis, in visits of operators. Nothing is concluded about actions that are
+/// not analysed before the limit.
 pub(super) const MAX_PAIR_CHECKS: usize = 20_000_000;
 
 pub(super) struct Index<'a, T: TimeNumber = Int> {
@@ -21,8 +21,8 @@ pub(super) struct Index<'a, T: TimeNumber = Int> {
     pub(super) marking: FxHashMap<Key, Vec<OperatorId>>,
     setting: Vec<Vec<OperatorId>>,
     changing: FxHashMap<NumericId, Vec<OperatorId>>,
-    /// Atoms and numbers that joint conditions over all read, numbered as in [`Happening::writes`],
-    /// ascending.
+    /// Atoms and numbers that are read by conditions over all of the kind of [`Instance::joint`],
+    /// numbered as in [`Happening::writes`], ascending.
     pub(super) joint: Vec<u32>,
 }
 

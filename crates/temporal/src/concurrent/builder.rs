@@ -248,7 +248,7 @@ impl<'a> Builder<'a> {
     /// Durations that do not depend on the state, and divisors of those that do.
     ///
     /// # Errors
-    /// Fails if a divisor is not positive.
+    /// A divisor is not positive, a duration cannot be computed, or a limit is reached.
     pub(super) fn static_durations(
         &mut self,
         Context { task, limits }: Context<'_>,
@@ -321,7 +321,8 @@ impl<'a> Builder<'a> {
         self.footprints.supposes
     }
 
-    /// Returns the temporal properties of each operator, and the number of access keys.
+    /// Returns the temporal properties of each operator, and the number of access keys. Also sets
+    /// [`Instance::joint`].
     pub(super) fn happenings<T: TimeNumber>(
         mut self,
         context: Context<'_>,

@@ -39,7 +39,7 @@ use crate::concurrent::time_number::TimeNumber;
 /// hash.
 const OVERHEAD: usize = size_of::<Node>() + 80;
 
-/// Noise raises a heuristic value by up to `(NOISE_LEVELS - 1) / NOISE_DIVISOR` of it.
+/// Noise raises a heuristic value by up to `(NOISE_LEVELS - 1) / NOISE_DIVISOR` of the value.
 const NOISE_LEVELS: usize = 8;
 const NOISE_DIVISOR: u64 = 20;
 
@@ -105,8 +105,8 @@ struct Node {
     links: Links,
 }
 
-/// Queue key: whether the state has no novel fact, heuristic value, and lower bound on the
-/// makespan. Smaller keys come first.
+/// Queue key: whether the state has no novel fact (always `false` in the first two queues), heuristic
+/// value, and lower bound on the makespan. Smaller keys come first.
 type Value<T> = (bool, u64, T);
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -128,7 +128,8 @@ pub(super) struct Greedy<'a, T: TimeNumber = Int> {
     nodes: Vec<Node>,
     /// Id and unpacked state of the node that was expanded last.
     latest: Option<(u32, TemporalState<T>)>,
-    /// Least lower bound on the makespan of each visited state, by a hash of the state.
+    /// Lower bound on the makespan of each visited state, by a hash of the state: that of the first
+    /// visit or, in mode `Sooner`, the least one.
     seen: FxHashMap<u64, T>,
     /// Approximate memory use of the nodes in bytes.
     bytes: usize,
@@ -192,7 +193,7 @@ impl<'a, T: TimeNumber> Greedy<'a, T> {
         Self { noise: (seed > 0).then_some(Random(seed)), ..self }
     }
 
-    /// Searches for a plan that is better than the incumbent, within `work` evaluations.
+    /// Searches for a plan that is better than the incumbent. Generates at most `work` successors.
     #[expect(clippy::arithmetic_side_effects, reason = "counted down from what was given")]
     pub(super) fn run(
         &mut self,

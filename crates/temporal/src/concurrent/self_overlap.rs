@@ -321,7 +321,7 @@ impl<T: TimeNumber> Index<'_, T> {
     }
 
     /// Returns `true` if no happening during a run, other than those of `own`, reads or sets the
-    /// variable.
+    /// variable, and no axiom reads it.
     fn is_hidden(
         &self,
         own: &Instance<T>,

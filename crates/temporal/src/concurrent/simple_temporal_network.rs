@@ -236,8 +236,9 @@ impl<T: TimeNumber> SimpleTemporalNetwork<T> {
         Some(next)
     }
 
-    /// Constrains the end of the running action at `position` to keep the distances in `after` from
-    /// earlier accesses. Returns `None` if the network becomes inconsistent.
+    /// Constrains the end of the running action at `position` in `opens` to be far enough behind
+    /// earlier accesses. `after` lists the access kinds that the end must follow, each with the
+    /// required distance. Returns `None` if the network becomes inconsistent.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "sums of fewer than 2^32 times fit, see `TimeNumber::TIME_BITS`"

@@ -64,8 +64,8 @@ pub(super) struct Split {
     pub(super) durations: Vec<FunctionId>,
     /// Per schema of the domain: whether the planner chooses its duration.
     pub(super) chosen: Vec<bool>,
-    /// Per schema of the domain: static divisor of its duration. The duration is the number that
-    /// holds it, divided by this value.
+    /// Per schema of the domain: static divisor of its duration. The duration is the value of the
+    /// duration fluent, divided by this expression. `None` for no division.
     pub(super) divisors: Vec<Option<Expression>>,
     /// Whether the split task keeps every optimal plan. `false` if a duration was fixed although the planner
     /// could choose it, or if durations are chosen and a condition contains a strict comparison.
@@ -217,7 +217,7 @@ fn timed(lifted: &Lifted, index: u32, event: &Event) -> Schema {
             effect(if holds { Change::Add(predicate, terms) } else { Change::Delete(predicate, terms) })
         })
         .collect();
-    // A plan without actions ends at time 0.
+    // A plan without actions ends at time 0, so literals at this time do not extend it.
     if event.time.is_positive() {
         effects.push(effect(Change::Add(lifted.time.waited, Vec::new())));
     }

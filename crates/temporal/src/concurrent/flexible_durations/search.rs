@@ -111,8 +111,8 @@ impl<'a> Search<'a> {
         self.bytes.saturating_add(queued) > limits.room() / 4
     }
 
-    /// Searches for a plan that is better than the incumbent, within `work` evaluations of
-    /// sequences.
+    /// Searches for a plan that is better than the incumbent `best`, which it replaces. Takes at most
+    /// `work` entries from the queues.
     pub(super) fn run(&mut self, best: &mut Option<Answer>, limits: &Limits, work: u64) -> Outcome {
         if self.nodes.is_empty()
             && let Some(outcome) = self.take_up(Course::new(self.concurrent), best)
