@@ -4,7 +4,6 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 
 use num_rational::BigRational;
 use ontology::vocab::local_name;
-use pddl::ast::{InitialElement, Name, Term};
 use pddl::validate::{Advance, advance};
 use rules::{Delta, Fact};
 
@@ -351,11 +350,8 @@ impl BeliefUpdate<'_> {
         let mut words = name.split_whitespace();
         let name = words.by_ref().collect::<Vec<_>>().join(" ");
         if !self.beliefs.mission.is_function(&name) {
-            let predicate = name.split(' ').next().unwrap_or(&name).to_owned();
-            let before = self.facts(&predicate);
-            self.set(&name, value)?;
             // A report of a known fact is not a change.
-            if self.facts(&predicate) != before {
+            if self.set(&name, value)? {
                 self.changes.predicates = true;
                 self.changes.facts = true;
             }
@@ -371,36 +367,23 @@ impl BeliefUpdate<'_> {
         Ok(())
     }
 
-    fn facts(&self, predicate: &str) -> BTreeSet<Vec<String>> {
-        let predicate = Name::new(predicate);
-        let word = |term: &Term| match term {
-            Term::Constant(identifier) | Term::Variable(identifier) => identifier.name.to_string(),
-        };
-        let words = |element: &InitialElement| match element {
-            InitialElement::Fact(atom) if atom.predicate.name == predicate => {
-                Some(atom.arguments.iter().map(word).collect())
-            }
-            _ => None,
-        };
-        self.beliefs.mission.problem().init.iter().filter_map(words).collect()
-    }
-
-    /// Sets a fact or a value of the problem. If the result does not fit the domain, restores the previous state and
-    /// returns a refusal.
-    fn set(&mut self, name: &str, value: &str) -> Result<(), Refusal> {
+    /// Sets a fact or a value of the problem. Returns `true` if this changes the believed state. If the result does
+    /// not fit the domain, restores the previous state and returns a refusal.
+    fn set(&mut self, name: &str, value: &str) -> Result<bool, Refusal> {
         let mission = &mut self.beliefs.mission;
-        let before = mission.problem().init.clone();
-        mission.set_in_problem(name, value).map_err(|message| fault(&message))?;
         let key = if mission.is_function(name) { name.to_owned() } else { format!("{name} {value}") };
-        if self.monitor.checked.contains(&key) {
-            return Ok(());
+        let is_checked = self.monitor.checked.contains(&key);
+        let before = if is_checked { Vec::new() } else { mission.problem().init.clone() };
+        let is_change = mission.set_in_problem(name, value).map_err(|message| fault(&message))?;
+        if is_checked || !is_change {
+            return Ok(is_change);
         }
         if let Err(messages) = mission.filled() {
             mission.set_init(before);
             return Err(first(&messages));
         }
         self.monitor.checked.insert(key);
-        Ok(())
+        Ok(true)
     }
 }
 
