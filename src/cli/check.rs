@@ -67,7 +67,7 @@ pub struct Arguments {
     time: TimeLimit,
 }
 
-/// How tight bounds have to be.
+/// Options for the accuracy of values.
 #[derive(Debug, Args)]
 struct Tightness {
     /// Maximum distance between the bounds on a value, relative to the value unless `--absolute` is given.

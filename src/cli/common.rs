@@ -101,7 +101,7 @@ impl Common {
     }
 }
 
-/// How answers are written.
+/// Format of answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum Format {
     /// Text for people.

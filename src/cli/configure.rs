@@ -41,7 +41,7 @@ pub struct Arguments {
     wanted: Wanted,
 }
 
-/// What is to be served, and what that is worth.
+/// Options for the required functions and the value of designs.
 #[derive(Debug, Clone, Default, Args)]
 pub(super) struct Wanted {
     /// A required function (repeatable). Default: the objectives of the knowledge base, or all its
@@ -109,10 +109,17 @@ impl Wanted {
         };
         for (function, ..) in &self.requirements {
             if !functions.contains(function) {
-                let text = format!(
-                    "`--require {function}.…` is about no objective; there are: {}",
-                    functions.join(", ")
-                );
+                let text = if functions.is_empty() {
+                    format!(
+                        "`--require {function}.…` needs `--objective {function}`; objectives of the knowledge base have \
+                         the requirements that it states"
+                    )
+                } else {
+                    format!(
+                        "`--require {function}.…` is about no objective; there are: {}",
+                        functions.join(", ")
+                    )
+                };
                 wrong.push(Message::error("M107", text));
             }
         }

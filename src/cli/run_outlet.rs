@@ -21,7 +21,7 @@ use serde::Serialize;
 use crate::cli::common::Common;
 use crate::cli::output;
 
-/// Where the run goes besides standard output.
+/// Options for outputs other than standard output.
 #[derive(Debug, Args)]
 pub(super) struct Outlets {
     /// Record events and answers to a new MCAP file.

@@ -42,7 +42,7 @@ pub(super) struct Situation {
     fail: Vec<String>,
 }
 
-/// Where imports are looked for; never the network.
+/// Options for the locations of imports, which are never read from the network.
 #[derive(Debug, Clone, Args)]
 pub(super) struct Imports {
     /// An OASIS XML catalog with the locations of imports (repeatable).

@@ -33,8 +33,8 @@ use crate::mission::Mission;
 /// Limit on reasoning steps per update of the knowledge base; see [`rules::Limits`]. The robot waits during reasoning.
 const MAX_REASONING_STEPS: u64 = 100_000_000;
 
-/// Number of names and values interned since the start above which the knowledge base is rebuilt. The rebuilt knowledge
-/// base lacks those that are not used any more.
+/// Number of names and values interned since the start, or since the knowledge base was rebuilt, above which it is
+/// rebuilt. The rebuilt knowledge base lacks those that are not used any more.
 const MAX_GROWTH: usize = 1024;
 
 /// A line is refused if its own time is later than the clock and also later than the previous line's time, both by more
@@ -95,6 +95,8 @@ pub struct Loop {
     /// Number of changes of the planning problem since the start, which identifies the current problem.
     pub(super) question: u64,
     digest: String,
+    /// Growth of the knowledge base directly after it was last rebuilt: the new names and values that are in use.
+    rebuilt_growth: usize,
 }
 
 impl Loop {
@@ -122,7 +124,7 @@ impl Loop {
             beliefs.available = available(base);
         }
         let agenda = Some(Agenda { is_start: true, ..Agenda::default() });
-        Ok(Self { settings, beliefs, monitor, planner, agenda, question: 0, digest })
+        Ok(Self { settings, beliefs, monitor, planner, agenda, question: 0, digest, rebuilt_growth: 0 })
     }
 
     /// Returns the settings of the loop.
@@ -342,10 +344,12 @@ impl Loop {
 
     fn compact_knowledge(&mut self) {
         let growth = self.beliefs.mission.knowledge().map_or(0, Knowledge::growth);
-        let Some(base) = self.beliefs.mission.knowledge_mut().filter(|_| growth > MAX_GROWTH) else { return };
+        let is_due = growth > self.rebuilt_growth + MAX_GROWTH;
+        let Some(base) = self.beliefs.mission.knowledge_mut().filter(|_| is_due) else { return };
         let statements = base.statements();
         // The statements were consistent and within the budget before, so that restoring them succeeds.
         let _ = base.restore(&statements);
+        self.rebuilt_growth = base.growth();
     }
 }
 
