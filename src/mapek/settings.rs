@@ -88,10 +88,11 @@ struct Section {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum SafeReaction {
-    /// Other available designs if what is left of the action can be done with them; a standstill otherwise.
+    /// Request other available designs with which the rest of the action can be executed. Without such designs,
+    /// suspend the action.
     #[default]
     Reconfigure,
-    /// A standstill.
+    /// Suspend the action.
     Suspend,
 }
 

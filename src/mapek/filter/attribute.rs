@@ -50,7 +50,7 @@ pub enum Stale {
     Keep,
     /// The measurement is withdrawn. The shipped rules do not violate a requirement without a measurement.
     Unknown,
-    /// The value with which the fewest designs can be used.
+    /// The value that satisfies the fewest bounds of designs.
     #[default]
     Worst,
 }

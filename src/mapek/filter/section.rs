@@ -76,7 +76,7 @@ pub struct MeasuredSection {
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     period: Number,
-    /// Value of a silent sensor: `worst` (the value with which the fewest designs can be used), `keep`
+    /// Value of a silent sensor: `worst` (the value that satisfies the fewest bounds of designs), `keep`
     /// (the last value), `unknown` (no value, which violates no requirement).
     #[serde(default)]
     stale: Stale,
