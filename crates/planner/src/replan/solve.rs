@@ -118,8 +118,9 @@ pub(super) fn solve(
     ReplanOutcome::Optimal { first, steps: decode(context, &plan).steps, metric }
 }
 
-/// Returns the current plan of the query if it is still valid. Otherwise, the outcome is `Unknown`, or `Misfit`
-/// if the task does not support a first step of the query. Used if there is no time for a search.
+/// Returns `Misfit` if the task cannot represent one of the query's first steps. Otherwise returns the current
+/// plan of the query after the best first step with which it is still valid, or `Unknown` if there is none.
+/// Used if there is no time for a search.
 pub(super) fn reuse_previous_plan(
     base: &GroundBase,
     task: &Task,

@@ -244,8 +244,9 @@ impl Machine {
         format!("{function} answers again")
     }
 
-    /// Retries designs whose delay is over, and requests the modes of contradicted grants whose period is
-    /// over. Passes a due tick to the loop in the state EXECUTE.
+    /// Reports designs as realisable again once their retry delay is over. Forgets granted modes once their
+    /// period is over; if another mode was reported in the meantime, asks for the current mode of the function.
+    /// In the state EXECUTE, also passes a due tick to the loop.
     pub(super) fn tick(&mut self) -> String {
         let now = self.now;
         let mut back = Vec::new();
