@@ -23,8 +23,8 @@ use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::encode::interference::Interference;
 use crate::sat::Lit;
 
-/// Maximum number of different accumulated amounts in the order encoding. Beyond it, the sum is
-/// encoded by binary addition.
+/// Maximum number of different accumulated amounts in the order encoding. Beyond it, or if a source
+/// requires more than 50 times as many additions of amounts, the sum is encoded by binary addition.
 const AMOUNT_LIMIT: usize = 1_000;
 
 /// Cost limit of an encoding: only plans with a cost of at most `limit` are admitted. With

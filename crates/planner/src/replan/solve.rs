@@ -166,8 +166,8 @@ impl Candidate {
     }
 }
 
-/// Returns the possible beginnings of plans. Returns `None` if the task does not support a first step of the
-/// query.
+/// Returns the possible beginnings of plans. Returns `None` if the task cannot represent one of the query's
+/// first steps.
 fn starts(base: &GroundBase, situation: &ReplanState, query: &Query<'_>) -> Option<Vec<Start>> {
     let sign = |metric: &BigRational| if base.task.objective.maximize { -metric } else { metric.clone() };
     if query.first.is_empty() {

@@ -59,8 +59,8 @@ pub(super) struct SimpleTemporalNetwork<T: TimeNumber = Int> {
     /// Running actions, sorted by instance. Runs of one instance are in the order of their starts,
     /// which is also the order of their ends.
     opens: Vec<RunningAction<T>>,
-    /// Time point and offset at which all further happenings take place until every condition over
-    /// all holds again. `None` if all these conditions hold.
+    /// Time point and offset at which all further happenings take place until every over-all
+    /// condition holds again. `None` if all these conditions hold.
     group: Option<(TimePoint, T)>,
     /// Time of the last happening; negative before the first one.
     latest: TimeExpression<T>,
@@ -110,7 +110,7 @@ impl<T: TimeNumber> SimpleTemporalNetwork<T> {
         &self.opens
     }
 
-    /// Returns `true` if some condition over all is violated, so that another happening must follow
+    /// Returns `true` if some over-all condition is violated, so that another happening must follow
     /// at the same time.
     pub(super) fn unsettled(&self) -> bool {
         self.group.is_some()

@@ -8,11 +8,11 @@ use serde_json::json;
 use crate::manager::machine::Machine;
 use crate::manager::machine::io::{Change, Outcome, Output, State};
 
-/// Number of attempts of a call without a reply.
+/// Maximum number of attempts of a call without a reply. A change that consists of steps gets one attempt.
 const MAX_ATTEMPTS: u32 = 2;
 
 /// Half of the delay before the first probe of a function without a reply. The delay is doubled with each
-/// further missed reply.
+/// further change without a reply, up to [`MAX_PROBE_DELAY`].
 const INITIAL_PROBE_DELAY: Duration = Duration::from_secs(1);
 
 const MAX_PROBE_DELAY: Duration = Duration::from_secs(60);
