@@ -119,8 +119,8 @@ pub(super) fn solve(
 }
 
 /// Returns `Misfit` if the task cannot represent one of the query's first steps. Otherwise returns the current
-/// plan of the query after the best first step with which it is still valid, or `Unknown` if there is none.
-/// Used if there is no time for a search.
+/// plan of the query after the best first step with which it is still valid, or `Unknown` if it is valid
+/// with no first step. Used if there is no time for a search.
 pub(super) fn reuse_previous_plan(
     base: &GroundBase,
     task: &Task,
