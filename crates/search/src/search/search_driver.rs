@@ -5,9 +5,10 @@
 //!
 //! In `search`, A\* with pattern databases runs first. If it finds no plan soon, a greedy best-first search
 //! looks for some plan. Then two A\* searches alternate: one uses only pattern databases, the other also
-//! LM-cut. The LM-cut search first gets a quarter of the other's work, and later the same work. Then a search
-//! whose lower bound lags behind that of the other gets only half of its work. The result of the search that
-//! finishes first is returned. Work is counted in units instead of time, so the result is deterministic.
+//! LM-cut. The LM-cut search first gets a quarter of the other's work, and later the same work. A search gets
+//! only half of its work if its lower bound lags behind that of the other, or if its memory may not suffice.
+//! The result of the search that finishes first is returned. Work is counted in units instead of time, so the
+//! result is deterministic.
 
 use std::sync::Arc;
 
