@@ -116,8 +116,8 @@ fn nothing_to_show() -> Message {
     Message::error("M130", "a limit was reached before there was anything to show")
 }
 
-/// Limits with a margin. If a command reaches them after it has read its input, and shows no answer, it is
-/// ended.
+/// The time and memory limits plus a margin. The program is ended if it reaches them after reading its input and has
+/// not begun to print an answer.
 struct Deadline {
     started: Instant,
     time: Option<Duration>,

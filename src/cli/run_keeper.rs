@@ -96,7 +96,8 @@ impl<'a> KeeperSession<'a> {
         Some(due.saturating_sub(self.begun + self.clock.now()).max(MIN_PAUSE))
     }
 
-    /// Reacts to the passing of time, if a filter is due. The answers have the number of the last line.
+    /// Handles the due time of a filter, if it has passed. The answers are written with the number of the last input
+    /// line, because time has no line of its own.
     fn elapse(&mut self) -> Result<Flow, Failure> {
         let now = self.begun + self.clock.now();
         if self.keeper.due().is_none_or(|due| due > now) {

@@ -233,7 +233,7 @@ impl<N: Number> Process<N> {
         if !self.risk.battery {
             return Some(0);
         }
-        // Actions without energy stay possible below the reserve.
+        // Actions that need no energy stay possible below the reserve.
         battery.checked_sub(levels).filter(|remaining| *remaining >= self.reserve || levels == 0)
     }
 }

@@ -128,8 +128,7 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
             altered(knowledge, [alteration]).is_some_and(|knowledge| !is_available(&knowledge, design))
         };
         let candidates = candidates(knowledge, design).into_iter();
-        // Lists those alterations of the design's components and measurements each of which makes it
-        // unavailable.
+        // Each listed alteration of a component or a measurement makes the design unavailable by itself.
         availability.ways = candidates.filter(loses).map(|alteration| vec![alteration]).collect();
         return availability;
     }

@@ -195,7 +195,7 @@ fn segment(bytes: &[u8], number: u64) -> Result<Segment, String> {
         let whole = line.strip_suffix(b"\n");
         let mut read = segment.after.read(whole.unwrap_or(line));
         if read.is_none() && whole.is_none() {
-            // The last character is damaged: it should be a line break.
+            // Perhaps only the line break is damaged. Then the line without its last byte is a valid record.
             read = line.split_last().and_then(|(_, rest)| segment.after.read(rest));
         }
         match (read, whole) {

@@ -51,7 +51,8 @@ pub fn spaced(mission: &Mission, problem: &Problem, plan: Plan, reading: &Readin
     if verdict.is_ok_and(|verdict| verdict.violation.is_none()) { later } else { plan }
 }
 
-/// Converts a plan to lines for PlanSys2. The plan's arguments must be as in the domain's file.
+/// Converts a plan to lines for PlanSys2; a duration of 0 becomes a thousandth. The plan's arguments must be those of
+/// the domain's file, without the designs that the knowledge base has added.
 pub fn plan_lines(plan: &Plan) -> Vec<PlanLine> {
     let line = |step: &Step| {
         let (start, duration) = step.times();

@@ -8,8 +8,8 @@
 //!   \[1\];
 //! - *greedy* chooses the design of each function separately: the admissible design with the lowest
 //!   cost of the next action. It chooses at each request of an action, and when a running action
-//!   loses a design. MROS chooses similarly: the design of greatest utility among those that fulfil
-//!   the requirements \[2\]. The task is planned again when an action has failed;
+//!   loses a design. MROS chooses similarly: the design of greatest utility among those that no
+//!   failure or measurement excludes \[2\]. The task is planned again when an action has failed;
 //! - *random* works as *greedy*, but chooses a random admissible design.
 //!
 //! All baselines except *none* also plan again if no step is left, the goal is not reached, and other designs are

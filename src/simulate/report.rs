@@ -22,7 +22,8 @@ pub enum Ending {
     GaveUp,
 }
 
-/// Writes a phrase for several missions with this ending, such as "lost the robot".
+/// Writes the ending as a verb phrase that can follow a number of missions, such as "lost the robot" in
+/// "2 lost the robot".
 impl fmt::Display for Ending {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {

@@ -47,7 +47,8 @@ pub struct Planner<'a> {
 }
 
 impl<'a> Planner<'a> {
-    /// Creates a planner with default options, without limits and without a callback.
+    /// Creates a planner with default options, without a time limit and without a callback. The memory limit of
+    /// searches is 2 GiB.
     pub fn new(domain: &'a Domain, problem: &'a Problem) -> Self {
         let (grounding, config) = (GroundConfig::default(), Config::default());
         Self { domain, problem, grounding, config, report: Box::new(|_| ControlFlow::Continue(())) }

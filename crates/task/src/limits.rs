@@ -85,7 +85,8 @@ impl Limits {
         self
     }
 
-    /// Sets the task sizes from which optional parts of the search are used.
+    /// Sets the thresholds (numbers of states, nodes or labels, or amounts of work) at which searches switch
+    /// optional parts on or off.
     #[doc(hidden)]
     #[must_use]
     pub fn with_thresholds(mut self, thresholds: Thresholds) -> Self {
@@ -93,7 +94,8 @@ impl Limits {
         self
     }
 
-    /// Returns the task sizes from which optional parts of the search are used.
+    /// Returns the thresholds (numbers of states, nodes or labels, or amounts of work) at which searches switch
+    /// optional parts on or off.
     pub fn thresholds(&self) -> &Thresholds {
         &self.thresholds
     }

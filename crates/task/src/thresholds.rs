@@ -1,8 +1,8 @@
-//! Task sizes from which optional parts of a search are used.
+//! Thresholds at which optional parts of a search are switched on or off.
 
-/// Sizes from which optional parts of the search are used. They affect the running time, not the correctness of
-/// the answers. Tests lower the sizes, so that small tasks, whose answers are known by brute force, exercise
-/// every pruning.
+/// Thresholds at which optional parts of a search are switched on or off: numbers of states, nodes or labels, or
+/// amounts of work. They affect the running time, not the correctness of the answers. Tests use other thresholds
+/// ([`Thresholds::NONE`]), so that small tasks, whose answers are known by brute force, exercise every pruning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Thresholds {
@@ -58,7 +58,8 @@ impl Default for Thresholds {
 }
 
 impl Thresholds {
-    /// Thresholds with which all parts are used from the start, and stubborn sets are never disabled.
+    /// Thresholds with which all optional parts of the search are used from the start, times are always the wider
+    /// integers, and stubborn sets are never disabled.
     pub const NONE: Self = Self {
         states: 0,
         progress: 0,

@@ -1,7 +1,7 @@
 //! Clauses for derived variables: the least fixpoint of their rules, by completion and level
 //! constraints.
 //!
-//! - body: `b@t ↔ ⋀ l@t` for the body b of each rule;
+//! - body: `b@t ↔ ⋀ l@t` for the body b of each rule, with the literals l, in the state before step t;
 //! - completion: `h@t ↔ ⋁ b@t` over the bodies b of the rules with head h \[1\];
 //! - levels: in a layer of variables that depend on each other, a true `h@t` needs a supporting rule s whose
 //!   body variables a from this layer are derived in earlier rounds: `h@t → ⋁ s@t`, `s@t → b@t`, and

@@ -1,8 +1,8 @@
 //! Formula under construction, to which the families of clauses are added.
 //!
-//! A group of operators has one variable, which is true at a step if one of its members is
-//! executed: `o@t → g@t` for each member, and `g@t → ⋁ o@t`. With groups, clauses about designs,
-//! costs and consumption do not have to be repeated for each operator.
+//! A group g of operators has one variable `g@t` per step t, which is true if one of the group's
+//! members o is executed at the step (`o@t`): `o@t → g@t` for each member, and `g@t → ⋁ o@t`. With
+//! groups, clauses about designs, costs and consumption do not have to be repeated for each operator.
 
 use std::collections::BTreeMap;
 

@@ -8,6 +8,11 @@
 //! variable. So the formula grows with the sum of the numbers of designs, not with their product.
 //! Each family of clauses has a file.
 //!
+//! The heads of these files state the clauses symbolically. `o@t` means that operator o is executed at step
+//! t; `v=d@t` that variable v has the value d in the state before step t, so the effects of step t are true
+//! at t+1; `slot=d@t` that design d is selected for the slot at step t. Facts (p, e) and literals (l) are
+//! also about the state before the step.
+//!
 //! \[1\] H. Kautz, B. Selman: Pushing the envelope: planning, propositional logic and stochastic
 //! search, AAAI 1996.
 

@@ -187,7 +187,7 @@ impl Solver for Varisat {
 enum Part {
     /// The code of a step is next.
     Code,
-    /// The length of a list is next. Its items have `each` numbers; `and_list` is `true` if another
+    /// The length of a list is next. Each item consists of `each` numbers; `and_list` is `true` if another
     /// list follows.
     Length { each: u64, and_list: bool },
     /// The numbers of a list are next: `left` of them remain. `and_list` is `true` if another list

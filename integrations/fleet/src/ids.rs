@@ -86,7 +86,7 @@ fn add(ranges: &mut Vec<(u64, u64)>, number: u64) {
         return;
     }
     ranges.insert(position, (number, number));
-    // A number with a greater one behind it is below 10^19, so that its successor exists.
+    // If a range follows, `number` is less than its first number, so `number + 1` cannot overflow.
     if ranges.get(position + 1).is_some_and(|(first, _)| *first == number + 1) {
         ranges[position].1 = ranges.remove(position + 1).1;
     }

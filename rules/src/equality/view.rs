@@ -1,4 +1,5 @@
-//! Facts of an engine under equality, about all names of each individual.
+//! Queries about facts with any names of individuals. The engine stores each fact only with the representatives
+//! of the equality classes.
 
 use smallvec::SmallVec;
 

@@ -61,8 +61,9 @@ fn group(body: &[Atom], position: usize) -> Vec<Term> {
 }
 
 impl Matcher<'_> {
-    /// Returns the matches of a rule's body: all of them, unless [`Matcher::too_many`] is set because there
-    /// are more than [`MATCH_LIMIT`]. The values are first names of individuals.
+    /// Returns the matches of a rule's body. If [`Matcher::too_many`] is set, matches may be missing, because the
+    /// enumeration was stopped at [`MATCH_LIMIT`]. An individual with several names is represented by its
+    /// smallest name ([`Names::find`]).
     pub fn matches_of(&mut self, rule: &Rule) -> Vec<Values> {
         let mut matches = Vec::new();
         let open: Vec<usize> = (0..rule.body.len()).collect();

@@ -42,8 +42,9 @@ pub(super) struct Timeline {
     pub(super) begun: usize,
 }
 
-/// The position of an action relative to the events: the phases of its start (`from`) and its end
-/// (`to`).
+/// The position of an action relative to the events: the phases (periods between events) in which it
+/// starts (`from`) and ends (`to`), whether start and end coincide with an event, and the times that
+/// this permits.
 #[derive(Debug, Clone)]
 pub(super) struct Passage {
     from: usize,

@@ -116,7 +116,7 @@ pub enum Cause {
         limit: usize,
     },
     /// It is not proved that at most one atom of a variable holds after an instance, or the
-    /// comparison of the instance's effects needs too many case splits.
+    /// comparison of the instance's effects would have to examine too many partial states.
     #[error(
         "cannot tell whether the ground task stands for the files: it takes at most one of {atoms} to hold, and neither \
          {instance} nor the witness by itself shows that this stays so; no difference was found"

@@ -169,7 +169,7 @@ impl<'a> Resolving<'a> {
         let types: Vec<&str> = types.map(|r#type| r#type.name.as_str()).collect();
         let object_types: Vec<&str> =
             object.r#type.alternatives.iter().map(|alternative| alternative.name.as_str()).collect();
-        // PDDL types an object without a type as `object`.
+        // In PDDL, an object without a type has the type `object`.
         let object_types = if object_types.is_empty() { vec!["object"] } else { object_types };
         Err(format!(
             "`{name}` is of type {}, but `{}` is a {}; an object of type {} would be right",

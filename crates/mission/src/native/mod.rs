@@ -42,7 +42,7 @@ const AT_WORK: &str = "fd_at_work";
 /// Predicate `(p FUNCTION)`: a design has been chosen for the function.
 const CONFIGURED: &str = "f_configured";
 
-/// Additions of a knowledge base to the actions of a plain domain.
+/// Additions of a knowledge base to the actions of a plain domain (see the head of this file).
 #[derive(Debug, Clone)]
 pub struct CoAdaptation {
     /// Requirements of each action, by the name of its schema.
@@ -54,8 +54,8 @@ pub struct CoAdaptation {
     changed: BTreeMap<Name, String>,
 }
 
-/// Required functions and quality bounds of an action, and the number of its parameters in the
-/// plain domain.
+/// Required functions and quality bounds of an action, and the number of its parameters before those
+/// for designs are added.
 #[derive(Debug, Clone)]
 struct Needs {
     functions: Vec<Needed>,

@@ -172,7 +172,9 @@ impl<N: Number> Run<'_, N> {
                 return;
             }
             if is_one {
-                // The remaining states cannot reach an exit that is sure to reach a terminal state.
+                // The probabilities of the states with a value in `best` are known to be 1. Only the other
+                // states are solved below: they cannot reach an exit from which a terminal state is
+                // reached with probability 1.
                 buffers.exits.retain(|(from, ..)| buffers.best[*from as usize].is_none());
                 buffers.steps.retain(|step| buffers.best[step.from as usize].is_none());
             }

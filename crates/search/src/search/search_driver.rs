@@ -1,13 +1,14 @@
 //! Scheduling of searches: a first plan, an optimal plan, and the closed states that prove its optimality.
 //!
-//! `search` alternates several searches; `search_states` and `search_from` run a single A\* search, and a
-//! greedy search if it finds no plan soon.
+//! `search` alternates several searches; `search_states` and `search_from` run a single A\* search. If it
+//! finds no plan soon and has no cost limit, a greedy search provides an upper bound.
 //!
 //! In `search`, A\* with pattern databases runs first. If it finds no plan soon, a greedy best-first search
 //! looks for some plan. Then two A\* searches alternate: one uses only pattern databases, the other also
-//! LM-cut. The LM-cut search gets a quarter of the work of the other one at first, and then as much. A search
-//! that lags behind gets half. The result of the search that finishes first is returned. Work is counted in
-//! units instead of time, so the result is deterministic.
+//! LM-cut. The LM-cut search first gets a quarter of the other's work, and later the same work. A search gets
+//! only half of its work if its lower bound lags behind that of the other, or if its memory may not suffice.
+//! The result of the search that finishes first is returned. Work is counted in units instead of time, so the
+//! result is deterministic.
 
 use std::sync::Arc;
 

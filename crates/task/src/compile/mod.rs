@@ -39,7 +39,8 @@ pub use semantics::PlanSemantics;
 use syntax_edits::unsupported;
 use trajectory_monitors::Monitors;
 
-/// A task whose preferences and trajectory constraints have been compiled away.
+/// A task whose preferences and trajectory constraints have been compiled away, except deadlines
+/// (`always-within`), which are checked on plans.
 pub struct CompiledTask<'t> {
     pub domain: Cow<'t, Domain>,
     pub problem: Cow<'t, Problem>,

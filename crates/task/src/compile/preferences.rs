@@ -27,8 +27,8 @@ const GOING_ON: &str = "the plan goes on";
 
 pub(super) const VIOLATION: &str = " is violated";
 
-/// Auxiliary atom that is never true. Hidden actions that are never executed add it, because actions without
-/// effects would be pruned.
+/// Atom that the hidden actions add, because actions without effects would be pruned. It is never true, because
+/// these actions are never executed: only their preconditions are evaluated.
 const VIOLATED: &str = "a preference is violated";
 
 pub(super) fn count(preference: &Name) -> Atom {

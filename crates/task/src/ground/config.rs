@@ -1,11 +1,13 @@
-//! Configuration of grounding: the roles of the domain's predicates, objectives, limits, and generality beyond
-//! the given problem.
+//! Configuration of grounding: the predicates that state which design solves which function, the objectives and
+//! the limits. Also requirements on the ground task beyond the given problem, for example that it stays valid
+//! for other initial values.
 
 use crate::limits::Limits;
 use crate::number::Int;
 use pddl::ast::{Metric, Name};
 
-/// Configuration of grounding: the roles of predicates, the objectives and the limits.
+/// Configuration of grounding: the predicates that state which design solves which function, the objectives and
+/// the limits.
 #[derive(Debug, Clone)]
 pub struct GroundConfig {
     /// Predicates `(p DESIGN FUNCTION)` that state which design solves which function.

@@ -130,8 +130,9 @@ fn substitute(condition: &mut GroundCondition, known: &FxHashMap<AtomId, bool>) 
     condition.tidy()
 }
 
-/// Maps each non-recursive derived atom with exactly one rule to the rule's body. Atoms in the body that also
-/// have a single rule are already inlined. Atoms whose body contradicts itself are omitted.
+/// Maps each non-recursive derived atom with exactly one rule to the rule's body. Such atoms in the body are
+/// already inlined where [`inline`] can replace them (a negative literal is replaced only by a literal). Atoms
+/// whose body contradicts itself are omitted.
 #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
 fn single_bodies(
     axioms: &[GroundAxiom],

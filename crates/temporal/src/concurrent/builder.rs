@@ -63,7 +63,7 @@ pub(super) struct Builder<'a> {
     joined: Vec<(OperatorId, [Footprint; 2])>,
     instances: FxHashMap<InstanceKey, Halves>,
     order: Vec<InstanceKey>,
-    /// Schemas of the domain whose condition over all can change.
+    /// Schemas of the domain whose over-all condition can change.
     held: FxHashSet<usize>,
 }
 
@@ -81,7 +81,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Groups the starts, ends and conditions over all of instances, and collects the write sets of
+    /// Groups the starts, ends and over-all conditions of instances, and collects the write sets of
     /// all operators.
     pub(super) fn collect(&mut self, context: Context<'_>) -> Result<(), Errors> {
         let Context { task, limits } = context;
@@ -183,7 +183,7 @@ impl<'a> Builder<'a> {
         });
         for pair in limits.watch(pairs) {
             let (key, start, over_all, end) = pair?;
-            // Without this operator, the condition over all is unreachable.
+            // Without this operator, the over-all condition is unreachable.
             if self.held.contains(&key.0) && over_all.is_none() {
                 continue;
             }
@@ -357,7 +357,7 @@ impl<'a> Builder<'a> {
         Ok((happenings, keys.len()))
     }
 
-    /// Reads of an operator when it happens, and reads of its condition over all. Returns `None` if
+    /// Reads of an operator when it happens, and reads of its over-all condition. Returns `None` if
     /// the operator never happens or is a timed initial literal.
     fn reads(&self, task: &Task, id: OperatorId, role: Role) -> Option<(Reads, Reads)> {
         let operator = &task.operators[id.index()];
@@ -392,7 +392,7 @@ fn timer(task: &Task, id: OperatorId) -> Option<NumericId> {
     })
 }
 
-/// Adds the interference constraints of conditions over all (with the reads `over_all`) and of
+/// Adds the interference constraints of over-all conditions (with the reads `over_all`) and of
 /// designs to a happening. Also sets [`Instance::joint`].
 fn join<T: TimeNumber>(
     happening: &mut Happening<T>,

@@ -131,7 +131,7 @@ fn bound<T: TimeNumber>(
 }
 
 /// Copy of the split task without costs, in which ends also require the facts and clauses (not the
-/// comparisons) of the conditions over all: these hold at some time before the end, because the
+/// comparisons) of the over-all conditions: these hold at some time before the end, because the
 /// duration is positive.
 fn without_costs<T: TimeNumber>(concurrent: &TemporalTask<T>) -> Task {
     let mut task = concurrent.task.clone();

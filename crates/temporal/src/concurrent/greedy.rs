@@ -56,7 +56,7 @@ pub(super) enum Mode {
     /// Starts and ends are separate successors.
     Overlapping,
     /// Like `Overlapping`, with two additions. A state reached again with a smaller lower bound on
-    /// the makespan is expanded again. Successors in which a condition over all is violated until a
+    /// the makespan is expanded again. Successors in which an over-all condition is violated until a
     /// simultaneous happening repairs it are kept.
     Sooner,
 }
@@ -64,7 +64,7 @@ pub(super) enum Mode {
 impl Mode {
     /// Returns the successor by a happening, after applying timed initial literals that must precede it.
     /// Appends all applied happenings to `links`. Returns `None` if the happening is not applicable or,
-    /// except in mode `Sooner`, leaves a condition over all violated.
+    /// except in mode `Sooner`, leaves an over-all condition violated.
     pub(super) fn apply_happening<T: TimeNumber>(
         self,
         concurrent: &TemporalTask<T>,
@@ -78,7 +78,7 @@ impl Mode {
             let before = waited.as_ref().unwrap_or(situation);
             let together = before.clocks.unsettled();
             match expansion.after(before, operator, false) {
-                // Another simultaneous happening rarely repairs a violated condition over all.
+                // Another simultaneous happening rarely repairs a violated over-all condition.
                 Ok((situation, _)) if situation.clocks.unsettled() && self != Self::Sooner => return None,
                 Ok((situation, compressed)) => {
                     links.push((operator, together));

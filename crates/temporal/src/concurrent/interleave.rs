@@ -79,8 +79,8 @@ pub(super) fn interleave_searches<T: TimeNumber>(
             break;
         }
         if is_stuck {
-            // No search has memory left. Until the deadline, the searches that need little memory
-            // begin again, in other orders and with the incumbent as upper bound.
+            // The exact search has used up its memory, and the other searches have ended. Until the
+            // deadline, the others begin again, in other orders and with the incumbent as upper bound.
             let restarts = &mut record.statistics.restarts;
             *restarts = restarts.saturating_add(1);
             seed = *restarts as u64;
@@ -126,7 +126,8 @@ pub(super) fn interleave_searches<T: TimeNumber>(
     (claimed(search_end, (concurrent, &exact), root), exact.incumbent)
 }
 
-/// Resumes a greedy search, from each improved plan to the next.
+/// Resumes a greedy search, again after each better plan, until it generates `work` successors without
+/// finding one or has ended. Each better plan is reported and becomes the incumbent.
 fn pursue<T: TimeNumber>(
     greedy: &mut Greedy<'_, T>,
     exact: &mut Search<'_, T>,
@@ -147,8 +148,8 @@ fn pursue<T: TimeNumber>(
     }
 }
 
-/// Resumes the search over goal orders, from each improved plan to the next. Removes it when it has
-/// ended.
+/// Resumes the search over goal orders for `work` work units. Each better plan is reported and becomes
+/// the incumbent. Sets `orders` to `None` once the search has ended.
 fn improve<T: TimeNumber>(
     orders: &mut Option<GoalOrders<'_, T>>,
     exact: &mut Search<'_, T>,

@@ -151,7 +151,7 @@ pub(super) struct SequentialPlanner<'w> {
 }
 
 enum Exact<'w> {
-    /// Not begun yet, because computing the heuristics may take longer than finding a plan.
+    /// The search begins later, because computing the heuristics may take longer than finding a plan.
     Later,
     Begun(Box<InterleavedSearch<'w, Int, Bounds>>),
     Over,

@@ -1,9 +1,9 @@
 //! Splits durative actions into starts and ends: a lifted task in which each schema is a single happening.
 //!
 //! A durative action becomes two instantaneous operators, the *snap actions* of Fox and Long \[1\].
-//! An atom that holds while the action runs links both. The condition over all becomes a third
+//! An atom that holds while the action runs links both. The over-all condition becomes a third
 //! schema that never happens; the search checks its condition while the action runs. An action of
-//! duration 0 is one happening without a condition over all. Timed initial literals become a
+//! duration 0 is one happening without an over-all condition. Timed initial literals become a
 //! sequence of schemas without parameters.
 //!
 //! \[1\] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 8.
@@ -24,7 +24,7 @@ use pddl::ast::{Comparison, Name, Span};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Half {
     Start,
-    /// The condition over all; no happening.
+    /// The over-all condition; no happening.
     OverAll,
     End,
     /// The whole action: instantaneous or of duration 0.

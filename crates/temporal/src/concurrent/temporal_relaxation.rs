@@ -2,7 +2,7 @@
 //!
 //! Each start, end, instantaneous action and timed initial literal becomes a rule, as in the relaxed
 //! planning graphs of CRIKEY \[1\]. A start adds the fact that its action runs, and the end requires
-//! this fact, so required concurrency is visible. An end also requires the condition over all. A numeric
+//! this fact, so required concurrency is visible. An end also requires the over-all condition. A numeric
 //! condition needs enough applications of rules to reach its amount \[2\]; a condition on a
 //! duration that the planner chooses always holds.
 //!

@@ -323,8 +323,9 @@ impl<T: TimeNumber> TemporalTask<T> {
         }
     }
 
-    /// Returns `true` if a happening writes an atom or number that the condition over all of an
-    /// instance reads. Always `false` unless happenings can maintain this condition jointly.
+    /// Returns `true` if the happening `operator` writes an atom or number that the over-all condition of
+    /// `instance` reads. Always `false` unless several simultaneous happenings can maintain this condition
+    /// jointly (see [`Instance::joint`]).
     pub(super) fn touches(&self, operator: OperatorId, instance: u32) -> bool {
         let joint = &self.instances[instance as usize].joint;
         let writes = &self.happenings[operator.index()].writes;

@@ -24,7 +24,8 @@ use crate::node::{Clock, Lifecycle, Node, Severity};
 use crate::perform::Perform;
 use crate::performer::performers;
 
-/// Period of the clock input and of the manager's own status on `/diagnostics`.
+/// Period of the clock input, of the requests for modes of new servers, and of the manager's own status on
+/// `/diagnostics`.
 const PERIOD: Duration = Duration::from_secs(1);
 
 /// Limit on the number of inputs that are kept while the manager is inactive.

@@ -22,7 +22,7 @@ pub enum Phase {
     Unconfigured,
     /// The node has read its mission and is idle.
     Inactive,
-    /// The node works.
+    /// The node has read its mission and performs its role.
     Active,
     /// The node is shutting down.
     Finalized,

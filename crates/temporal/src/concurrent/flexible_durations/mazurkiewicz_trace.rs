@@ -66,7 +66,7 @@ fn depend(concurrent: &TemporalTask, one: OperatorId, other: OperatorId) -> bool
         });
         used.next().is_some()
     };
-    // An instance with a joint condition over all (see `Instance::joint`) depends on every happening
+    // An instance with a joint over-all condition (see `Instance::joint`) depends on every happening
     // that writes what the condition reads.
     let touches = |id, instance: Option<u32>| instance.is_some_and(|index| concurrent.touches(id, index));
     let mut joint = 0..u32::try_from(concurrent.instances.len()).unwrap_or(u32::MAX);

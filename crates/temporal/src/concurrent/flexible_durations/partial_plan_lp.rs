@@ -44,7 +44,7 @@ pub(super) struct RunningAction {
     /// Value of the number that holds the duration of this run, if the instance has such a number.
     /// Other runs of the instance may have other values.
     number: Option<Affine>,
-    /// Time of the last happening that wrote an atom or number in the joint condition over all of
+    /// Time of the last happening that wrote an atom or number in the joint over-all condition of
     /// the instance (see [`Instance::joint`]). `None` if the instance has no joint condition.
     last: Option<Affine>,
 }
@@ -190,7 +190,7 @@ impl Course {
         Some(next)
     }
 
-    /// Returns `true` if a happening is applicable, ignoring numeric conditions, conditions over all
+    /// Returns `true` if a happening is applicable, ignoring numeric conditions, over-all conditions
     /// and times.
     fn admits(&self, concurrent: &TemporalTask, (operator, run): (OperatorId, u32), role: Role) -> bool {
         let designs = &concurrent.happenings[operator.index()].designs;
@@ -392,7 +392,7 @@ impl Course {
         Some(())
     }
 
-    /// Adds constraints that every condition over all of a running action holds after the last
+    /// Adds constraints that the over-all conditions of all running actions hold after the last
     /// happening, `operator`. Returns `None` if a propositional condition does not hold or a
     /// constraint is certainly violated.
     fn keep_up(

@@ -32,7 +32,7 @@ use crate::concurrent::temporal_task::TemporalTask;
 const BOOST: i64 = 1_000;
 
 /// Queue entry: heuristic value, lower bound on the metric, depth (deepest first), insertion order,
-/// parent node, and the happening with the index of the run that it ends.
+/// parent node, and the happening with the index of the action's run that it ends (0 for a start).
 type QueueEntry = Reverse<(u64, Rational, Reverse<u32>, u32, u32, (OperatorId, u32))>;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
