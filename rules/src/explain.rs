@@ -9,7 +9,7 @@ use crate::fixpoint::resolve;
 use crate::literal::Literal;
 use crate::plan::Condition;
 use crate::rule::{Atom, Rule, Variable};
-use crate::safety::bound_variables_of_checked;
+use crate::safety::bound_variables;
 use crate::source::Source;
 use crate::store::{Record, RelationId, Row, state};
 use crate::symbol::Symbol;
@@ -183,10 +183,8 @@ impl Search<'_> {
         let asserted = engine.store.get(relation).state(row) & state::ASSERTED != 0;
         let Some(rule) = engine.rule_of(record).filter(|_| !asserted) else { return Reason::Asserted };
         let bound = engine.records.get(record);
-        let variables = (0..)
-            .zip(bound_variables_of_checked(rule))
-            .filter(|&(_, is_bound)| is_bound)
-            .map(|(v, _)| Variable(v));
+        let variables =
+            (0..).zip(bound_variables(rule)).filter(|&(_, is_bound)| is_bound).map(|(v, _)| Variable(v));
         let bindings = variables.map(|v| (rule.variable_name(v), bound[usize::from(v.0)])).collect();
         let supports = self.supports(record);
         let absent = engine.body_facts(record, true);

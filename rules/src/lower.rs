@@ -7,7 +7,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use crate::aggregate::Function;
 use crate::plan::{Condition, Lowered, Template};
 use crate::rule::{Atom, Rule, Term, Variable};
-use crate::safety::{Scope, binding, bound_variables_of_checked};
+use crate::safety::{Scope, binding, bound_variables};
 use crate::source::Source;
 use crate::store::{RelationId, Store};
 use crate::symbol::{Symbol, Symbols};
@@ -63,7 +63,7 @@ impl<'a> Lowering<'a> {
         let mut heads: Vec<Template> = rule.head.iter().filter_map(|atom| self.template(atom)).collect();
         // The matches of a constraint are stored, so that violations can be listed and retracted.
         if rule.head.is_empty() {
-            let variables = (0..).zip(bound_variables_of_checked(rule)).filter(|&(_, is_bound)| is_bound);
+            let variables = (0..).zip(bound_variables(rule)).filter(|&(_, is_bound)| is_bound);
             let variables: Vec<u16> = variables.map(|(number, _)| number).collect();
             let relation = self.anonymous(variables.len());
             heads.push(Template { relation, arguments: columns(&variables) });

@@ -25,7 +25,7 @@ pub(crate) struct Scope {
 }
 
 pub(crate) struct Binding {
-    bound: Bound,
+    pub bound: Bound,
     /// Aggregates in an order in which each comes after the aggregates whose results it needs.
     pub scopes: Vec<Scope>,
 }
@@ -134,16 +134,14 @@ fn context(rule: &Rule, variables: &[u16], bound: &Bound, earlier: &[Scope]) -> 
     }
 }
 
-/// Returns a flag for each variable of a rule: `true` if the body binds it. Variables local to aggregates are not bound.
+/// Returns a flag for each variable of a rule that has passed [`check`]: `true` if the body binds it. Variables local to
+/// aggregates are not bound.
 pub(crate) fn bound_variables(rule: &Rule) -> Vec<bool> {
-    binding(rule).bound.0
-}
-
-/// Like [`bound_variables`], but fast for rules that have passed [`check`]: without negation and aggregates, such a rule
-/// has no unbound variable.
-pub(crate) fn bound_variables_of_checked(rule: &Rule) -> Vec<bool> {
     let may_be_local = |atom: &Atom| matches!(atom, Atom::Aggregate { .. } | Atom::Not { .. });
-    if rule.body.iter().any(may_be_local) { bound_variables(rule) } else { vec![true; rule.variable_count()] }
+    if rule.body.iter().any(may_be_local) {
+        return binding(rule).bound.0;
+    }
+    vec![true; rule.variable_count()]
 }
 
 /// Returns the errors of one rule: arities of atoms, forbidden head atoms and nested aggregates; if there are

@@ -31,7 +31,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::fact::Fact;
 use crate::rule::{Atom, Program, Rule, RuleIdentity, Term, Variable};
-use crate::safety::bound_variables;
+use crate::safety::binding;
 use crate::symbol::{Symbol, Symbols};
 use crate::vocabulary::{DIFFERENT_FROM, SAME_AS};
 use classes::Classes;
@@ -50,7 +50,7 @@ impl Program {
         let mut program = Self { equality: true, ..self.clone() };
         for rule in &mut program.rules {
             // The rules are not checked yet, so that their variables need not be bound.
-            let bound = bound_variables(rule);
+            let bound = binding(rule).bound.0;
             let is_bound = |term: Term| term.as_variable().is_some_and(|v| bound[usize::from(v.0)]);
             for atom in &mut rule.body {
                 match *atom {

@@ -16,7 +16,7 @@ use crate::engine::Engine;
 use crate::fact::Fact;
 use crate::fixpoint::resolve;
 use crate::rule::{Atom, Rule, Term, Variable};
-use crate::safety::bound_variables_of_checked;
+use crate::safety::bound_variables;
 use crate::store::{Record, state};
 use crate::symbol::Symbol;
 
@@ -278,10 +278,8 @@ impl<'a> Builder<'a> {
         if concluded != *fact {
             return Some(self.renamed(fact, &concluded));
         }
-        let variables = (0..)
-            .zip(bound_variables_of_checked(rule))
-            .filter(|&(_, is_bound)| is_bound)
-            .map(|(v, _)| Variable(v));
+        let variables =
+            (0..).zip(bound_variables(rule)).filter(|&(_, is_bound)| is_bound).map(|(v, _)| Variable(v));
         let bindings = variables.map(|v| (rule.variable_name(v), bound[usize::from(v.0)])).collect();
         let atoms = |negated: bool| {
             let ground = rule.body.iter().filter_map(move |atom| match atom {
