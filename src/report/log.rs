@@ -44,18 +44,20 @@ fn happening(answer: &Value) -> (Kind, String, Vec<Reason>) {
         "inferred" => inferred(answer),
         "contradicted" => (
             Kind::Inference,
-            "what is known contradicts itself, or no more".to_owned(),
+            "the knowledge has become inconsistent, or consistent again".to_owned(),
             lines(&answer["contradictions"]),
         ),
-        "unconcluded" => (Kind::Inference, format!("not concluded: {}", word("message")), Vec::new()),
-        "plan_requested" => (Kind::Plan, "a plan is looked for".to_owned(), lines(&answer["because"])),
+        "unconcluded" => {
+            (Kind::Inference, format!("the conclusions are unknown: {}", word("message")), Vec::new())
+        }
+        "plan_requested" => (Kind::Plan, "planning has started".to_owned(), lines(&answer["because"])),
         "plan_found" => {
             let steps: Vec<Reason> =
                 list(&answer["steps"]).iter().map(|step| leaf(action(step, "action"))).collect();
             let proved = if answer["optimal"] == Value::Bool(true) { ", optimal" } else { "" };
             (Kind::Plan, format!("a plan of {} steps, cost {}{proved}", steps.len(), word("cost")), steps)
         }
-        "plan_kept" => (Kind::Plan, format!("the plan stays: {}", word("because")), Vec::new()),
+        "plan_kept" => (Kind::Plan, format!("the plan is kept: {}", word("because")), Vec::new()),
         "plan_none" => (
             Kind::Plan,
             format!("no plan ({}): {}", word("status"), word("because")),
@@ -96,7 +98,7 @@ fn inferred(answer: &Value) -> (Kind, String, Vec<Reason>) {
     });
     let objectives = list(&answer["objectives"]).iter().map(|objective| {
         let statuses: Vec<String> = list(&objective["statuses"]).iter().map(plain).collect();
-        let statuses = if statuses.is_empty() { "all is well".to_owned() } else { statuses.join(", ") };
+        let statuses = if statuses.is_empty() { "no error".to_owned() } else { statuses.join(", ") };
         Reason {
             text: format!("{}: {statuses}", plain(&objective["objective"])),
             supports: lines(&objective["because"]),

@@ -178,7 +178,11 @@ fn invalid_arguments_are_usage_errors() {
     check(&metaplan(&["plan", "missions/ugv.toml", "--time-limit", "-1"]), 2, &["negative"]);
     check(&metaplan(&["plan", "missions/ugv.toml", "--set", "safety=1"]), 2, &["nothing measures it"]);
     check(&metaplan(&["plan", "missions/ugv.toml", "--set", "fd_available fd_aruco=false"]), 2, &["--fail"]);
-    check(&metaplan(&["plan", "missions/ugv.toml", "--directory", "."]), 2, &["manifest names its own"]);
+    check(
+        &metaplan(&["plan", "missions/ugv.toml", "--directory", "."]),
+        2,
+        &["manifest of a mission has keys for them"],
+    );
     check(&metaplan(&["reason", "ontology/kb/ugv.ttl", "--directory", "nowhere"]), 2, &["no directory"]);
     check(&metaplan(&["validate", "missions/ugv.toml"]), 2, &["and a plan"]);
     check(&metaplan(&["plan", "missions/ugv.toml", "--time-limit", "soon"]), 2, &["not a number of seconds"]);
@@ -428,8 +432,8 @@ fn alternatives_are_listed_with_forced_steps() {
         &unique,
         0,
         &[
-            "the only one that is as good, idle actions apart, proved",
-            "step 1: in every plan that is as good: move",
+            "no other plan is equally good, apart from plans with idle actions",
+            "step 1: in every equally good plan: move",
         ],
     );
     let problem = PROBLEM.replace("(way b c)", "(way b c) (way a d) (way d c)").replace("a b c", "a b c d");
@@ -440,8 +444,8 @@ fn alternatives_are_listed_with_forced_steps() {
         &[
             "alternative 1",
             "go a d",
-            "no others that are as good, idle actions apart, proved",
-            "step 1: in every plan that is as good: nothing",
+            "no other equally good plans, apart from plans with idle actions",
+            "step 1: in every equally good plan: nothing",
         ],
     );
     let answer = plan(DOMAIN, &problem, &["--alternatives", "0", "--format", "json"]).json();
@@ -466,8 +470,8 @@ fn alternatives_exclude_idle_actions() {
         &answer,
         0,
         &[
-            "the plan is the only one that is as good, idle actions apart, proved",
-            "step 1: in every plan",
+            "proved: no other plan is equally good, apart from plans with idle actions",
+            "step 1: in every equally good plan",
             idle,
         ],
     );

@@ -352,8 +352,8 @@ fn journals_depend_on_the_name_map() {
 fn name_options_require_a_knowledge_base() {
     let (domain, problem) = ("encodings/uuv/domain.pddl", "encodings/uuv/problem.pddl");
     for (arguments, status, words) in [
-        (&["plan", domain, problem, "--name", "a=b"][..], 2, "`--name` goes with `--kb`"),
-        (&["plan", "missions/uuv.toml", "--name", "a=b"], 2, "a mission's manifest names its own"),
+        (&["plan", domain, problem, "--name", "a=b"][..], 2, "`--name` requires `--kb`"),
+        (&["plan", "missions/uuv.toml", "--name", "a=b"], 2, "the manifest of a mission has keys for them"),
         (&["plan", domain, problem, "--kb", KB, "--name", "a"], 2, "is not of the form NAME=VALUE"),
         (&["plan", domain, problem, "--kb", KB, "--name", "a=b"], 3, "error[M223]: `--name a=b`: "),
         (

@@ -92,7 +92,7 @@ fn missing_plan_is_stated_plainly() {
 
 #[test]
 fn all_causes_of_an_unavailable_design_are_listed() {
-    let sentence = "2 causes rule it out, and all of them have to go before it is available:";
+    let sentence = "2 causes make the design unavailable, and all of them must be removed:";
     let kinect = "c_status(c_kinect, &quot;FALSE&quot;) is stated";
     let sun = "hasValue(obs_ambient_light, &quot;0.9&quot;^^decimal) is stated";
     let check = |situation: &[&str], has_kinect: bool, has_sun: bool| {
@@ -226,7 +226,7 @@ fn places_are_drawn_at_positions_of_the_manifest() {
     let report = || metaplan_in(mission.path(), &["report", "missions/ugv.toml", "--svg", "pictures"], "");
     let outcome = report();
     assert_eq!(outcome.status, 0, "{outcome:?}");
-    assert!(!outcome.stdout.contains("laid out by the ways"));
+    assert!(!outcome.stdout.contains("the layout of places"));
     let map = std::fs::read_to_string(mission.path().join("pictures/map.svg")).expect("a map");
     let document = Document::parse(&map).expect("XML");
     let place = |name: &str| {
