@@ -196,19 +196,22 @@ fn deviations_from_the_text_are_warnings() {
     for (text, expected) in [
         (
             ":i :undeclared 1 .",
-            "test.ttl:10:5: warning[O201]: <http://e/#undeclared> is declared nowhere; read as a data property because of its use",
+            "test.ttl:10:5: warning[O201]: <http://e/#undeclared> is not declared; read as a data property \
+             because of its use",
         ),
         (
             ":i :undeclared :i .",
-            "test.ttl:10:5: warning[O201]: <http://e/#undeclared> is declared nowhere; read as an object property because of its use",
+            "test.ttl:10:5: warning[O201]: <http://e/#undeclared> is not declared; read as an object property \
+             because of its use",
         ),
         (
             ":i a :Undeclared .",
-            "test.ttl:10:7: warning[O201]: <http://e/#Undeclared> is declared nowhere; read as a class because of its use",
+            "test.ttl:10:7: warning[O201]: <http://e/#Undeclared> is not declared; read as a class because of its use",
         ),
         (
             ":C :undeclared 1 .",
-            "test.ttl:10:5: warning[O201]: <http://e/#undeclared> is declared nowhere; read as an annotation property because of its use",
+            "test.ttl:10:5: warning[O201]: <http://e/#undeclared> is not declared; read as an annotation \
+             property because of its use",
         ),
         (
             ":p owl:propertyChainAxiom ( :q 5 ) .",

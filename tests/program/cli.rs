@@ -354,7 +354,7 @@ fn all_solvers_give_the_same_answer() {
         assert_eq!((answer.status, &answer.stdout), (0, &cheapest.stdout), "{strategy}");
     }
     let answer = metaplan(&["plan", "missions/ugv.toml", "--solver", "no-such-solver -q"]);
-    check(&answer, 2, &["M113", "`no-such-solver` does not serve", "varisat, batsat"]);
+    check(&answer, 2, &["M113", "`no-such-solver` cannot be used", "varisat, batsat"]);
     check(&metaplan(&["plan", "missions/ugv.toml", "--solver", " "]), 2, &["needs a name"]);
 }
 
@@ -371,10 +371,10 @@ fn claims_of_external_solvers_are_not_proofs() {
         metaplan(&[&["plan", "missions/ugv.toml", "--solver", &solver], options].concat())
     };
     let unchecked = plan("20", &["--horizon", "2"]);
-    check(&unchecked, 11, &["no plan with up to 2 steps, by the word of `sh ", "solver.sh 20`, unchecked"]);
+    check(&unchecked, 11, &["no plan with up to 2 steps, according to `sh ", "solver.sh 20`, not checked"]);
     // A claim that the search has already proved does not depend on the external solver.
     check(&plan("20", &[]), 0, &["optimal, proved: the"]);
-    check(&plan("7", &[]), 2, &["does not serve", "it failed: exit status: 7"]);
+    check(&plan("7", &[]), 2, &["cannot be used", "it failed: exit status: 7"]);
 }
 
 #[test]

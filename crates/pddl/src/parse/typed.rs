@@ -27,11 +27,7 @@ impl Parser<'_> {
             if let Some(glued) = symbol.strip_prefix('-') {
                 let r#type = self.type_after_dash(item, glued, &mut items);
                 if untyped_from == list.len() {
-                    self.sink.warning(
-                        "P107",
-                        item.span(),
-                        "there is nothing before this `-` that it could type",
-                    );
+                    self.sink.warning("P107", item.span(), "there are no names before this `-`");
                 }
                 list[untyped_from..].iter_mut().for_each(|entry| entry.r#type = r#type.clone());
                 untyped_from = list.len();

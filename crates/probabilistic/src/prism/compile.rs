@@ -286,7 +286,7 @@ impl Names {
             return Err(Diagnostic::new(
                 "Q204",
                 place,
-                format!("`{name}` stands for something with itself in it"),
+                format!("the definition of `{name}` contains `{name}` itself"),
             ));
         }
         self.open.push(name.to_owned());

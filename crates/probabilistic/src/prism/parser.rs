@@ -85,7 +85,7 @@ fn part(
     let Kind::Name(word) = cursor.peek() else { return Err(cursor.expected("a declaration")) };
     let mut is_kind = |declared: ModelKind| match kind.replace(declared) {
         None => Ok(()),
-        Some(_) => Err(Diagnostic::new("Q107", place, "the model has said before what it is")),
+        Some(_) => Err(Diagnostic::new("Q107", place, "the model type is already given")),
     };
     match word.as_str() {
         "mdp" | "nondeterministic" => is_kind(ModelKind::Mdp)?,
@@ -124,7 +124,7 @@ fn initial(cursor: &mut Cursor<'_>, model: &mut Model) -> Read<()> {
     cursor.need_word("endinit")?;
     match model.initial.replace(states) {
         None => Ok(()),
-        Some(_) => Err(Diagnostic::new("Q107", place, "the model has said before where it starts")),
+        Some(_) => Err(Diagnostic::new("Q107", place, "the initial states are already given")),
     }
 }
 

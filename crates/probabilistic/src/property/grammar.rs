@@ -407,7 +407,7 @@ fn reward_path(cursor: &mut Cursor<'_>) -> Read<RewardPath> {
         Ok(Path::Until(left, goal, None)) if left.kind == ExprKind::Bool(true) => Ok(RewardPath::Reach(goal)),
         _ => {
             let text =
-                "of rewards, `F`, `C`, `C<=k`, `I=k` and `S` are handled, and not what LTL says besides";
+                "of rewards, `F`, `C`, `C<=k`, `I=k` and `S` are handled, and no other operators of LTL";
             Err(Diagnostic::new("Q403", place, text))
         }
     }

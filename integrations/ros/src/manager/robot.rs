@@ -155,7 +155,7 @@ impl Robot {
         let mut missing: Vec<String> =
             futures::future::join_all(missing).await.into_iter().flatten().collect();
         if !self.node.is_written("/diagnostics") {
-            missing.push("nobody writes on /diagnostics".to_owned());
+            missing.push("/diagnostics has no publisher".to_owned());
         }
         missing
     }

@@ -107,7 +107,7 @@ pub(super) async fn pursue_on<A: Action>(
                     return End::Failed(because);
                 }
                 Ok(Accepted::Lost(because)) => return End::Failed(because),
-                Err(_) => return End::Failed("nothing more is heard of it".to_owned()),
+                Err(_) => return End::Failed("its server no longer responds".to_owned()),
             },
             () = canceled => pursued.cancel(),
         }

@@ -24,13 +24,13 @@ fn declared() -> Vec<Declared> {
     vec![
         parameter(
             "plan_solver_timeout",
-            "how long whoever asks for a plan waits for it, in seconds",
+            "time for which a client of the planner waits for a plan, in seconds",
             ParameterValue::Double(DEFAULT_TIMEOUT),
             timeout,
         ),
         parameter(
             "plan_solver_plugins",
-            "accepted, as PlanSys2's parameter files have it; there are no plugins here",
+            "accepted for PlanSys2's parameter files and ignored: there are no plugins",
             ParameterValue::StringArray(Vec::new()),
             any_value,
         ),
@@ -48,7 +48,7 @@ fn declared() -> Vec<Declared> {
         ),
         parameter(
             "alternatives",
-            "up to so many further plans that are as good, in the answer of get_plan_array",
+            "maximum number of further equally good plans in the answer of get_plan_array",
             ParameterValue::Integer(DEFAULT_ALTERNATIVES as i64),
             alternatives,
         ),

@@ -247,7 +247,7 @@ impl Machine {
     }
 
     fn queue_line(&mut self, line: String) -> String {
-        let because = "what is known has changed".to_owned();
+        let because = "the knowledge has changed".to_owned();
         self.lines.push_back(line);
         because
     }
