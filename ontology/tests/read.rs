@@ -223,7 +223,8 @@ fn deviations_from_the_text_are_warnings() {
         ),
         (
             "[] rdfs:comment \"of nothing\" .",
-            "warning[O202]: not read: <http://www.w3.org/2000/01/rdf-schema#comment> of 1 blank nodes (nothing else is said of them)",
+            "warning[O202]: not read: <http://www.w3.org/2000/01/rdf-schema#comment> of 1 blank nodes (there \
+             are no other statements about them)",
         ),
         (
             "[] a swrl:Imp ; rdfs:label \"R\" ; swrl:body ( 5 ) ; swrl:head rdf:nil .",
@@ -231,7 +232,7 @@ fn deviations_from_the_text_are_warnings() {
         ),
         (
             "[] a swrl:Imp ; swrl:body _:l ; swrl:head rdf:nil . _:l rdf:first :a ; rdf:rest _:l .",
-            "warning[O203]: rule <test.ttl>#0 is left out: the list at _:d0b1 runs in a circle",
+            "warning[O203]: rule <test.ttl>#0 is left out: the list at _:d0b1 is cyclic",
         ),
         (
             "[] a swrl:Imp ; swrl:body ( [ a swrl:ClassAtom ; swrl:classPredicate :C ; swrl:argument1 :z ] ) ; swrl:head rdf:nil .",

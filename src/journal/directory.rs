@@ -106,8 +106,8 @@ impl JournalFiles {
     pub(super) fn require_complete(&self, directory: &Path) -> Result<(), Message> {
         let Some(number) = self.incomplete else { return Ok(()) };
         let text = format!(
-            "the journal cannot be resumed: it could not be written after {}, and the loop continued without it, so the numbers \
-             of later effects would be assigned again",
+            "the journal cannot be resumed: it could not be written after {}, and the loop continued without it, so \
+             the numbers of later effects would be assigned again",
             self.name(number)
         );
         let help = "free disk space, and start a journal in another directory; `metaplan journal show` lists the \
@@ -241,9 +241,9 @@ fn check_opening(record: &Record, number: u64) -> Result<(), String> {
     }
 }
 
-pub(super) const OLD_FORMAT: &str = "is of the format `metaplan-journal/2` or older, which this version does not read; finish the mission \
-                                     with the version that wrote it, or restart the mission with a journal in another \
-                                     directory";
+pub(super) const OLD_FORMAT: &str = "is of the format `metaplan-journal/2` or older, which this version does not \
+                                     read; finish the mission with the version that wrote it, or restart the mission \
+                                     with a journal in another directory";
 
 /// Describes the fault of a file whose first line is not a segment header.
 fn no_journal(first: &[u8]) -> String {

@@ -62,8 +62,8 @@ pub(super) fn usable<'a>(
     if let Some(old) = problems.iter().find(|text| text.ends_with(OLD_FORMAT)) {
         return Err(format!("{old}; nothing was changed"));
     }
-    let way_out = "nothing was changed; `metaplan journal show` lists the intact records; restore the damaged files from a \
-                   backup, or use another directory";
+    let way_out = "nothing was changed; `metaplan journal show` lists the intact records; restore the damaged files \
+                   from a backup, or use another directory";
     Err(format!("{}; {way_out}", problems.join(", ")))
 }
 

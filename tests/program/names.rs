@@ -151,7 +151,7 @@ fn certificates_depend_on_the_name_map() {
     change(&copy.path().join("c").display().to_string(), "origin.json", &exchange);
     let outcome = verify_in(copy.path(), &["c"]);
     assert_eq!(outcome.status, 30, "{outcome:#?}");
-    assert!(outcome.stdout.contains("the knowledge says"), "{outcome:#?}");
+    assert!(outcome.stdout.contains("the knowledge implies"), "{outcome:#?}");
 }
 
 fn check(entries: &str, status: i32, words: &[&str]) -> Outcome {

@@ -32,12 +32,15 @@ impl Log {
             @for message in &self.messages { p class="bad" { (message) } }
             h2 { "What happened" }
             (shown("log", &PAGE, &|canvas| self.picture(canvas)))
-            p class="dim" { "A mark can represent several entries that are close together; the list shows each of them." }
+            p class="dim" {
+                "A mark can represent several entries that are close together; the list shows each of them."
+            }
             h2 { "List" }
             @let listed: Vec<&Happening> = self.listed();
             @if listed.len() < self.happenings.len() {
                 p class="dim" {
-                    "The journal has " (self.happenings.len()) " entries, " (marked) " of which are not reports of the robot. The list shows "
+                    "The journal has " (self.happenings.len()) " entries, " (marked)
+                    " of which are not reports of the robot. The list shows "
                     (listed.len()) " of them: the earliest ones, and conclusions, plans and effects of the loop \
                                     rather than reports."
                 }

@@ -118,7 +118,9 @@ fn plan(plan: &Plan, name: &str, palette: &Palette, (span, canvases): (&Span, &[
                 h3 { "Map" }
                 (shown(&format!("{name}-map"), canvases, &|canvas| map(plan, own, palette, canvas)))
                 @if own.places.iter().any(|place| place.position.is_none()) {
-                    p class="dim" { "The mission has no coordinates: the layout of places follows from the ways between them." }
+                    p class="dim" {
+                        "The mission has no coordinates: the layout of places follows from the ways between them."
+                    }
                 }
             }
         }

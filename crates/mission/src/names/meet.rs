@@ -210,8 +210,8 @@ impl Comparison<'_> {
         };
         let only_here: Vec<&str> = only_here.iter().map(|object| object.name.as_str()).collect();
         let text = format!(
-            "the problem and the knowledge base have no common design of the required function `{function}`; in the problem only: {}; in the knowledge \
-             base only: {}",
+            "the problem and the knowledge base have no common design of the required function `{function}`; in the \
+             problem only: {}; in the knowledge base only: {}",
             list(&only_here),
             list(&base_designs),
         );
@@ -227,8 +227,8 @@ impl Comparison<'_> {
                      `[bindings.names]`: {entries}"
                 ),
                 None => format!(
-                    "the knowledge base has no function `{function}`; add it to the knowledge base, or state in the problem which \
-                     of its designs are available"
+                    "the knowledge base has no function `{function}`; add it to the knowledge base, or state in the \
+                     problem which of its designs are available"
                 ),
             })
         };

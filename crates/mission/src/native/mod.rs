@@ -135,8 +135,8 @@ impl CoAdaptation {
             let action = domain.actions.iter().find(|action| action.identifier.name == *name);
             for function in action.into_iter().flat_map(|action| self.not_counted(action)) {
                 let text = format!(
-                    "`{name}` uses `({function})` where reconfigurations cannot be counted; use it in `increase` or `decrease`, outside \
-                     of `when` and `forall`"
+                    "`{name}` uses `({function})` where reconfigurations cannot be counted; use it in `increase` or \
+                     `decrease`, outside of `when` and `forall`"
                 );
                 errors.push(Message::error("M228", text));
             }

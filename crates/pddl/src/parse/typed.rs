@@ -49,11 +49,11 @@ impl Parser<'_> {
             let span = Span { start: dash.span().start + 1, ..dash.span() };
             self.sink
                 .warning("P107", dash.span(), format!("`-{glued}` is read as `- {glued}`"))
-                .help("put a space behind the dash: other planners read one name here");
+                .help("put a space after the dash: other planners read one name here");
             return self.named_type(glued, span);
         }
         let Some(item) = items.next() else {
-            self.sink.error("P107", dash.span(), "a type is missing behind this `-`");
+            self.sink.error("P107", dash.span(), "a type is missing after this `-`");
             return TypeExpression::default();
         };
         self.type_expression(item)

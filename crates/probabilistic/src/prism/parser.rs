@@ -102,13 +102,13 @@ fn part(
         "rewards" => return rewards(cursor, model),
         "ctmc" | "stochastic" | "pta" | "pomdp" | "popta" | "smg" | "csg" | "idtmc" | "imdp" | "ma" => {
             cursor.advance();
-            let text = format!("models of the kind `{word}` are not handled; `mdp` and `dtmc` are");
+            let text = format!("models of the kind `{word}` are not supported; use `mdp` or `dtmc`");
             return Err(Diagnostic::new("Q401", place, text));
         }
         "init" => return initial(cursor, model),
         "system" | "observables" | "invariant" | "player" => {
             cursor.advance();
-            let text = format!("`{word}` declarations are not handled");
+            let text = format!("`{word}` declarations are not supported");
             return Err(Diagnostic::new("Q401", place, text));
         }
         _ => return Err(cursor.expected("a declaration (`const`, `formula`, `module`, `rewards`, `label`)")),

@@ -103,7 +103,7 @@ pub(super) async fn pursue_on<A: Action>(
                 }
                 Ok(Accepted::Ended(GoalEnd::Canceled, _)) => return End::Canceled,
                 Ok(Accepted::Ended(GoalEnd::Aborted, result)) => {
-                    let because = shortfall(&result).unwrap_or_else(|| "its server gave up".to_owned());
+                    let because = shortfall(&result).unwrap_or_else(|| "its server has aborted the goal".to_owned());
                     return End::Failed(because);
                 }
                 Ok(Accepted::Lost(because)) => return End::Failed(because),
