@@ -107,8 +107,8 @@ pub enum Error {
     /// O112: expressions are nested more deeply than the reader accepts.
     #[error(
         "{}: error[O112]: expressions are nested more than {deepest} deep{}",
-        place(file, position.as_ref()), about.as_ref().map_or_else(String::new, |iri| format!(", in statements \
-                                                                                               about <{iri}>"))
+        place(file, position.as_ref()),
+        about.as_ref().map_or_else(String::new, |iri| format!(", in statements about <{iri}>"))
     )]
     TooDeep {
         /// The document.

@@ -351,7 +351,7 @@ impl Keeper {
                 function: objective.function.as_ref().map(|function| function.name.clone()),
                 from: Some(design.to_owned()),
                 to: None,
-                because: vec!["the objective was given up".to_owned()],
+                because: vec!["the objective was removed".to_owned()],
                 optimal: true,
                 effect: self.effects,
                 repeated: false,

@@ -77,7 +77,7 @@ fn happening(answer: &Value) -> (Kind, String, Vec<Reason>) {
         "suspend_action" => (Kind::Effect, format!("suspend: {}", word("because")), Vec::new()),
         "resume_action" => (Kind::Effect, "resume".to_owned(), Vec::new()),
         "filtered" => {
-            let text = format!("{} {} is held back: {}", word("name"), word("value"), word("because"));
+            let text = format!("{} {} is not adopted yet: {}", word("name"), word("value"), word("because"));
             (Kind::Inference, text, Vec::new())
         }
         "silent" => {

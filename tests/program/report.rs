@@ -67,7 +67,7 @@ fn pages_are_deterministic() {
 fn plans_before_and_after_are_compared_with_reasons() {
     let page = page(&["missions/ugv.toml", "--fail", "c_kinect", "--set", "robot_at=wp2"]);
     for text in [
-        "The status of c_kinect: not said before, FALSE now.",
+        "The status of c_kinect: unknown before, FALSE now.",
         "The task: (robot_at wp1) before, (robot_at wp2) now.",
         "fd_amcl_kinect is not available any more",
         "c_status(c_kinect, &quot;FALSE&quot;) is stated",
@@ -176,7 +176,7 @@ fn certificates_are_verified_and_shown() {
     assert_eq!(metaplan(&["plan", "missions/ugv.toml", "--certificate", &certificate]).status, 0);
     let verified_page = page(&["missions/ugv.toml", "--certificate", &certificate]);
     assert!(
-        verified_page.contains("What was verified")
+        verified_page.contains(">Verification<")
             && verified_page.contains("verified: the plan is optimal, metric 408")
     );
     let rejected_page =

@@ -251,9 +251,9 @@ fn verified(checked: &Checked) -> Markup {
     };
     html! {
         section aria-labelledby="verified" {
-            h2 id="verified" { "What was verified" }
+            h2 id="verified" { "Verification" }
             p class={ "verdict " (if checked.verified { "good" } else { "bad" }) } { (checked.verdict) }
-            (table("verification", &["part", "result", "what was found"], &rows))
+            (table("verification", &["part", "result", "details"], &rows))
         }
     }
 }
