@@ -103,7 +103,7 @@ fn unsupported_features_are_refused_with_their_position() {
         .replace("(:action", "(:functions (used)) (:action")
         .replace("(at ?b))", "(at ?b) (increase (used) 1))");
     let unset = PROBLEM.replace("(at c)))", "(at c)) (:metric minimize (used)))");
-    check(&plan(&counting, &unset, &[]), 3, &["domain.pddl:7:", "E301", "`used` without an initial value"]);
+    check(&plan(&counting, &unset, &[]), 3, &["domain.pddl:7:", "E301", "`used` has no initial value"]);
     check(
         &plan(&counting, &unset.replace("(at a)", "(at a) (= (used) 0)"), &[]),
         0,
