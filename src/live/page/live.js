@@ -168,7 +168,7 @@ const CHANGES = {
   },
   inferred(it) {
     know(it.designs);
-    for (const own of it.objectives) state.designs.set(own.objective, { text: own.statuses.join(", ") || "is well", because: own.because });
+    for (const own of it.objectives) state.designs.set(own.objective, { text: own.statuses.join(", ") || "has no error", because: own.because });
     showDesigns();
   },
 };

@@ -175,7 +175,7 @@ impl Robot {
                         Seen::Mode(mode) => Ok(mode),
                         Seen::Nothing => Ok(String::new()),
                         Seen::Unsettled | Seen::Ambiguous => {
-                            Err(format!("the nodes of {name} do not show which design it has"))
+                            Err(format!("the nodes of {name} do not show the current design"))
                         }
                     },
                 };

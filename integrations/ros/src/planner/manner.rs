@@ -36,13 +36,13 @@ fn declared() -> Vec<Declared> {
         ),
         parameter(
             "metric",
-            "what is minimised where the problem has no metric, as PlanSys2's problems have none: `(cost)`, `total-time`",
+            "the metric to minimise if the problem has none, as problems of PlanSys2: `(cost)`, `total-time`",
             ParameterValue::String(String::new()),
             any_value,
         ),
         parameter(
             "overlap",
-            "whether durative actions may overlap: `yes`, `no`, or `auto`: unless a knowledge base joins in",
+            "whether durative actions may overlap: `yes`, `no`, or `auto` (`yes` without a knowledge base, else `no`)",
             ParameterValue::String("auto".to_owned()),
             overlap,
         ),
