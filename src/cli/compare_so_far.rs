@@ -114,12 +114,12 @@ impl SoFar {
         let Some(of) = self.of else {
             return Message::error(
                 "M130",
-                "the time limit or an interruption came before anything was compared",
+                "the time limit or an interruption stopped the comparison before its first result",
             );
         };
         let measured = self.begun.as_ref().map_or(0, |begun| begun.candidates.len());
         let text = format!(
-            "the time limit or an interruption came before everything was compared; what is shown is incomplete: {} of {of} \
+            "the time limit or an interruption stopped the comparison; the results are incomplete: {} of {of} \
              comparisons, and {measured} candidates of the next",
             self.done.len()
         );

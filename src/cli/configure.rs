@@ -116,7 +116,7 @@ impl Wanted {
                     )
                 } else {
                     format!(
-                        "`--require {function}.…` is about no objective; there are: {}",
+                        "`--require {function}.…` does not name an objective; there are: {}",
                         functions.join(", ")
                     )
                 };
@@ -163,7 +163,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
 fn text(configuration: &Configuration, wishes: &Wishes) -> String {
     let mut text = String::new();
     if configuration.choices.is_empty() {
-        return "no function is in need\n".to_owned();
+        return "no objective needs a new design\n".to_owned();
     }
     let rows = configuration.choices.iter().map(|choice| {
         let function = choice.function.clone().unwrap_or_default();
@@ -174,9 +174,7 @@ fn text(configuration: &Configuration, wishes: &Wishes) -> String {
     });
     text += &output::table(&["objective", "function", "design", "utility", "in need, since"], rows);
     let worth = match &wishes.worth {
-        Worth::Mros => {
-            "as MROS has it: concluded, or else the estimated `performance`, or else 0.001".to_owned()
-        }
+        Worth::Mros => "as in MROS: inferred, else the estimated `performance`, else 0.001".to_owned(),
         Worth::Most(attribute) => format!("the estimated {attribute}; more is better"),
         Worth::Least(attribute) => format!("the estimated {attribute}, negated; less is better"),
     };
@@ -186,7 +184,7 @@ fn text(configuration: &Configuration, wishes: &Wishes) -> String {
         "not proved: a limit was reached; a better choice may exist"
     };
     let _ =
-        writeln!(text, "\nutility: {worth}\nin sum {}; {proved}", output::decimal(&configuration.utility));
+        writeln!(text, "\nutility: {worth}\ntotal: {}; {proved}", output::decimal(&configuration.utility));
     for choice in &configuration.choices {
         text += &reasons(choice);
     }

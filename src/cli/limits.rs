@@ -67,7 +67,7 @@ impl Guard {
         if let Some(megabytes) = memory
             && !memory::watch(megabytes, limits.interrupt())
         {
-            let text = "`--memory-limit`: this platform does not tell how much memory a process occupies";
+            let text = "`--memory-limit`: this platform does not report the memory of a process";
             return Err(Failure::usage(Message::error("M115", text)));
         }
         if let Some(megabytes) = memory {
@@ -113,7 +113,7 @@ impl Guard {
 }
 
 fn nothing_to_show() -> Message {
-    Message::error("M130", "a limit was reached before there was anything to show")
+    Message::error("M130", "a limit was reached before there was a result")
 }
 
 /// The time and memory limits plus a margin. The program is ended if it reaches them after reading its input and has

@@ -188,7 +188,7 @@ fn read(words: Vec<String>) -> Result<Option<simulate::Arguments>, clap::Error> 
 fn run(cli: &Cli) -> Result<Exit, Failure> {
     let triples = matches!(cli.common.format, Format::Ntriples | Format::Turtle);
     if triples && !matches!(cli.command, Subcommands::Reason(_)) {
-        let text = "`--format ntriples` and `--format turtle` go with `reason`";
+        let text = "`--format ntriples` and `--format turtle` are formats of `reason`";
         return Err(Failure::usage(Message::error("M107", text)));
     }
     match &cli.command {

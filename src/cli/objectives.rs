@@ -36,7 +36,7 @@ pub(super) fn front_text(name: &str, objectives: &[String], front: &Front, colum
             let open = if proved < solved.len() { ", and one more that is not proved to be" } else { "" };
             let _ = writeln!(
                 text,
-                "{proved} on the front{open}; a limit came before it was proved that there are no others"
+                "{proved} on the front{open}; a limit was reached before it was proved that there are no others"
             );
         }
         (_, Some(point)) => text += &answer_text(name, &point.solution, columns),

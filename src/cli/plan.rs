@@ -383,7 +383,7 @@ fn missing_text(missing: &[MissingValue]) -> String {
     if lines.is_empty() {
         lines
     } else {
-        format!("numbers are missing without which actions cannot be done:\n{lines}")
+        format!("actions are impossible because numbers are missing:\n{lines}")
     }
 }
 

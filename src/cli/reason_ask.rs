@@ -225,7 +225,7 @@ fn name(word: &str, names: &BTreeSet<String>) -> Result<String, Message> {
     let matches: Vec<&String> = names.iter().filter(|iri| local_name(iri) == local).collect();
     match matches[..] {
         [iri] => Ok(iri.clone()),
-        [] => Err(Message::error("M134", format!("nothing is called `{word}`; write an IRI as <IRI>"))),
+        [] => Err(Message::error("M134", format!("nothing has the name `{word}`; write an IRI as <IRI>"))),
         _ => {
             let candidates: Vec<String> = matches.iter().map(|iri| format!("<{iri}>")).collect();
             Err(Message::error(

@@ -72,7 +72,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         return keep(arguments, common);
     }
     if !arguments.wanted.is_empty() {
-        let text = "`--objective`, `--require`, `--budget`, `--exclusive`, `--most` and `--least` go with `--configure`";
+        let text = "`--objective`, `--require`, `--budget`, `--exclusive`, `--most` and `--least` require \
+                    `--configure`";
         return Err(Failure::usage(Message::error("M107", text)));
     }
     let setup = arguments.situation.setup(&arguments.inputs, common)?;

@@ -82,7 +82,10 @@ impl Lines {
         if let (None, Source::Recorded(replay)) = (&line, &self.source)
             && replay.is_unfinished()
         {
-            let text = format!("{} breaks off: it was not finished; all that is whole was read", self.name);
+            let text = format!(
+                "{} is truncated: recording was interrupted; all complete messages were read",
+                self.name
+            );
             output::warnings(common, [&Message::warning("M330", text)]);
         }
         Ok(line)

@@ -121,8 +121,8 @@ impl Situation {
                 let is_empty = self.knowledge.is_empty() && self.rules.is_empty() && self.names.is_empty();
                 let here = imports.catalog.is_empty() && imports.directory.is_empty();
                 if !(is_empty && here && !imports.ignore_missing_imports) {
-                    let text = "`--kb`, `--rules`, `--name` and where imports lie go with DOMAIN and PROBLEM; \
-                                a mission's manifest names its own";
+                    let text = "`--kb`, `--rules`, `--name` and the options for imports require DOMAIN and \
+                                PROBLEM; the manifest of a mission has keys for them";
                     return Err(Failure::usage(Message::error("M107", text)));
                 }
                 let mut setup = Setup::read(manifest)?;
@@ -133,14 +133,14 @@ impl Situation {
             }
             [domain, problem] => {
                 if self.scenario.is_some() {
-                    let text = "`--scenario` goes with a mission's manifest";
+                    let text = "`--scenario` requires a mission's manifest";
                     return Err(Failure::usage(Message::error("M107", text)));
                 }
                 for (option, given) in
                     [("--rules", !self.rules.is_empty()), ("--name", !self.names.is_empty())]
                 {
                     if self.knowledge.is_empty() && given {
-                        let text = format!("`{option}` goes with `--kb`");
+                        let text = format!("`{option}` requires `--kb`");
                         return Err(Failure::usage(Message::error("M107", text)));
                     }
                 }

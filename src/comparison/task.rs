@@ -49,7 +49,7 @@ impl Tasked {
     pub fn new(mission: &Mission, problem: &Problem, roles: &Roles) -> Result<Self, Errors> {
         let timed = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
         if timed {
-            let text = "timed initial literals have no place in a decision process";
+            let text = "decision processes do not support timed initial literals";
             return Err(vec![Message::error("M127", text)].into());
         }
         let task = mission.ground(problem, &[], &Limits::none())?;

@@ -320,13 +320,13 @@ impl Whole<'_> {
             if sum > self.left[budget] {
                 let whole = sum + self.kept.iter().map(|other| demand(other)).sum::<BigRational>();
                 return format!(
-                    "{attribute} would come to {}; the budget is {}",
+                    "{attribute} would be {} in total; the budget is {}",
                     decimal(&whole),
                     decimal(most)
                 );
             }
         }
-        "other functions would have to take designs that are worse in sum, or go without one".to_owned()
+        "other functions would need designs with a lower total utility, or would have no design".to_owned()
     }
 
     fn reasons(&self, design: &str, rejection: &Rejection) -> Vec<String> {
@@ -335,7 +335,7 @@ impl Whole<'_> {
                 let because = ruled_out(self.knowledge, design);
                 if because.is_empty() { vec!["it is not available".to_owned()] } else { because }
             }
-            Rejection::Failed => vec!["it has failed this objective before".to_owned()],
+            Rejection::Failed => vec!["it failed for this objective before".to_owned()],
             Rejection::Violates { attribute, measured, operator, estimation } => {
                 vec![format!(
                     "{attribute}: measured {} {operator} {}",

@@ -274,7 +274,7 @@ impl Keeper {
             }
             Event::Tick | Event::Note { .. } => {}
             other => {
-                let text = format!("`{}` is about plans, and here there is none", other.kind());
+                let text = format!("`{}` requires a plan, and `run --configure` has none", other.kind());
                 return Err(Refusal::new("M306", text));
             }
         }
@@ -302,7 +302,9 @@ impl Keeper {
 
     fn check_effect(&self, effect: u64) -> Result<(), Refusal> {
         let is_known = (1..=self.effects).contains(&effect);
-        is_known.then_some(()).ok_or_else(|| Refusal::new("M305", format!("there was no effect {effect}")))
+        is_known
+            .then_some(())
+            .ok_or_else(|| Refusal::new("M305", format!("no effect with the number {effect} was requested")))
     }
 
     /// Undoes a failed change of design: marks the new design as not realisable, so that the next best design is
@@ -349,7 +351,7 @@ impl Keeper {
                 function: objective.function.as_ref().map(|function| function.name.clone()),
                 from: Some(design.to_owned()),
                 to: None,
-                because: vec!["the objective was given up".to_owned()],
+                because: vec!["the objective was removed".to_owned()],
                 optimal: true,
                 effect: self.effects,
                 repeated: false,

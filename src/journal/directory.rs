@@ -106,8 +106,8 @@ impl JournalFiles {
     pub(super) fn require_complete(&self, directory: &Path) -> Result<(), Message> {
         let Some(number) = self.incomplete else { return Ok(()) };
         let text = format!(
-            "the journal cannot be resumed: it could not be written after {}, and the loop continued without it, so that the \
-             numbers of later effects would be used twice",
+            "the journal cannot be resumed: it could not be written after {}, and the loop continued without it, so \
+             the numbers of later effects would be assigned again",
             self.name(number)
         );
         let help = "free disk space, and start a journal in another directory; `metaplan journal show` lists the \
@@ -126,7 +126,7 @@ impl JournalFiles {
         })?;
         match self.segments.get(&number) {
             Some(Ok(segment)) if segment.before != snapshot.before => {
-                Err(format!("{name} is not of the same journal as {}", self::name("journal", number)))
+                Err(format!("{name} belongs to another journal than {}", self::name("journal", number)))
             }
             _ => Ok(snapshot),
         }
@@ -146,7 +146,7 @@ impl JournalFiles {
                 Some(Ok(segment)) => segment,
             };
             if let End::Damaged(line) = segment.end {
-                return Err(format!("line {line} of {name} is damaged, or does not belong there"));
+                return Err(format!("line {line} of {name} is damaged or out of order"));
             }
             if let Some(before) = chain.last()
                 && !follows(before, segment)
@@ -232,15 +232,18 @@ fn snapshot(bytes: &[u8], number: u64) -> Result<SnapshotFile, String> {
 fn check_opening(record: &Record, number: u64) -> Result<(), String> {
     match (record.text(0), record.count(2)) {
         (Some(FORMAT), Some(stated)) if stated == number => Ok(()),
-        (Some(FORMAT), stated) => Err(format!("has the number {} in it", stated.unwrap_or_default())),
+        (Some(FORMAT), stated) => Err(format!(
+            "has the number {} in its header, which differs from its name",
+            stated.unwrap_or_default()
+        )),
         (Some("metaplan-journal/2"), _) => Err(OLD_FORMAT.to_owned()),
         (format, _) => Err(format!("has the format `{}`, not `{FORMAT}`", format.unwrap_or_default())),
     }
 }
 
-pub(super) const OLD_FORMAT: &str = "is of the format `metaplan-journal/2` or older, which this version does not read; let the version that \
-                                     wrote it bring its mission to an end, or begin the mission anew with a journal in another \
-                                     directory";
+pub(super) const OLD_FORMAT: &str = "is of the format `metaplan-journal/2` or older, which this version does not \
+                                     read; finish the mission with the version that wrote it, or restart the mission \
+                                     with a journal in another directory";
 
 /// Describes the fault of a file whose first line is not a segment header.
 fn no_journal(first: &[u8]) -> String {
@@ -250,7 +253,7 @@ fn no_journal(first: &[u8]) -> String {
     match (old, damaged) {
         (true, _) => OLD_FORMAT.to_owned(),
         (false, true) => "is damaged in its first line".to_owned(),
-        (false, false) => "is not a journal; it was left as it is".to_owned(),
+        (false, false) => "is not a journal and was not changed".to_owned(),
     }
 }
 

@@ -61,7 +61,7 @@ impl Lock {
                 let owner =
                     owner.parse::<u32>().map_or_else(|_| String::new(), |id| format!(" (number {id})"));
                 let text = format!(
-                    "another process{owner} uses the journal in {}; end it first, or take another directory",
+                    "another process{owner} uses the journal in {}; stop that process, or use another directory",
                     directory.display()
                 );
                 Err(Message::error("M322", text))

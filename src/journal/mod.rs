@@ -125,32 +125,33 @@ impl Journal {
         let mut recovery = Recovery::default();
         let directory = directory.to_owned();
         let failed = |error: io::Error| broken(&directory, &error.to_string());
-        let (segment, (file, link), observations, unfinished) =
-            if contents.segments.is_empty() && contents.snapshots.is_empty() {
-                // The lock file proves that the journal had records before.
-                if lock.records > 0 {
-                    return Err(broken(&directory, &format!("{} is missing", name("journal", 0))));
-                }
-                let created = create_segment(&directory, &Link::first(), &digest, 0).map_err(failed)?;
-                (0, created, 0, Some(Unfinished::Agenda))
-            } else {
-                let Resumed { from, segments, observations, unfinished, missing_snapshots } =
-                    resume(&directory, &contents, control, &mut recovery)?;
-                let (file, link) = settle(&directory, &segments, &mut recovery).map_err(failed)?;
-                for (number, line) in missing_snapshots {
-                    write_snapshot(&directory, number, &line).map_err(failed)?;
-                }
-                // A machine that lost power may have lost records that were not flushed.
-                if lock.records > link.next {
-                    let text = format!(
-                        "the last {} records of the journal are missing; send again what follows `seq`",
-                        lock.records - link.next
-                    );
-                    recovery.warnings.push(Message::warning("M323", text));
-                }
-                let segment = segments.last().map_or(from, |last| last.number);
-                (segment, (file, link), observations, unfinished)
-            };
+        let (segment, (file, link), observations, unfinished) = if contents.segments.is_empty()
+            && contents.snapshots.is_empty()
+        {
+            // The lock file proves that the journal had records before.
+            if lock.records > 0 {
+                return Err(broken(&directory, &format!("{} is missing", name("journal", 0))));
+            }
+            let created = create_segment(&directory, &Link::first(), &digest, 0).map_err(failed)?;
+            (0, created, 0, Some(Unfinished::Agenda))
+        } else {
+            let Resumed { from, segments, observations, unfinished, missing_snapshots } =
+                resume(&directory, &contents, control, &mut recovery)?;
+            let (file, link) = settle(&directory, &segments, &mut recovery).map_err(failed)?;
+            for (number, line) in missing_snapshots {
+                write_snapshot(&directory, number, &line).map_err(failed)?;
+            }
+            // A machine that lost power may have lost records that were not flushed.
+            if lock.records > link.next {
+                let text = format!(
+                    "the last {} records of the journal are missing; send the events after this `seq` again",
+                    lock.records - link.next
+                );
+                recovery.warnings.push(Message::warning("M323", text));
+            }
+            let segment = segments.last().map_or(from, |last| last.number);
+            (segment, (file, link), observations, unfinished)
+        };
         let journal = Self {
             directory,
             policy,

@@ -48,7 +48,7 @@ pub(super) fn usable<'a>(
                 problems.sort();
                 problems.dedup();
                 let warning = |text: &String| {
-                    Message::warning("M323", format!("the journal: {text}; it was not needed"))
+                    Message::warning("M323", format!("the journal: {text}; recovery did not need this file"))
                 };
                 warnings.extend(problems.iter().map(warning));
                 return Ok((from, segments));
@@ -62,8 +62,8 @@ pub(super) fn usable<'a>(
     if let Some(old) = problems.iter().find(|text| text.ends_with(OLD_FORMAT)) {
         return Err(format!("{old}; nothing was changed"));
     }
-    let way_out = "nothing was changed; `metaplan journal show` lists what is sound; restore what is damaged from a copy, or \
-                   take another directory";
+    let way_out = "nothing was changed; `metaplan journal show` lists the intact records; restore the damaged files \
+                   from a backup, or use another directory";
     Err(format!("{}; {way_out}", problems.join(", ")))
 }
 
@@ -81,8 +81,7 @@ impl<C: Recoverable> Replay<'_, C> {
         // The `end` record only links segments.
         let mut records = segment.records.iter().filter(|record| record.kind != "end").peekable();
         while let Some(record) = records.next() {
-            let wrong =
-                || broken(self.directory, &format!("record {} is not where it belongs", record.number));
+            let wrong = || broken(self.directory, &format!("record {} is out of order", record.number));
             // Only the last observation of a journal may lack its answers.
             if self
                 .unfinished
@@ -137,8 +136,7 @@ impl<C: Recoverable> Replay<'_, C> {
         if self.control.decision(answers).agrees(&written.list(0)) {
             return Ok(());
         }
-        let text =
-            format!("the mission now leads to another decision than the one in record {}", written.number);
+        let text = format!("replay gives a different decision than record {}", written.number);
         Err(broken(self.directory, &text))
     }
 }
@@ -176,7 +174,7 @@ pub(super) fn settle(
             return Ok((file, segment.after.clone()));
         }
     }
-    Err(io::Error::other("nothing is in it"))
+    Err(io::Error::other("it has no segments"))
 }
 
 /// Copies the incomplete record at the end of a file, i.e. all bytes from `sound` on, to a new file

@@ -98,6 +98,6 @@ fn describe(segment: &Segment) -> String {
         End::Incomplete(bytes) => {
             format!("{records}; then {bytes} bytes of a record that was not written completely")
         }
-        End::Damaged(line) => format!("{records}; line {line} is damaged, or does not belong there"),
+        End::Damaged(line) => format!("{records}; line {line} is damaged or out of order"),
     }
 }

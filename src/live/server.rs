@@ -55,7 +55,8 @@ impl Live {
     pub fn open(address: Address, token: Option<Token>, painter: Option<Painter>) -> Result<Self, Message> {
         // Other machines on the network could otherwise read the run.
         if !address.is_loopback() && token.is_none() {
-            let text = format!("who can reach {} can look at the run: a token is needed there", address.0);
+            let text =
+                format!("every machine that can reach {} could see the run: a token is required", address.0);
             return Err(Message::error("M332", text));
         }
         let failed = |error: io::Error| {

@@ -113,7 +113,7 @@ impl Adaptation<'_> {
             changes.reasons.push("the situation has changed, and there is no plan".to_owned());
         }
         if changes.reasons.is_empty() && self.beliefs.stuck && self.is_retry_due() {
-            changes.reasons.push("the last search for a plan was cut short".to_owned());
+            changes.reasons.push("the last search for a plan stopped at a limit".to_owned());
         }
         if changes.reasons.is_empty() {
             if !findings.lost.is_empty() && self.beliefs.plan.is_some() {

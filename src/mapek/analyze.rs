@@ -147,7 +147,7 @@ pub(super) fn availability(knowledge: &Knowledge, design: &str, available: bool)
 /// Returns the message that conclusions are missing. Without conclusions, no design counts as available, and planning
 /// is impossible.
 pub(super) fn missing_conclusions(fault: &Fault) -> String {
-    format!("it is not known what follows: {}", fault.message)
+    format!("the conclusions are unknown: {}", fault.message)
 }
 
 fn statuses(knowledge: &Knowledge) -> BTreeMap<String, Vec<String>> {

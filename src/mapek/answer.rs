@@ -339,7 +339,7 @@ impl Answer {
             Self::Duplicate { sequence } => object.serialize_entry("seq", sequence),
             Self::Stale { sequence, mark } => {
                 let because = format!(
-                    "too many numbers are missing: of those up to {mark} it is not known any more which were seen"
+                    "too many gaps in `seq`: which of the numbers up to {mark} were received is no longer recorded"
                 );
                 object.serialize_entry("seq", sequence)?;
                 object.serialize_entry("because", &because)

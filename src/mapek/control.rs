@@ -53,8 +53,8 @@ pub(crate) fn time_of_line(
     match own {
         Some(time) if time > latest => {
             let message = format!(
-                "`time` is {} s, but may be {} s at most: it is in seconds since the start of the mission, and skips a million at \
-                 most",
+                "`time` is {} s, but may be at most {} s: it is in seconds since the start of the mission and may \
+                 increase by at most a million",
                 time.as_secs_f64(),
                 latest.as_secs()
             );

@@ -163,7 +163,7 @@ fn check_action(beliefs: &mut Beliefs, settings: &Settings, answers: &mut Vec<An
         }
         OverdueOutcome::Cancelled => {
             let running = running.clone();
-            let because = format!("nothing was heard of action {action} for {seconds} s");
+            let because = format!("no event about action {action} arrived for {seconds} s");
             // An action that has never started may be waiting for a design that its function was wrongly believed to
             // have.
             if !running.started {

@@ -144,7 +144,7 @@ pub(super) fn suspend(beliefs: &mut Beliefs, running: Running, reason: &str, ans
     beliefs.plan = None;
     beliefs.stuck = true;
     if !running.suspended {
-        let because = format!("{reason}; no other design serves, and there is no plan without it");
+        let because = format!("{reason}; no other design can be used, and no plan exists without the action");
         effect(beliefs, running.action, Command::Suspend { because }, answers);
     }
     beliefs.running = Some(Running { suspended: true, provisional: false, ..running });

@@ -248,7 +248,7 @@ impl Observation {
         let value: Value = serde_json::from_str(text)
             .map_err(|error| Refusal::new("M301", format!("this is not JSON: {error}")))?;
         if let Some(key) = doubled_key(text) {
-            return Err(Refusal::new("M302", format!("the field `{key}` is there twice")));
+            return Err(Refusal::new("M302", format!("the field `{key}` is repeated")));
         }
         let Value::Object(mut fields) = value else {
             return Err(Refusal::new("M301", "an event is a JSON object"));
@@ -425,7 +425,10 @@ fn measured(attribute: &str, value: &str) -> Result<Event, Refusal> {
 
 fn component(component: &str, value: &str) -> Result<Event, Refusal> {
     let wrong = || {
-        Refusal::new("M304", format!("the status `{value}` of {component} is none; it should be {STATUSES}"))
+        Refusal::new(
+            "M304",
+            format!("the status `{value}` of {component} is not valid; it should be {STATUSES}"),
+        )
     };
     Ok(Event::Component { component: component.to_owned(), status: status(value).ok_or_else(wrong)? })
 }

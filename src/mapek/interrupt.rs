@@ -43,12 +43,16 @@ pub(super) fn weigh(
         (Some(_), Some(_)) => gained.map_or(Interruption::None, |gained| {
             let gained = number::decimal(&gained);
             Interruption::Cancel {
-                because: format!("{reason}; the mission is better without it by {gained}"),
+                because: format!("{reason}; cancelling the action improves the metric by {gained}"),
             }
         }),
         (Some(_), None) => Interruption::None,
         (None, Some(_)) => {
-            let because = if can_go_on { "no plan goes on with it" } else { "no other design serves" };
+            let because = if can_go_on {
+                "no plan exists that continues the action"
+            } else {
+                "no other design can be used"
+            };
             Interruption::Cancel { because: format!("{reason}; {because}") }
         }
         (None, None) if can_go_on => Interruption::None,
@@ -92,10 +96,10 @@ mod tests {
             blocking: vec!["fd_a".to_owned()],
         };
         check(false, true, true, None, &Interruption::None);
-        check(false, true, true, Some(3), &cancel("the mission is better without it by 3"));
+        check(false, true, true, Some(3), &cancel("cancelling the action improves the metric by 3"));
         check(false, true, false, None, &Interruption::None);
-        check(false, false, true, None, &cancel("no other design serves"));
-        check(true, false, true, None, &cancel("no plan goes on with it"));
+        check(false, false, true, None, &cancel("no other design can be used"));
+        check(true, false, true, None, &cancel("no plan exists that continues the action"));
         check(true, false, false, None, &Interruption::None);
         check(false, false, false, None, &suspend);
     }

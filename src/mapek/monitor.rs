@@ -131,8 +131,10 @@ impl BeliefUpdate<'_> {
             Event::Fact { name, value } => self.fact(name, value),
             Event::Acknowledged { effect } => self.acknowledged(*effect),
             Event::ObjectiveAdded { .. } | Event::ObjectiveRemoved { .. } => {
-                let text =
-                    format!("`{}` goes with `run --configure`; here the plan needs functions", event.kind());
+                let text = format!(
+                    "`{}` requires `run --configure`; here the plan determines the required functions",
+                    event.kind()
+                );
                 Err(Refusal::new("M306", text))
             }
             Event::Tick | Event::Note { .. } => Ok(()),
@@ -142,7 +144,7 @@ impl BeliefUpdate<'_> {
     /// Updates the knowledge base with a report about the individual `name`. `kind` is the noun for error messages.
     pub(super) fn report(&mut self, kind: &str, name: &str, report: RobotReport) -> Result<(), Refusal> {
         let Some(knowledge) = self.beliefs.mission.knowledge_mut() else {
-            let text = format!("there is no knowledge base that has a {kind} `{name}`");
+            let text = format!("without a knowledge base there is no {kind} `{name}`");
             return Err(Refusal::new("M306", text));
         };
         let was_known = knowledge.fault().is_none();
@@ -153,12 +155,14 @@ impl BeliefUpdate<'_> {
 
     fn acknowledged(&mut self, effect: u64) -> Result<(), Refusal> {
         match self.beliefs.acknowledge(effect) {
-            Receipt::Unknown => Err(Refusal::new("M305", format!("there was no effect {effect}"))),
+            Receipt::Unknown => {
+                Err(Refusal::new("M305", format!("no effect with the number {effect} was requested")))
+            }
             Receipt::Recorded => Ok(()),
             Receipt::Doubtful(function) => {
                 let running = self.beliefs.running.as_ref();
                 if running.is_some_and(|running_action| running_action.step.design(&function).is_some()) {
-                    self.changes.reasons.push(format!("it is not certain which design {function} has"));
+                    self.changes.reasons.push(format!("the current design of {function} is uncertain"));
                 }
                 Ok(())
             }
@@ -170,14 +174,15 @@ impl BeliefUpdate<'_> {
     /// effect.
     fn failed_reconfiguration(&mut self, effect: u64) -> Result<(), Refusal> {
         if self.beliefs.mission.knowledge().is_none() {
-            return Err(Refusal::new("M306", "there is no knowledge base that has designs"));
+            return Err(Refusal::new("M306", "without a knowledge base there are no designs"));
         }
         match self.beliefs.reconfiguration_failed(effect) {
             Failure::Design(design) => self.report("design", &design, RobotReport::Design(false)),
             Failure::Stale => Ok(()),
-            Failure::NotReconfiguration => {
-                Err(Refusal::new("M305", format!("no reconfiguration {effect} was asked for")))
-            }
+            Failure::NotReconfiguration => Err(Refusal::new(
+                "M305",
+                format!("no reconfiguration with the number {effect} was requested"),
+            )),
         }
     }
 
@@ -299,7 +304,9 @@ impl BeliefUpdate<'_> {
         self.beliefs.failures = None;
         if running.cancelling || running.suspended {
             let expected_end = if running.cancelling { "cancelled" } else { "suspended" };
-            self.changes.reasons.push(format!("action {action} was to be {expected_end}, but has succeeded"));
+            self.changes
+                .reasons
+                .push(format!("action {action} should have been {expected_end}, but has succeeded"));
         }
         Ok(())
     }

@@ -56,7 +56,7 @@ impl BeliefUpdate<'_> {
             let action = running.action;
             self.changes
                 .reasons
-                .push(format!("{function} has no design any more, and action {action} needs it"));
+                .push(format!("{function} no longer has a design, but action {action} needs {function}"));
         }
         Ok(())
     }

@@ -219,9 +219,10 @@ impl Settings {
     pub(crate) fn doubts(&self, knowledge: Option<&Knowledge>) -> Vec<Message> {
         let mut doubts = self.filters.doubts(knowledge);
         if self.settle.is_zero() && knowledge.is_some() {
-            let text = "each design that comes back is followed by a search for a better plan at once: `settle` is 0";
+            let text = "each design that becomes available again starts a search for a better plan immediately: \
+                        `settle` is 0";
             doubts.push(
-                Message::warning("M144", text).with_help("set `settle` in `[adaptation]` to some seconds"),
+                Message::warning("M144", text).with_help("set `settle` in `[adaptation]` to a few seconds"),
             );
         }
         doubts

@@ -246,7 +246,7 @@ impl<'m, 'r> Planner<'m, 'r> {
         let reading = Reading::sequential(task.is_timed());
         let alternatives = match self.alternatives {
             Some(limit) => {
-                (self.stage)("the plan is proved; other plans that are as good are looked for");
+                (self.stage)("the plan is proved optimal; searching for other equally good plans");
                 self.further_plans(&task, &point.solution, limit)?
             }
             None => None,

@@ -11,7 +11,7 @@ use crate::number::decimal;
 use crate::report::designs::because;
 
 /// Text in place of an unknown status of a component or an unknown value of an attribute.
-const UNKNOWN: &str = "not said";
+const UNKNOWN: &str = "unknown";
 
 /// The cost of a plan, or the reason why there is no cost.
 #[derive(Debug, Clone, PartialEq, Eq)]

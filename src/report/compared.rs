@@ -24,9 +24,9 @@ pub fn comparison_sheet(mission: &str, comparisons: &[(Option<Pair>, Comparison)
     parts.push(table(rows));
     let front: usize = comparisons.iter().map(|(_, comparison)| comparison.front.len()).sum();
     Sheet {
-        name: format!("{mission}: plans beside policies"),
-        description: "All candidates are measured in one decision process, exactly.".to_owned(),
-        verdict: format!("{} rows, {front} vertices of fronts.", rows.len()),
+        name: format!("{mission}: plans and policies"),
+        description: "All candidates are evaluated exactly in one decision process.".to_owned(),
+        verdict: format!("{} rows, {front} vertices of Pareto fronts.", rows.len()),
         parts,
     }
 }
@@ -101,8 +101,7 @@ fn prices(comparison: &Comparison) -> Vec<Change> {
         let steps = steps.map(|loss| {
             after(loss.moves, [loss.open_loop, loss.replanned, loss.solved_again, loss.anticipated])
         });
-        let text =
-            format!("What the loss of {} costs, at a rate of {} for each move", loss.component, loss.rate);
+        let text = format!("Cost of the loss of {}, at a rate of {} per move", loss.component, loss.rate);
         prices.push(Change { text, because: steps.collect() });
     }
     prices

@@ -44,7 +44,8 @@ pub fn front_sheet(seen: Seen<'_>, objectives: &[String], front: &Front) -> Shee
         titles.into_iter().zip(&solved).map(|(title, point)| (title, plan_picture(seen, &point.solution)));
     Sheet {
         name: format!("{}: {}", seen.mission.name, objectives.join(" against ")),
-        description: "Plans that are best by one objective without being worse by the other.".to_owned(),
+        description: "Plans that no other plan improves in one objective without being worse in the other."
+            .to_owned(),
         verdict,
         parts: vec![
             Part::Heading("Front".to_owned()),

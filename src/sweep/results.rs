@@ -89,7 +89,7 @@ impl Results {
             if !resume {
                 return Err(wrong(
                     &path,
-                    "it is there already; go on with `--resume`, or take another directory",
+                    "it exists already; continue with `--resume`, or use another directory",
                 ));
             }
             let (found, lines) = parse(&path, &text[..whole])?;

@@ -53,7 +53,8 @@ impl Mission {
         let symbol = Name::new(symbol);
         let is_own = matches!(arguments, [design] if self.decides_on(design));
         if self.knowledge.is_some() && self.bindings.is_availability(&symbol) && !is_own {
-            let text = format!("the knowledge base decides on `{symbol}`; let components fail with `--fail`");
+            let text =
+                format!("the knowledge base determines `{symbol}`; use `--fail` for failed components");
             return Err(Message::error("M106", text));
         }
         let arity = |declared: &[pddl::ast::Declaration]| {

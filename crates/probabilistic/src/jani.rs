@@ -147,7 +147,7 @@ fn recursion(model: &Model, formula: &Named) -> Option<Diagnostic> {
     for at in 0.. {
         let Some((name, _)) = used.get(at).copied() else { break };
         if name == formula.name {
-            let text = format!("`{name}` stands for something with itself in it");
+            let text = format!("the definition of `{name}` contains `{name}` itself");
             return Some(Diagnostic::new("Q204", formula.place, text));
         }
         if !used[..at].iter().any(|(earlier, _)| *earlier == name)

@@ -29,7 +29,7 @@ pub type Errors = diagnostics::Errors<Error>;
 #[non_exhaustive]
 pub enum Error {
     /// A construct that the planner does not support, although it can be parsed and possibly validated.
-    #[error("{construct} cannot be planned with: {instead}")]
+    #[error("the planner does not support {construct}; supported: {instead}")]
     Unsupported {
         /// The construct in the file.
         construct: String,
@@ -39,7 +39,7 @@ pub enum Error {
         place: Place,
     },
     /// A numeric fluent that is read but has no initial value.
-    #[error("`{name}` without an initial value cannot be planned with: a value for it in `:init`")]
+    #[error("`{name}` has no initial value; state it in `:init`")]
     NoValue {
         /// Name of the function.
         name: String,

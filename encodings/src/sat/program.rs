@@ -154,7 +154,7 @@ impl Program {
 /// may be incomplete, so the result is an error.
 fn has_ended(child: &mut Child, is_over: &dyn Fn() -> bool) -> Result<bool, String> {
     while !is_over() {
-        match child.try_wait().map_err(|error| format!("how it ended is not known: {error}"))? {
+        match child.try_wait().map_err(|error| format!("its exit status is unknown: {error}"))? {
             Some(status) if matches!(status.code(), Some(0 | 10 | 20)) => return Ok(true),
             Some(status) => return Err(format!("it failed: {status}")),
             None => thread::sleep(INTERVAL),

@@ -298,6 +298,6 @@ fn signals() -> Result<watch::Receiver<bool>, Errors> {
         }
     };
     ctrlc::set_handler(handler)
-        .map_err(|error| vec![Message::error("N302", format!("signals cannot be heard: {error}"))])?;
+        .map_err(|error| vec![Message::error("N302", format!("signals cannot be handled: {error}"))])?;
     Ok(heard)
 }

@@ -280,7 +280,8 @@ impl Robot {
         if let Some(before) = before
             && !is_same(&decided, before)
         {
-            let text = format!("what is written of event {} is not what follows from it", event.sequence);
+            let text =
+                format!("the stored decision of event {} differs from the computed one", event.sequence);
             return Err(Faulted(text));
         }
         Ok(Begun::Decided(decided))

@@ -122,11 +122,11 @@ fn start() -> Result<(), Errors> {
         }
     };
     ctrlc::set_handler(handler)
-        .map_err(|error| vec![Message::error("N100", format!("signals cannot be heard: {error}"))])?;
+        .map_err(|error| vec![Message::error("N100", format!("signals cannot be handled: {error}"))])?;
     let Arguments { role, mission, settings, journal, executor, allow_commands, seconds, output, .. } =
         arguments;
     if journal.is_some() && matches!(role, Role::Planner | Role::Controller | Role::Discover) {
-        let text = "`--journal` is for a manager and a reasoner: nothing of a planner has to be known after a restart";
+        let text = "`--journal` is for a manager and a reasoner: a planner has no persistent state";
         return Err(vec![Message::error("N100", text)].into());
     }
     if output.is_some() && role != Role::Discover {

@@ -20,8 +20,8 @@ impl Prover {
         let explanation = self.extend(&Assignment::new(), statements.to_vec(), &mut budget)?;
         Ok(match explanation {
             Some(reason) => Answer::Follows(reason),
-            None if budget == 0 => Answer::Open("too many individuals come into question"),
-            None => Answer::Open("the rules do not conclude it of anybody"),
+            None if budget == 0 => Answer::Open("there are too many candidate individuals"),
+            None => Answer::Open("the rules do not conclude it for any individual"),
         })
     }
 

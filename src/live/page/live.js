@@ -121,7 +121,7 @@ function know(designs) {
 const WORDS = {
   inferred: (it) => [
     ...it.designs.map((own) => `${own.design} is ${own.available ? "available" : "not available"}`),
-    ...it.objectives.map((own) => `${own.objective}: ${own.statuses.join(", ") || "all is well"}`),
+    ...it.objectives.map((own) => `${own.objective}: ${own.statuses.join(", ") || "no error"}`),
   ].join("; "),
   plan_requested: (it) => reasons(it.because),
   plan_found: (it) => `${it.steps.length} steps, cost ${it.cost}${it.optimal ? ", proved optimal" : ""}`,
@@ -135,7 +135,7 @@ const WORDS = {
   suspend_action: (it) => `${it.action}: ${it.because}`,
   resume_action: (it) => `${it.action}`,
   error: (it) => `${it.code}: ${it.message}`,
-  unconcluded: (it) => it.message ?? "it is known again what follows",
+  unconcluded: (it) => it.message ?? "the conclusions are known again",
   unrecorded: (it) => it.message,
   contradicted: (it) => it.contradictions.map((own) => own.violated).join("; ") || "consistent again",
 };
@@ -168,7 +168,7 @@ const CHANGES = {
   },
   inferred(it) {
     know(it.designs);
-    for (const own of it.objectives) state.designs.set(own.objective, { text: own.statuses.join(", ") || "is well", because: own.because });
+    for (const own of it.objectives) state.designs.set(own.objective, { text: own.statuses.join(", ") || "has no error", because: own.because });
     showDesigns();
   },
 };

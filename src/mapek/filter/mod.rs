@@ -49,9 +49,10 @@ impl FilterSettings {
         });
         let mut doubts: Vec<Message> = noisy.collect();
         if self.heal_time.is_zero() && filters.has_components {
-            let text = "a component that comes and goes switches designs with every report: `heal_time` is 0";
+            let text = "an intermittent component switches designs with every report: `heal_time` is 0";
             doubts.push(
-                Message::warning("M144", text).with_help("set `heal_time` in `[adaptation]` to some seconds"),
+                Message::warning("M144", text)
+                    .with_help("set `heal_time` in `[adaptation]` to a few seconds"),
             );
         }
         doubts

@@ -66,7 +66,10 @@ pub fn against(mission: &Mission, design: &str) -> Vec<String> {
     });
     let negative = negative.iter().filter(|duration| duration.design.as_deref() == Some(design));
     let negative = negative.map(|duration| {
-        format!("with it {} would take {}, less than no time", duration.action, duration.duration)
+        format!(
+            "with it the duration of {} would be {}, which is negative",
+            duration.action, duration.duration
+        )
     });
     missing.chain(negative).collect()
 }

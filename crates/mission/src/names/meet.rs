@@ -210,8 +210,8 @@ impl Comparison<'_> {
         };
         let only_here: Vec<&str> = only_here.iter().map(|object| object.name.as_str()).collect();
         let text = format!(
-            "no design of the required function `{function}` is known to both sides; in the problem only: {}; in the knowledge \
-             base only: {}",
+            "the problem and the knowledge base have no common design of the required function `{function}`; in the \
+             problem only: {}; in the knowledge base only: {}",
             list(&only_here),
             list(&base_designs),
         );
@@ -223,12 +223,12 @@ impl Comparison<'_> {
             let candidates = pairs(&names, &[function.as_str()]);
             Some(match suggested(&candidates) {
                 Some(entries) => format!(
-                    "the knowledge base knows no function `{function}`; name it as the knowledge base does, or write in \
+                    "the knowledge base has no function `{function}`; name it as the knowledge base does, or write in \
                      `[bindings.names]`: {entries}"
                 ),
                 None => format!(
-                    "the knowledge base knows no function `{function}`; either it gets one, or the problem says which of its designs \
-                     are available"
+                    "the knowledge base has no function `{function}`; add it to the knowledge base, or state in the \
+                     problem which of its designs are available"
                 ),
             })
         };
@@ -269,12 +269,16 @@ impl Comparison<'_> {
             format!("in the problem only: {}; in the knowledge base only: {}", list(&here), list(&there));
         match (unknown.first(), unnamed.first()) {
             (Some(first), _) => {
-                let text = format!("the knowledge base does not know all {members} of the problem; {lists}");
+                let text = format!("the knowledge base lacks {members} of the problem; {lists}");
                 let help = suggestion(&there, &here, false);
                 let ours: Vec<&str> =
                     here.iter().copied().filter(|name| own.contains(&Name::new(name))).collect();
                 let decides = (!ours.is_empty()).then(|| {
-                    format!("the problem itself decides whether {} can be used, whose functions the knowledge base does not know", list(&ours))
+                    format!(
+                        "the problem determines whether {} can be used, since the knowledge base does not \
+                             have their functions",
+                        list(&ours)
+                    )
                 });
                 let help = [help, decides]
                     .into_iter()
@@ -283,7 +287,7 @@ impl Comparison<'_> {
                 OneSided::Objects(Finding { in_domain: first.in_domain, span: first.span, text, help })
             }
             (None, Some(first)) if role.class == DESIGN => {
-                let text = format!("the problem names {members}, but not all of the knowledge base; {lists}");
+                let text = format!("the problem lacks {members} of the knowledge base; {lists}");
                 OneSided::Individuals(first.iri.clone(), text)
             }
             _ => OneSided::Nothing,
@@ -326,11 +330,11 @@ fn suggestion<'n>(known: &[&'n str], here: &[&'n str], all: bool) -> Option<Stri
     let entries = suggested(&matches);
     match (entries, all) {
         (Some(entries), _) => {
-            Some(format!("did you mean the same? Then write in `[bindings.names]`: {entries}"))
+            Some(format!("if these names mean the same, write in `[bindings.names]`: {entries}"))
         }
-        (None, true) => Some(
-            "say in `[bindings.names]` which individual is which object: INDIVIDUAL = \"OBJECT\"".to_owned(),
-        ),
+        (None, true) => {
+            Some("map individuals to objects in `[bindings.names]`: INDIVIDUAL = \"OBJECT\"".to_owned())
+        }
         (None, false) => None,
     }
 }

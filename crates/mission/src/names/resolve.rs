@@ -100,7 +100,7 @@ impl<'a> Resolving<'a> {
             _ => {
                 let iris: Vec<&str> = matches.iter().map(|individual| individual.iri.as_str()).collect();
                 let text = format!(
-                    "`{}` may be each of {}; write the IRI that is meant",
+                    "`{}` is ambiguous, it can be each of {}; write the IRI",
                     entry.individual,
                     list(&iris)
                 );
@@ -131,7 +131,7 @@ impl<'a> Resolving<'a> {
                 let names: Vec<&str> =
                     self.individuals.iter().map(|individual| individual.name.as_str()).collect();
                 let text = format!(
-                    "the pattern `{}` meets no individual that has not a name of its own here; there are: {}",
+                    "the pattern `{}` matches no individual without an entry of its own; there are: {}",
                     entry.individual,
                     list(&names)
                 );
@@ -140,7 +140,7 @@ impl<'a> Resolving<'a> {
             Some(reason) if match_count == 0 => self.errors.push(entry.wrong("M224", &reason)),
             Some(reason) => {
                 let text = format!(
-                    "the pattern leaves {} as they are, without an object: {reason}",
+                    "the pattern does not map {}, which keep their names: {reason}",
                     list(&unmatched)
                 );
                 self.warnings.push(entry.questionable("M226", &text));

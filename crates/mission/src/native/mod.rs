@@ -135,8 +135,8 @@ impl CoAdaptation {
             let action = domain.actions.iter().find(|action| action.identifier.name == *name);
             for function in action.into_iter().flat_map(|action| self.not_counted(action)) {
                 let text = format!(
-                    "`{name}` uses `({function})` where no change of designs is counted; `increase` and `decrease` count it, outside of \
-                     `when` and `forall`"
+                    "`{name}` uses `({function})` where reconfigurations cannot be counted; use it in `increase` or \
+                     `decrease`, outside of `when` and `forall`"
                 );
                 errors.push(Message::error("M228", text));
             }
@@ -150,7 +150,7 @@ impl CoAdaptation {
                 });
                 if !fits {
                     let text = format!(
-                        "<{}> counts for `{name}` in the context `{context}`, which is not a predicate of the domain \
+                        "<{}> applies to `{name}` in the context `{context}`, which is not a predicate of the domain \
                          whose parameters have names of the action's parameters",
                         quality.individual.iri
                     );

@@ -186,7 +186,7 @@ impl Parser<'_> {
         let diagnostic =
             self.sink.error("P106", at_start(item), format!("expected {description}, found {actual}"));
         if item.symbol().is_some_and(|symbol| symbol.starts_with("{{") || symbol.starts_with("{%")) {
-            diagnostic.help("this file is a template; give the file that is made from it");
+            diagnostic.help("this file is a template; give the file that is generated from it");
         }
         diagnostic
     }

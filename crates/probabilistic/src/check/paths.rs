@@ -182,7 +182,7 @@ impl<N: Number> Query<'_, N> {
             RewardPath::Total => self.total(direction, self.rewards(name)?),
             RewardPath::LongRun if self.program.kind == ModelKind::Dtmc => self.long_run(self.rewards(name)?),
             RewardPath::LongRun => {
-                Err(refusal("Q403", "`S` is handled for Markov chains, and not for decision processes"))
+                Err(refusal("Q403", "`S` is supported for Markov chains only, not for decision processes"))
             }
         }
     }

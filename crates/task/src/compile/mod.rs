@@ -110,8 +110,8 @@ pub fn compile<'t>(
     let has_events = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
     if has_events && !used_preferences.is_empty() && matches!(course, PlanSemantics::Sequence) {
         errors.push(unsupported(
-            "a preference beside timed initial literals",
-            "a plan that waits for a literal after its last action would be judged too late",
+            "a preference together with timed initial literals",
+            "`--concurrent`, or preferences without timed initial literals",
             (File::Problem, problem.metric.as_ref().map_or(problem.name.span, |metric| metric.span)),
         ));
     }

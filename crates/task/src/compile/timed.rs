@@ -27,7 +27,7 @@ impl Monitors<'_> {
             PlanSemantics::Overlapping(separation) => Ok(separation.clone()),
             PlanSemantics::Sequence => Err(unsupported(
                 "a constraint on the times of states (`within`, `always-within`, `hold-during`, `hold-after`)",
-                "`--concurrent`, or constraints on the order of states; `validate` judges those on times, too",
+                "`--concurrent`, or constraints on the order of states; `validate` supports constraints on times, too",
                 place,
             )),
         }

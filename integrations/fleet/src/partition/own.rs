@@ -418,12 +418,12 @@ impl<S: Store> Partition<S> {
     /// would have followed it. The events of the robot are read again by the next owner of the partition.
     pub(super) fn fault(&mut self, robot: &str, event: u64, decision: u64, why: &str) {
         metrics::counter!("metaplan_fleet_faulted_total").increment(1);
-        tracing::error!(partition = self.number, robot, "does not go on: {why}");
+        tracing::error!(partition = self.number, robot, "robot suspended: {why}");
         let subject = Address { partition: self.number, robot: robot.to_owned() }.to_string();
         let slot = self.slot(robot);
         slot.suspended = Some(slot.unsaved.front().copied().unwrap_or((event, decision)));
         slot.unsaved.clear();
-        let text = format!("the robot does not go on: {why}");
+        let text = format!("the robot is suspended: {why}");
         self.refuse(Some((subject, text)), "faulted");
     }
 }

@@ -147,7 +147,7 @@ impl Nats {
             |error: &dyn std::fmt::Display| Diagnostic::error("N311", format!("{}: {error}", access.url));
         if !is_name(&layout.fleet) {
             let text = format!(
-                "`{}` is no name of a fleet: use up to 64 letters, digits, `-` and `_`",
+                "`{}` is not a name of a fleet: use up to 64 letters, digits, `-` and `_`",
                 layout.fleet
             );
             return Err(wrong(&text));
@@ -305,7 +305,7 @@ impl Nats {
                     (info.stream_sequence, info.consumer_sequence, info.pending)
                 };
                 if number != expected {
-                    return Err(failed("messages were lost on their way"));
+                    return Err(failed("messages were lost"));
                 }
                 expected += 1;
                 got += 1;
@@ -315,7 +315,7 @@ impl Nats {
             }
             total += got;
             if got == 0 {
-                return Err(failed("the server has no more messages, and should have"));
+                return Err(failed("the server lacks messages that it should have"));
             }
         }
         // The server would also remove an unused consumer by itself, but later.

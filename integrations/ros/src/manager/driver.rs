@@ -69,7 +69,7 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
     }
     let timeout = node.declare_seconds(
         "call_timeout",
-        "How long a function may take to change its mode before it is asked once more, in seconds.",
+        "Time after which an unfinished change of mode is requested again, in seconds.",
         5.0,
     )?;
     let attribute = |name: &str| {
@@ -117,7 +117,7 @@ fn journal(node: &Node, options: &Options, control: &mut Loop) -> Result<Option<
         node.log(Severity::Warn, warning.text().trim_end());
     }
     if recovery.replayed.is_some() {
-        let text = format!("goes on from the journal after {} lines", control.beliefs().lines());
+        let text = format!("continues from the journal after {} lines", control.beliefs().lines());
         node.log(Severity::Info, &text);
     }
     Ok(Some(journal))
@@ -195,7 +195,7 @@ impl Driver {
         let silent = modes.iter().filter(|(_, mode)| mode.is_none()).count();
         let text = match silent {
             0 => "every function answers".to_owned(),
-            _ => format!("{silent} of {} functions do not say which mode they have", modes.len()),
+            _ => format!("{silent} of {} functions do not report their modes", modes.len()),
         };
         self.node.log(Severity::Info, &text);
         self.handle(Input::Ready(modes))?;

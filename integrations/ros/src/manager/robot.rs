@@ -155,7 +155,7 @@ impl Robot {
         let mut missing: Vec<String> =
             futures::future::join_all(missing).await.into_iter().flatten().collect();
         if !self.node.is_written("/diagnostics") {
-            missing.push("nobody writes on /diagnostics".to_owned());
+            missing.push("/diagnostics has no publisher".to_owned());
         }
         missing
     }
@@ -175,7 +175,7 @@ impl Robot {
                         Seen::Mode(mode) => Ok(mode),
                         Seen::Nothing => Ok(String::new()),
                         Seen::Unsettled | Seen::Ambiguous => {
-                            Err(format!("the nodes of {name} do not show which design it has"))
+                            Err(format!("the nodes of {name} do not show the current design"))
                         }
                     },
                 };

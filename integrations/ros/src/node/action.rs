@@ -426,7 +426,7 @@ impl Node {
             loop {
                 for error in served.poll(&graph, &mut gates, &mut take) {
                     let Some(node) = weak.upgrade() else { return };
-                    node.log(Severity::Warn, &format!("what {full} has heard is wrong: {error}"));
+                    node.log(Severity::Warn, &format!("a message to {full} is malformed: {error}"));
                 }
                 if weak.strong_count() == 0 {
                     return;

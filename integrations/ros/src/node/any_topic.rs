@@ -78,7 +78,7 @@ impl Node {
             let Some((package, message)) = message_type(&kind) else {
                 node.log(
                     Severity::Warn,
-                    &format!("{full} has the type {kind}, which is no message of ROS 2"),
+                    &format!("{full} has the type {kind}, which is not a message type of ROS 2"),
                 );
                 return;
             };

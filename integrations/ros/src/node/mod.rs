@@ -216,7 +216,7 @@ fn client_name(full: &str) -> Result<ros2_client::Name, Message> {
 }
 
 fn creation_error(entity: &str, error: &dyn std::fmt::Display) -> Message {
-    Message::error("N122", format!("{entity} could not be made: {error}"))
+    Message::error("N122", format!("{entity} could not be created: {error}"))
 }
 
 /// Returns `true` if `ROS_DISTRO` is `lyrical` or `rolling`, in which some message types differ.

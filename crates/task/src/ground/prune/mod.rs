@@ -43,7 +43,7 @@ pub fn prune(task: &mut GroundTask<'_>, generality: &Generality) -> Result<Optio
         return Ok(Some(never_true(&task.world.atom_name(atom))));
     }
     if generality.numbers.is_none() && !goal_can_hold(task)? {
-        let reason = "the numbers that the goal asks for are out of reach, even if nothing is ever deleted";
+        let reason = "the numbers that the goal requires cannot be reached, even if nothing is ever deleted";
         return Ok(Some(reason.into()));
     }
     drop_unread_numerics(task);
@@ -65,5 +65,5 @@ fn why_goal_is_false(task: &GroundTask<'_>) -> String {
             }
         }
     }
-    "the goal contradicts what never changes".into()
+    "the goal contradicts static facts".into()
 }
