@@ -74,6 +74,12 @@ changed domain.pddl 's/(or (corridor ?s ?r) (open ?s ?r)/(or (open ?s ?r)/'
 changed domain.pddl 's/(:derived (some-dark) (exists/(:derived (some-dark) (forall/'
 changed problem.pddl 's/(on hall)//'
 changed problem.pddl 's/(not (lit bedroom))/(lit bedroom)/'
+# An operator with 48 conditional effects, most of which do not concern the variables of a potential.
+directory=tests/dials
+accepted "$directory" 'proved: the plan of 2 steps is optimal, metric 5'
+mutated "$directory"
+changed domain.pddl 's/(when (and (next ?p ?q) (not (up ?p))) (not (up ?q)))/(when (and (next ?p ?q) (not (up ?p))) (up ?q))/'
+changed problem.pddl 's/(next p2 p3)/(next p2 p3) (next p0 p3)/'
 directory=tests/ugv
 accepted "$directory" 'proved: the plan of 4 steps is optimal, metric 408'
 mutated "$directory"
