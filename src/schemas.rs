@@ -8,7 +8,7 @@ use crate::answers::{
     ChangesAnswer, CheckAnswer, ChecksAnswer, CodeAnswer, CompareAnswer, ConfigureAnswer, DesignAnswer,
     EntailmentAnswer, ErrorAnswer, ImportAnswer, InitAnswer, JournalAnswer, LintAnswer, MissionExport,
     ModelExport, ParetoAnswer, PlanAnswer, ReasonAnswer, ReasonsAnswer, SchemaAnswer, SimulateAnswer,
-    VerdictAnswer, VerificationAnswer,
+    VerdictAnswer, VerifyAnswer,
 };
 use crate::mapek::event_schema;
 use crate::recording::answer_schema;
@@ -47,7 +47,7 @@ pub const FORMATS: [Entry; 25] = [
     ("simulate", "metaplan simulate", || vec![schema_for!(SimulateAnswer)]),
     ("sweep", "metaplan sweep", || vec![schema_for!(SweepAnswer)]),
     ("verdict", "metaplan validate", || vec![schema_for!(VerdictAnswer)]),
-    ("verification", "metaplan verify", || vec![schema_for!(VerificationAnswer)]),
+    ("verification", "metaplan verify", || vec![schema_for!(VerifyAnswer)]),
 ];
 
 /// Returns the schema of a format, or `None` if the format does not exist.

@@ -3,6 +3,7 @@
 
 mod derivations;
 mod knowledge;
+mod proved;
 
 use std::fs;
 use std::io::{BufRead, BufReader, BufWriter};
@@ -15,6 +16,8 @@ use pddl::{print_domain, print_problem};
 use planner::{
     Certificate, ExactTask, Limits, RefutationOutputs, Solution, Status, Task, certify, certify_exact, refute,
 };
+
+pub use proved::{ProvedChecker, Theorem};
 
 pub use ::verify::{Claim, Verification, VerifiedPart, Verifier};
 

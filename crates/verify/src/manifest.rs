@@ -159,7 +159,7 @@ impl Subject {
 pub struct VerifiedPart {
     /// Name of the part: `files`, `derivations`, `knowledge`, `task`, `plan`, `argument`,
     /// `formula`, `proof`, `steps` or `mission`; or `limits` if the time or memory limit was
-    /// reached.
+    /// reached; or `theorem` if the proved checker disagrees.
     pub part: &'static str,
     /// A summary of the check, or a description of the first defect as an error.
     pub result: Result<String, String>,
