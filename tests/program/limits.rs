@@ -147,7 +147,7 @@ fn comparisons_at_a_limit_show_finished_results() {
         assert_eq!(outcome.status, 12, "{outcome:#?}");
         let answer: Value = serde_json::from_str(&outcome.stdout).expect("JSON");
         let text = answer["messages"][0]["message"].as_str().expect("a sentence");
-        assert!(answer["messages"][0]["code"] == "M130" && text.contains("before"), "{answer:#}");
+        assert!(answer["messages"][0]["code"] == "M130" && text.contains("the comparison"), "{answer:#}");
         assert!(answer["format"] == "metaplan-error/1" || answer["complete"] == false, "{answer:#}");
         let Some(comparisons) = answer["comparisons"].as_array() else { continue };
         for comparison in &comparisons[..comparisons.len().saturating_sub(1)] {
