@@ -65,7 +65,8 @@ impl FfHeuristic {
         }
     }
 
-    /// Returns the cost of a relaxed plan under the operator costs `prices`, each at least 1. The cost is
+    /// Returns the cost of a relaxed plan that achieves all `targets` under the operator costs `prices`, each at
+    /// least 1. The cost is
     /// capped at `MAX_COST`. Returns `None` if there is no relaxed plan. Afterwards `applicable` contains the
     /// operators that may be applicable in the state, and `preferred` contains those of them that belong to
     /// the relaxed plan.
@@ -74,13 +75,21 @@ impl FfHeuristic {
         relaxation: &Relaxation<N>,
         prices: &[u32],
         state: &State<N>,
+        targets: &[Proposition],
     ) -> Option<u32> {
         self.preferred.clear();
-        self.reach(relaxation, prices, state);
-        (self.costs[relaxation.goal as usize] < UNREACHED).then(|| self.relaxed_plan(relaxation, prices))
+        self.reach(relaxation, prices, state, targets);
+        let is_reached = targets.iter().all(|target| self.costs[*target as usize] < UNREACHED);
+        is_reached.then(|| self.relaxed_plan(relaxation, prices, targets))
     }
 
-    fn reach<N: TaskNumber>(&mut self, relaxation: &Relaxation<N>, prices: &[u32], state: &State<N>) {
+    fn reach<N: TaskNumber>(
+        &mut self,
+        relaxation: &Relaxation<N>,
+        prices: &[u32],
+        state: &State<N>,
+        targets: &[Proposition],
+    ) {
         self.costs.fill(UNREACHED);
         self.sums.fill(0);
         self.left.copy_from_slice(&self.initially_left);
@@ -109,14 +118,22 @@ impl FfHeuristic {
                 self.reached(relaxation, prices, node);
             }
         }
+        let mut missing = targets;
         while let Some((cost, proposition)) = self.queue.pop() {
             if self.costs[proposition as usize] != cost {
                 continue;
             }
             // Propositions of cost 0 are always processed completely, because they determine which operators
             // are applicable.
-            if cost > 0 && self.costs[relaxation.goal as usize] <= cost {
-                break;
+            if cost > 0 {
+                while let [target, rest @ ..] = missing
+                    && self.costs[*target as usize] <= cost
+                {
+                    missing = rest;
+                }
+                if missing.is_empty() {
+                    break;
+                }
             }
             for node in relaxation.waiting.of(proposition) {
                 let unreached = &mut self.left[*node as usize];
@@ -167,11 +184,20 @@ impl FfHeuristic {
         }
     }
 
-    fn relaxed_plan<N: TaskNumber>(&mut self, relaxation: &Relaxation<N>, prices: &[u32]) -> u32 {
+    fn relaxed_plan<N: TaskNumber>(
+        &mut self,
+        relaxation: &Relaxation<N>,
+        prices: &[u32],
+        targets: &[Proposition],
+    ) -> u32 {
         let mut total: u32 = 0;
-        self.marks.push(relaxation.goal);
+        for target in targets {
+            if !self.marked[*target as usize] {
+                self.marked[*target as usize] = true;
+                self.marks.push(*target);
+            }
+        }
         let mut next = 0;
-        self.marked[relaxation.goal as usize] = true;
         while let Some(proposition) = self.marks.get(next).copied() {
             next = next.saturating_add(1);
             let Supporter { node, times } = self.supporters[proposition as usize];

@@ -10,18 +10,19 @@
 //! - \[1\] M. Helmert: The Fast Downward planning system, JAIR 26, 2006, section 5.
 //! - \[2\] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010, section 6.
 
+use std::sync::Arc;
+
 use task::limits::{Interrupted, LimitPoll, Limits};
 use task::plan::ground::{GroundPlan, GroundStep, cost};
 use task::task::number::TaskNumber;
-use task::task::{OperatorId, State};
+use task::task::{OperatorId, State, Task};
 
 use crate::satisfice::alternating_open_list::AlternatingOpenList;
-use crate::satisfice::search_context::{SearchContext, USELESS_OPERATOR_COST};
+use crate::satisfice::delete_relaxation::Proposition;
+use crate::satisfice::search_context::{GENERATION_COST, SearchContext, USELESS_OPERATOR_COST};
+use crate::satisfice::segment_goal::SegmentGoal;
 use crate::satisfice::store::Store;
 use crate::search::SearchStatistics;
-
-/// Work units charged for generating a successor and looking it up in the store.
-const GENERATION_COST: u64 = 200;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum HeuristicWeight {
@@ -29,6 +30,14 @@ pub(super) enum HeuristicWeight {
     Greedy,
     /// The path cost plus this multiple of the heuristic value (weighted A\*).
     Times(u64),
+}
+
+/// Start and goal of a search.
+pub(super) enum SearchGoal<N> {
+    /// From the initial state to the goal of the task. Landmarks guide the search.
+    Task,
+    /// From a state of a plan to the goal of a segment.
+    Segment(State<N>, SegmentGoal),
 }
 
 struct Node<N> {
@@ -49,13 +58,19 @@ pub(super) enum Outcome<N> {
 
 pub(super) struct Search<N> {
     weight: HeuristicWeight,
-    prices: Vec<u32>,
+    /// Goal of the search, if it is not the goal of the task.
+    segment: Option<SegmentGoal>,
+    /// Propositions of the goal.
+    targets: Vec<Proposition>,
+    prices: Arc<[u32]>,
     /// Mean scaled operator cost, without useless operators. Converts a number of landmarks to a cost.
     mean: u32,
     store: Store<N>,
     nodes: Vec<Node<N>>,
-    /// Reached landmarks of each state, as a bitset of `LandmarkStatus::stride` words.
+    /// Reached landmarks of each state, as a bitset of `stride` words.
     reached: Vec<u64>,
+    /// Number of words of a bitset of landmarks: 0 in a segment.
+    stride: usize,
     open: AlternatingOpenList<u64>,
     /// Lowest value of each heuristic among the evaluated states.
     best: [u32; 2],
@@ -64,15 +79,32 @@ pub(super) struct Search<N> {
 }
 
 impl<N: TaskNumber> Search<N> {
-    pub(super) fn new(context: &mut SearchContext<'_, N>, weight: HeuristicWeight, prices: Vec<u32>) -> Self {
-        let estimates = if context.status.is_empty() { 1 } else { 2 };
+    pub(super) fn new(
+        context: &mut SearchContext<'_, N>,
+        weight: HeuristicWeight,
+        prices: Arc<[u32]>,
+        goal: SearchGoal<N>,
+    ) -> Self {
+        let (initial, segment) = match goal {
+            SearchGoal::Task => (context.task.initial.clone(), None),
+            SearchGoal::Segment(initial, goal) => (initial, Some(goal)),
+        };
+        let has_landmarks = segment.is_none() && !context.status.is_empty();
+        let estimates = if has_landmarks { 2 } else { 1 };
+        let targets = match &segment {
+            None => vec![context.relaxation.goal],
+            Some(goal) => goal.facts.iter().map(|fact| context.relaxation.fact(*fact)).collect(),
+        };
         let useful = prices.iter().filter(|price| **price < USELESS_OPERATOR_COST);
         let sum: u64 = useful.clone().map(|price| u64::from(*price)).sum();
         let mean = sum.checked_div(useful.count() as u64).unwrap_or(1);
         let mut search = Self {
             mean: u32::try_from(mean).unwrap_or(u32::MAX).max(1),
             weight,
+            segment,
+            targets,
             prices,
+            stride: if has_landmarks { context.status.stride() } else { 0 },
             store: Store::new(context.task),
             nodes: Vec::new(),
             reached: Vec::new(),
@@ -80,8 +112,12 @@ impl<N: TaskNumber> Search<N> {
             best: [u32::MAX; 2],
             incomplete: false,
         };
-        let initial = context.task.initial.clone();
-        let reached = context.status.initially(&context.relaxation, &initial);
+        let reached = if has_landmarks {
+            context.status.initially(&context.relaxation, &initial)
+        } else {
+            context.status.request_none();
+            Vec::new()
+        };
         search.store.insert(&initial);
         search.nodes.push(Node { parent: 0, step: 0, cost: N::zero(), price: 0 });
         search.reached.extend(&reached);
@@ -106,6 +142,9 @@ impl<N: TaskNumber> Search<N> {
     ) -> Result<Outcome<N>, Interrupted> {
         let mut pulse: LimitPoll<'_> = limits.pulse();
         let evaluation_work = context.size();
+        if self.stride == 0 {
+            context.status.request_none();
+        }
         while work > 0 {
             pulse.beat()?;
             let Some((parent, step)) = self.open.pop() else { return Ok(Outcome::Exhausted) };
@@ -142,17 +181,14 @@ impl<N: TaskNumber> Search<N> {
             if !is_new && (self.weight == HeuristicWeight::Greedy || total >= self.nodes[id as usize].cost) {
                 continue;
             }
-            let stride = context.status.stride();
-            let start = (parent as usize).saturating_mul(stride);
-            let before = self.reached[start..start.saturating_add(stride)].to_vec();
-            let mut reached = context.status.progress(&context.relaxation, &before, &state);
+            let mut reached = self.reach(context, parent, &state);
             let node = Node { parent, step, cost: total, price };
             if is_new {
                 self.nodes.push(node);
                 self.reached.extend(&reached);
             } else {
                 self.nodes[id as usize] = node;
-                let start = (id as usize).saturating_mul(stride);
+                let start = (id as usize).saturating_mul(self.stride);
                 // A landmark counts as reached only if it was reached on each path that was the cheapest one to
                 // the state when it was found.
                 for (new, old) in reached.iter_mut().zip(&mut self.reached[start..]) {
@@ -163,7 +199,7 @@ impl<N: TaskNumber> Search<N> {
             work = work.saturating_sub(evaluation_work);
             figures.evaluated = figures.evaluated.saturating_add(1);
             figures.expanded = figures.expanded.saturating_add(1);
-            if context.task.is_goal(&state) {
+            if self.is_goal(context.task, &state) {
                 return Ok(Outcome::Plan(self.plan(context, id)));
             }
             self.look(context, id, &state, &reached);
@@ -171,13 +207,29 @@ impl<N: TaskNumber> Search<N> {
         Ok(Outcome::Paused)
     }
 
+    fn is_goal(&self, task: &Task<N>, state: &State<N>) -> bool {
+        self.segment.as_ref().map_or_else(|| task.is_goal(state), |goal| goal.holds(task, state))
+    }
+
+    /// Returns the bitset of the landmarks that are reached in `state`, a successor of the state `parent`.
+    fn reach(&self, context: &mut SearchContext<'_, N>, parent: u32, state: &State<N>) -> Vec<u64> {
+        if self.stride == 0 {
+            return Vec::new();
+        }
+        let start = (parent as usize).saturating_mul(self.stride);
+        let before = &self.reached[start..start.saturating_add(self.stride)];
+        context.status.progress(&context.relaxation, before, state)
+    }
+
     /// Evaluates a state and adds its applicable steps to the open lists. A state without a relaxed plan is a
     /// dead end, so none of its steps are added.
     fn look(&mut self, context: &mut SearchContext<'_, N>, id: u32, state: &State<N>, reached: &[u64]) {
-        let Some(ff_value) = context.explorer.estimate(&context.relaxation, &self.prices, state) else {
+        let SearchContext { explorer, relaxation, .. } = context;
+        let Some(ff_value) = explorer.estimate(relaxation, &self.prices, state, &self.targets) else {
             return;
         };
-        let landmark_count = context.status.remaining(reached);
+        let has_landmarks = self.stride > 0;
+        let landmark_count = if has_landmarks { context.status.remaining(reached) } else { 0 };
         let mut progress = false;
         for (best, value) in self.best.iter_mut().zip([ff_value, landmark_count]) {
             if value < *best {
@@ -189,7 +241,9 @@ impl<N: TaskNumber> Search<N> {
         if progress {
             self.open.boost();
         }
-        context.status.request_landmark(reached);
+        if has_landmarks {
+            context.status.request_landmark(reached);
+        }
         let (steps, preferred) = context.steps(state);
         let value = |estimate: u32| match self.weight {
             HeuristicWeight::Greedy => estimate.into(),
