@@ -35,6 +35,9 @@ const MAX_BOOST: u32 = 3;
 /// Minimum number of times that the budget of the improvement of the best plan is doubled while a proof is not
 /// within reach.
 const MIN_BOOST: i32 = 2;
+/// Maximum number of times that the budget of the improvement of the best plan is doubled while a proof is within
+/// reach.
+const NEAR_BOOST: i32 = 1;
 /// Numerator and denominator of a ratio. If the cost of a plan divided by the lower bound exceeds this ratio,
 /// a better plan is probably easier to find than a proof.
 const NEAR_OPTIMAL_RATIO: (Int, Int) = (3, 2);
@@ -181,11 +184,11 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         let nodes = work.saturating_mul(RELAXATION_WORK_PER_STATE) as u64;
         let limit = self.best.as_ref().map(|plan| plan.cost);
         // A first plan is more important than a better plan, and a better plan is more important than a proof,
-        // unless a proof is within reach. Then, if the satisficing search is unsuccessful, its next budget is
-        // smaller.
+        // unless a proof is within reach. If the satisficing search is unsuccessful, its share becomes smaller,
+        // because A\* may be faster.
         let has_hope = self.exact.as_ref().is_some_and(InterleavedSearch::may_finish);
         let (twice, halved) = match limit {
-            None => (MAX_BOOST, 0),
+            None => (MAX_BOOST.saturating_sub(self.satisficer_share).max(1), 0),
             Some(_) if !is_near => (1, 0),
             Some(_) => (0, if has_hope { self.satisficer_share } else { 0 }),
         };
@@ -227,10 +230,15 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
     /// Replaces parts of the best plan by cheaper ones. The budget is doubled or halved after each turn, by
     /// whether the turn has succeeded.
     fn improve_best_plan(&mut self, work: usize, _: usize) -> Turn {
-        let is_near = self.is_near();
+        let has_hope = self.exact.as_ref().is_some_and(InterleavedSearch::may_finish);
+        let (least, most) = if has_hope && self.is_near() {
+            (MAX_BACKOFF.cast_signed().saturating_neg(), NEAR_BOOST)
+        } else {
+            (MIN_BOOST, MAX_BOOST.cast_signed())
+        };
         let (satisficer, best) = (self.satisficer.as_mut()?, self.best.as_ref()?);
         let span = info_span!("improve", expanded = Empty, generated = Empty).entered();
-        let share = self.improvement_share;
+        let share = self.improvement_share.clamp(least, most);
         let nodes = work.saturating_mul(RELAXATION_WORK_PER_STATE) as u64;
         let mut nodes = (nodes << share.max(0) >> share.min(0).unsigned_abs()).max(1);
         let before = satisficer.figures;
@@ -242,11 +250,10 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         satisficer.figures.add_to(before, &mut self.run.statistics);
         record(&span, &self.run.statistics);
         if !is_better {
-            let least = if is_near { MAX_BACKOFF.cast_signed().saturating_neg() } else { MIN_BOOST };
             self.improvement_share = share.saturating_sub(1).max(least);
             return None;
         }
-        self.improvement_share = MAX_BOOST.cast_signed();
+        self.improvement_share = most;
         self.improve(plan, PlannerPart::Satisficing)
     }
 

@@ -33,7 +33,7 @@ use crate::search::{MutexPairs, SearchStatistics};
 
 use plan_improvement::PlanImprovement;
 use search::{HeuristicWeight, Outcome, Search, SearchGoal};
-use search_context::SearchContext;
+use search_context::{MEMORY_SHARE, SearchContext};
 
 /// Configurations of the searches that run one after another: whether operator costs are used, and the weight
 /// of the heuristic.
@@ -45,9 +45,6 @@ const SEARCH_SEQUENCE: [(bool, HeuristicWeight); 6] = [
     (true, HeuristicWeight::Times(2)),
     (true, HeuristicWeight::Times(1)),
 ];
-
-/// A search may use 1/`MEMORY_SHARE` of the available memory. If it needs more, the next search begins.
-const MEMORY_SHARE: usize = 16;
 
 /// Result of one turn of the satisficing search.
 pub enum StepResult<N> {

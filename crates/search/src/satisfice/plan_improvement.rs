@@ -22,9 +22,8 @@ use task::task::State;
 use task::task::number::TaskNumber;
 
 use crate::random::Random;
-use crate::satisfice::MEMORY_SHARE;
 use crate::satisfice::search::{HeuristicWeight, Outcome, Search, SearchGoal};
-use crate::satisfice::search_context::SearchContext;
+use crate::satisfice::search_context::{MEMORY_SHARE, SearchContext};
 use crate::satisfice::segment_goal::SegmentGoal;
 use crate::satisfice::step_order::StepOrder;
 use crate::search::SearchStatistics;
@@ -35,8 +34,8 @@ const MIN_STEPS: usize = 4;
 const MIN_EVALUATIONS: u64 = 100;
 /// Maximum number of times that the limit on evaluated states is doubled.
 const MAX_DOUBLINGS: u32 = 8;
-/// Weights of the heuristic; passes alternate between them.
-const WEIGHTS: [u64; 2] = [2, 1];
+/// Weight of the heuristic in every second pass; in the others it is 1.
+const GREEDY_WEIGHT: u64 = 2;
 /// Maximum number of remembered segments.
 const MAX_FAILURES: usize = 1 << 18;
 
@@ -52,7 +51,8 @@ pub(super) struct PlanImprovement<N> {
     /// Position of the next segment in the plan.
     next: usize,
     doublings: u32,
-    passes: usize,
+    /// `true` if the current pass uses [`GREEDY_WEIGHT`].
+    is_greedy: bool,
     has_improved: bool,
     /// Search of the current segment, with its remaining work units, its end, and its key in `failures`.
     current: Option<SegmentSearch<N>>,
@@ -80,7 +80,7 @@ impl<N: TaskNumber> PlanImprovement<N> {
             segment: MIN_STEPS,
             next: 0,
             doublings: 0,
-            passes: 0,
+            is_greedy: true,
             has_improved: false,
             current: None,
             failures: FxHashMap::default(),
@@ -175,11 +175,12 @@ impl<N: TaskNumber> PlanImprovement<N> {
         let end = self.next.saturating_add(self.segment).min(count);
         let (start, steps) = (&self.states[self.next], &self.plan.steps[self.next..end]);
         let goal = SegmentGoal::new(context.task, &self.states[end], &self.plan.steps[end..]);
-        let key = FxBuildHasher.hash_one((start, &goal.facts, self.passes % WEIGHTS.len()));
+        let weight = if self.is_greedy { GREEDY_WEIGHT } else { 1 };
+        let key = FxBuildHasher.hash_one((start, &goal.facts, weight));
         let is_known = self.failures.get(&key).is_some_and(|doublings| *doublings >= self.doublings);
         match cost(context.task, steps).filter(|cost| *cost > N::zero() && !is_known) {
             Some(cost) => {
-                let weight = HeuristicWeight::Times(WEIGHTS[self.passes % WEIGHTS.len()]);
+                let weight = HeuristicWeight::Times(weight);
                 let prices = context.prices(true);
                 let search = Search::new(context, weight, prices, SearchGoal::Segment(start.clone(), goal));
                 let evaluations = MIN_EVALUATIONS << self.doublings;
@@ -193,7 +194,7 @@ impl<N: TaskNumber> PlanImprovement<N> {
     /// Chooses the length of the segments and the order of the steps for the next pass.
     fn end_pass(&mut self, context: &SearchContext<'_, N>) {
         let count = self.plan.steps.len();
-        self.passes = self.passes.saturating_add(1);
+        self.is_greedy = !self.is_greedy;
         if !self.has_improved {
             if self.segment >= count {
                 self.segment = MIN_STEPS;

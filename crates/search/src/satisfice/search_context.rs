@@ -16,6 +16,8 @@ use crate::satisfice::landmarks::Landmarks;
 use crate::search::design_combinations::pareto_optimal_combinations;
 use crate::search::{MutexPairs, SearchStatistics, is_monotone};
 
+/// A search may use 1/`MEMORY_SHARE` of the available memory. If it needs more, the next search begins.
+pub(super) const MEMORY_SHARE: usize = 16;
 /// Work units charged for generating a successor and looking it up in the store.
 pub(super) const GENERATION_COST: u64 = 200;
 /// Cost of an operator that is never useful according to the h² mutexes.

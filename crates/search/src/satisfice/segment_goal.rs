@@ -98,9 +98,9 @@ mod tests {
                     }
                 }
             }
-            for end in 0..states.len() {
-                let goal = SegmentGoal::new(&task, &states[end], &plan.steps[end..]);
-                assert!(goal.holds(&task, &states[end]), "{text:?}");
+            for (end, reached_end) in states.iter().enumerate() {
+                let goal = SegmentGoal::new(&task, reached_end, &plan.steps[end..]);
+                assert!(goal.holds(&task, reached_end), "{text:?}");
                 complete += usize::from(goal.is_complete);
                 for state in &reached {
                     let is_plan = pass(&task, state, &plan.steps[end..]).is_some();
