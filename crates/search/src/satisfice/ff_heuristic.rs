@@ -12,7 +12,7 @@ use task::task::State;
 use task::task::number::TaskNumber;
 
 use crate::satisfice::bucket_queue::Queue;
-use crate::satisfice::delete_relaxation::{NO_OPERATOR, Proposition, Relaxation};
+use crate::satisfice::delete_relaxation::{Gain, NO_OPERATOR, Proposition, Relaxation};
 
 const UNREACHED: u32 = u32::MAX;
 const MAX_COST: u32 = 1 << 30;
@@ -36,8 +36,11 @@ pub(super) struct FfHeuristic {
     initially_left: Vec<u32>,
     queue: Queue,
     values: Vec<f64>,
+    numbers: Vec<f64>,
     pub(super) applicable: Vec<u32>,
     pub(super) preferred: Vec<u32>,
+    /// Preferred operators that the relaxed plan repeats, with the number of applications.
+    pub(super) repeated: Vec<(u32, u32)>,
     marked: Vec<bool>,
     marks: Vec<Proposition>,
     planned: Vec<u32>,
@@ -56,8 +59,10 @@ impl FfHeuristic {
             initially_left: lengths.map(task::number::dense).collect(),
             queue: Queue::default(),
             values: vec![0.0; relaxation.directions.len()],
+            numbers: Vec::new(),
             applicable: Vec::new(),
             preferred: Vec::new(),
+            repeated: Vec::new(),
             marked: vec![false; relaxation.propositions],
             marks: Vec::new(),
             planned: Vec::new(),
@@ -78,6 +83,7 @@ impl FfHeuristic {
         targets: &[Proposition],
     ) -> Option<u32> {
         self.preferred.clear();
+        self.repeated.clear();
         self.reach(relaxation, prices, state, targets);
         let is_reached = targets.iter().all(|target| self.costs[*target as usize] < UNREACHED);
         is_reached.then(|| self.relaxed_plan(relaxation, prices, targets))
@@ -99,6 +105,8 @@ impl FfHeuristic {
         for proposition in relaxation.facts(&state.values).chain(relaxation.always.iter().copied()) {
             self.put(proposition, 0, no_supporter);
         }
+        self.numbers.clear();
+        self.numbers.extend(state.numbers.iter().map(TaskNumber::approximate));
         for (direction, index) in relaxation.directions.iter().zip(0..) {
             let value: Option<N> = direction.value(&state.numbers);
             for (threshold, strict, proposition) in &direction.thresholds {
@@ -173,14 +181,27 @@ impl FfHeuristic {
         for support in &relaxation.supports[node as usize] {
             let direction = &relaxation.directions[support.direction as usize];
             let value = self.values[support.direction as usize];
+            let gain = self.gain(&support.gain);
             for (threshold, _, proposition) in &direction.thresholds {
                 if self.costs[*proposition as usize] == 0 {
                     continue;
                 }
-                let times = times(threshold.approximate() - value, support.gain);
+                let times = times(threshold.approximate() - value, gain);
                 let cost = sum.saturating_add(price.saturating_mul(times)).min(MAX_COST);
                 self.put(*proposition, cost, Supporter { node, times });
             }
+        }
+    }
+
+    /// Returns the increase of an expression by one application in the evaluated state.
+    fn gain(&self, gain: &Gain) -> f64 {
+        match gain {
+            Gain::Constant(gain) => *gain,
+            Gain::Linear(constant, terms) => {
+                let terms = terms.iter().map(|(variable, factor)| factor * self.numbers[variable.index()]);
+                constant + terms.sum::<f64>()
+            }
+            Gain::Unlimited => f64::INFINITY,
         }
     }
 
@@ -219,6 +240,9 @@ impl FfHeuristic {
                         self.preferred.push(operator);
                     }
                 }
+                if times > 1 && self.sums[node as usize] == 0 {
+                    self.repeated.push((operator, times));
+                }
             }
             for condition in relaxation.conditions.of(node) {
                 if !self.marked[*condition as usize] {
@@ -238,10 +262,14 @@ impl FfHeuristic {
 }
 
 /// Returns the estimated number of applications whose gains add up to at least the missing amount: at least 1
-/// and at most `MAX_REPETITIONS`.
+/// and at most `MAX_REPETITIONS`. If the gain is not positive in the evaluated state, it may be positive later, so
+/// the maximum is returned.
 fn times(missing: f64, gain: f64) -> u32 {
     if gain.is_infinite() {
         return 1;
+    }
+    if gain <= 0.0 {
+        return MAX_REPETITIONS.to_u32().unwrap_or(u32::MAX);
     }
     (missing / gain).ceil().clamp(1.0, MAX_REPETITIONS).to_u32().unwrap_or(1)
 }

@@ -7,8 +7,12 @@
 //! `incomplete` is `false`, all reachable states were visited, except those behind dead ends and those that
 //! the h² mutexes prove useless.
 //!
+//! If the relaxed plan applies an operator several times, the search also jumps over the states between \[3\].
+//!
 //! - \[1\] M. Helmert: The Fast Downward planning system, JAIR 26, 2006, section 5.
 //! - \[2\] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010, section 6.
+//! - \[3\] E. Scala, A. Saetti, I. Serina, A. E. Gerevini: Search-guidance mechanisms for numeric planning through
+//!   subgoaling relaxation, ICAPS 2020.
 
 use std::sync::Arc;
 
@@ -47,6 +51,8 @@ struct Node<N> {
     cost: N,
     /// Path cost as the sum of the scaled operator costs.
     price: u64,
+    /// `true` if the state was reached within a jump and is not evaluated yet.
+    is_pending: bool,
 }
 
 pub(super) enum Outcome<N> {
@@ -72,6 +78,8 @@ pub(super) struct Search<N> {
     /// Number of words of a bitset of landmarks: 0 in a segment.
     stride: usize,
     open: AlternatingOpenList<u64>,
+    /// Number of states of jumps whose work is not charged yet.
+    jumped: u64,
     /// Lowest value of each heuristic among the evaluated states.
     best: [u32; 2],
     /// `true` if states were pruned because a number overflowed or their path cost reached the limit.
@@ -109,6 +117,7 @@ impl<N: TaskNumber> Search<N> {
             nodes: Vec::new(),
             reached: Vec::new(),
             open: AlternatingOpenList::new([false, true].repeat(estimates)),
+            jumped: 0,
             best: [u32::MAX; 2],
             incomplete: false,
         };
@@ -119,7 +128,7 @@ impl<N: TaskNumber> Search<N> {
             Vec::new()
         };
         search.store.insert(&initial);
-        search.nodes.push(Node { parent: 0, step: 0, cost: N::zero(), price: 0 });
+        search.nodes.push(Node { parent: 0, step: 0, cost: N::zero(), price: 0, is_pending: false });
         search.reached.extend(&reached);
         search.look(context, 0, &initial, &reached);
         search
@@ -148,8 +157,9 @@ impl<N: TaskNumber> Search<N> {
         while work > 0 {
             pulse.beat()?;
             let Some((parent, step)) = self.open.pop() else { return Ok(Outcome::Exhausted) };
-            work = work.saturating_sub(GENERATION_COST);
-            figures.generated = figures.generated.saturating_add(1);
+            let generated = std::mem::take(&mut self.jumped).saturating_add(1);
+            work = work.saturating_sub(GENERATION_COST.saturating_mul(generated));
+            figures.generated = figures.generated.saturating_add(generated);
             let (operator, choice, cost) = context.step(step);
             if context.pairs.as_ref().is_some_and(|pairs| pairs.is_operator_useless(operator)) {
                 continue;
@@ -177,17 +187,22 @@ impl<N: TaskNumber> Search<N> {
                 continue;
             }
             let (id, is_new) = self.store.insert(&state);
+            let is_cheaper = is_new || total < self.nodes[id as usize].cost;
+            let is_pending = !is_new && std::mem::take(&mut self.nodes[id as usize].is_pending);
             // Greedy search ignores path costs, so it does not reopen states.
-            if !is_new && (self.weight == HeuristicWeight::Greedy || total >= self.nodes[id as usize].cost) {
+            let reopens = is_cheaper && self.weight != HeuristicWeight::Greedy;
+            if !is_new && !is_pending && !reopens {
                 continue;
             }
             let mut reached = self.reach(context, parent, &state);
-            let node = Node { parent, step, cost: total, price };
+            let node = Node { parent, step, cost: total, price, is_pending: false };
             if is_new {
                 self.nodes.push(node);
                 self.reached.extend(&reached);
             } else {
-                self.nodes[id as usize] = node;
+                if is_cheaper {
+                    self.nodes[id as usize] = node;
+                }
                 let start = (id as usize).saturating_mul(self.stride);
                 // A landmark counts as reached only if it was reached on each path that was the cheapest one to
                 // the state when it was found.
@@ -253,7 +268,49 @@ impl<N: TaskNumber> Search<N> {
         };
         let landmarks = landmark_count.saturating_mul(self.mean);
         let (ff_value, landmarks) = (value(ff_value), value(landmarks));
+        for (operator, times) in std::mem::take(&mut context.explorer.repeated) {
+            let step = preferred.iter().find(|step| context.step(**step).0.0 == operator);
+            if let Some(step) = step {
+                let last = self.jump(context, id, state, *step, times);
+                if last != id {
+                    self.open.push(last, [ff_value, ff_value, landmarks, landmarks], &[*step], &[*step]);
+                }
+            }
+        }
         self.open.push(id, [ff_value, ff_value, landmarks, landmarks], &steps, &preferred);
+    }
+
+    /// Applies a step up to `times - 1` times, while it stays applicable, and returns the node of the last state.
+    /// The states between are stored but not evaluated [3]. They are evaluated when another path reaches them.
+    fn jump(
+        &mut self,
+        context: &mut SearchContext<'_, N>,
+        from: u32,
+        state: &State<N>,
+        step: u32,
+        times: u32,
+    ) -> u32 {
+        let mut node = from;
+        let mut state = state.clone();
+        for _ in 1..times {
+            let (operator, choice, cost) = context.step(step);
+            let schema = &context.task.operators[operator.index()];
+            let Some(next) = context.task.successor(schema, &state, choice) else { break };
+            let Some(total) = self.nodes[node as usize].cost.plus(cost).filter(N::is_moderate) else { break };
+            if !schema.applicable(&next, choice) {
+                break;
+            }
+            self.jumped = self.jumped.saturating_add(1);
+            let price = self.nodes[node as usize].price.saturating_add(self.prices[operator.index()].into());
+            let (id, is_new) = self.store.insert(&next);
+            if is_new {
+                let reached = self.reach(context, node, &next);
+                self.nodes.push(Node { parent: node, step, cost: total, price, is_pending: true });
+                self.reached.extend(reached);
+            }
+            (node, state) = (id, next);
+        }
+        node
     }
 
     fn plan(&self, context: &SearchContext<'_, N>, goal: u32) -> GroundPlan<N> {
