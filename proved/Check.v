@@ -47,21 +47,24 @@ Definition pattern_truth (pat : list key) (vals : list Z) (l : literal) : option
   | Some x => Some (Bool.eqb (x =? snd (fst l)) (snd l))
   | None => None
   end.
-(* Values of the pattern that conditional effects may produce. *)
+Definition mem_key (v : key) (pat : list key) := existsb (Pos.eqb v) pat.
+Definition same_values (a b : list Z) : bool := if list_eq_dec Z.eq_dec a b then true else false.
+(* Values of the pattern that conditional effects may produce. Effects on other variables are left out, and
+   values are not repeated: their number is then at most that of all values of the pattern. *)
 Fixpoint reached_patterns (pat : list key) (vals : list Z) (cs : list (list literal * list fact)) (ts : list (list Z)) :=
   match cs with
   | [] => ts
   | c :: r =>
       let tr := map (pattern_truth pat vals) (fst c) in
-      if existsb (fun t => match t with Some false => true | _ => false end) tr then reached_patterns pat vals r ts
+      if forallb (fun f => negb (mem_key (fst f) pat)) (snd c) then reached_patterns pat vals r ts
+      else if existsb (fun t => match t with Some false => true | _ => false end) tr then reached_patterns pat vals r ts
       else let new := map (fun t => pattern_after pat t (snd c)) ts in
            if forallb (fun t => match t with Some true => true | _ => false end) tr then reached_patterns pat vals r new
-           else reached_patterns pat vals r (ts ++ new)
+           else reached_patterns pat vals r (ts ++ filter (fun t => negb (existsb (same_values t) ts)) new)
   end.
 Definition successor_patterns (pat : list key) (o : operator) (vals : list Z) :=
   reached_patterns pat vals (conditional o) [pattern_after pat vals (effects o)].
 
-Definition mem_key (v : key) (pat : list key) := existsb (Pos.eqb v) pat.
 Definition mentions (pat : list key) (o : operator) : bool :=
   existsb (fun f => mem_key (fst f) pat) (facts (precondition o) ++ effects o ++ flat_map snd (conditional o)).
 

@@ -132,6 +132,12 @@ Definition symbolic_comparison (k : knowledge) (strict : bool) (r : result) : op
   | Is f => if implied k strict f then Some true
             else if implied k (negb strict) (plus_form (constant 0) (-1 # 1) f) then Some false else None
   end.
+(* Kleene's conjunction over a list, which ends at the first element that is false. *)
+Definition all_kleene {X} (t : X -> option bool) : list X -> option bool :=
+  fix all l := match l with
+               | [] => Some true
+               | x :: r => match t x with Some false => Some false | b => and_kleene b (all r) end
+               end.
 (* [Some b] means that the condition does not have the other truth value; it may be undefined. *)
 Fixpoint symbolic_truth (k : knowledge) (s : symbolic) (d : result) (env : list key) (f : formula) : option bool :=
   match f with
@@ -143,7 +149,7 @@ Fixpoint symbolic_truth (k : knowledge) (s : symbolic) (d : result) (env : list 
   | And g h => match symbolic_truth k s d env g with
                | Some false => Some false
                | x => and_kleene x (symbolic_truth k s d env h) end
-  | Forall t g => fold_right (fun o r => and_kleene (symbolic_truth k s d (env ++ [o]) g) r) (Some true) (objects P t)
+  | Forall t g => all_kleene (fun o => symbolic_truth k s d (env ++ [o]) g) (objects P t)
   end.
 Inductive symbolic_change := SFact (a : atom) (holds : bool) | SNumber (a : atom) (assigns : bool) (f : form).
 Fixpoint symbolic_changes (k : knowledge) (s : symbolic) (d : result) (env : list key) (e : effect) : option (list symbolic_change) :=
@@ -211,8 +217,11 @@ Fixpoint projected (keep : atom -> bool) (with_numbers : bool) (k : knowledge) (
                            | Some l, Is g => Some [SNumber (f, l) assigns g] | _, _ => None end
       else Some []
   | Both a b => both (projected keep with_numbers k env a) (projected keep with_numbers k env b)
-  | When f a => match symbolic_truth k unchanged Undefined env f, projected keep with_numbers k env a with
-                | Some true, r => r | Some false, _ => Some [] | None, Some [] => Some [] | None, _ => None end
+  | When f a => match projected keep with_numbers k env a with
+                | Some [] => Some []               (* whether the condition holds does not matter *)
+                | r => match symbolic_truth k unchanged Undefined env f with
+                       | Some true => r | Some false => Some [] | None => None end
+                end
   | Each t a => fold_right (fun o r => both (projected keep with_numbers k (env ++ [o]) a) r) (Some []) (objects P t)
   end.
 (* The atoms on which unknown conditions of the kept effects depend. *)
@@ -227,10 +236,12 @@ Fixpoint atoms_of (env : list key) (f : formula) : list atom :=
 Fixpoint deciding_atoms (keep : atom -> bool) (k : knowledge) (env : list key) (e : effect) : list atom :=
   match e with
   | Both a b => deciding_atoms keep k env a ++ deciding_atoms keep k env b
-  | When f a => match symbolic_truth k unchanged Undefined env f, projected keep false k env a with
-                | Some _, _ => deciding_atoms keep k env a
-                | None, Some [] => []
-                | None, _ => atoms_of env f ++ deciding_atoms keep k env a end
+  | When f a => match projected keep false k env a with
+                | Some [] => []
+                | _ => match symbolic_truth k unchanged Undefined env f with
+                       | Some _ => deciding_atoms keep k env a
+                       | None => atoms_of env f ++ deciding_atoms keep k env a end
+                end
   | Each t a => flat_map (fun o => deciding_atoms keep k (env ++ [o]) a) (objects P t)
   | _ => []
   end.
@@ -380,8 +391,10 @@ Fixpoint definite (look : atom -> option bool) (env : list key) (f : formula) : 
   | Same t u => match object_of env t, object_of env u with Some a, Some b => Some (Pos.eqb a b) | _, _ => None end
   | Compare _ _ _ => None
   | Not g => option_map negb (definite look env g)
-  | And g h => and_kleene (definite look env g) (definite look env h)
-  | Forall t g => fold_right (fun o r => and_kleene (definite look (env ++ [o]) g) r) (Some true) (objects P t)
+  | And g h => match definite look env g with
+               | Some false => Some false
+               | x => and_kleene x (definite look env h) end
+  | Forall t g => all_kleene (fun o => definite look (env ++ [o]) g) (objects P t)
   end.
 Definition is_some (b : bool) (t : option bool) : bool := match t with Some c => Bool.eqb b c | None => false end.
 Fixpoint look_up (depth limit : nat) (k : knowledge) (a : atom) : option bool :=

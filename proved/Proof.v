@@ -322,6 +322,12 @@ Lemma targets_ok : forall pat s cs ts g, In (map g pat) ts ->
     (reached_patterns pat (shape s pat) cs ts).
 Proof.
   intros pat s. induction cs as [|c cs IH]; intros ts g H; simpl; [exact H|].
+  destruct (forallb (fun f => negb (mem_key (fst f) pat)) (snd c)) eqn:Other.
+  { destruct (fires s c); simpl; [|apply IH, H].
+    erewrite map_ext_in; [apply IH, H|]. intros v I. simpl. rewrite last_put_app. f_equal.
+    apply last_put_none. intros f F e. rewrite forallb_forall in Other. specialize (Other f F).
+    apply negb_true_iff in Other. assert (mem_key (fst f) pat = true); [|congruence].
+    apply memb_In. rewrite e. exact I. }
   destruct (existsb _ _) eqn:E.
   { rewrite (fired_false _ _ _ E). apply IH, H. }
   assert (N : In (map (fun v => last_put (snd c) v (g v)) pat) (map (fun t =>
@@ -331,9 +337,12 @@ Proof.
   - rewrite (fired_true _ _ _ F). simpl.
     apply (IH _ _) in N. erewrite map_ext; [exact N|]. intro v. simpl. apply last_put_app.
   - destruct (fires s c); simpl.
-    + assert (N' : In (map (fun v => last_put (snd c) v (g v)) pat) (ts ++ map (fun t =>
-        pattern_after pat t (snd c)) ts))
-        by (apply in_or_app; right; exact N).
+    + assert (N' : In (map (fun v => last_put (snd c) v (g v)) pat) (ts ++ filter (fun t => negb (existsb (same_values t) ts)) (map (fun t =>
+        pattern_after pat t (snd c)) ts))).
+      { apply in_or_app. destruct (existsb (same_values (map (fun v => last_put (snd c) v (g v)) pat)) ts) eqn:D.
+        - left. apply existsb_exists in D. destruct D as [t [I S]]. unfold same_values in S.
+          destruct (list_eq_dec Z.eq_dec _ t) as [<-|]; [exact I|discriminate].
+        - right. apply filter_In. split; [exact N|]. rewrite D. reflexivity. }
       apply (IH _ _) in N'. erewrite map_ext; [exact N'|]. intro v. simpl. apply last_put_app.
     + apply IH. apply in_or_app. left. exact H.
 Qed.

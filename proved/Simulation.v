@@ -280,12 +280,16 @@ Proof.
   intros look L. induction f; intros env v H; cbn [definite truth] in *; try exact H; try discriminate.
   - destruct (ground env ts); [|discriminate]. rewrite (L _ _ H). reflexivity.
   - destruct (definite P look env f) as [t|] eqn:E; [|discriminate]. rewrite (IHf _ _ E). exact H.
-  - destruct (definite P look env f1) as [x|] eqn:E1; [rewrite (IHf1 _ _ E1)|];
+  - assert (H' : and_kleene (definite P look env f1) (definite P look env f2) = Some v)
+      by (destruct (definite P look env f1) as [[]|]; exact H).
+    clear H. rename H' into H.
+    destruct (definite P look env f1) as [x|] eqn:E1; [rewrite (IHf1 _ _ E1)|];
       destruct (definite P look env f2) as [y|] eqn:E2; try (rewrite (IHf2 _ _ E2)); try exact H;
       try destruct x; try destruct y; try discriminate; injection H as <-;
       try (destruct (truth P w None env f1) as [[]|]; reflexivity);
       destruct (truth P w None env f2) as [[]|]; reflexivity.
-  - revert v H. induction (objects P type) as [|o os IH]; intros v H; cbn [fold_right] in *; [exact H|].
+  - rewrite all_kleene_fold in H.
+    revert v H. induction (objects P type) as [|o os IH]; intros v H; cbn [fold_right] in *; [exact H|].
     set (x := fold_right _ _ os) in H. set (y := fold_right _ _ os).
     assert (X : forall b, x = Some b -> y = Some b) by exact IH. clearbody x y. clear IH.
     destruct (definite P look (env ++ [o]) f) as [t|] eqn:E.

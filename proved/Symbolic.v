@@ -163,6 +163,9 @@ Proof.
   - destruct f as [[|] c]; [|discriminate]. apply andb_true_iff in H. destruct H as [S H]. subst st.
     apply less_spec in H. rewrite ev_empty. exact H.
 Qed.
+Lemma all_kleene_fold : forall X (t : X -> option bool) l,
+  all_kleene t l = fold_right (fun x r => and_kleene (t x) r) (Some true) l.
+Proof. induction l as [|x l IH]; cbn; [reflexivity|]. rewrite IH. destruct (t x) as [[]|]; reflexivity. Qed.
 Lemma symbolic_truth_ok : forall w s d r, Describes w0 w s -> agrees w0 d r ->
   forall f env b, symbolic_truth P T N k s r env f = Some b -> truth P w d env f <> Some (negb b).
 Proof.
@@ -197,7 +200,8 @@ Proof.
            pose proof (IHf2 env _ E3)).
     all: injection H as <-; destruct (truth P w d env f1) as [[]|], (truth P w d env f2) as [[]|];
            simpl in *; congruence.
-  - revert v H. induction (objects P type) as [|o os IH]; intros v H; cbn [fold_right] in *;
+  - rewrite all_kleene_fold in H.
+    revert v H. induction (objects P type) as [|o os IH]; intros v H; cbn [fold_right] in *;
       [injection H as <-; discriminate|].
     pose proof (fun v => IHf (env ++ [o]) v) as A. revert v H A.
     generalize (symbolic_truth P T N k s r (env ++ [o]) f) as x. generalize (truth P w d (env ++ [o]) f) as t.
@@ -427,15 +431,20 @@ Proof.
     destruct (symbolic_expression P N unchanged Undefined env e) as [| |g]; try discriminate.
     injection K as <-. constructor; [|constructor]. simpl. repeat split. apply G. exact Ev.
   - eapply both_filter; [| |exact H|exact K]; intros; [eapply IHe1|eapply IHe2]; eassumption.
-  - destruct (symbolic_truth P T N k unchanged Undefined env f) as [b|] eqn:E.
+  - assert (K' : projected P T N keep n k env e = Some [] /\ ss = [] \/
+      exists b, symbolic_truth P T N k unchanged Undefined env f = Some b /\
+                if b then projected P T N keep n k env e = Some ss else ss = []).
+    { destruct (projected P T N keep n k env e) as [[|]|]; [left; split; congruence| |];
+        right; destruct (symbolic_truth P T N k unchanged Undefined env f) as [[]|]; try discriminate;
+        eexists; (split; [reflexivity|]); cbv iota; congruence. }
+    destruct K' as [[Pr ->]|[b [E Pr]]].
+    + destruct (truth P w0 None env f) as [[]|]; [| |discriminate].
+      * eapply IHe; eassumption.
+      * injection H as <-. constructor.
     + apply (symbolic_truth_ok w0 unchanged None Undefined (describes_itself P w0) eq_refl) in E.
       destruct (truth P w0 None env f) as [[]|]; [| |discriminate]; destruct b; simpl in E; try congruence.
       * eapply IHe; eassumption.
-      * injection H as <-. injection K as <-. constructor.
-    + destruct (projected P T N keep n k env e) as [[|]|] eqn:Pr; try discriminate. injection K as <-.
-      destruct (truth P w0 None env f) as [[]|]; [| |discriminate].
-      * eapply IHe; eassumption.
-      * injection H as <-. constructor.
+      * injection H as <-. subst ss. constructor.
   - revert cs ss H K. induction (objects P type) as [|o os IH]; intros cs ss H K; cbn [fold_right] in *.
     + injection H as <-. injection K as <-. constructor.
     + eapply both_filter; [| |exact H|exact K]; [intros; eapply IHe; eassumption|exact IH].

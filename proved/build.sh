@@ -13,5 +13,7 @@ done
 cd ocaml
 ocamlfind ocamlopt -c checker.mli checker.ml reader.ml evidence.ml
 for program in check check_list prepare mutants differential semantics; do
-  ocamlfind ocamlopt checker.cmx reader.cmx evidence.cmx "$program.ml" -o "$program"
+  # `metaplan verify --proved` finds its two programs by these names, also in PATH.
+  case $program in check | prepare) name=metaplan-proved-$program ;; *) name=$program ;; esac
+  ocamlfind ocamlopt checker.cmx reader.cmx evidence.cmx "$program.ml" -o "$name"
 done

@@ -25,13 +25,13 @@ echo 'docs/explanation/proved.md has the numbers of lines'
 
 stored=../crates/verify/tests/certificates
 accepted() {
-  ocaml/prepare "$1" >"$temporary/evidence.txt" || fail "no evidence for $1"
-  answer=$(ocaml/check "$1" "$temporary/evidence.txt") || fail "$1: $answer"
+  ocaml/metaplan-proved-prepare "$1" >"$temporary/evidence.txt" || fail "no evidence for $1"
+  answer=$(ocaml/metaplan-proved-check "$1" "$temporary/evidence.txt") || fail "$1: $answer"
   [ "$answer" = "$2" ] || fail "$1: $answer"
   echo "$1: $answer"
 }
 rejected() {
-  if answer=$(ocaml/check "$1" "$temporary/evidence.txt"); then fail "$1 is accepted"; fi
+  if answer=$(ocaml/metaplan-proved-check "$1" "$temporary/evidence.txt"); then fail "$1 is accepted"; fi
   [ "$answer" = "$2" ] || fail "$1: $answer"
   echo "$1: $answer"
 }
@@ -50,7 +50,7 @@ changed() {
   cp -r "$directory" "$temporary/changed"
   sed "$2" "$directory/$1" >"$temporary/changed/$1"
   if cmp -s "$directory/$1" "$temporary/changed/$1"; then fail "nothing is changed by $2"; fi
-  if answer=$(ocaml/check "$temporary/changed" "$temporary/evidence.txt"); then fail "accepted after $2: $answer"; fi
+  if answer=$(ocaml/metaplan-proved-check "$temporary/changed" "$temporary/evidence.txt"); then fail "accepted after $2: $answer"; fi
 }
 # The comparison needs the range of the battery.
 directory=tests/battery
@@ -74,6 +74,12 @@ changed domain.pddl 's/(or (corridor ?s ?r) (open ?s ?r)/(or (open ?s ?r)/'
 changed domain.pddl 's/(:derived (some-dark) (exists/(:derived (some-dark) (forall/'
 changed problem.pddl 's/(on hall)//'
 changed problem.pddl 's/(not (lit bedroom))/(lit bedroom)/'
+# An operator with 48 conditional effects, most of which do not concern the variables of a potential.
+directory=tests/dials
+accepted "$directory" 'proved: the plan of 2 steps is optimal, metric 5'
+mutated "$directory"
+changed domain.pddl 's/(when (and (next ?p ?q) (not (up ?p))) (not (up ?q)))/(when (and (next ?p ?q) (not (up ?p))) (up ?q))/'
+changed problem.pddl 's/(next p2 p3)/(next p2 p3) (next p0 p3)/'
 directory=tests/ugv
 accepted "$directory" 'proved: the plan of 4 steps is optimal, metric 408'
 mutated "$directory"
@@ -86,7 +92,7 @@ changed domain.pddl 's/(at start (not (robot_at ?from)))//'
 changed plan.txt '1d'
 # A list of objectives: one certificate for each objective, with limits for those before it.
 cp -r tests/errands "$temporary/errands"
-for i in 1 2; do ocaml/prepare "tests/errands/$i" >"$temporary/$i"; done
+for i in 1 2; do ocaml/metaplan-proved-prepare "tests/errands/$i" >"$temporary/$i"; done
 list() {
   answer=$(ocaml/check_list "$temporary/errands" $2) || true
   [ "$answer" = "$1" ] || fail "errands: $answer, where the answer should be: $1"

@@ -1,4 +1,4 @@
-//! Collects all errors and warnings about a mission, without planning.
+//! Collects errors and warnings about a mission, without planning.
 
 use std::time::Duration;
 
@@ -13,7 +13,8 @@ use crate::setup::Setup;
 const TIME_LIMIT: Duration = Duration::from_secs(20);
 
 /// Returns the errors and warnings about a mission: errors first, without duplicates. Constructs that the planner does
-/// not support are found by grounding, which stops after 20 seconds.
+/// not support are found by grounding, which stops after 20 seconds. If the problem cannot be filled from the knowledge
+/// base, it is not grounded.
 ///
 /// ```
 /// use std::path::Path;

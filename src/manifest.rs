@@ -1,5 +1,5 @@
-//! Parses mission manifests (TOML) into the sections that the caller defines, and determines the
-//! positions of entries for messages.
+//! Parses manifests (TOML files of missions, settings and studies) into the sections that the caller defines,
+//! and determines the positions of entries for messages.
 
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
@@ -82,8 +82,8 @@ pub fn parse<S: DeserializeOwned>(
 }
 
 impl ManifestPath {
-    /// Converts a path relative to the manifest to a path relative to the current directory, with
-    /// as few `..` components as possible.
+    /// Resolves a path that is relative to the manifest's directory. Removes `dir/..` from the result, unless
+    /// the result would then name another file.
     pub fn path(&self, path: &Path) -> PathBuf {
         let whole = self.directory.join(path);
         let short = shortened(&whole);
@@ -172,7 +172,7 @@ impl ManifestPath {
     }
 }
 
-/// JSON Schema of the values that [`ManifestPath::number`] accepts.
+/// JSON Schema for the values of [`ManifestPath::number`]. It does not restrict the content of strings.
 pub fn decimal(_: &mut SchemaGenerator) -> Schema {
     json_schema!({ "type": ["number", "string"], "minimum": 0 })
 }

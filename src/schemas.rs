@@ -1,5 +1,5 @@
-//! JSON Schemas of manifests and of all JSON inputs and outputs, derived from the types that read
-//! and write them.
+//! JSON Schemas of manifests and of the JSON inputs and outputs. Most of them are derived from the types that read and
+//! write the documents.
 
 use schemars::{Schema, schema_for};
 use serde_json::{Map, Value, json};
@@ -8,7 +8,7 @@ use crate::answers::{
     ChangesAnswer, CheckAnswer, ChecksAnswer, CodeAnswer, CompareAnswer, ConfigureAnswer, DesignAnswer,
     EntailmentAnswer, ErrorAnswer, ImportAnswer, InitAnswer, JournalAnswer, LintAnswer, MissionExport,
     ModelExport, ParetoAnswer, PlanAnswer, ReasonAnswer, ReasonsAnswer, SchemaAnswer, SimulateAnswer,
-    VerdictAnswer, VerificationAnswer,
+    VerdictAnswer, VerifyAnswer,
 };
 use crate::mapek::event_schema;
 use crate::recording::answer_schema;
@@ -19,8 +19,9 @@ use crate::sweep::{self, SweepAnswer};
 /// to satisfy one of them.
 type Entry = (&'static str, &'static str, fn() -> Vec<Schema>);
 
-/// All formats by name. The answer formats have the name of their field `format` without the prefix
-/// `metaplan-` and without the version.
+/// The formats with a schema, by name. The name of an answer format is its field `format` without the prefix
+/// `metaplan-` and without the version, e.g. `plan` for `metaplan-plan/1`. The format `check` includes
+/// `metaplan-checks/1`.
 pub const FORMATS: [Entry; 25] = [
     ("manifest", "a mission's manifest", || vec![setup::schema()]),
     ("study", "a study of metaplan sweep", || vec![sweep::schema()]),
@@ -46,7 +47,7 @@ pub const FORMATS: [Entry; 25] = [
     ("simulate", "metaplan simulate", || vec![schema_for!(SimulateAnswer)]),
     ("sweep", "metaplan sweep", || vec![schema_for!(SweepAnswer)]),
     ("verdict", "metaplan validate", || vec![schema_for!(VerdictAnswer)]),
-    ("verification", "metaplan verify", || vec![schema_for!(VerificationAnswer)]),
+    ("verification", "metaplan verify", || vec![schema_for!(VerifyAnswer)]),
 ];
 
 /// Returns the schema of a format, or `None` if the format does not exist.

@@ -167,13 +167,14 @@ impl Setup {
         Experiment::new(mission, self.settings.clone(), simulation.clone(), self.time_unit)
     }
 
-    /// Returns all faults of the scenarios, each with its position in the manifest.
+    /// Returns all faults of the scenarios, each with its position in the manifest. If the mission's problem is faulty
+    /// itself, PDDL faults are omitted.
     pub fn mistakes(&self) -> Vec<Message> {
         self.scenarios.iter().flat_map(|(name, scenario)| self.situation(name, scenario).1).collect()
     }
 
     /// Returns the mission in the situation of a scenario. Also returns all faults of the scenario and its simulation;
-    /// if the mission's problem is faulty itself, PDDL faults of the simulation are omitted.
+    /// if the mission's problem is faulty itself, PDDL faults are omitted.
     fn situation(&self, name: &str, scenario: &Scenario<Simulation>) -> (Mission, Vec<Message>) {
         let mut mission = self.mission.clone();
         let is_sound = mission.filled().is_ok();

@@ -16,7 +16,7 @@ use task::task::Task;
 use testing::missions::Mission;
 use testing::{costs_by_steps, depot, fleet, ground_text, optimum};
 
-/// Lower limit on the step bound up to which formulas are tested.
+/// Number of steps up to which formulas are tested at least.
 const STEPS: usize = 6;
 
 const MOST_STEPS: usize = 16;

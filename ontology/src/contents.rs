@@ -3,7 +3,8 @@
 use crate::error::Warning;
 use crate::owl::{AnnotatedAxiom, Annotation, EntityKind, Iri, Rule};
 
-/// Contents of an ontology. All lists are sorted, except the rules, which are in document order.
+/// Contents of an ontology. In the result of `horned::build`, the axioms, entities and annotations are sorted, and
+/// the rules are in document order.
 #[derive(Debug, Default)]
 pub(crate) struct Parts {
     pub entities: Vec<(EntityKind, Iri)>,

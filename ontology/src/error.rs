@@ -39,7 +39,7 @@ impl fmt::Display for Position {
     }
 }
 
-/// All errors of a knowledge base.
+/// Errors of a knowledge base.
 pub type Errors = diagnostics::Errors<Error>;
 
 /// The reason why a knowledge base cannot be used.
@@ -75,8 +75,8 @@ pub enum Error {
     /// O103: an import is not found.
     #[error(
         "{}: error[O103]: cannot find the import <{import}>; name a directory that contains it \
-         (--directory), or a catalog with <uri name=\"{import}\" uri=\"FILE\"/> (--catalog), or go on without it \
-         (--ignore-missing-imports)", place(file, position.as_ref())
+         (--directory), or a catalog with <uri name=\"{import}\" uri=\"FILE\"/> (--catalog), or continue without \
+         it (--ignore-missing-imports)", place(file, position.as_ref())
     )]
     UnresolvedImport {
         /// The importing document.
@@ -97,7 +97,7 @@ pub enum Error {
     /// O105: the merged documents do not form an OWL ontology.
     #[error("{}: error[O105]: the documents do not form an OWL ontology: {reason}", place(file, position.as_ref()))]
     NotAnOntology {
-        /// The first document.
+        /// First of the merged documents.
         file: String,
         /// Position of the faulty statement in its document, if found.
         position: Option<Position>,
@@ -107,7 +107,8 @@ pub enum Error {
     /// O112: expressions are nested more deeply than the reader accepts.
     #[error(
         "{}: error[O112]: expressions are nested more than {deepest} deep{}",
-        place(file, position.as_ref()), about.as_ref().map_or_else(String::new, |iri| format!(", in what is said of <{iri}>"))
+        place(file, position.as_ref()),
+        about.as_ref().map_or_else(String::new, |iri| format!(", in statements about <{iri}>"))
     )]
     TooDeep {
         /// The document.
@@ -161,7 +162,7 @@ pub enum Error {
     },
     /// O114: a retracted statement has an anonymous individual.
     #[error(
-        "error[O114]: {statement} cannot be retracted: an individual without a name is another one in each document"
+        "error[O114]: {statement} cannot be retracted: an individual without a name is a different one in each document"
     )]
     Nameless {
         /// The statement in functional-style syntax.
@@ -211,7 +212,7 @@ impl Error {
 #[non_exhaustive]
 pub enum Warning {
     /// O201: an entity is used without a declaration.
-    #[error("{}warning[O201]: <{iri}> is declared nowhere; read as {kind} because of its use", before(position.as_ref()))]
+    #[error("{}warning[O201]: <{iri}> is not declared; read as {kind} because of its use", before(position.as_ref()))]
     Undeclared {
         /// IRI of the entity.
         iri: String,
@@ -265,7 +266,7 @@ pub enum Warning {
     },
     /// O206: an import is not found, and `allow_missing_imports` is set.
     #[error(
-        "warning[O206]: {}: the import <{import}> is left out: found nowhere", place(file, position.as_ref())
+        "warning[O206]: {}: the import <{import}> is left out: not found", place(file, position.as_ref())
     )]
     MissingImport {
         /// The importing document.
@@ -277,7 +278,7 @@ pub enum Warning {
     },
     /// O207: a document retracts a statement that is not stated.
     #[error(
-        "warning[O207]: nothing states {statement}, so it cannot be retracted; what follows from other statements stays"
+        "warning[O207]: nothing states {statement}, so it cannot be retracted; conclusions from other statements remain"
     )]
     NotStated {
         /// The statement in functional-style syntax.
@@ -322,7 +323,8 @@ pub enum Warning {
         reason: String,
     },
     /// O303: a rule is disabled in the editor, but evaluated.
-    #[error("warning[O303]: rule <{ontology}>#{position}{} has isRuleEnabled false; it is evaluated all the same", label_suffix(label.as_deref()))]
+    #[error("warning[O303]: rule <{ontology}>#{position}{} has isRuleEnabled false; it is evaluated \
+             nevertheless", label_suffix(label.as_deref()))]
     DisabledRule {
         /// Ontology of the rule.
         ontology: String,
@@ -333,8 +335,8 @@ pub enum Warning {
     },
     /// O304: summary of the axioms outside the OWL 2 RL profile.
     #[error(
-        "warning[O304]: {outside} of {axioms} axioms are not used in full, because they lie outside OWL 2 RL; what is \
-         concluded is right, and other things may follow, too"
+        "warning[O304]: {outside} of {axioms} axioms are not used in full, because they lie outside OWL 2 RL; all \
+         conclusions are sound, but some may be missing"
     )]
     Profile {
         /// Number of axioms that are omitted or used in part.
@@ -379,8 +381,8 @@ pub enum Warning {
     },
     /// O405: designs compare an attribute with a measurement that does not exist.
     #[error(
-        "warning[O405]: <{attribute}> is compared with what is measured, and nothing has been; until then no design is \
-         ruled out by it"
+        "warning[O405]: <{attribute}> is compared with a measured value, but has none; until it has one, it rules out \
+         no design"
     )]
     NothingMeasured {
         /// IRI of the attribute type.
@@ -388,8 +390,8 @@ pub enum Warning {
     },
     /// O406: a status has an unexpected datatype.
     #[error(
-        "warning[O406]: <{subject}> has the status {value} of <{property}>, of which {expected} is expected; rules do \
-         not see it"
+        "warning[O406]: <{subject}> has the status {value} of <{property}>, of which {expected} is expected; rules \
+         ignore it"
     )]
     StatusDatatype {
         /// IRI of the individual.

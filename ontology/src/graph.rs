@@ -102,7 +102,7 @@ impl Graph {
             }
             let Some(subject) = subject_of(&node) else { return Err(format!("{node} is not a list")) };
             if !visited.insert(subject.clone()) {
-                return Err(format!("the list at {head} runs in a circle"));
+                return Err(format!("the list at {head} is cyclic"));
             }
             list.items.push(self.object(&subject, rdf::FIRST)?.clone());
             let tail = self.object(&subject, rdf::REST)?.clone();

@@ -10,9 +10,9 @@ use crate::vocab::{owl, rdf};
 /// Formats facts about individuals: unary facts as `rdf:type` triples, binary facts as triples of
 /// properties.
 ///
-/// Omits facts of other arities, facts about literals, the auxiliary relations of [`crate::lower`],
-/// membership in `owl:Thing`, and `sameAs` of an individual with itself. Anonymous individuals become blank
-/// nodes again.
+/// Omits facts of other arities, facts whose first argument is a literal, the auxiliary relations of
+/// [`crate::lower`], membership in `owl:Thing`, and `sameAs` of an individual with itself. Anonymous individuals
+/// become blank nodes again.
 pub fn ntriples<'a>(symbols: &Symbols, facts: impl IntoIterator<Item = &'a Fact>) -> String {
     let mut terms = Terms::new(symbols);
     let mut triples: Vec<[u32; 3]> = facts.into_iter().filter_map(|fact| terms.triple(fact)).collect();

@@ -245,7 +245,7 @@ pub struct Rule {
     pub label: Option<Arc<str>>,
     /// Value of `swrla:isRuleEnabled`, if stated. Reasoners such as Pellet ignore it.
     pub enabled: Option<bool>,
-    /// All annotations, sorted, including label and `isRuleEnabled`.
+    /// All annotations, including label and `isRuleEnabled`.
     pub annotations: Vec<Annotation>,
     /// Antecedent: the conjunction of these atoms. May be empty.
     pub body: Vec<Atom>,

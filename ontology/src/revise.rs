@@ -62,7 +62,7 @@ impl Stated {
     /// `retracted`. A statement in both lists is asserted. Imports of these documents are not followed.
     ///
     /// # Errors
-    /// Returns all errors of the documents, and O114 for a retracted statement with an anonymous individual.
+    /// Returns the errors of the documents, and O114 for a retracted statement with an anonymous individual.
     pub fn change<P: AsRef<Path>>(
         &self,
         asserted: &[P],
@@ -237,9 +237,10 @@ impl Stated {
         removed
     }
 
-    /// Returns `true` if the change can be computed without a translation of the whole ontology:
-    /// `axioms` are only assertions about named classes and properties, and no rule of `program` depends
-    /// on the set of stated names.
+    /// Returns `true` if the change can be computed without a translation of the whole ontology: `axioms` are
+    /// only assertions about individuals by named classes and properties, and no rule of `program` derives
+    /// members of `owl:Thing`, which depend on all names in the ontology. The names must not belong to OWL's
+    /// own vocabulary, and no individual may also be declared as something else.
     fn is_plain(&self, axioms: &[AnnotatedAxiom], program: &Program, symbols: &Symbols) -> bool {
         // The rules and facts of `owl:Thing` depend on all names that are stated.
         let thing = symbols.find_name(owl::THING);

@@ -204,7 +204,7 @@ fn rejections_name_position_and_cause() {
         (
             "deep.ttl",
             deep.as_str(),
-            "deep.ttl:6:2: error[O112]: expressions are nested more than 128 deep, in what is said of <http://e/#A>",
+            "deep.ttl:6:2: error[O112]: expressions are nested more than 128 deep, in statements about <http://e/#A>",
         ),
         (
             "empty.ttl",

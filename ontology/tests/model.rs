@@ -77,7 +77,7 @@ fn mistakes_are_reported() {
     let attribute = ":q a t:QualityAttributeType ; t:qa_comparison_operator \"<\" .
         :e a t:QAvalue ; t:isQAtype :q ; t:hasValue 2 . :fd t:hasQAestimation :e .";
     check(":q a t:QualityAttributeType ; t:qa_comparison_operator \"<\" .", &[]);
-    check(attribute, &["warning[O405]: <http://x#q> is compared with what is measured"]);
+    check(attribute, &["warning[O405]: <http://x#q> is compared with a measured value"]);
     check(&format!("{attribute} :obs_q a t:QAvalue ; t:isQAtype :q ; t:hasValue 1 ."), &[]);
     check(
         ":q a t:QualityAttributeType . :r a t:Requirement ; t:isQAtype :q ; t:hasMinimum 1 . :fd t:hasRequirement :r .",

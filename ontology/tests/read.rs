@@ -196,19 +196,22 @@ fn deviations_from_the_text_are_warnings() {
     for (text, expected) in [
         (
             ":i :undeclared 1 .",
-            "test.ttl:10:5: warning[O201]: <http://e/#undeclared> is declared nowhere; read as a data property because of its use",
+            "test.ttl:10:5: warning[O201]: <http://e/#undeclared> is not declared; read as a data property \
+             because of its use",
         ),
         (
             ":i :undeclared :i .",
-            "test.ttl:10:5: warning[O201]: <http://e/#undeclared> is declared nowhere; read as an object property because of its use",
+            "test.ttl:10:5: warning[O201]: <http://e/#undeclared> is not declared; read as an object property \
+             because of its use",
         ),
         (
             ":i a :Undeclared .",
-            "test.ttl:10:7: warning[O201]: <http://e/#Undeclared> is declared nowhere; read as a class because of its use",
+            "test.ttl:10:7: warning[O201]: <http://e/#Undeclared> is not declared; read as a class because of its use",
         ),
         (
             ":C :undeclared 1 .",
-            "test.ttl:10:5: warning[O201]: <http://e/#undeclared> is declared nowhere; read as an annotation property because of its use",
+            "test.ttl:10:5: warning[O201]: <http://e/#undeclared> is not declared; read as an annotation \
+             property because of its use",
         ),
         (
             ":p owl:propertyChainAxiom ( :q 5 ) .",
@@ -220,7 +223,8 @@ fn deviations_from_the_text_are_warnings() {
         ),
         (
             "[] rdfs:comment \"of nothing\" .",
-            "warning[O202]: not read: <http://www.w3.org/2000/01/rdf-schema#comment> of 1 blank nodes (nothing else is said of them)",
+            "warning[O202]: not read: <http://www.w3.org/2000/01/rdf-schema#comment> of 1 blank nodes (there \
+             are no other statements about them)",
         ),
         (
             "[] a swrl:Imp ; rdfs:label \"R\" ; swrl:body ( 5 ) ; swrl:head rdf:nil .",
@@ -228,7 +232,7 @@ fn deviations_from_the_text_are_warnings() {
         ),
         (
             "[] a swrl:Imp ; swrl:body _:l ; swrl:head rdf:nil . _:l rdf:first :a ; rdf:rest _:l .",
-            "warning[O203]: rule <test.ttl>#0 is left out: the list at _:d0b1 runs in a circle",
+            "warning[O203]: rule <test.ttl>#0 is left out: the list at _:d0b1 is cyclic",
         ),
         (
             "[] a swrl:Imp ; swrl:body ( [ a swrl:ClassAtom ; swrl:classPredicate :C ; swrl:argument1 :z ] ) ; swrl:head rdf:nil .",

@@ -28,4 +28,4 @@ let () =
       | Stack_overflow -> print_endline "rejected: too deep for the stack"; 3
       | Sys_error message -> Printf.printf "rejected: %s\n" message; 3
       | error -> Printf.printf "rejected: %s\n" (Printexc.to_string error); 3)
-  | _ -> prerr_endline "usage: check CERTIFICATE EVIDENCE"; exit 2
+  | _ -> prerr_endline "usage: metaplan-proved-check CERTIFICATE EVIDENCE"; exit 2

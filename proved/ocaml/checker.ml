@@ -1318,6 +1318,16 @@ let pattern_truth pat vals l =
   | Some x -> Some (eqb (Z.eqb x (snd (fst l))) (snd l))
   | None -> None
 
+(** val mem_key : key0 -> key0 list -> bool **)
+
+let mem_key v pat =
+  existsb (Coq_Pos.eqb v) pat
+
+(** val same_values : z list -> z list -> bool **)
+
+let same_values a b =
+  if list_eq_dec Z.eq_dec a b then true else false
+
 (** val reached_patterns :
     key0 list -> z list -> (literal list * fact list) list -> z list list ->
     z list list **)
@@ -1327,17 +1337,23 @@ let rec reached_patterns pat vals cs ts =
   | [] -> ts
   | c :: r ->
     let tr = map (pattern_truth pat vals) (fst c) in
-    if existsb (fun t0 ->
-         match t0 with
-         | Some y -> if y then false else true
-         | None -> false) tr
+    if forallb (fun f -> negb (mem_key (fst f) pat)) (snd c)
     then reached_patterns pat vals r ts
-    else let new0 = map (fun t0 -> pattern_after pat t0 (snd c)) ts in
-         if forallb (fun t0 -> match t0 with
-                               | Some y -> y
-                               | None -> false) tr
-         then reached_patterns pat vals r new0
-         else reached_patterns pat vals r (app ts new0)
+    else if existsb (fun t0 ->
+              match t0 with
+              | Some y -> if y then false else true
+              | None -> false) tr
+         then reached_patterns pat vals r ts
+         else let new0 = map (fun t0 -> pattern_after pat t0 (snd c)) ts in
+              if forallb (fun t0 ->
+                   match t0 with
+                   | Some y -> y
+                   | None -> false) tr
+              then reached_patterns pat vals r new0
+              else reached_patterns pat vals r
+                     (app ts
+                       (filter (fun t0 -> negb (existsb (same_values t0) ts))
+                         new0))
 
 (** val successor_patterns :
     key0 list -> operator -> z list -> z list list **)
@@ -1345,11 +1361,6 @@ let rec reached_patterns pat vals cs ts =
 let successor_patterns pat o vals =
   reached_patterns pat vals o.conditional
     ((pattern_after pat vals o.effects) :: [])
-
-(** val mem_key : key0 -> key0 list -> bool **)
-
-let mem_key v pat =
-  existsb (Coq_Pos.eqb v) pat
 
 (** val mentions : key0 list -> operator -> bool **)
 
@@ -2500,6 +2511,16 @@ let symbolic_comparison k strict = function
        then Some false
        else None
 
+(** val all_kleene : ('a1 -> bool option) -> 'a1 list -> bool option **)
+
+let rec all_kleene t0 = function
+| [] -> Some true
+| x :: r ->
+  (match t0 x with
+   | Some b0 ->
+     if b0 then and_kleene (Some true) (all_kleene t0 r) else Some false
+   | None -> and_kleene None (all_kleene t0 r))
+
 (** val symbolic_truth :
     problem -> task -> names -> knowledge -> symbolic -> result -> key1 list
     -> formula -> bool option **)
@@ -2529,9 +2550,8 @@ let rec symbolic_truth p t0 n k s d env = function
      else Some false
    | None -> and_kleene None (symbolic_truth p t0 n k s d env h))
 | Forall (t1, g) ->
-  fold_right (fun o r ->
-    and_kleene (symbolic_truth p t0 n k s d (app env (o :: [])) g) r) (Some
-    true) (p.objects t1)
+  all_kleene (fun o -> symbolic_truth p t0 n k s d (app env (o :: [])) g)
+    (p.objects t1)
 
 type symbolic_change =
 | SFact of atom * bool
@@ -2712,14 +2732,17 @@ let rec projected p t0 n keep with_numbers k env = function
   both (projected p t0 n keep with_numbers k env a)
     (projected p t0 n keep with_numbers k env b)
 | When (f, a) ->
-  (match symbolic_truth p t0 n k unchanged Undefined env f with
-   | Some b ->
-     if b then projected p t0 n keep with_numbers k env a else Some []
+  (match projected p t0 n keep with_numbers k env a with
+   | Some l ->
+     (match l with
+      | [] -> Some []
+      | s :: l0 ->
+        (match symbolic_truth p t0 n k unchanged Undefined env f with
+         | Some b -> if b then Some (s :: l0) else Some []
+         | None -> None))
    | None ->
-     (match projected p t0 n keep with_numbers k env a with
-      | Some l -> (match l with
-                   | [] -> Some []
-                   | _ :: _ -> None)
+     (match symbolic_truth p t0 n k unchanged Undefined env f with
+      | Some b -> if b then None else Some []
       | None -> None))
 | Each (t1, a) ->
   fold_right (fun o r ->
@@ -2748,15 +2771,17 @@ let rec deciding_atoms p t0 n keep k env = function
   app (deciding_atoms p t0 n keep k env a)
     (deciding_atoms p t0 n keep k env b)
 | When (f, a) ->
-  (match symbolic_truth p t0 n k unchanged Undefined env f with
-   | Some _ -> deciding_atoms p t0 n keep k env a
+  (match projected p t0 n keep false k env a with
+   | Some l ->
+     (match l with
+      | [] -> []
+      | _ :: _ ->
+        (match symbolic_truth p t0 n k unchanged Undefined env f with
+         | Some _ -> deciding_atoms p t0 n keep k env a
+         | None -> app (atoms_of p env f) (deciding_atoms p t0 n keep k env a)))
    | None ->
-     (match projected p t0 n keep false k env a with
-      | Some l ->
-        (match l with
-         | [] -> []
-         | _ :: _ ->
-           app (atoms_of p env f) (deciding_atoms p t0 n keep k env a))
+     (match symbolic_truth p t0 n k unchanged Undefined env f with
+      | Some _ -> deciding_atoms p t0 n keep k env a
       | None -> app (atoms_of p env f) (deciding_atoms p t0 n keep k env a)))
 | Each (t1, a) ->
   flat_map (fun o -> deciding_atoms p t0 n keep k (app env (o :: [])) a)
@@ -3084,11 +3109,13 @@ let rec definite p look env = function
    | None -> None)
 | Compare (_, _, _) -> None
 | Not g -> option_map negb (definite p look env g)
-| And (g, h) -> and_kleene (definite p look env g) (definite p look env h)
+| And (g, h) ->
+  (match definite p look env g with
+   | Some b ->
+     if b then and_kleene (Some true) (definite p look env h) else Some false
+   | None -> and_kleene None (definite p look env h))
 | Forall (t0, g) ->
-  fold_right (fun o r ->
-    and_kleene (definite p look (app env (o :: [])) g) r) (Some true)
-    (p.objects t0)
+  all_kleene (fun o -> definite p look (app env (o :: [])) g) (p.objects t0)
 
 (** val is_some : bool -> bool option -> bool **)
 

@@ -551,13 +551,15 @@ val pattern_value : key0 list -> z list -> key0 -> z option
 
 val pattern_truth : key0 list -> z list -> literal -> bool option
 
+val mem_key : key0 -> key0 list -> bool
+
+val same_values : z list -> z list -> bool
+
 val reached_patterns :
   key0 list -> z list -> (literal list * fact list) list -> z list list -> z
   list list
 
 val successor_patterns : key0 list -> operator -> z list -> z list list
-
-val mem_key : key0 -> key0 list -> bool
 
 val mentions : key0 list -> operator -> bool
 
@@ -845,6 +847,8 @@ val symbolic_expression :
 val implied : knowledge -> bool -> form -> bool
 
 val symbolic_comparison : knowledge -> bool -> result -> bool option
+
+val all_kleene : ('a1 -> bool option) -> 'a1 list -> bool option
 
 val symbolic_truth :
   problem -> task -> names -> knowledge -> symbolic -> result -> key1 list ->

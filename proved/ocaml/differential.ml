@@ -115,10 +115,10 @@ let () =
       write_manifest work metric;
       let outputs = Filename.concat work "answer" and evidence = Filename.concat work "evidence" in
       let rust = run (Printf.sprintf "%s %s > %s 2>&1" (quote verify) (quote work) (quote (outputs ^ "-verify"))) in
-      let prepared = run (Printf.sprintf "%s/prepare %s > %s 2> %s" (quote programs) (quote work) (quote evidence) (quote (outputs ^ "-prepare"))) in
+      let prepared = run (Printf.sprintf "%s/metaplan-proved-prepare %s > %s 2> %s" (quote programs) (quote work) (quote evidence) (quote (outputs ^ "-prepare"))) in
       let proved =
         if prepared <> 0 then 1
-        else run (Printf.sprintf "timeout 100 %s/check %s %s > %s 2>&1" (quote programs) (quote work) (quote evidence) (quote (outputs ^ "-check"))) in
+        else run (Printf.sprintf "timeout 100 %s/metaplan-proved-check %s %s > %s 2>&1" (quote programs) (quote work) (quote evidence) (quote (outputs ^ "-check"))) in
       let case = (rust = 0, proved = 0) in
       if fst case <> snd case then
         ignore (run (Printf.sprintf "cp -r %s %s" (quote work)

@@ -399,4 +399,4 @@ let () =
   | [| _; directory |] -> (try prepare directory with
     | R.Rejected message -> prerr_endline ("rejected: " ^ message); exit 3
     | No_invariant instance -> prerr_endline ("rejected: no case tree is found for (" ^ instance ^ ")"); exit 3)
-  | _ -> prerr_endline "usage: prepare CERTIFICATE > EVIDENCE"; exit 2
+  | _ -> prerr_endline "usage: metaplan-proved-prepare CERTIFICATE > EVIDENCE"; exit 2

@@ -83,8 +83,8 @@ fn transport() -> Task {
     (symbols, program, facts)
 }
 
-/// Knowledge base of designs, each with a required component and a lower bound on a measured attribute;
-/// about eleven facts per design.
+/// Knowledge base of designs, each with a required component and a lower bound on a measured attribute; about seven
+/// stated facts per design.
 fn knowledge_base(designs: usize) -> Task {
     let mut symbols = Symbols::new();
     let program = program(COADAPTATION_RULES, &mut symbols);

@@ -15,7 +15,7 @@ use crate::symbol::{Symbol, Symbols};
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Function {
     pub aggregate: Aggregate,
-    /// Aggregated operand of a row: a column (as a variable number) or a constant.
+    /// The value to aggregate in each row: a column (as a variable number), or a constant.
     pub value: Source,
 }
 

@@ -1,10 +1,10 @@
 //! Evaluation of a program, and its incremental maintenance under insertion and deletion of facts.
 //!
-//! Every derived row records its first derivation, and these derivations never support each other in a
-//! circle. Deletion is delete-and-rederive [1], restricted to the recorded derivations: a row is over-deleted
-//! only if a body atom of its recorded derivation ceases to hold. The original algorithm over-deletes a row
-//! if this happens to *any* of its derivations. Over-deleted rows are rederived stratum by stratum, so that a
-//! deletion seldom propagates far.
+//! Every derived row records one derivation, by which it was found, and the recorded derivations never support each
+//! other in a circle. Deletion is delete-and-rederive [1], restricted to the recorded derivations: a row is
+//! over-deleted only if a change affects its recorded derivation. The original algorithm over-deletes a row if a
+//! change affects *any* of its derivations. Over-deleted rows are rederived stratum by stratum, so that a deletion
+//! seldom propagates far.
 //!
 //! [1] Gupta, Mumick, Subrahmanian, "Maintaining views incrementally", SIGMOD 1993.
 
@@ -38,9 +38,11 @@ impl Engine {
     /// Creates an engine and derives all facts that follow from stated facts.
     ///
     /// # Errors
-    /// Returns the first invalid fact (R302, R303); otherwise the errors of all rules (R2xx, R302), where a
-    /// missing stratification (R206, R208) is reported only if there is no other error; otherwise R301 if the
-    /// derivation exceeds the step budget.
+    /// Returns one of the following:
+    /// - the first invalid fact (R302, R303);
+    /// - otherwise the errors of all rules (R2xx, R302), of which R206 and R208 (no stratification) are reported only
+    ///   if there is no other error;
+    /// - otherwise R301, if the derivation exceeds the step budget.
     pub fn new(
         symbols: Symbols,
         program: Program,
@@ -143,8 +145,9 @@ impl Engine {
         }
     }
 
-    /// Applies a change of the stated rows of the store, like [`Engine::apply`] without the translation
-    /// between names and representatives. After an error, the store is in an undefined state.
+    /// Applies a change of the stated rows, like [`Engine::apply`], but expects and returns rows of the store as they
+    /// are: with equality, each name is the representative of its class of equal names. After an error, the store is
+    /// in an undefined state.
     pub(crate) fn apply_rows(&mut self, delta: Delta) -> Result<Delta, Error> {
         self.replan()?;
         let stated = state_change(self, delta);
@@ -161,8 +164,7 @@ impl Engine {
         network.plan(&mut self.store, true, (&self.program, &self.limits))
     }
 
-    /// Derives all facts again after an aborted update. `undo` restores the facts that were stated
-    /// before the update.
+    /// Restores the stated facts with `undo` after an aborted update, and derives all facts again.
     pub(crate) fn restore(&mut self, undo: &Delta) {
         let (stated, undone) = (self.stated(), FxHashSet::from_iter(&undo.delete));
         let previous = stated.into_iter().filter(|fact| !undone.contains(fact));

@@ -57,8 +57,8 @@ impl EngineBuilder {
         self
     }
 
-    /// Adds rules in SWRL's human-readable syntax. `source` names the text in errors and in the identities
-    /// of the rules. A rule without a body states facts.
+    /// Adds rules in SWRL's human-readable syntax. `source` names the text in errors and in the identities of the
+    /// rules. The head of a rule without a body always holds.
     #[must_use]
     pub fn rules(mut self, source: &str, text: &str) -> Self {
         self.texts.push((source.to_owned(), text.to_owned()));
@@ -96,8 +96,8 @@ impl EngineBuilder {
     /// Parses the rule texts, and creates an engine with all facts that follow.
     ///
     /// # Errors
-    /// Returns all errors of all texts (R101 to R105). If the texts have none, returns the errors of
-    /// [`Engine::new`].
+    /// Returns the errors of all texts (R101 to R105). If the texts have none, returns the errors of
+    /// [`Engine::with_limits`].
     pub fn build(mut self) -> Result<Engine, Errors> {
         let mut errors: Vec<Error> = Vec::new();
         for (source, text) in &self.texts {

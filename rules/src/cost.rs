@@ -1,9 +1,9 @@
 //! Join-order statistics: expected sizes of look-ups, from samples of the relations.
 //!
-//! A look-up in `n` rows by columns with `d1, d2, …` distinct values is expected to match `n / min(n,
-//! d1·d2·…)` rows. An empty relation is assumed to have 64 rows, and a relation whose rows are yet to be
-//! derived as many rows as the largest relation (at least 64). Each column of such a relation of `n` rows is
-//! assumed to have `n^(1/arity)` distinct values.
+//! A look-up in `n` rows by columns with `d1, d2, …` distinct values is expected to match `n / min(n, d1·d2·…)` rows.
+//! An empty relation is assumed to have 64 rows. A relation whose rows are yet to be derived is assumed to have as
+//! many rows as the largest relation, but at least 64. Each column of a relation with an assumed number `n` of rows
+//! is assumed to have `n^(1/arity)` distinct values.
 
 use rustc_hash::FxHashSet;
 

@@ -62,7 +62,8 @@ pub struct Aggregated {
     pub matches: Vec<Vec<usize>>,
 }
 
-/// A violation of an integrity constraint, of a datatype, or of the distinctness of literals.
+/// A violation of an integrity constraint, of a datatype, or of the principle that a literal equals neither another
+/// literal nor an individual.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub struct Violation {
     /// Cause of the violation.
@@ -132,8 +133,8 @@ impl fmt::Display for DisplayViolation<'_> {
 }
 
 impl Derivation {
-    /// Formats the derivation as an indented tree, with one fact and its reason per line. A fact that
-    /// occurs again is not explained again.
+    /// Formats the derivation as an indented tree, with one line for each fact with its reason, for each absent fact
+    /// and for each aggregate. A fact that occurs again is not explained again.
     pub fn display<'a>(&'a self, symbols: &'a Symbols) -> impl fmt::Display + 'a {
         DisplayDerivation { derivation: self, symbols }
     }

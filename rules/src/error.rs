@@ -3,10 +3,10 @@
 use crate::builtin::{BuiltIn, SWRLB};
 use crate::rule::RuleIdentity;
 
-/// All errors of a set of rules or of an update.
+/// Errors of a set of rules or of an update.
 pub type Errors = diagnostics::Errors<Error>;
 
-/// An error. R1xx: rule text; R2xx: a rule; R3xx: an update.
+/// An error. R1xx: rule text; R2xx: a rule; R3xx: facts, or an evaluation that was stopped.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -48,7 +48,7 @@ pub enum Error {
     },
     /// A `swrlb` built-in on lists.
     #[error(
-        "{file}:{line}:{column}: R104 built-in `{name}` works on lists, which the engine has no values for"
+        "{file}:{line}:{column}: R104 built-in `{name}` works on lists, which the engine does not support"
     )]
     RefusedBuiltIn {
         /// The source as named by the caller.
@@ -167,9 +167,7 @@ pub enum Error {
         aggregate: &'static str,
     },
     /// A nested aggregate.
-    #[error(
-        "R209 rule {rule}: an aggregate within an aggregate; conclude the inner one by a rule of its own"
-    )]
+    #[error("R209 rule {rule}: an aggregate within an aggregate; compute the inner one in a separate rule")]
     NestedAggregate {
         /// The rule.
         rule: RuleIdentity,
@@ -183,7 +181,7 @@ pub enum Error {
         fault: Box<str>,
     },
     /// The step budget is exhausted. The engine is in its state before the update.
-    #[error("R301 step budget of {budget} used up, last in rule {rule}{}", value_note(value.as_deref()))]
+    #[error("R301 step budget of {budget} exhausted, last in rule {rule}{}", value_note(value.as_deref()))]
     BudgetExhausted {
         /// The rule that was being evaluated.
         rule: RuleIdentity,
@@ -260,6 +258,6 @@ fn did_you_mean(iri: &str) -> String {
 
 fn value_note(value: Option<&str>) -> String {
     value.map_or_else(String::new, |value| {
-        format!(", which makes new values of its own conclusions; the last one is {value}")
+        format!(", which computes new values from its own conclusions; the last one is {value}")
     })
 }

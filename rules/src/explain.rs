@@ -16,9 +16,9 @@ use crate::symbol::Symbol;
 use crate::vocabulary::{DIFFERENT_FROM, SAME_AS};
 
 impl Engine {
-    /// Returns the derivation that was recorded when the fact was derived, down to stated facts, or
-    /// `None` if the fact does not hold. The time is proportional to the size of the result. A fact that
-    /// is both stated and derived is reported as stated.
+    /// Returns the derivation that was recorded when the fact was derived, down to stated facts, or `None` if the
+    /// fact does not hold. The rules are not evaluated again. A fact that is both stated and derived is reported as
+    /// stated.
     ///
     /// ```
     /// use metaplan_rules::{Engine, Fact};
@@ -47,10 +47,10 @@ impl Engine {
         Some(Derivation { steps })
     }
 
-    /// Returns all violations, sorted: the matches of integrity constraints (rules with an empty head), the
-    /// facts with ill-typed literals and, under equality, the `owl:sameAs` pairs of a literal with a
-    /// different symbol. A knowledge base is consistent if there are no violations. Under equality, a match
-    /// binds individuals rather than names, and its supports are stated facts where possible.
+    /// Returns all violations, sorted: the matches of integrity constraints (rules with an empty head), the facts
+    /// with ill-typed literals and, under equality, the `owl:sameAs` pairs of a literal with a different symbol. If
+    /// there are none, the rules find no contradiction in the facts. Under equality, a match binds individuals rather
+    /// than names, and its supports are stated facts where possible.
     pub fn violations(&self) -> Vec<Violation> {
         let mut violations = Vec::new();
         for &(relation, position) in &self.network.constraints {

@@ -56,8 +56,8 @@ pub(crate) enum Start {
 /// deferred.
 const BLOCK_MATCHES: usize = 1 << 16;
 
-/// Maximum number of partial matches in a small block, which passes several steps within one rule
-/// application.
+/// Maximum number of partial matches in a small block. A small block passes several steps of its plan at once,
+/// instead of one step per application of the crepe rule.
 const SMALL_MATCHES: usize = 64;
 
 /// Complete matches of a plan: `bindings` contains the values of all variables, one match after the
@@ -136,8 +136,8 @@ mod program {
     }
 }
 
-/// Reference to a round in tuples of the crepe program. Compared and hashed by address, because crepe
-/// requires equality and a hash.
+/// Reference to a [`Round`] that can be a value in a tuple of the crepe program. Compared and hashed by
+/// address, because crepe requires equality and a hash of its values.
 #[derive(Clone, Copy)]
 pub(crate) struct Handle<'a>(&'a dyn Evaluate);
 

@@ -1,9 +1,9 @@
 //! Incremental maintenance: computes the change of all facts from a change of the stated facts, stratum by
 //! stratum.
 //!
-//! In each stratum that the change affects: 1. over-delete the rows whose recorded derivation no longer
-//! holds; 2. rederive the over-deleted rows that have another derivation from the remaining facts; 3. insert
-//! semi-naively the consequences of new and rederived rows.
+//! In each stratum that the change affects: 1. over-delete the rows whose recorded derivation may no longer hold; 2.
+//! rederive the over-deleted rows that have another derivation from the remaining facts; 3. insert semi-naively the
+//! consequences of new, rederived and removed rows.
 
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -22,8 +22,8 @@ use crate::plan::HIDDEN;
 use crate::store::{Record, RelationId, Row, state};
 use crate::symbol::{Symbol, Symbols};
 
-/// Upper limit on the number of start rows per run of the crepe (Datalog) program; bounds the memory of
-/// partial matches.
+/// Upper limit on the number of starts (pairs of a plan and a start row) per run of the crepe (Datalog) program;
+/// bounds the memory of partial matches.
 const CHUNK: usize = 2048;
 
 type Rows = Vec<(RelationId, Row)>;
@@ -31,7 +31,8 @@ type Rows = Vec<(RelationId, Row)>;
 /// A change of the stated facts that has been applied to the store, with the affected rows.
 #[derive(Default)]
 pub(crate) struct Stated {
-    /// The change without insertions of stated facts and deletions of facts that are not stated.
+    /// The change without insertions of facts that are already stated, and without deletions of facts that are not
+    /// stated.
     effective: Delta,
     added: Rows,
     doomed: Rows,
@@ -275,8 +276,8 @@ impl<'a> Maintenance<'a> {
         self.doomed.iter().filter(is_doomed).copied().collect()
     }
 
-    /// Derives the consequences of new rows, of rederived rows, and of the absence of removed rows in a
-    /// stratum.
+    /// Derives the consequences of new rows, of rederived rows, of the absence of removed rows, and of changed groups
+    /// of aggregates in a stratum.
     fn insert(&mut self, stratum: &Stratum) -> Result<(), Error> {
         let disappeared = self.still_doomed();
         let relevant = |&&(id, row): &&(RelationId, Row)| {

@@ -318,7 +318,7 @@ impl Planner<'_> {
                 let is_known = |column: &usize| bound.is_bound(sources[*column]);
                 let columns: Vec<usize> = (0..sources.len()).filter(is_known).collect();
                 let mask = columns.iter().fold(0, |mask, column| mask | 1 << column);
-                // Most rows of a closure are not links; visiting each of them would take longer than all
+                // Most rows of a closure are not links; visiting each of them would take longer than deriving all
                 // conclusions.
                 let excluded_rule = is_link.then_some(self.number);
                 let index =
@@ -378,7 +378,7 @@ fn built_in_step(built_in: BuiltIn, sources: &[Source], bound: &mut Bound) -> St
     }
 }
 
-/// Returns `true` if a condition can be evaluated without an enumeration of rows.
+/// Returns `true` if a condition can be evaluated without extending the match by rows of a relation.
 fn is_ready(condition: &Condition, bound: &Bound) -> bool {
     match condition {
         Condition::Same(left, right) => bound.is_bound(*left) || bound.is_bound(*right),

@@ -29,7 +29,7 @@ impl Engine {
     /// consequences.
     ///
     /// # Errors
-    /// Returns the errors of [`Engine::new`]. After an error, the engine is in its previous state.
+    /// Returns the errors of [`Engine::with_limits`]. After an error, the engine is in its previous state.
     pub fn set_program(&mut self, program: Program) -> Result<Delta, Errors> {
         if self.equality.is_some() && program.equality {
             return self.change(Delta::default(), program);
@@ -55,7 +55,7 @@ impl Engine {
     /// remains on.
     ///
     /// # Errors
-    /// Returns the errors of [`Engine::new`] and [`Engine::apply`]. After an error, the engine is in its
+    /// Returns the errors of [`Engine::with_limits`] and [`Engine::apply`]. After an error, the engine is in its
     /// previous state.
     pub fn change(&mut self, delta: Delta, program: Program) -> Result<Delta, Errors> {
         for fact in delta.insert.iter().chain(&delta.delete) {
@@ -104,8 +104,8 @@ impl Engine {
         pairs.any(|row| !self.is_asserted(&Fact::new(same_as, row.iter().copied())))
     }
 
-    /// Switches equality on, under the condition that no rule derives an `owl:sameAs` pair yet. The
-    /// stated pairs are retracted and added to the insertions of `delta`. Returns the change of the
+    /// Switches equality on, under the condition that no rule derives an `owl:sameAs` pair yet. The stated pairs are
+    /// retracted and, unless `delta` deletes them, added to the insertions of `delta`. Returns the change of the
     /// facts.
     fn switch_on(&mut self, delta: &mut Delta) -> Result<Delta, Error> {
         let same_as = self.symbols_mut().name(SAME_AS);
@@ -127,7 +127,7 @@ impl Engine {
     /// Adds rules and returns the net change of all facts that hold, sorted.
     ///
     /// # Errors
-    /// Returns the errors of [`Engine::new`]. After an error, the engine is in its previous state.
+    /// Returns the errors of [`Engine::with_limits`]. After an error, the engine is in its previous state.
     pub fn add_rules(&mut self, rules: impl IntoIterator<Item = Rule>) -> Result<Delta, Errors> {
         let mut program = Program::clone(&self.program);
         program.rules.extend(rules);
@@ -229,8 +229,7 @@ fn net(changes: impl IntoIterator<Item = Delta>) -> Delta {
     net
 }
 
-/// Returns the first of several errors. Rules that were compiled before can fail only because they have no
-/// common stratification, or by an interrupt.
+/// Returns the first of several errors. A change under equality reports only one error.
 fn first(errors: Errors) -> Error {
     errors.into_iter().next().unwrap_or(Error::UnknownSymbol { index: 0 })
 }

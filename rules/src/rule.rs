@@ -14,7 +14,8 @@ pub struct Variable(pub u16);
 /// An argument of an atom.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]
 pub enum Term {
-    /// A variable. It ranges over the symbols that occur in facts, so every rule is DL-safe.
+    /// A variable. Its values are symbols in facts and computed literals, never unnamed individuals, so every rule is
+    /// DL-safe.
     Variable(Variable),
     /// A name or literal.
     Constant(Symbol),
@@ -71,11 +72,11 @@ pub enum Aggregate {
     /// Sum of a term over all matches; 0 without matches. The sum is exact for decimals, and otherwise
     /// has the widest floating-point type among the values. There is no sum if a value is not a number.
     Sum(Term),
-    /// Minimum of a term over all matches. There is no minimum without matches, or if two values are
-    /// incomparable.
+    /// Minimum of a term over all matches. There is no minimum without matches, or if a value is incomparable with
+    /// all candidates for it.
     Min(Term),
-    /// Maximum of a term over all matches. There is no maximum without matches, or if two values are
-    /// incomparable.
+    /// Maximum of a term over all matches. There is no maximum without matches, or if a value is incomparable with
+    /// all candidates for it.
     Max(Term),
 }
 
@@ -138,8 +139,8 @@ impl fmt::Display for RuleIdentity {
     }
 }
 
-/// A rule: if the body holds, every head atom holds. A rule with an empty head is an integrity constraint.
-/// A rule with an empty body states facts.
+/// A rule: if the body holds, every head atom holds. A rule with an empty head is an integrity constraint. The head
+/// of a rule with an empty body always holds.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 pub struct Rule {
     /// Identity of the rule.

@@ -19,13 +19,13 @@ pub(crate) struct Scope {
     pub group: Vec<u16>,
     /// Other variables of the aggregate, in ascending order.
     pub locals: Vec<u16>,
-    /// Positions of the atoms outside the aggregate that bind the group variables that its own atoms do
-    /// not bind.
+    /// Positions of atoms outside the aggregate. They bind the group variables that the aggregate's own atoms leave
+    /// unbound.
     pub context: Vec<usize>,
 }
 
 pub(crate) struct Binding {
-    bound: Bound,
+    pub bound: Bound,
     /// Aggregates in an order in which each comes after the aggregates whose results it needs.
     pub scopes: Vec<Scope>,
 }
@@ -134,7 +134,7 @@ fn context(rule: &Rule, variables: &[u16], bound: &Bound, earlier: &[Scope]) -> 
     }
 }
 
-/// Returns a flag for each variable of a checked rule: `true` if the body binds it. Variables local to
+/// Returns a flag for each variable of a rule that has passed [`check`]: `true` if the body binds it. Variables local to
 /// aggregates are not bound.
 pub(crate) fn bound_variables(rule: &Rule) -> Vec<bool> {
     let may_be_local = |atom: &Atom| matches!(atom, Atom::Aggregate { .. } | Atom::Not { .. });

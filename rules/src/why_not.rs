@@ -29,8 +29,8 @@ const SEARCH_LIMIT: usize = 20_000;
 pub struct NearMiss {
     /// Identity of the rule.
     pub identity: RuleIdentity,
-    /// Variables of the rule, named without question mark, with their values in the best binding. `None` if
-    /// an obstacle leaves a variable unbound.
+    /// Variables of the rule, named without question mark, with their values in the best binding. `None` for a
+    /// variable that an obstacle leaves unbound, or that is local to an aggregate.
     pub bindings: Vec<(String, Option<Symbol>)>,
     /// Facts that satisfy atoms of the body in the best binding.
     pub supports: Vec<Fact>,
@@ -58,7 +58,8 @@ pub enum Obstacle {
         /// Arguments of the built-in; a function has its result first. An argument without a value, such
         /// as the result of a function that is undefined or not interned, is `None`.
         arguments: Vec<Option<Symbol>>,
-        /// Exact absolute difference of two compared numbers; `None` for other comparisons.
+        /// Exact absolute difference of the arguments, if the built-in has two and both are numbers; otherwise
+        /// `None`.
         gap: Option<BigRational>,
     },
     /// An aggregate has a different value, or no value.

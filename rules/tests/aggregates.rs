@@ -182,6 +182,6 @@ fn unsafe_and_unstratified_aggregates_are_refused() {
     let nested = "?n = count { p(?x) ^ ?x = max { ?y | q(?y) } } -> r(?n)";
     refuse(
         nested,
-        &["R209 rule test#0: an aggregate within an aggregate; conclude the inner one by a rule of its own"],
+        &["R209 rule test#0: an aggregate within an aggregate; compute the inner one in a separate rule"],
     );
 }

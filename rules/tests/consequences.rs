@@ -224,7 +224,8 @@ fn runaway_rules_end_in_an_error_that_names_them() {
     let error = engine.apply(change).expect_err("it never ends");
     assert_eq!(
         error.to_string(),
-        "R301 step budget of 10000 used up, last in rule test#0 (count), which makes new values of its own conclusions; the last one is 2"
+        "R301 step budget of 10000 exhausted, last in rule test#0 (count), which computes new values from its \
+         own conclusions; the last one is 2"
     );
     assert_eq!(engine.facts().collect::<Vec<_>>(), [start[1].clone()]);
     assert!(

@@ -77,6 +77,17 @@ fn facts_follow_inserted_and_deleted_pairs() {
 }
 
 #[test]
+fn pairs_of_names_that_no_other_atom_binds_are_matched() {
+    let stated = "p(a), sameAs(a, b)";
+    check("sameAs(?x, ?y) ^ differentFrom(?x, c) -> q(?x, ?y)", stated, &["= p(a) ^ p(b)"]);
+    check(
+        "sameAs(?x, ?y) -> q(?x, ?y)",
+        stated,
+        &["= p(a) ^ p(b) ^ q(a, a) ^ q(a, b) ^ q(b, a) ^ q(b, b)", "-sameAs(a, b)", "= p(a)"],
+    );
+}
+
+#[test]
 fn equality_does_not_support_itself() {
     let rules = "[fp] p(?x, ?y) ^ p(?x, ?z) ^ differentFrom(?y, ?z) -> sameAs(?y, ?z) .
         [ifp] p(?x, ?z) ^ p(?y, ?z) ^ differentFrom(?x, ?y) -> sameAs(?x, ?y) .";

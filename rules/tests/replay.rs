@@ -61,7 +61,7 @@ fn a_complete_derivation_is_accepted() {
 
 #[test]
 fn missing_steps_are_rejected() {
-    check(without("<usable>(<a>)"), Err("<usable>(<a>) follows by rule test#0 (usable), and is missing"));
+    check(without("<usable>(<a>)"), Err("<usable>(<a>) follows by rule test#0 (usable), but is missing"));
     check(without("<after>(<a>, <d>)"), Err("<after>(<a>, <d>) follows by rule test#4 (steps)"));
     check(without("<requires>(<a>, <d>)"), Err("rule test#5 (many) does not apply"));
 }
@@ -121,7 +121,7 @@ fn omitting_a_negated_fact_is_rejected() {
         }
         derivation.steps.push(usable);
     };
-    check(deny, Err("<broken>(<b>) follows by rule test#1 (low), and is missing"));
+    check(deny, Err("<broken>(<b>) follows by rule test#1 (low), but is missing"));
 }
 
 /// A rule that compares a variable with a name derives facts about that name. Facts about its other names

@@ -91,7 +91,7 @@ fn errors_have_codes_and_positions() {
     );
     check(
         "p(?x) ^ swrlb:listConcat(?x, ?x) -> q(?x)",
-        &["test:1:9: R104 built-in `listConcat` works on lists, which the engine has no values for"],
+        &["test:1:9: R104 built-in `listConcat` works on lists, which the engine does not support"],
     );
     check(
         "p(?x) ^ swrlb:lesThan(?x, 3) -> q(?x) . p(?x) ^ swrlb:greaterthan(?x, 3) -> q(?x) . p(?x) ^ swrlb:frobnicate(?x) -> q(?x)",

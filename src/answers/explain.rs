@@ -57,9 +57,9 @@ pub struct DesignAnswer<'a> {
     changes: Vec<ChangePart<'a>>,
     /// Failed components and measurements that contribute to ruling the design out.
     causes: Vec<CausePart<'a>>,
-    /// If the design is unavailable: the smallest sets of changes that make it available. Otherwise:
-    /// the changes that make it unavailable. All changes of a set are necessary, and together they
-    /// suffice.
+    /// If the design is unavailable: sets of changes that make it available; some are missing if there are many.
+    /// Otherwise: single changes, each of which makes it unavailable. The changes of a set suffice together, and
+    /// none of them was found to be superfluous.
     repairs: Vec<RepairPart<'a>>,
     /// Whether all plans of this answer are proved optimal; if not, a limit was reached.
     complete: bool,

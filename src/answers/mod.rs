@@ -1,5 +1,5 @@
-//! JSON answers of the commands: a type for each answer, whose fields have the order of the format.
-//! `docs/reference/json.md` lists them.
+//! JSON answers of the commands, except `sweep`: a type for each answer, whose fields have the order of the
+//! format. `docs/reference/json.md` describes them.
 //!
 //! The types are built from results of the library. The command line only writes them.
 
@@ -17,6 +17,7 @@ mod reason;
 mod run;
 mod simulate;
 mod validate;
+mod verify;
 
 pub use ::mission::message::ErrorAnswer;
 pub use ::verify::VerificationAnswer;
@@ -34,3 +35,4 @@ pub use reason::{AssertionAnswer, EntailmentAnswer, ReasonAnswer, ReasonsAnswer,
 pub use run::{HandledLine, LogLine, NumberedAnswer, PlanningLine, ReadyLine};
 pub use simulate::{SimulateAnswer, accomplished_cost, beside_joint, runs_of, sample};
 pub use validate::VerdictAnswer;
+pub use verify::{VerifyAnswer, theorem_line};

@@ -129,8 +129,8 @@ impl SimulateAnswer<'_> {
         Self { time_unit, ..self }
     }
 
-    /// Sets the number of requested missions and the messages. The answer is incomplete if there is
-    /// a message.
+    /// Sets the number of requested runs (the field `missions`) and the messages. The answer is incomplete if
+    /// there is a message.
     #[must_use]
     pub fn of(self, missions: usize, messages: Vec<Message>) -> Self {
         Self { missions, complete: messages.is_empty(), messages, ..self }

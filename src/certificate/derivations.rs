@@ -1,5 +1,5 @@
-//! Exports all facts of a mission's knowledge base with their derivations. `rules::replay` checks
-//! the derivations; it shares no code with the evaluation of rules.
+//! Exports all facts of a mission's knowledge base, each with one derivation. `rules::replay` checks the
+//! derivations. Of the code that evaluates rules, it uses only that of single built-ins and aggregates.
 
 use rules::{DerivationStep, Engine, Literal, Reason, Symbol, Value};
 

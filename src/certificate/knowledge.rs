@@ -39,7 +39,7 @@ pub(super) fn files(mission: &Mission) -> Result<Option<[(&'static str, String);
         changes: knowledge.statements(),
     };
     let wrong = |error: &dyn std::fmt::Display| Message::error("M120", format!("no certificate: {error}"));
-    // Rules are identified by their positions, so reasoning has to use this document.
+    // Derivations refer to rules by their positions in this document, so the engine has to be built from it.
     let Stated { symbols, program, facts, .. } = stated(&document, &origin).map_err(|error| wrong(&error))?;
     let engine = Engine::new(symbols, program, facts)
         .map_err(|errors| first(errors.iter().map(Message::from_rules).collect()))?;

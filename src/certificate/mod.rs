@@ -1,8 +1,9 @@
-//! Writes certificates: directories with a plan and its proof, which `metaplan-verify` checks. The
-//! documentation of `verify` specifies the files.
+//! Writes certificates: directories with a proof that a plan is optimal, or that no plan exists.
+//! `metaplan-verify` checks them. The documentation of the crate `verify` specifies the files.
 
 mod derivations;
 mod knowledge;
+mod proved;
 
 use std::fs;
 use std::io::{BufRead, BufReader, BufWriter};
@@ -15,6 +16,8 @@ use pddl::{print_domain, print_problem};
 use planner::{
     Certificate, ExactTask, Limits, RefutationOutputs, Solution, Status, Task, certify, certify_exact, refute,
 };
+
+pub use proved::{ProvedChecker, Theorem};
 
 pub use ::verify::{Claim, Verification, VerifiedPart, Verifier};
 
@@ -69,7 +72,8 @@ pub struct Contents<'c> {
     pub task: Ground<'c>,
     /// The solution of the task, whose status the certificate proves.
     pub solution: &'c Solution,
-    /// The plan in terms of the mission's domain: one line per action, with start and duration.
+    /// The plan in terms of the mission's domain: one line per action, with start and duration if actions take
+    /// time. Empty without a plan.
     pub plan: &'c str,
 }
 
@@ -87,8 +91,8 @@ impl Contents<'_> {
 /// Writes the certificate of a solution into a new directory.
 ///
 /// # Errors
-/// The solution has no certificate or one that is too large or would be rejected (M120), or the directory cannot be
-/// written (M109).
+/// The solution has no certificate, or one that is too large or would be rejected (M120); the knowledge base
+/// cannot be read again; or the directory cannot be written (M109).
 pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Result<(), Message> {
     let Contents { mission, problem, task, solution, plan } = *contents;
     let wrong = |error: &dyn std::fmt::Display| Message::error("M120", format!("no certificate: {error}"));
@@ -121,7 +125,7 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
         }
         None => Claim::Unsolvable,
     };
-    // The checker rejects larger files.
+    // The checker rejects certificates with more text.
     if files.iter().map(|(_, text)| text.len() as u64).sum::<u64>() > TEXT_LIMIT {
         return Err(wrong(&format_args!("its files have more than {TEXT_LIMIT} bytes")));
     }
@@ -131,7 +135,7 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
     // The files are written to a temporary directory that is renamed at the end.
     let whole = create_directory(directory).map_err(failed)?;
     let metric = contents.metric(limits).map_err(|reason| wrong(&reason))?;
-    // A certificate that `verify` would reject is not written.
+    // A certificate with an argument that `verify` would reject is not written.
     check(text(&files, TASK), text(&files, ARGUMENT), metric.as_ref()).map_err(|fault| wrong(&fault))?;
     let refutation =
         refutation(whole.path(), (text(&files, TASK), text(&files, ARGUMENT)), metric.as_ref(), limits)
@@ -153,8 +157,8 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
     whole.commit().map_err(failed)
 }
 
-/// Creates the witness, which relates the ground task to the PDDL files, and compares task and
-/// files as `verify` does. Returns an error if they cannot be compared.
+/// Creates the witness (an over-approximation of the reachable states), and uses it to compare the ground task
+/// with the PDDL files, as `verify` does. Returns an error if they differ or cannot be compared.
 fn compared((domain, problem): (&str, &str), task: &str, limits: &Limits) -> Result<String, String> {
     let (domain, problem) = read_pddl(domain, problem)?;
     let witness =
@@ -167,8 +171,8 @@ fn compared((domain, problem): (&str, &str), task: &str, limits: &Limits) -> Res
     Ok(witness)
 }
 
-/// Writes the formula "there is a better plan" and its refutation. Returns `Refutation::None` with
-/// the reasons if no refutation is found.
+/// Writes the formula "there is a better plan" and its refutation; without `metric`, the formula is "there is a
+/// plan". Returns `Refutation::None` with the reasons if no refutation is found or its proof is too large.
 fn refutation(
     directory: &Path,
     documents: (&str, &str),

@@ -67,7 +67,7 @@ pub struct Arguments {
     time: TimeLimit,
 }
 
-/// How tight bounds have to be.
+/// Options for the accuracy of values.
 #[derive(Debug, Args)]
 struct Tightness {
     /// Maximum distance between the bounds on a value, relative to the value unless `--absolute` is given.
@@ -251,8 +251,8 @@ fn single(arguments: &Arguments, common: &Common, property: &str, report: &Repor
     Ok(if is_proved(arguments, report) { Exit::Done } else { Exit::NotProved })
 }
 
-/// Writes several answers: as JSON, as a line for each property, or as a table with a line for each combination of
-/// values. Also writes the CSV file, if requested.
+/// Writes several answers: as JSON, as text for each property or, if constants vary, as a table with a line for
+/// each combination of values. Also writes the CSV file, if requested.
 fn write_all(
     arguments: &Arguments,
     common: &Common,

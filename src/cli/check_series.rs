@@ -18,14 +18,14 @@ const MOST: usize = 100_000;
 /// One combination of values of the given constants.
 pub struct Combination {
     pub settings: Settings,
-    /// Values in this combination of the constants that have several values, in the order of the command line.
+    /// Names and values of those constants for which a series is given, in the order of the command line.
     pub varied: Vec<(String, String)>,
 }
 
 /// A combination of constant values with the result of each property.
 pub type Row<'a> = (&'a Combination, &'a [Result<Report, Error>]);
 
-/// Returns all combinations of the constants' values. The value of the last constant changes first.
+/// Returns all combinations of the constants' values. The value of the last constant changes fastest.
 pub fn combinations(constants: &[(String, String)]) -> Result<Vec<Combination>, Failure> {
     let mut combinations = vec![Combination { settings: Settings::new(), varied: Vec::new() }];
     for (name, text) in constants {

@@ -58,7 +58,8 @@ fn states_text(variables: &[(String, bool)], states: &[Listed]) -> String {
     output::table(&header, rows)
 }
 
-/// Formats a value exactly, or with its bounds.
+/// Formats a value with its accuracy, for example `3`, `0.5 (1/2)`, or `0.3 (between 0.299 and 0.301)`. Long
+/// fractions are marked as `(exact, rounded)`.
 pub fn shown(answer: &Answer) -> String {
     match answer {
         Answer::Infinite => "infinite".to_owned(),

@@ -23,7 +23,7 @@ pub(super) enum Exit {
     Fault = 70,
 }
 
-/// Exit status and messages of a command that ends without an answer.
+/// Exit status and messages of a command that fails.
 pub(super) struct Failure {
     pub(super) exit: Exit,
     pub(super) messages: Errors,
@@ -101,7 +101,7 @@ impl Common {
     }
 }
 
-/// How answers are written.
+/// Format of answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum Format {
     /// Text for people.
@@ -114,7 +114,8 @@ pub(super) enum Format {
     Turtle,
 }
 
-/// Converts an error about a model and a property to a failure. Both are given by name and text, for the messages.
+/// Converts an error about a model and a property to a failure. Both are given as pairs of file name and text,
+/// which messages quote.
 pub(super) fn process_failure(error: Error, model: (&str, &str), property: (&str, &str)) -> Failure {
     match error {
         Error::Model(problems) => in_file(&problems, model),

@@ -153,8 +153,9 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     so_far.end(common)
 }
 
-/// Returns the missions to compare, each with the data from which its process (Markov decision process) is built:
-/// the mission itself, or variants with other starts and goals. A variant has the names of its start and goal.
+/// Returns the missions to compare, each with the data from which its process (Markov decision process) is
+/// built: the mission itself, or variants with other starts and goals. The pair has the names of the start and
+/// the goal of a variant; it is `None` for the mission itself.
 fn missions(
     arguments: &Arguments,
     mission: &Mission,

@@ -70,7 +70,7 @@ impl Shared {
     pub fn show_after(&self, time: Option<Duration>, common: &Common) {
         let limits = time.map_or_else(Limits::none, |time| Limits::none().with_time(time));
         let (common, shared, interrupt) = (common.clone(), self.clone(), limits.interrupt());
-        // Without a handler, Ctrl-C ends the program as usual.
+        // If no handler can be set, Ctrl-C ends the program as usual.
         let _ = ctrlc::set_handler(move || {
             if interrupt.swap(true, Ordering::Relaxed) {
                 std::process::exit(130);
@@ -96,7 +96,7 @@ impl Shared {
     /// other thread ends the program.
     ///
     /// # Errors
-    /// The table cannot be written.
+    /// A requested file cannot be written.
     pub fn end(&self, common: &Common) -> Result<Exit, Failure> {
         let Some(so_far) = self.take() else {
             // The other thread is showing the results and will end the program.
@@ -114,12 +114,12 @@ impl SoFar {
         let Some(of) = self.of else {
             return Message::error(
                 "M130",
-                "the time limit or an interruption came before anything was compared",
+                "the time limit or an interruption stopped the comparison before its first result",
             );
         };
         let measured = self.begun.as_ref().map_or(0, |begun| begun.candidates.len());
         let text = format!(
-            "the time limit or an interruption came before everything was compared; what is shown is incomplete: {} of {of} \
+            "the time limit or an interruption stopped the comparison; the results are incomplete: {} of {of} \
              comparisons, and {measured} candidates of the next",
             self.done.len()
         );

@@ -133,8 +133,8 @@ pub fn costs_text(k: &Costs) -> String {
     )
 }
 
-/// Returns the peak resident memory since the last call, or since the start of the program, in megabytes. `None` if the
-/// system cannot reset the peak.
+/// Returns the peak resident memory since the last call, or since the start of the program, in megabytes, and
+/// resets the peak. Returns `None` if the system does not support this.
 pub fn memory_since() -> Option<u64> {
     let peak = peak_memory();
     // Linux: 5 resets the peak.

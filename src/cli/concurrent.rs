@@ -5,7 +5,7 @@ use num_rational::BigRational;
 
 use crate::cli::values::time;
 
-/// Whether and how actions overlap.
+/// Options for actions that overlap.
 #[derive(Debug, Args)]
 pub(super) struct Overlap {
     /// Allow actions to overlap as in PDDL 2.1. `total-time` is the makespan, which is minimised if the

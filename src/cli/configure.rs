@@ -41,7 +41,7 @@ pub struct Arguments {
     wanted: Wanted,
 }
 
-/// What is to be served, and what that is worth.
+/// Options for the required functions and the value of designs.
 #[derive(Debug, Clone, Default, Args)]
 pub(super) struct Wanted {
     /// A required function (repeatable). Default: the objectives of the knowledge base, or all its
@@ -82,11 +82,13 @@ impl Wanted {
             && self.least.is_none()
     }
 
-    /// Creates the configurator for a knowledge base, with the required functions as objectives.
+    /// Creates the configurator for a knowledge base, with the functions of `--objective` as additional
+    /// objectives. Without this option and without objectives in the knowledge base, all functions are
+    /// objectives.
     ///
     /// # Errors
-    /// All names in the options that are not in the knowledge base, and requirements for functions without an
-    /// objective.
+    /// All names in the options that are not in the knowledge base, and requirements for functions that this
+    /// method does not add as objectives.
     pub(super) fn configurator(&self, knowledge: Knowledge) -> Result<Configurator, Failure> {
         let worth = match (&self.most, &self.least) {
             (Some(attribute), _) => Worth::Most(attribute.clone()),
@@ -107,10 +109,17 @@ impl Wanted {
         };
         for (function, ..) in &self.requirements {
             if !functions.contains(function) {
-                let text = format!(
-                    "`--require {function}.…` is about no objective; there are: {}",
-                    functions.join(", ")
-                );
+                let text = if functions.is_empty() {
+                    format!(
+                        "`--require {function}.…` needs `--objective {function}`; objectives of the knowledge base have \
+                         the requirements that it states"
+                    )
+                } else {
+                    format!(
+                        "`--require {function}.…` does not name an objective; there are: {}",
+                        functions.join(", ")
+                    )
+                };
                 wrong.push(Message::error("M107", text));
             }
         }
@@ -154,7 +163,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
 fn text(configuration: &Configuration, wishes: &Wishes) -> String {
     let mut text = String::new();
     if configuration.choices.is_empty() {
-        return "no function is in need\n".to_owned();
+        return "no objective needs a new design\n".to_owned();
     }
     let rows = configuration.choices.iter().map(|choice| {
         let function = choice.function.clone().unwrap_or_default();
@@ -165,9 +174,7 @@ fn text(configuration: &Configuration, wishes: &Wishes) -> String {
     });
     text += &output::table(&["objective", "function", "design", "utility", "in need, since"], rows);
     let worth = match &wishes.worth {
-        Worth::Mros => {
-            "as MROS has it: concluded, or else the estimated `performance`, or else 0.001".to_owned()
-        }
+        Worth::Mros => "as in MROS: inferred, else the estimated `performance`, else 0.001".to_owned(),
         Worth::Most(attribute) => format!("the estimated {attribute}; more is better"),
         Worth::Least(attribute) => format!("the estimated {attribute}, negated; less is better"),
     };
@@ -177,15 +184,15 @@ fn text(configuration: &Configuration, wishes: &Wishes) -> String {
         "not proved: a limit was reached; a better choice may exist"
     };
     let _ =
-        writeln!(text, "\nutility: {worth}\nin sum {}; {proved}", output::decimal(&configuration.utility));
+        writeln!(text, "\nutility: {worth}\ntotal: {}; {proved}", output::decimal(&configuration.utility));
     for choice in &configuration.choices {
         text += &reasons(choice);
     }
     text
 }
 
-/// Formats the reasons why better designs were not chosen or cannot be used, and the requirements that the chosen
-/// design misses.
+/// Formats the reasons why designs are ruled out or cannot be chosen together with the other choices, and the
+/// requirements that the chosen design misses.
 fn reasons(choice: &Choice) -> String {
     let mut text = String::new();
     for considered in &choice.considered {

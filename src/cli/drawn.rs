@@ -17,7 +17,7 @@ use crate::cli::output;
 /// Width of a picture if the width of the terminal is unknown.
 const COLUMNS: u16 = 100;
 
-/// Where a plan is drawn.
+/// Options for the picture of a plan.
 #[derive(Debug, Args)]
 pub(super) struct Drawing {
     /// Also write the plan as a timeline to an SVG file; with `--pareto`, the front.
@@ -39,7 +39,7 @@ enum When {
     Never,
 }
 
-/// Where the pictures of an answer go.
+/// Options for the page of an answer.
 #[derive(Debug, Clone, Default, Args)]
 pub(super) struct Pages {
     /// Also write the answer as an HTML page.

@@ -139,12 +139,12 @@ fn cost_text(answer: &BestPlan, best: &BestPlan) -> String {
     match &best.cost {
         Some(base) if !best.proved => {
             format!(
-                "the best plan costs {} (the best one known as things are, {})",
+                "the best plan costs {} (the best known plan of the current situation costs {})",
                 decimal(cost),
                 decimal(base)
             )
         }
-        Some(base) if cost == base => format!("the best plan costs {}, no more", decimal(cost)),
+        Some(base) if cost == base => format!("the best plan costs {}, the same", decimal(cost)),
         Some(base) if cost > base => {
             format!("the best plan costs {}, {} more", decimal(cost), decimal(&(cost - base)))
         }
@@ -154,7 +154,7 @@ fn cost_text(answer: &BestPlan, best: &BestPlan) -> String {
     }
 }
 
-/// Formats a change of a measurement or of a component's status. `about` marks the bound as approximate.
+/// Formats a change of a value or of a component's status. `about` marks the bound as approximate.
 fn alteration_text(alteration: &Alteration, about: bool) -> String {
     let Alteration { name, from, to } = alteration;
     let now = from.as_ref().map(|from| format!(" (now {})", decimal(from))).unwrap_or_default();
@@ -181,7 +181,7 @@ fn why_text(why: &Availability) -> String {
         && way.len() > 1
     {
         let names = way.iter().map(|alteration| alteration.name.as_str()).collect::<Vec<_>>().join(", ");
-        let _ = writeln!(text, "{} causes, all of which have to go: {names}", way.len());
+        let _ = writeln!(text, "{} causes, all of which must be removed: {names}", way.len());
     }
     text
 }
@@ -242,7 +242,7 @@ fn repairs_text(found: &DesignExplanation) -> String {
         }
     }
     for repair in groups {
-        text += "it is available again if all of these come true together, and not without one of them\n";
+        text += "it is available again only if all of these hold together\n";
         for alteration in &repair.alterations {
             let _ = writeln!(text, "    {}", alteration_text(alteration, false));
         }
@@ -276,7 +276,7 @@ fn changes_text(found: &SmallestChanges) -> String {
         text += &plan_text(&change.then);
     }
     if !complete {
-        text += "a limit was reached: other changes were not looked for\n";
+        text += "a limit was reached: other changes were not examined\n";
     }
     text
 }

@@ -39,7 +39,7 @@ pub struct Arguments {
     output: Option<PathBuf>,
 }
 
-/// What a mission can be written as.
+/// Format of the exported mission.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Language {
     /// Domain and problem for other planners, with availability and values from the knowledge base.
@@ -50,7 +50,7 @@ enum Language {
     Jani,
 }
 
-/// What a model says about a mission.
+/// Abstraction level of an exported model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Setting {
     /// All routes, reconfiguration in every place, collisions are part of the state, and the battery limits moves.
@@ -85,8 +85,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-/// Writes the co-adaptation process (Markov decision process) of a mission, with all its uncertain parts, as a PRISM or
-/// JANI model.
+/// Writes the co-adaptation process (Markov decision process) of a mission as a PRISM or JANI model, with all
+/// its uncertain parts or in the published setting.
 fn process(
     arguments: &Arguments,
     common: &Common,

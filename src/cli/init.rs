@@ -69,7 +69,7 @@ fn refused(directory: &Path, shown: &str, error: ErrorKind) -> Message {
     let above = directory.parent().filter(|above| !above.as_os_str().is_empty());
     match (error, above) {
         (ErrorKind::AlreadyExists | ErrorKind::DirectoryNotEmpty, _) => {
-            let text = "this is there already, and nothing is overwritten; choose another name";
+            let text = "this exists already, and nothing is overwritten; choose another name";
             Message::at("M133", shown, None, text)
         }
         (ErrorKind::NotFound, Some(above)) => {

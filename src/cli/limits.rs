@@ -1,4 +1,4 @@
-//! Time limits and signals, from the first file read to the last proof.
+//! Limits on time and memory, and signals, from the first file read to the last proof.
 //!
 //! While a mission is read and reasoned about, there is no answer to save. So a signal ends the program at once, and a
 //! separate thread ends it at the time limit, unless an answer is being written. Commands that do not plan need nothing
@@ -58,7 +58,7 @@ impl Guard {
     /// Starts to measure time and memory.
     ///
     /// # Errors
-    /// The platform does not report the memory of the process.
+    /// There is a memory limit, but the platform does not report the memory of the process.
     pub(super) fn new(time: Option<Duration>, memory: Option<u64>, common: &Common) -> Result<Self, Failure> {
         let mut limits = Limits::none();
         if let Some(time) = time {
@@ -67,7 +67,7 @@ impl Guard {
         if let Some(megabytes) = memory
             && !memory::watch(megabytes, limits.interrupt())
         {
-            let text = "`--memory-limit`: this platform does not tell how much memory a process occupies";
+            let text = "`--memory-limit`: this platform does not report the memory of a process";
             return Err(Failure::usage(Message::error("M115", text)));
         }
         if let Some(megabytes) = memory {
@@ -113,10 +113,11 @@ impl Guard {
 }
 
 fn nothing_to_show() -> Message {
-    Message::error("M130", "a limit was reached before there was anything to show")
+    Message::error("M130", "a limit was reached before there was a result")
 }
 
-/// Limits, with a margin, at which a command is ended that has read its input and shows no answer.
+/// The time and memory limits plus a margin. The program is ended if it reaches them after reading its input and has
+/// not begun to print an answer.
 struct Deadline {
     started: Instant,
     time: Option<Duration>,
@@ -165,7 +166,7 @@ fn give_up_late(limits: Limits, has_read: Arc<AtomicBool>, late: Deadline, commo
     });
 }
 
-/// Ends the program, unless an answer is being shown, or `condition` returns `true`.
+/// Ends the program, unless the output of an answer or file has begun, or `condition` returns `true`.
 fn end_unless(common: &Common, condition: impl FnOnce() -> bool) {
     // A thread that writes an answer holds this lock until the answer is complete.
     let _stdout = std::io::stdout().lock();

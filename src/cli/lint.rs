@@ -50,7 +50,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
 
 fn summary(errors: usize, warnings: usize) -> String {
     match (errors, warnings) {
-        (0, 0) => "nothing to complain about\n".to_owned(),
+        (0, 0) => "no problems found\n".to_owned(),
         _ => format!("{}, {}\n", counted(errors, "error"), counted(warnings, "warning")),
     }
 }

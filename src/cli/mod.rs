@@ -1,5 +1,5 @@
-//! The command line: parses arguments, calls the library, and writes answers to standard output and
-//! everything else to standard error.
+//! The command line: parses arguments and calls the library. Answers go to standard output or to the files that
+//! options name, messages and progress to standard error.
 
 mod alternatives;
 mod check;
@@ -134,7 +134,7 @@ const MAX_HELP_COLUMNS: usize = 100;
 /// Parses the command line, runs the command, and reports failures and panics.
 pub fn main() -> ExitCode {
     let cli = parse();
-    // The default hook would print a stack trace to users; a short message is printed below.
+    // The default hook would print a message for developers; a short message for users is printed below.
     std::panic::set_hook(Box::new(|_| {}));
     let outcome = std::panic::catch_unwind(|| traced(&cli));
     let exit = match outcome {
@@ -152,8 +152,8 @@ pub fn main() -> ExitCode {
     ExitCode::from(exit as u8)
 }
 
-/// Runs the command, with a trace if requested. A trace that cannot be written is an error after
-/// the answer.
+/// Runs the command, and writes a trace if requested. If the command succeeds but its trace cannot be written,
+/// this is the error.
 fn traced(cli: &Cli) -> Result<Exit, Failure> {
     let trace = cli.common.trace.as_deref().map(Trace::begin).transpose()?;
     let outcome = run(cli);
@@ -163,7 +163,8 @@ fn traced(cli: &Cli) -> Result<Exit, Failure> {
     }
 }
 
-/// Parses the command line. `--color` applies to messages about faulty arguments at any position.
+/// Parses the command line. `--color` also applies to messages about faulty arguments, even if these arguments
+/// precede the option.
 fn parse() -> Cli {
     let words: Vec<String> = std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
     let beside = words.iter().zip(words.iter().skip(1)).filter(|(word, _)| *word == "--color");
@@ -187,7 +188,7 @@ fn read(words: Vec<String>) -> Result<Option<simulate::Arguments>, clap::Error> 
 fn run(cli: &Cli) -> Result<Exit, Failure> {
     let triples = matches!(cli.common.format, Format::Ntriples | Format::Turtle);
     if triples && !matches!(cli.command, Subcommands::Reason(_)) {
-        let text = "`--format ntriples` and `--format turtle` go with `reason`";
+        let text = "`--format ntriples` and `--format turtle` are formats of `reason`";
         return Err(Failure::usage(Message::error("M107", text)));
     }
     match &cli.command {

@@ -7,7 +7,8 @@ use planner::{Exact, Front, Status};
 use crate::cli::plan_answer::answer_text;
 use crate::cli::plan_text::steps_text;
 
-/// Formats the values of several objectives in one line. Returns an empty text for fewer than two objectives.
+/// Formats the values of several objectives in one line. Returns an empty text for fewer than two objectives,
+/// or without values.
 pub(super) fn values_text(objectives: &[String], values: &[Exact]) -> String {
     if objectives.len() < 2 || values.is_empty() {
         return String::new();
@@ -35,7 +36,7 @@ pub(super) fn front_text(name: &str, objectives: &[String], front: &Front, colum
             let open = if proved < solved.len() { ", and one more that is not proved to be" } else { "" };
             let _ = writeln!(
                 text,
-                "{proved} on the front{open}; a limit came before it was proved that there are no others"
+                "{proved} on the front{open}; a limit was reached before it was proved that there are no others"
             );
         }
         (_, Some(point)) => text += &answer_text(name, &point.solution, columns),

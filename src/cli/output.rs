@@ -19,7 +19,7 @@ use crate::cli::common::{Common, Failure, Format};
 
 static ANSWER_LOST: AtomicBool = AtomicBool::new(false);
 
-/// Set once an answer, or a part of one, is being written.
+/// Set once an answer, a part of one, or a file is being written.
 static HAS_BEGUN: AtomicBool = AtomicBool::new(false);
 
 /// Maximum number of messages shown; further messages are only counted.
@@ -54,8 +54,8 @@ pub fn answer_lost() -> bool {
     ANSWER_LOST.load(Ordering::Relaxed)
 }
 
-/// Returns `true` if an answer, or a part of one, is being written or has been written. The result
-/// stays valid while the caller holds the lock of standard output.
+/// Returns `true` if an answer, a part of one, or a file is being written or has been written. The result stays
+/// valid while the caller holds the lock of standard output.
 pub fn has_begun() -> bool {
     HAS_BEGUN.load(Ordering::Relaxed)
 }
@@ -138,7 +138,7 @@ pub fn file_named(output: Option<&PathBuf>) -> Option<&Path> {
 pub fn make_directory(path: &Path) -> Result<(), Failure> {
     require_directory(path)?;
     std::fs::create_dir_all(path).map_err(|error| {
-        let text = format!("the directory cannot be made: {}", error.kind());
+        let text = format!("the directory cannot be created: {}", error.kind());
         Message::at("M109", &path.display().to_string(), None, text).into()
     })
 }
@@ -148,8 +148,8 @@ pub fn require_directory(path: &Path) -> Result<(), Failure> {
     if path.as_os_str() != "-" {
         return Ok(());
     }
-    let text =
-        "`-` is standard output, and several files are written; name a directory (`./-` if it is called so)";
+    let text = "`-` is standard output, but several files are written; name a directory (`./-` for a directory \
+                with this name)";
     Err(Failure::usage(Message::error("M107", text)))
 }
 

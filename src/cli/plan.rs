@@ -164,7 +164,7 @@ fn configuration(arguments: &Arguments, limits: Limits) -> Config {
 }
 
 impl Arguments {
-    /// Rejects combinations of options that the parser cannot detect.
+    /// Rejects unusable SAT solvers, and combinations of options that the parser cannot detect.
     fn check(&self) -> Result<(), Failure> {
         let usage = |code: &str, text: String| Failure::usage(Message::error(code, text));
         self.solver.check().map_err(|error| usage("M113", error.to_string()))?;
@@ -383,7 +383,7 @@ fn missing_text(missing: &[MissingValue]) -> String {
     if lines.is_empty() {
         lines
     } else {
-        format!("numbers are missing without which actions cannot be done:\n{lines}")
+        format!("actions are impossible because numbers are missing:\n{lines}")
     }
 }
 

@@ -12,7 +12,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use crate::cli::common::Common;
 use crate::cli::output;
 
-/// Delay before the first progress line, so that short commands show none.
+/// Delay before the first line if standard error is not a terminal, so that short commands write none.
 const INITIAL_DELAY: Duration = Duration::from_secs(3);
 
 const INTERVAL: Duration = Duration::from_secs(5);

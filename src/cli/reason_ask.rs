@@ -97,8 +97,9 @@ impl Questions {
     }
 }
 
-/// Answers a query about each assertion. Returns the answers as text and as JSON, and the exit status. `answer` returns
-/// the reason, and `true` if the query has an answer.
+/// Answers a query about each assertion. Returns the answers as text and as JSON, and the exit status. `answer`
+/// returns the text for one assertion, and `true` if the query applies: the assertion holds (`--why`) or does
+/// not hold (`--why-not`).
 fn reasons(
     knowledge: &mut Knowledge,
     assertions: &[String],
@@ -211,8 +212,8 @@ fn names(engine: &Engine) -> BTreeSet<String> {
     symbols.into_iter().filter_map(text).collect()
 }
 
-/// Resolves a word to an IRI: an IRI in brackets, a full IRI in `names`, or a local name with any prefix. Returns an
-/// error unless exactly one IRI in `names` has the local name.
+/// Resolves a word to an IRI: an IRI in angle brackets, a full IRI in `names`, or a local name with any prefix.
+/// Returns an error for a local name that no IRI or several IRIs in `names` have.
 fn name(word: &str, names: &BTreeSet<String>) -> Result<String, Message> {
     if let Some(iri) = word.strip_prefix('<').and_then(|rest| rest.strip_suffix('>')) {
         return Ok(iri.to_owned());
@@ -224,7 +225,7 @@ fn name(word: &str, names: &BTreeSet<String>) -> Result<String, Message> {
     let matches: Vec<&String> = names.iter().filter(|iri| local_name(iri) == local).collect();
     match matches[..] {
         [iri] => Ok(iri.clone()),
-        [] => Err(Message::error("M134", format!("nothing is called `{word}`; write an IRI as <IRI>"))),
+        [] => Err(Message::error("M134", format!("nothing has the name `{word}`; write an IRI as <IRI>"))),
         _ => {
             let candidates: Vec<String> = matches.iter().map(|iri| format!("<{iri}>")).collect();
             Err(Message::error(

@@ -126,8 +126,8 @@ struct Answer {
 }
 
 impl Answer {
-    /// Plans a mission. Actions may overlap if `separation`, the minimum time between interfering starts and ends of
-    /// actions, is given. The validator has executed the plan.
+    /// Plans a mission, and executes the plan, if there is one, with the validator. Actions may overlap if
+    /// `separation` is given, the minimum time between interfering starts and ends of actions.
     fn of(
         mission: &Mission,
         positions: &Positions,

@@ -72,7 +72,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         return keep(arguments, common);
     }
     if !arguments.wanted.is_empty() {
-        let text = "`--objective`, `--require`, `--budget`, `--exclusive`, `--most` and `--least` go with `--configure`";
+        let text = "`--objective`, `--require`, `--budget`, `--exclusive`, `--most` and `--least` require \
+                    `--configure`";
         return Err(Failure::usage(Message::error("M107", text)));
     }
     let setup = arguments.situation.setup(&arguments.inputs, common)?;
@@ -177,7 +178,7 @@ fn keep_going(
     if events.is_file() { session.replay(events) } else { session.live(events) }
 }
 
-/// Time of planning before the first heartbeat, and between two heartbeats.
+/// Time of planning before the first heartbeat (line with the progress), and between two heartbeats.
 const HEARTBEAT: Duration = Duration::from_secs(1);
 
 /// Starts a thread that reports the progress every second while a plan is being computed. It runs until the program

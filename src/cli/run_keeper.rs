@@ -1,5 +1,6 @@
-//! Session of the configuration loop: connects it with its input and output, in two modes, for lines of a file and for
-//! lines as they arrive. A choice of designs needs no search, so each line is answered completely in both modes.
+//! Session of the configuration loop: connects the loop with its input and output, in two modes, for lines of a
+//! file and for lines as they arrive. Designs are chosen without planning, so each line is answered completely
+//! in both modes.
 
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::time::{Duration, Instant};
@@ -19,7 +20,7 @@ pub(super) struct KeeperSession<'a> {
     journal: Option<Journal>,
     outlet: &'a Outlet,
     clock: SystemClock,
-    /// Time of the last line of the resumed journal, since the start; 0 without such a line.
+    /// Time of the last line or timer event of the resumed journal, since the start; 0 without such an event.
     begun: Duration,
     /// `true` if a line had a time. Time then advances with lines only.
     has_times: bool,
@@ -66,8 +67,8 @@ impl<'a> KeeperSession<'a> {
         Ok(())
     }
 
-    /// Makes the first choice of designs. After a restart, repeats the answers that may not have left the program
-    /// before.
+    /// Makes the first choice of designs. If a journal is resumed, completes unfinished work instead, and
+    /// repeats effects that were not acknowledged.
     fn begin(&mut self) -> Result<Flow, Failure> {
         let read = Instant::now();
         let answers = match &mut self.journal {
@@ -88,14 +89,15 @@ impl<'a> KeeperSession<'a> {
         flow(self.outlet.answer(self.keeper.lines(), &answers, read))
     }
 
-    /// Returns the time until a report that a filter holds back becomes due. `None` without such a
-    /// report, or if lines have times.
+    /// Returns the time until a filter changes a belief without a further report, for example after a debounce
+    /// time. `None` if no filter does, or if lines have times.
     fn pause(&mut self) -> Option<Duration> {
         let due = self.keeper.due().filter(|_| !self.has_times)?;
         Some(due.saturating_sub(self.begun + self.clock.now()).max(MIN_PAUSE))
     }
 
-    /// Reacts to the passing of time. The answers have the number of the last line.
+    /// Handles the due time of a filter, if it has passed. The answers are written with the number of the last input
+    /// line, because time has no line of its own.
     fn elapse(&mut self) -> Result<Flow, Failure> {
         let now = self.begun + self.clock.now();
         if self.keeper.due().is_none_or(|due| due > now) {

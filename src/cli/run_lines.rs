@@ -29,7 +29,7 @@ pub(super) struct Lines {
 type Reader = Box<dyn BufRead + Send>;
 
 enum Source {
-    /// Input that is not opened yet, because standard input may block.
+    /// Input whose format is not determined yet: this needs the first byte, and reading it may block.
     Fresh(Option<Reader>),
     Text(Reader),
     Recorded(Box<Replay<Reader>>),
@@ -82,7 +82,10 @@ impl Lines {
         if let (None, Source::Recorded(replay)) = (&line, &self.source)
             && replay.is_unfinished()
         {
-            let text = format!("{} breaks off: it was not finished; all that is whole was read", self.name);
+            let text = format!(
+                "{} is truncated: recording was interrupted; all complete messages were read",
+                self.name
+            );
             output::warnings(common, [&Message::warning("M330", text)]);
         }
         Ok(line)
@@ -117,7 +120,7 @@ fn next_text(reader: &mut Reader) -> io::Result<Option<Line>> {
     loop {
         let Some(bytes) = read_line(reader)? else { return Ok(None) };
         let text = String::from_utf8_lossy(&bytes);
-        // A byte order mark precedes the first line, and also later lines where files were concatenated.
+        // A byte order mark may precede the first line, and also later lines where files were concatenated.
         let text = text.trim_start_matches('\u{feff}').trim_ascii();
         if !text.is_empty() {
             return Ok(Some(Line { text: text.to_owned(), now: None }));

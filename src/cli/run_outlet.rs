@@ -21,7 +21,7 @@ use serde::Serialize;
 use crate::cli::common::Common;
 use crate::cli::output;
 
-/// Where the run goes besides standard output.
+/// Options for outputs other than standard output.
 #[derive(Debug, Args)]
 pub(super) struct Outlets {
     /// Record events and answers to a new MCAP file.
@@ -119,7 +119,7 @@ impl Outlet {
         if let Some((recorder, name)) = &self.recorder {
             lines.lines().for_each(|line| recorder.answer(line));
             if recorder.has_failed() && !self.is_told.swap(true, Ordering::Relaxed) {
-                let text = format!("{name} cannot be written any more: the run goes on without a recording");
+                let text = format!("{name} can no longer be written: the run continues without a recording");
                 output::note(Message::warning("M331", text).text());
             }
         }
@@ -193,12 +193,14 @@ fn record(path: &Path, events: Recorded, mission: &str) -> Result<(Recorder, Str
     };
     let name = path.display().to_string();
     if crate::file::is_stdout(path) {
-        let text = "standard output has the answers; name a file for the recording";
+        let text = "standard output is used for the answers; name a file for the recording";
         return Err(Message::at("M331", &name, None, text));
     }
     let recorder = Recorder::create(path, mission, form).map_err(|error| {
         let text = if error.kind() == io::ErrorKind::AlreadyExists {
-            "is there already, and no recording is overwritten: name another file, or remove it".to_owned()
+            "exists already, and recordings are never overwritten: name another file, or remove the existing \
+             one"
+            .to_owned()
         } else {
             format!("the recording cannot be written: {error}")
         };

@@ -1,10 +1,9 @@
 //! Session of `metaplan run`: connects the adaptation loop with its input and output, in two modes.
 //!
-//! If all input is available, as in a file, each line is answered completely before the next one is
-//! read, so the same lines give the same answers. If lines arrive as they happen, from a pipe or a
-//! terminal, the loop reacts to all waiting lines before it deliberates. Plans are then computed on
-//! another thread while the loop keeps reacting. A line that changes the planning problem cancels
-//! the search.
+//! If all input is available, as in a file, each line is answered completely before the next one is read, so
+//! the same lines give the same answers. If lines arrive as they happen, from a pipe or a terminal, the loop
+//! reacts to all waiting lines before it deliberates. Plans are then computed on another thread while the loop
+//! keeps reacting. A line that changes the planning problem cancels the search, but only a few times in a row.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -20,8 +19,8 @@ use crate::cli::common::{Common, Failure};
 use crate::cli::run_lines::{Line, Lines};
 use crate::cli::run_outlet::{Outlet, is_over, unwritten, warn_if_unrecorded};
 
-/// Capacity of the channel of read lines, and maximum number of inputs that are moved from it to the queue of waiting
-/// inputs.
+/// Capacity of the channel of inputs, and number of waiting inputs up to which the queue is filled from the
+/// channel.
 pub(super) const MAX_WAITING: usize = 1024;
 
 /// Maximum number of consecutive cancelled searches. The next search runs to its end; otherwise
@@ -59,7 +58,8 @@ pub(super) struct Session<'a> {
     journal: Option<Journal>,
     outlet: &'a Outlet,
     clock: SystemClock,
-    /// Time of the last line of the resumed journal, since the start of the mission; 0 without such a line.
+    /// Time of the last line or timer event of the resumed journal, since the start of the mission; 0 without
+    /// such an event.
     begun: Duration,
     /// Number of the current line, shared with the thread that reports the progress of planning.
     line: Arc<AtomicU64>,
@@ -159,7 +159,8 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// Makes the first decision, or completes the decision that the journal left unfinished.
+    /// Makes the first decision. If a journal is resumed, completes unfinished work instead, and repeats
+    /// effects that were not acknowledged.
     fn begin(&mut self, read: Instant) -> Result<Flow, Failure> {
         let answers = match &mut self.journal {
             None => self.control.start(),
@@ -190,8 +191,8 @@ impl<'a> Session<'a> {
         now
     }
 
-    /// Reacts to a line, and deliberates if `is_last` is `true` and no search is necessary. `is_last` says that no
-    /// further line is waiting.
+    /// Reacts to a line, and also deliberates if no further line is waiting (`is_last`) and no search is
+    /// necessary. A line of a recording is answered completely.
     fn line(&mut self, line: &Line, read: Instant, is_last: bool) -> Result<Flow, Failure> {
         if self.close()? == Flow::Over {
             return Ok(Flow::Over);
@@ -253,9 +254,9 @@ impl<'a> Session<'a> {
         self.say(&answers)
     }
 
-    /// Returns `true` if deliberation is pending, no action under way might need a reaction, and the line is about an
-    /// action or effect that was not requested yet. The writer of such a line knows the loop's answers in advance, as
-    /// in a file that is piped.
+    /// Returns `true` if deliberation is pending, no action is under way (it might need a reaction), and the
+    /// line is about an action or effect that was not requested yet. Such lines were written for answers that
+    /// the loop has not given yet, as in a file that is piped.
     fn is_early(&self, line: &Line) -> bool {
         let is_idle = self.control.has_agenda() && self.control.beliefs().running().is_none();
         is_idle && self.control.is_ahead(&Observation::parse(&line.text))

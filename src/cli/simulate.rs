@@ -108,7 +108,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let total = strategies.len() * arguments.runs as usize;
     let incomplete = (runs.len() < total).then(|| {
         let text = format!(
-            "the time limit or an interruption came before all was simulated; what is shown is incomplete: {} of {total} missions",
+            "the time limit or an interruption stopped the simulation; the results are incomplete: {} of \
+             {total} missions",
             runs.len()
         );
         Message::error("M130", text)
@@ -139,7 +140,7 @@ pub fn subject(arguments: &Arguments) -> String {
 /// Checks whether the scenario of a command line can be simulated. Paths are relative to `directory`.
 ///
 /// # Errors
-/// All mistakes in the scenario.
+/// All mistakes in the mission's files, or in the scenario.
 pub fn check(arguments: &Arguments, directory: &Path, common: &Common) -> Result<(), Failure> {
     experiment(&directory.join(&arguments.mission), &arguments.scenario, common).map(drop)
 }

@@ -42,7 +42,7 @@ pub(super) struct Situation {
     fail: Vec<String>,
 }
 
-/// Where imports are looked for; never the network.
+/// Options for the locations of imports, which are never read from the network.
 #[derive(Debug, Clone, Args)]
 pub(super) struct Imports {
     /// An OASIS XML catalog with the locations of imports (repeatable).
@@ -79,8 +79,8 @@ impl Situation {
         Self { knowledge, rules, imports, names, scenario, set, fail }
     }
 
-    /// Returns the options without scenario, set values and failed components, which select the mission as its files
-    /// define it. Returns `None` if there are no such changes.
+    /// Returns these options without scenario, set values and failed components. The result selects the mission
+    /// as its files define it. Returns `None` if the options contain no such changes.
     pub(super) fn before(&self) -> Option<Self> {
         let (scenario, set, fail) = (None, Vec::new(), Vec::new());
         let differs = self.scenario.is_some() || !self.set.is_empty() || !self.fail.is_empty();
@@ -121,8 +121,8 @@ impl Situation {
                 let is_empty = self.knowledge.is_empty() && self.rules.is_empty() && self.names.is_empty();
                 let here = imports.catalog.is_empty() && imports.directory.is_empty();
                 if !(is_empty && here && !imports.ignore_missing_imports) {
-                    let text = "`--kb`, `--rules`, `--name` and where imports lie go with DOMAIN and PROBLEM; \
-                                a mission's manifest names its own";
+                    let text = "`--kb`, `--rules`, `--name` and the options for imports require DOMAIN and \
+                                PROBLEM; the manifest of a mission has keys for them";
                     return Err(Failure::usage(Message::error("M107", text)));
                 }
                 let mut setup = Setup::read(manifest)?;
@@ -133,14 +133,14 @@ impl Situation {
             }
             [domain, problem] => {
                 if self.scenario.is_some() {
-                    let text = "`--scenario` goes with a mission's manifest";
+                    let text = "`--scenario` requires a mission's manifest";
                     return Err(Failure::usage(Message::error("M107", text)));
                 }
                 for (option, given) in
                     [("--rules", !self.rules.is_empty()), ("--name", !self.names.is_empty())]
                 {
                     if self.knowledge.is_empty() && given {
-                        let text = format!("`{option}` goes with `--kb`");
+                        let text = format!("`{option}` requires `--kb`");
                         return Err(Failure::usage(Message::error("M107", text)));
                     }
                 }

@@ -1,4 +1,4 @@
-//! The command `metaplan sweep`, which executes the runs of a parameter study.
+//! The command `metaplan sweep`, which executes the runs of a parameter study or merges their results.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -73,7 +73,8 @@ fn sweep(arguments: &Arguments, study: &Study, guard: Guard, common: &Common) ->
             let line = if limits.reached() { None } else { perform(&program, study, &run, &limits)? };
             let Some(line) = line else {
                 let text = format!(
-                    "the time limit or an interruption came before all runs were done; {} of {total} are, and `--resume` goes on",
+                    "the time limit or an interruption stopped the study after {} of {total} runs; continue \
+                     with `--resume`",
                     results.done.len()
                 );
                 messages.push(Message::error("M130", text));
@@ -145,7 +146,7 @@ fn merge(arguments: &Arguments, study: &Study, common: &Common) -> Result<Exit, 
         let keys: Vec<String> = keys.collect();
         let suggestion = did_you_mean(study.rows(), keys.iter().map(String::as_str));
         let text = format!(
-            "no answer has anything at `{}`{suggestion}; there are: {}",
+            "no answer has a value at `{}`{suggestion}; there are: {}",
             study.rows(),
             keys.join(", ")
         );
@@ -160,7 +161,8 @@ fn merge(arguments: &Arguments, study: &Study, common: &Common) -> Result<Exit, 
     Ok(say(&SweepAnswer::new(&lines, 0..study.len(), &groups), &groups, common))
 }
 
-/// Writes the answer. Returns [`Exit::NotProved`] if runs are missing, and [`Exit::Done`] otherwise.
+/// Writes the answer. Returns [`Exit::NotProved`] if runs are missing or have no answer, and [`Exit::Done`]
+/// otherwise.
 fn say(answer: &SweepAnswer, groups: &[Group], common: &Common) -> Exit {
     if common.format == Format::Json {
         output::json_answer(answer);

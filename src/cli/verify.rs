@@ -3,16 +3,18 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use crate::certificate::{Verification, Verifier};
+use crate::answers::{VerifyAnswer, theorem_line};
+use crate::certificate::{ProvedChecker, Theorem, Verification, Verifier};
 use clap::Args;
 
-use ::verify::{Watch, json};
+use ::verify::Watch;
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::output;
 use crate::cli::progress::during;
 use crate::cli::situation::Situation;
 use crate::cli::values::{seconds, setting};
+use crate::visible::{pretty, visible_json};
 
 /// Arguments of `verify`.
 #[derive(Debug, Args)]
@@ -37,13 +39,22 @@ pub struct Arguments {
     /// Mark a component as failed (repeatable).
     #[arg(long, value_name = "COMPONENT", requires = "mission")]
     fail: Vec<String>,
+    /// Also run the checker that is extracted from a Coq proof, and name the parts that the theorem covers. Its programs `metaplan-proved-prepare` and `metaplan-proved-check` are found in FOLDER, or beside this program and in PATH.
+    #[arg(long, value_name = "FOLDER", num_args = 0..=1, require_equals = true)]
+    #[expect(clippy::option_option, reason = "the option may have no value")]
+    proved: Option<Option<PathBuf>>,
 }
 
 /// Runs `metaplan verify` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let format = common.format;
-    let watch =
-        Watch::start(arguments.time_limit, move |report| std::process::exit(show(report, format) as i32));
+    let checker = match &arguments.proved {
+        Some(folder) => Some(ProvedChecker::find(folder.as_deref())?),
+        None => None,
+    };
+    let watch = Watch::start(arguments.time_limit, move |report| {
+        std::process::exit(show(report, None, format) as i32)
+    });
     let verifier = Verifier::new(&arguments.directory).stop(|| watch.reached());
     if let Some(file) = &arguments.smt {
         output::write_file(file, &verifier.conditions()?)?;
@@ -59,14 +70,26 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         }
         None => None,
     };
-    let report = during("verifying", common, || verifier.mission(mission.as_ref()).verify());
-    Ok(show(&watch.end(report), format))
+    let verifier = verifier.mission(mission.as_ref());
+    let mut report = during("verifying", common, || verifier.verify());
+    let theorem = match checker {
+        Some(checker) => Some(during("running the proved checker", common, || {
+            checker.compare(&arguments.directory, &mut report, &|| watch.reached())
+        })?),
+        None => None,
+    };
+    Ok(show(&watch.end(report), theorem.as_ref(), format))
 }
 
-fn show(report: &Verification, format: Format) -> Exit {
+/// Prints the results of the checkers and returns the exit status.
+fn show(report: &Verification, theorem: Option<&Theorem>, format: Format) -> Exit {
     output::document(&match format {
-        Format::Json => json(report),
-        _ => report.to_string(),
+        Format::Json => visible_json(&pretty(&VerifyAnswer::new(report, theorem))).into_owned(),
+        _ => report.to_string() + &theorem.map(theorem_line).unwrap_or_default(),
     });
-    if report.verified() { Exit::Done } else { Exit::Invalid }
+    match theorem {
+        _ if !report.verified() => Exit::Invalid,
+        Some(Theorem::None(_)) => Exit::NotProved,
+        _ => Exit::Done,
+    }
 }

@@ -207,6 +207,12 @@ pub const CODES: &[[&str; 4]] = &[
         "Set `hysteresis`, `debounce`, `settle` or `heal_time`; see [noise](../explanation/loop.md#noise).",
     ],
     [
+        "M145",
+        "The proved checker cannot be run.",
+        "Its programs are not found, cannot be started, or temporary files cannot be written.",
+        "Build them with `sh proved/build.sh` in the source code, and add `proved/ocaml` to PATH or use `--proved=FOLDER`.",
+    ],
+    [
         "M150",
         "A study is wrong.",
         "A key of its file has a value that cannot be varied, a placeholder has no key, or there are too many runs.",

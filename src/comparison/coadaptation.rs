@@ -286,7 +286,7 @@ impl Coadaptation {
     /// Checks that all probabilities are from 0 to 1, and that no time or energy is negative.
     ///
     /// # Errors
-    /// All numbers out of range.
+    /// M122 for each move, change of configuration or loss with a number out of range.
     pub(super) fn checked(self) -> Result<Self, Errors> {
         let (zero, one) = (BigRational::zero(), BigRational::one());
         let mut problems = Vec::new();

@@ -1,5 +1,5 @@
-//! Evaluates both approaches exactly in one Markov decision process: policies computed by model
-//! checking, and plans with and without replanning.
+//! Evaluates all candidates exactly in one Markov decision process: policies computed by model checking, plans
+//! with and without replanning, the published procedure, and the shortest route.
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -22,7 +22,7 @@ pub type Listener<'a> = dyn FnMut(&[Candidate], &Costs) + 'a;
 /// Settings of a comparison.
 #[derive(Clone)]
 pub struct Config<'a> {
-    /// The sources of uncertainty in the common process.
+    /// The sources of uncertainty in the process in which all candidates are evaluated.
     pub risk: Risk,
     /// Time added for a failed mission. `None` for ten times the time that the first plan takes if nothing
     /// fails (at least 10; 10,000 if there is no plan).
@@ -43,7 +43,7 @@ pub struct Candidate {
     pub kind: char,
     /// Description of the candidate for the table.
     pub name: String,
-    /// Exact values of the candidate in the common process.
+    /// Exact values of the candidate in the process in which all candidates are evaluated.
     pub measures: Measures,
 }
 
@@ -56,17 +56,18 @@ pub struct Comparison {
     /// Vertices of the Pareto front, each with expected time and probability of success without
     /// collision. Only vertices with a finite time are included.
     pub front: Vec<[f64; 2]>,
-    /// Lower bounds on time and on energy of every decision rule, even a clairvoyant one.
+    /// Lower bounds on the time and on the energy that any decision rule needs to reach the goal, even a
+    /// clairvoyant one.
     pub hindsight: [Hindsight; 2],
     /// Time added for a failed mission.
     pub penalty: f64,
-    /// Reason why the plan with replanning cannot be worse than the best policy, if this follows
-    /// without computation.
+    /// Reason why the plan with replanning cannot be worse than the best policy, if this follows without
+    /// computation. `None` also if the computed price of determinism is not 0.
     pub no_price: Option<&'static str>,
     /// Total times if the component is lost, for each number of moves before the loss. `None` if the mission
     /// defines no loss or has no plan.
     pub loss: Option<LossReport>,
-    /// Computational costs of both approaches.
+    /// Computational costs of model checking and of planning.
     pub costs: Costs,
 }
 
@@ -95,11 +96,11 @@ impl Comparison {
     }
 }
 
-/// Evaluates and compares all candidates. `planner` is called for the start, and for each state
-/// that needs a new plan. `report` is called after each new result.
+/// Evaluates and compares all candidates. `planner` is called for the start, and once for each other state that
+/// needs a new plan. `report` is called after each new result.
 ///
 /// # Errors
-/// Errors of the planner, or the process has more states than the limit.
+/// Errors of the planner, or too many states.
 pub fn compare(
     mission: &Coadaptation,
     config: &Config<'_>,

@@ -162,7 +162,7 @@ impl Spent {
     }
 }
 
-/// Lower bounds on the time or energy of every policy.
+/// Lower bounds on the time or the energy that any policy needs to reach the goal.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
 pub struct Hindsight {
@@ -175,8 +175,8 @@ pub struct Hindsight {
     pub expected: Option<f64>,
 }
 
-/// Computes the lower bounds for time or energy. Neglects collisions, failures and the battery,
-/// which can only decrease the bounds.
+/// Computes the lower bounds for time or energy. Collisions, failures and the battery are neglected. This can
+/// only decrease the bounds, so they stay valid.
 pub fn hindsight(mission: &Coadaptation, risk: Risk, penalty: f64, spent: Spent) -> Hindsight {
     let start = mission.start * mission.configurations.len() + mission.initial;
     let never = relaxed(mission, spent, false, None);
@@ -201,9 +201,9 @@ pub fn hindsight(mission: &Coadaptation, risk: Risk, penalty: f64, spent: Spent)
     Hindsight { least, expected: Some(expected).filter(|value| value.is_finite()) }
 }
 
-/// Returns the least time or energy from each pair of place and configuration to the goal. With
-/// `lost`, configurations that need the component cannot be used. If given, `later` has the values
-/// that apply after the next move.
+/// Returns the least time or energy from each pair of place and configuration to the goal. With `lost`,
+/// configurations that need the component cannot be used. If `later` is given, it has the values from the pair
+/// that the next move reaches.
 fn relaxed(mission: &Coadaptation, spent: Spent, lost: bool, later: Option<&[f64]>) -> Vec<f64> {
     let designs = mission.configurations.len();
     let at = |place: usize, design: usize| place * designs + design;

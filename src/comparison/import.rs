@@ -162,7 +162,8 @@ impl LegalConfiguration {
 
 /// Speed in metres per second from which the energy of a move is computed.
 const SPEED: f64 = 0.68;
-/// Energy per metre and milliwatt at [`SPEED`], in the map's unit.
+/// Factor in the energy of a move at full speed, in the map's unit: length in metres × [`SPEED`] × power in
+/// milliwatts × this factor.
 const ENERGY: f64 = 0.01;
 const MAX_LISTED_PLACES: usize = 20;
 /// Energy of the battery that is kept in reserve, in the map's unit.
@@ -174,8 +175,8 @@ fn pair(a: &str, b: &str) -> Corridor {
     if a <= b { (a.to_owned(), b.to_owned()) } else { (b.to_owned(), a.to_owned()) }
 }
 
-/// Returns the measurement in `field` for each corridor and configuration, rounded to `digits`
-/// decimals. Of several measurements, the last one is used.
+/// Returns the measurement in `field` for each corridor and localisation method that have one, rounded to
+/// `digits` decimals. Of several measurements, also in opposite directions, the last one is used.
 fn measured(
     list: &[Measured<'_>],
     field: &str,

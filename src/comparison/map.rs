@@ -71,7 +71,7 @@ impl<'de: 't, 't> Deserialize<'de> for Measured<'t> {
         let end = |name: &str| {
             let text = entry[name].as_str().map(ToOwned::to_owned);
             text.ok_or_else(|| {
-                de::Error::custom(format!("a measurement is of an arc, and needs a place `{name}`"))
+                de::Error::custom(format!("a measurement belongs to an arc and needs the place `{name}`"))
             })
         };
         let (from, to) = (end("from")?, end("to")?);
@@ -114,7 +114,7 @@ impl<'t> Map<'t> {
             let id = node.id.text.as_str();
             match objects.insert(object(id), id) {
                 Some(other) if other == id => {
-                    wrong(node.id.raw, format!("the place `{id}` is there twice"));
+                    wrong(node.id.raw, format!("the place `{id}` is repeated"));
                 }
                 Some(other) => {
                     wrong(
@@ -157,17 +157,17 @@ impl<'t> Map<'t> {
             warn("the map has no measurements of time; each move takes its length at full speed");
         }
         if self.hitrate.is_empty() && self.successrate.is_empty() {
-            warn("the map has no probabilities; every move gets to its end, and nothing is hit");
+            warn("the map has no probabilities; every move is assumed to succeed without a collision");
         }
         if !self.unsafe_rectangles.is_empty() {
-            warn("the rectangles in `unsafe-rects` are not taken over; robots follow the arcs");
+            warn("the rectangles in `unsafe-rects` are ignored; robots follow the arcs");
         }
         warnings
     }
 }
 
-/// Converts the name of a place or design to a PDDL name: lower case, with `_` in place of special
-/// characters.
+/// Converts the name of a place or design to a PDDL name: lower case, with `_` in place of each character that
+/// is not an ASCII letter or digit.
 pub(super) fn object(name: &str) -> String {
     let safe: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
     safe.to_ascii_lowercase()

@@ -10,8 +10,8 @@ use probabilistic::{Direction, Error, Mdp, Number, Problem};
 
 use crate::comparison::process::{Process, State};
 
-/// Decision rule: returns the number of the action for a state and a number of executed steps. `None` or an impossible
-/// action ends the mission.
+/// Decision rule: returns the number of the action for a state and a number of executed steps (0 if steps are
+/// not counted). `None` or an impossible action ends the mission.
 pub type Decide<'a> = dyn FnMut(State, u32) -> Option<u32> + 'a;
 
 struct FixedProcess<'a, 'b, N> {
@@ -80,14 +80,14 @@ pub struct Measures {
     pub penalised_time: Option<f64>,
     /// Expected number of states in which a new plan is needed.
     pub replans: f64,
-    /// Number of reachable states.
+    /// Number of states that are reachable with the decision rule.
     pub states: usize,
 }
 
-/// Evaluates a decision rule. `process` must have all rewards of `REWARDS`. With `counts`, decisions depend on the
-/// number of executed steps. `penalty` is the time added for a failed mission. `reserve` is the battery level for
-/// [`Measures::goal_with_reserve`]. After all decisions are made, `replans` returns `true` for states in which a new
-/// plan was needed.
+/// Evaluates a decision rule. `process` must have all rewards of `REWARDS`. With `counts`, steps are counted,
+/// so that decisions can depend on their number. `penalty` is the time added for a failed mission. `reserve` is
+/// the battery level for [`Measures::goal_with_reserve`]. `replans` is called after all decisions are made, and
+/// returns `true` for states in which a new plan was needed.
 ///
 /// # Errors
 /// There are too many states.

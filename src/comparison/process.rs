@@ -15,7 +15,7 @@ use crate::comparison::coadaptation::Coadaptation;
 /// Names of the rewards of the process, in their order.
 pub const REWARDS: [&str; 5] = ["time", "energy", "collisions", "reconfigurations", "moves"];
 
-/// The sources of uncertainty that a process includes.
+/// The optional parts of a process: sources of uncertainty, and the battery.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[allow(clippy::struct_excessive_bools, reason = "each is a choice of its own")]
 pub struct Risk {
@@ -30,7 +30,8 @@ pub struct Risk {
 }
 
 impl Risk {
-    /// Returns collisions and failures, and the loss of a component and the battery if the mission has data about them.
+    /// Selects collisions and failures, and the loss of a component and the battery if the mission has data
+    /// about them.
     pub fn all(mission: &Coadaptation) -> Self {
         Self {
             collisions: true,
@@ -45,7 +46,7 @@ impl Risk {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct State(u64);
 
-/// Decoded contents of a state.
+/// Decoded contents of a state: numbers of the place and of the configuration, flags, and battery level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[allow(missing_docs, reason = "the names say it")]
 pub struct Valuation {
@@ -213,7 +214,7 @@ impl<N: Number> Process<N> {
         self
     }
 
-    /// Returns the numbers of the states that are at the goal.
+    /// Returns the set of the numbers of all goal states (see [`Process::is_goal`]).
     pub fn goals(&self, states: &States<State>) -> FixedBitSet {
         let mut goals = FixedBitSet::with_capacity(states.len());
         for (number, state) in states.iter().enumerate() {
@@ -232,7 +233,7 @@ impl<N: Number> Process<N> {
         if !self.risk.battery {
             return Some(0);
         }
-        // Actions without energy stay possible below the reserve.
+        // Actions that need no energy stay possible below the reserve.
         battery.checked_sub(levels).filter(|remaining| *remaining >= self.reserve || levels == 0)
     }
 }

@@ -1,12 +1,13 @@
 //! The published procedure: the five shortest routes, one configuration for the whole route, and a
 //! utility.
 //!
-//! The procedure is described by Cámara, Schmerl and Garlan (SEAMS 2020); its details are those of
-//! the public re-implementation. Simple paths are sorted by length and the first five are kept. For
-//! each route, model checking determines the best configuration by the priority property, and
-//! evaluates the other properties with this configuration. The route with the best utility is
-//! chosen. Two peculiarities are preserved. Each move that can collide overwrites the flag
-//! `collided`, so only the last of these moves counts. An empty battery does not end a mission.
+//! The procedure is described by Cámara, Schmerl and Garlan (SEAMS 2020); its details are those of the public
+//! re-implementation. Simple paths are sorted by length and the first five are kept. For each route, the best
+//! configuration is determined by the priority property, and the other properties are evaluated with this
+//! configuration. The route with the best utility is chosen. The original uses a model checker for these
+//! values; this module computes them directly, by sums over the route. Two peculiarities are preserved. Each
+//! move that can collide overwrites the flag `collided`, so only the last of these moves counts. An empty
+//! battery does not end a mission.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};

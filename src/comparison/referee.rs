@@ -52,8 +52,8 @@ impl Referee<'_> {
         Problem::new(&self.explored.mdp, direction, rewards, terminal)
     }
 
-    /// Returns an optimal policy for each single objective, unless none is found. The first one minimises penalised
-    /// time.
+    /// Returns the policies that are found for four objectives: penalised time, probability of reaching the
+    /// goal, probability of reaching it without collision, and energy. The last three break ties by time.
     pub fn policies(&self) -> Vec<NamedPolicy> {
         let (goal, safe) = (self.goal(), self.safe_goal());
         let mut policies = Vec::new();
@@ -132,7 +132,8 @@ impl Referee<'_> {
         Some(Action::from_number(self.explored.mdp.action(*choice as usize)))
     }
 
-    /// Returns each state that a policy reaches, with the action of the policy in this state.
+    /// Returns each state that a policy reaches before the mission ends, with the action of the policy in this
+    /// state.
     pub fn decisions(&self, policy: &[u32]) -> Vec<(Valuation, Action)> {
         let mdp = &self.explored.mdp;
         let mut visited = FixedBitSet::with_capacity(mdp.states());
@@ -167,8 +168,8 @@ impl Referee<'_> {
         play(&self.exact(), true, self.penalty, self.reserve(), &|_| false, &mut decide)
     }
 
-    /// Returns the reason why determinism has no price, if there is one. If only the collision flag
-    /// is uncertain, and no transition depends on it, the fastest plan is an optimal policy.
+    /// Returns the reason why the price of determinism is 0, if there is one. If only the collision flag is
+    /// uncertain, and no transition depends on it, the fastest plan is an optimal policy.
     pub fn no_price(&self) -> Option<&'static str> {
         use num_traits::One;
         let certain = |probability: &BigRational| probability.is_one();

@@ -5,15 +5,15 @@ use num_rational::BigRational;
 use crate::comparison::coadaptation::{Coadaptation, Switch, Traversal};
 use crate::comparison::process::Action;
 
-/// Returns the fastest actions that follow a route of arcs, with reconfigurations before any arc.
-/// `None` if the route cannot be traversed.
+/// Returns the fastest actions that follow a route of arcs; the configuration can be changed before each arc.
+/// Returns `None` if the route cannot be traversed with the available configurations. The battery is ignored.
 pub fn best_on_route(mission: &Coadaptation, route: &[usize]) -> Option<Vec<Action>> {
     best_by(mission, route, |traversal| traversal.time.clone(), |switch| switch.time.clone())
         .map(|(_, plan)| plan)
 }
 
-/// Returns the least cost of following a route, and the actions with this cost. `traversal_cost`
-/// and `switch_cost` define the cost.
+/// Returns the least cost of following a route, and the actions with this cost. `traversal_cost` and
+/// `switch_cost` define the cost. Returns `None` if the route cannot be traversed.
 fn best_by(
     mission: &Coadaptation,
     route: &[usize],

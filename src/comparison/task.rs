@@ -1,10 +1,10 @@
-//! Converts any mission to a co-adaptation process. Its places are the states of the ground task, and its
-//! configurations are the combinations of designs in the arguments of actions.
+//! Converts a mission without declared places to a co-adaptation process. Its places are the states of the
+//! ground task, and its configurations are the combinations of designs in the arguments of actions.
 //!
-//! Missions that declare places and configurations are converted more directly
-//! ([`Coadaptation::new`]). For all other missions, the reachable states of the task are
-//! enumerated, including numeric values. Actions choose their designs freely, so reconfiguration
-//! costs nothing. The cost of an action is the increase of the metric.
+//! Missions that declare places and configurations are converted more directly ([`Coadaptation::new`]). For
+//! other missions without timed initial literals, the reachable states of the task are enumerated, including
+//! numeric values. Actions choose their designs freely, so reconfiguration costs nothing. The time of a move in
+//! the process is the increase of the metric by the action.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -24,13 +24,13 @@ use crate::mission::{Mission, Planning as _};
 /// Maximum number of states of a task that is converted to a process.
 const MAX_STATES: usize = 50_000;
 
-/// A mission as a process whose places are task states, with the mapping from places and actions of
-/// the task to the process.
+/// A mission as a process whose places are task states, with the mapping from actions of the task to moves of
+/// the process.
 #[derive(Debug, Clone)]
 pub struct Tasked {
     /// Data of the process.
     pub coadaptation: Coadaptation,
-    /// For each place, a predecessor and the action that leads from there. `None` for the start.
+    /// For each task state, a predecessor and the action that leads from there. `None` for the start.
     origins: Vec<Option<(usize, Act)>>,
     /// For each place and each action of the task, the number of the arc and the configuration.
     moves: Vec<HashMap<Act, (usize, usize)>>,
@@ -49,7 +49,7 @@ impl Tasked {
     pub fn new(mission: &Mission, problem: &Problem, roles: &Roles) -> Result<Self, Errors> {
         let timed = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
         if timed {
-            let text = "timed initial literals have no place in a decision process";
+            let text = "decision processes do not support timed initial literals";
             return Err(vec![Message::error("M127", text)].into());
         }
         let task = mission.ground(problem, &[], &Limits::none())?;

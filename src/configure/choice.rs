@@ -1,4 +1,4 @@
-//! Chooses designs for the objectives in need, and explains the decision for every other design.
+//! Chooses designs for the objectives that need one, and states for each candidate design why it was chosen or not.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,13 +15,13 @@ use crate::number::decimal;
 /// Definition of a design's utility.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub enum Worth {
-    /// Utility as in MROS: the value that the knowledge base infers, otherwise the estimated
-    /// `performance`, otherwise 0.001.
+    /// Utility as in MROS: the value that the knowledge base infers; otherwise the design's only estimation of
+    /// `performance`; otherwise, also with several estimations, 0.001.
     #[default]
     Mros,
-    /// The design's estimation of the given attribute type (local name); larger is better.
+    /// The design's estimation of the given attribute type (local name), 0 if the design has none; larger is better.
     Most(String),
-    /// The design's estimation of the given attribute type (local name); smaller is better.
+    /// The design's estimation of the given attribute type (local name), 0 if the design has none; smaller is better.
     Least(String),
 }
 
@@ -30,8 +30,8 @@ pub enum Worth {
 pub struct Wishes {
     /// Definition of a design's utility.
     pub worth: Worth,
-    /// Budgets: attribute types by local name, with the limit on the sum of the chosen designs'
-    /// estimations, in the type's unit.
+    /// Budgets: attribute types by local name, each with a limit in its unit. The limit applies to the sum of the
+    /// estimations of all designs in use. A design without an estimation counts as 0.
     pub budgets: Vec<(String, BigRational)>,
     /// Components, by local name, that only one design can use at a time.
     pub exclusive: BTreeSet<String>,
@@ -41,12 +41,13 @@ pub struct Wishes {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Configuration {
-    /// The choice for each objective that needs a design, sorted by name.
+    /// The choice for each objective that needs a design, sorted by the IRI of the objective.
     pub choices: Vec<Choice>,
     /// Sum of the utilities of the chosen designs.
     pub utility: BigRational,
-    /// `true` if it is proved that no choice is better: serves more functions, else misses fewer requirements, else has
-    /// more utility. Otherwise a limit was reached.
+    /// `true` if it is proved that no other choice is better, `false` if a limit was reached before the proof. A choice
+    /// is better if it serves more functions; with equally many, if it misses fewer requirements; then if it has more
+    /// utility.
     pub optimal: bool,
 }
 
@@ -58,14 +59,14 @@ pub struct Choice {
     pub objective: String,
     /// Function of the objective, by local name, if it has one.
     pub function: Option<String>,
-    /// Reasons why the objective needs a design: its statuses, `updatable`, `always improve`, or
-    /// `ungrounded`.
+    /// Reasons why the objective needs a design: its statuses, `updatable`, `always improve`, or `ungrounded`. Empty if
+    /// the only reason is that the last choice or change of its design failed.
     pub need: Vec<String>,
     /// The design before the choice, by local name.
     pub before: Option<String>,
-    /// The chosen design, by local name, if any is usable.
+    /// The chosen design, by local name; `None` if no design was chosen.
     pub design: Option<String>,
-    /// All designs of the function, in the order of preference.
+    /// All designs of the function, the preferred ones first: fewest missed requirements, then greatest utility.
     pub considered: Vec<Considered>,
 }
 
@@ -92,7 +93,8 @@ pub enum Verdict {
     RuledOut(Vec<String>),
     /// The design is not better than the chosen one: it misses more requirements, or equally many without more utility.
     Less,
-    /// The design would be better, but conflicts with other choices; the reason is a sentence.
+    /// The design is usable and would be better, but conflicts with the designs of other objectives; the reason is a
+    /// sentence.
     Together(String),
 }
 
@@ -116,7 +118,7 @@ impl Group {
     }
 }
 
-/// Returns the design that currently provides an objective's function, or `None` if the objective has none.
+/// Returns the local name of the design that currently provides an objective's function; `None` if no design does.
 pub(super) fn current(objective: &Objective) -> Option<&str> {
     let designs = objective.groundings.iter().filter_map(|grounding| grounding.design.as_ref());
     designs.map(|design| design.name.as_str()).next()
@@ -142,7 +144,7 @@ pub(super) fn choose(
             needing.push(group);
         } else {
             let current = group.current().map(ToOwned::to_owned);
-            // A fixed group still uses its components and its share of the budgets.
+            // The design that an objective keeps still uses its components and its share of the budgets.
             group.candidates.retain(|offer| Some(&offer.design) == current.as_ref());
             fixed.push(group);
         }
@@ -192,7 +194,7 @@ pub(super) fn choose(
 struct Offers<'a> {
     knowledge: &'a Knowledge,
     wishes: &'a Wishes,
-    /// Components and estimations of designs, by IRI.
+    /// Components and estimations of each design, by the IRI of the design.
     designs: BTreeMap<String, (Vec<String>, BTreeMap<String, BigRational>)>,
 }
 
@@ -246,14 +248,14 @@ impl<'a> Offers<'a> {
     }
 }
 
-/// The joint choice for all objectives in need, from which the verdict on each design is derived.
+/// The joint choice for all objectives in need, from which the verdict (decision) on each candidate design is derived.
 struct Whole<'a> {
     knowledge: &'a Knowledge,
     wishes: &'a Wishes,
     needing: &'a [Group],
     /// For each group, the index of the chosen design among the candidates; `None` if no design was chosen.
     designs: &'a [Option<usize>],
-    /// Designs in use of objectives that are not in need. They are kept.
+    /// Designs of the objectives that are not in need. These objectives keep their designs.
     kept: &'a [&'a Offer],
     /// Remaining budgets after the demands of the kept designs.
     left: &'a [BigRational],
@@ -287,7 +289,7 @@ impl Whole<'_> {
                 offer.rejections.iter().flat_map(|rejection| self.reasons(&offer.design, rejection));
             return Verdict::RuledOut(reasons.collect());
         }
-        // Candidates are sorted by preference.
+        // Candidates are sorted by preference, so a later one is not better.
         if self.designs[at].is_some_and(|chosen| chosen < position) {
             return Verdict::Less;
         }
@@ -318,13 +320,13 @@ impl Whole<'_> {
             if sum > self.left[budget] {
                 let whole = sum + self.kept.iter().map(|other| demand(other)).sum::<BigRational>();
                 return format!(
-                    "{attribute} would come to {}; the budget is {}",
+                    "{attribute} would be {} in total; the budget is {}",
                     decimal(&whole),
                     decimal(most)
                 );
             }
         }
-        "other functions would have to take designs that are worse in sum, or go without one".to_owned()
+        "other functions would need designs with a lower total utility, or would have no design".to_owned()
     }
 
     fn reasons(&self, design: &str, rejection: &Rejection) -> Vec<String> {
@@ -333,7 +335,7 @@ impl Whole<'_> {
                 let because = ruled_out(self.knowledge, design);
                 if because.is_empty() { vec!["it is not available".to_owned()] } else { because }
             }
-            Rejection::Failed => vec!["it has failed this objective before".to_owned()],
+            Rejection::Failed => vec!["it failed for this objective before".to_owned()],
             Rejection::Violates { attribute, measured, operator, estimation } => {
                 vec![format!(
                     "{attribute}: measured {} {operator} {}",

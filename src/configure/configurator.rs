@@ -1,4 +1,4 @@
-//! A knowledge base with objectives, and the designs that serve them.
+//! Knowledge base with objectives, for which designs can be chosen and adopted.
 
 use std::collections::BTreeSet;
 
@@ -13,7 +13,7 @@ use crate::knowledge::Knowledge;
 use crate::message::{Errors, Message, did_you_mean};
 use crate::number::decimal;
 
-/// Maximum number of inference steps after a report of the robot; see [`rules::Limits`].
+/// Maximum number of inference steps per update of the knowledge base; see [`rules::Limits`].
 const STEPS: u64 = 100_000_000;
 
 /// An objective to pursue: a function to provide, with requirements.
@@ -91,7 +91,7 @@ impl Configurator {
         &self.knowledge
     }
 
-    /// Returns the knowledge base, for the assertion of the robot's reports.
+    /// Returns the knowledge base for changes, e.g. to assert reports of the robot.
     pub fn knowledge_mut(&mut self) -> &mut Knowledge {
         &mut self.knowledge
     }
@@ -122,8 +122,8 @@ impl Configurator {
     /// Adds an objective.
     ///
     /// # Errors
-    /// The function or an attribute type does not exist, or there is already an objective of that
-    /// name.
+    /// The function or an attribute type does not exist, the name cannot be used or already belongs to an objective, or
+    /// the rules do not terminate.
     pub fn pursue(&mut self, goal: &Goal) -> Result<(), Message> {
         let bound = |bound: &BigRational| Literal::Decimal(rules::Decimal::from_rational(bound));
         let requirements =
@@ -136,16 +136,16 @@ impl Configurator {
     /// Removes an objective, given by IRI or local name.
     ///
     /// # Errors
-    /// The objective does not exist.
+    /// The objective does not exist, or the rules do not terminate.
     pub fn give_up(&mut self, objective: &str) -> Result<(), Message> {
         self.change(|runtime| runtime.remove_objective(objective))?;
         self.pending.remove(ontology::vocab::local_name(objective));
         Ok(())
     }
 
-    /// Chooses designs for the objectives in need: those that want a design because of their status or properties, that
-    /// have no design, or for which the last choice or change of design failed. At a limit, returns the best choice
-    /// found.
+    /// Chooses designs for the objectives in need, without adopting them. An objective is in need if its status or
+    /// properties require a design, or if it has no design. It is also in need if the last choice or change of its
+    /// design failed. At a limit, returns the best choice found.
     ///
     /// # Errors
     /// The rules do not terminate.
@@ -157,9 +157,10 @@ impl Configurator {
         choose(&self.knowledge, &self.wishes, &is_in_need, limits)
     }
 
-    /// Grounds the objective by the chosen design, i.e. makes it the design of the objective. Statuses and recoveries
-    /// that made the objective updatable are retracted; failures of designs are kept. An objective that no design can
-    /// serve keeps its design and stays in need.
+    /// Grounds the objective by the chosen design, i.e. makes it the design of the objective. The objective's statuses
+    /// are retracted; if it was updatable, so are the reports of recovered components. Recorded failures of designs are
+    /// kept. If the design changes, measurements of the previous design's performance no longer count. An objective
+    /// without a chosen design keeps its design and stays in need.
     ///
     /// # Errors
     /// The objective or the design does not exist, or the rules do not terminate.

@@ -24,11 +24,11 @@ use crate::message::Message;
 pub enum KeeperAnswer {
     /// An answer that the planning loop of [`crate::mapek`] gives, too.
     Loop(Answer),
-    /// A new design for an objective, or the report that no design can serve it.
+    /// A requested change of an objective's design, or the report that no design was chosen for it.
     Service(Service),
 }
 
-/// A new design for an objective, or the report that no design can serve it.
+/// A requested change of an objective's design, or the report that no design was chosen for it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "answer")]
 #[non_exhaustive]
@@ -55,14 +55,15 @@ pub enum Service {
         #[serde(skip_serializing_if = "std::ops::Not::not")]
         repeated: bool,
     },
-    /// No design can serve the objective now. The objective keeps its design, if any.
+    /// No design was chosen for the objective, usually because none can serve it now. The objective keeps its design,
+    /// if any.
     #[serde(rename = "unserved")]
     Unserved {
         /// The objective.
         objective: String,
         /// Function of the objective.
         function: Option<String>,
-        /// Reasons, as sentences, why each design is unusable.
+        /// Reasons, as sentences: why the objective needs a design, and why each design was not chosen.
         because: Vec<String>,
     },
 }
@@ -83,10 +84,10 @@ impl Service {
     }
 }
 
-/// Maximum number of changes of design that can be undone.
+/// Maximum number of stored changes of designs. An older change cannot be undone.
 const MAX_CHANGES: usize = 256;
 
-/// A requested change of an objective's design. A failed change is undone, even after its acknowledgement.
+/// A requested change of an objective's design. If the change fails, it is undone, even after its acknowledgement.
 #[derive(Debug, Clone)]
 pub(super) struct PendingChange {
     pub(super) objective: String,
@@ -108,7 +109,7 @@ pub struct Keeper {
     pub(super) statuses: BTreeMap<String, Vec<String>>,
     pub(super) violated: BTreeSet<String>,
     pub(super) fault: Option<Fault>,
-    /// Objectives that no design can serve, each with the reasons reported last.
+    /// Objectives for which no design could be chosen, each with the reasons reported last.
     pub(super) unserved: BTreeMap<String, Vec<String>>,
     pub(super) filters: Filters,
     pub(super) unrecorded: Unrecorded,
@@ -119,8 +120,8 @@ pub struct Keeper {
 }
 
 impl Keeper {
-    /// Creates the loop. `limit` is the time limit of each choice. Without filters, every report is
-    /// believed at once.
+    /// Creates the loop. `limit` is the time limit of each choice. Unless filters are added, every report is believed
+    /// at once.
     pub fn new(configurator: Configurator, limit: Option<Duration>) -> Self {
         let available = available(configurator.knowledge());
         let filters = Filters::new(&FilterSettings::none(), Some(configurator.knowledge()));
@@ -145,7 +146,7 @@ impl Keeper {
         }
     }
 
-    /// Adds filters of measurements and component reports.
+    /// Sets the filters of measurements and component reports, in place of earlier ones.
     #[must_use]
     pub fn with_filters(self, settings: &FilterSettings) -> Self {
         let filters = Filters::new(settings, Some(self.configurator.knowledge()));
@@ -160,7 +161,7 @@ impl Keeper {
     }
 
     /// Returns the next time, since the start, at which a filter changes a belief without a further report; `None` if
-    /// no filter does. The caller should handle a tick at this time.
+    /// no filter does. The caller should handle a tick event at this time.
     pub fn due(&self) -> Option<Duration> {
         self.filters.due(&self.states)
     }
@@ -205,9 +206,9 @@ impl Keeper {
         self.handle_at(observation, self.now)
     }
 
-    /// Handles a line and returns the answers. `now`, the time since the start, is used if the line
-    /// has no time of its own. Time never decreases: an earlier time is replaced by the time of the
-    /// previous line. A line is refused if its own time skips too much.
+    /// Handles a line and returns the answers. `now`, the time since the start, is used if the line has no time of its
+    /// own. Time never decreases: an earlier time is replaced by the time of the previous line. A line is refused if
+    /// its sequence number was used before, or if its own time skips too much.
     pub fn handle_at(&mut self, observation: &Observation, now: Duration) -> Vec<KeeperAnswer> {
         let mut answers = Vec::new();
         self.lines += u64::from(!observation.is_timer);
@@ -273,7 +274,7 @@ impl Keeper {
             }
             Event::Tick | Event::Note { .. } => {}
             other => {
-                let text = format!("`{}` is about plans, and here there is none", other.kind());
+                let text = format!("`{}` requires a plan, and `run --configure` has none", other.kind());
                 return Err(Refusal::new("M306", text));
             }
         }
@@ -301,7 +302,9 @@ impl Keeper {
 
     fn check_effect(&self, effect: u64) -> Result<(), Refusal> {
         let is_known = (1..=self.effects).contains(&effect);
-        is_known.then_some(()).ok_or_else(|| Refusal::new("M305", format!("there was no effect {effect}")))
+        is_known
+            .then_some(())
+            .ok_or_else(|| Refusal::new("M305", format!("no effect with the number {effect} was requested")))
     }
 
     /// Undoes a failed change of design: marks the new design as not realisable, so that the next best design is
@@ -319,7 +322,7 @@ impl Keeper {
         self.configurator.revert(&objective, from.as_deref())
     }
 
-    /// Asserts the reports that filters have held back and that are due.
+    /// Asserts the beliefs that filters change because of the time, e.g. reports that were held back and are now due.
     fn elapse(&mut self, answers: &mut Vec<KeeperAnswer>) {
         let mut filter_answers = Vec::new();
         let due: Vec<Accepted> = self.filters.elapse(&mut self.states, self.now, &mut filter_answers);
@@ -348,7 +351,7 @@ impl Keeper {
                 function: objective.function.as_ref().map(|function| function.name.clone()),
                 from: Some(design.to_owned()),
                 to: None,
-                because: vec!["the objective was given up".to_owned()],
+                because: vec!["the objective was removed".to_owned()],
                 optimal: true,
                 effect: self.effects,
                 repeated: false,
@@ -396,7 +399,7 @@ impl Keeper {
         }
         let Some(design) = &choice.design else {
             let because = reasons_of(choice);
-            // The same reasons are reported only once.
+            // Unchanged reasons are not reported again.
             if self.unserved.get(&objective) != Some(&because) {
                 self.unserved.insert(objective.clone(), because.clone());
                 answers.push(KeeperAnswer::Service(Service::Unserved { objective, function, because }));

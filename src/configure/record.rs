@@ -122,7 +122,8 @@ fn statements(data: &Value) -> Option<Statements> {
     Some(Statements { added: list("added")?, removed: list("removed")? })
 }
 
-/// Restores the state from a snapshot. Returns `None` if the snapshot is damaged or belongs to another knowledge base.
+/// Restores the state from a snapshot. Returns `None` if the snapshot is damaged or belongs to another knowledge base;
+/// the state may then be partly restored.
 fn restore(keeper: &mut Keeper, data: &Value) -> Option<()> {
     let number = |name: &str| data.get(name).and_then(Value::as_u64);
     let knowledge = keeper.configurator.knowledge_mut();

@@ -42,9 +42,9 @@ pub struct Availability {
     pub because: Vec<String>,
     /// Failed components and measurements that contribute to ruling the design out.
     pub causes: Vec<Cause>,
-    /// If the design is unavailable: minimal sets of alterations that make it available; some may be missing if there
-    /// are many. All alterations of a set together suffice, and no proper subset suffices. If the design is available:
-    /// sets of one alteration, each of which makes it unavailable.
+    /// If the design is unavailable: minimal sets of alterations that make it available; some may be missing if
+    /// there are many. All alterations of a set together suffice, and none of them was found to be superfluous.
+    /// If the design is available: sets of one alteration, each of which makes it unavailable.
     pub ways: Vec<Vec<Alteration>>,
 }
 
@@ -87,8 +87,8 @@ pub fn causes(knowledge: &Knowledge, design: &FunctionDesign) -> Causes {
     Causes { causes: causes_of(knowledge, design, &ways), are_all_needed: ways.len() == 1 }
 }
 
-/// Returns a cause for each different alteration in `ways`. Its reasons are the conclusions that remain after all other
-/// alterations of the set.
+/// Returns a cause for each different alteration in `ways`, unless reasoning fails. Its reasons are the
+/// conclusions that remain after all other alterations of its set.
 fn causes_of(knowledge: &Knowledge, design: &FunctionDesign, ways: &[Vec<Alteration>]) -> Vec<Cause> {
     let mut causes: Vec<Cause> = Vec::new();
     for (way, alteration) in ways.iter().flat_map(|way| way.iter().map(move |alteration| (way, alteration))) {
@@ -102,9 +102,9 @@ fn causes_of(knowledge: &Knowledge, design: &FunctionDesign, ways: &[Vec<Alterat
     causes
 }
 
-/// Returns minimal sets of alterations that make a design available (see [`repairs`]). The alterations of all
-/// components and measurements are considered only if those of the design's own components and measurements do not
-/// suffice.
+/// Returns minimal sets of alterations that make a design available (see [`repairs`]). Recoveries of
+/// components, and measurements, that only concern other designs are considered only if alterations that
+/// concern this design do not suffice.
 fn ways(knowledge: &Knowledge, design: &FunctionDesign) -> Vec<Vec<Alteration>> {
     let candidates = candidates(knowledge, design);
     let ways = repairs(knowledge, design, &candidates);
@@ -128,7 +128,7 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
             altered(knowledge, [alteration]).is_some_and(|knowledge| !is_available(&knowledge, design))
         };
         let candidates = candidates(knowledge, design).into_iter();
-        // For an available design, each of its own alterations that makes it unavailable on its own is listed.
+        // Each listed alteration of a component or a measurement makes the design unavailable by itself.
         availability.ways = candidates.filter(loses).map(|alteration| vec![alteration]).collect();
         return availability;
     }
@@ -190,8 +190,8 @@ fn repairs(
     minimal_sets.into_iter().map(|set| set.into_iter().cloned().collect()).collect()
 }
 
-/// Returns the non-empty subsets of the positions 0 to `count` − 1: smaller subsets first, then in
-/// lexicographic order.
+/// Returns the non-empty subsets of the positions 0 to `count` − 1: smaller subsets first, and subsets of one
+/// size in lexicographic order.
 fn subsets(count: usize) -> impl Iterator<Item = Vec<usize>> {
     (1..=count).flat_map(move |size| {
         std::iter::successors(Some((0..size).collect::<Vec<usize>>()), move |last| {
@@ -246,8 +246,8 @@ fn is_available(knowledge: &Knowledge, design: &FunctionDesign) -> bool {
     designs.iter().any(|candidate| candidate.individual == design.individual && candidate.available)
 }
 
-/// Computes the best plan after alterations of the situation. At a limit, returns the best plan found until then.
-/// If reasoning fails with the alterations, the best plan is unknown.
+/// Computes the best plan after alterations of the situation. At a limit, returns the best plan found until
+/// then. If reasoning fails with the alterations, the result has no plan and is not proved.
 pub(super) fn in_situation(
     mission: &Mission,
     alterations: &[Alteration],
@@ -322,8 +322,8 @@ fn all_candidates(knowledge: &Knowledge, mut candidates_found: Vec<Alteration>) 
     candidates_found
 }
 
-/// Returns an alteration for each component for which `is_own` returns `true`. Failed components
-/// are repaired, or, with `working`, working components fail.
+/// Returns the recovery of each failed component or, with `working`, the failure of each working component.
+/// Only components are included for whose IRI `is_own` returns `true`.
 fn components(knowledge: &Knowledge, working: bool, is_own: &dyn Fn(&str) -> bool) -> Vec<Alteration> {
     let components = knowledge.view().components().into_iter();
     let components = components.filter(|component| is_own(&component.individual.iri));
@@ -335,8 +335,9 @@ fn components(knowledge: &Knowledge, working: bool, is_own: &dyn Fn(&str) -> boo
         .collect()
 }
 
-/// Returns the values of an attribute at which all requirements `bounds` hold. With `hold`, i.e. if
-/// they hold at the current value `from`, returns the values at which one of them is violated.
+/// Returns targets for an attribute with the value `from` at which the requirements `bounds` hold: at least the
+/// greatest violated minimum, and at most the least violated maximum. With `hold`, returns targets at which a
+/// requirement that holds now is violated: below the greatest such minimum, and above the least such maximum.
 fn targets<'a>(bounds: impl Iterator<Item = &'a Requirement>, from: &BigRational, hold: bool) -> Vec<Target> {
     let (mut least, mut most): (Vec<&BigRational>, Vec<&BigRational>) = (Vec::new(), Vec::new());
     for requirement in bounds {

@@ -37,7 +37,8 @@ pub struct Repair {
     pub then: BestPlan,
 }
 
-/// A single alteration that changes the best plan or the availability of a design.
+/// A single alteration, with the best plan after it. It changes the best plan, or it contributes to a change of
+/// the availability of a design.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Change {

@@ -107,8 +107,8 @@ impl VariedMission<'_> {
         Ok(Some(best(&mission, self.limits)?).filter(|plan| plan.proved))
     }
 
-    /// Returns `true` if a plan has other actions than the current best plan, or if only one of the
-    /// two exists.
+    /// Returns `true` if a plan has other actions or arguments than the current best plan, or if only one of
+    /// the two exists.
     fn is_other(&self, plan: &BestPlan) -> bool {
         let steps = |plan: &BestPlan| -> Vec<_> {
             plan.steps.iter().map(|step| (step.action.clone(), step.arguments.clone())).collect()
@@ -128,9 +128,9 @@ impl VariedMission<'_> {
         Ok(Outcome::None)
     }
 
-    /// Searches upwards or downwards for the nearest value of a numeric function at which the best plan changes: first
-    /// in growing relative steps of up to 100 %, then by bisection. Returns [`Outcome::None`] if the current value
-    /// `from` is not positive.
+    /// Searches upwards or downwards for a value of a numeric function at which the best plan changes: first in
+    /// growing relative steps of up to 100 %, then by bisection. A nearer change that is undone within a step
+    /// is not found. Returns [`Outcome::None`] if the current value `from` is not positive.
     fn bisected(&self, function: &str, from: &BigRational, upwards: bool) -> Result<Outcome, Errors> {
         // Relative steps need a positive start value.
         if *from <= BigRational::default() {

@@ -1,5 +1,5 @@
-//! Reads the segment files and snapshot files of a journal's directory, and reports all their
-//! faults.
+//! Reads the segment files and snapshot files of a journal's directory, each with its first fault, and opens files that
+//! only their user can access.
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
@@ -24,7 +24,7 @@ pub(super) struct Segment {
     pub(super) after: Link,
     /// Sound records of the segment, without its header.
     pub(super) records: Vec<Record>,
-    /// Number of bytes of the complete records at the beginning of the file.
+    /// Number of bytes of the header and the sound records at the beginning of the file.
     pub(super) sound: u64,
     pub(super) end: End,
 }
@@ -37,7 +37,7 @@ pub(super) enum End {
     Unbroken,
     /// The segment ends with this number of bytes of an incomplete record.
     Incomplete(u64),
-    /// The line with this number, from 1, is damaged.
+    /// The line with this number, from 1, is damaged. The lines after it are not read.
     Damaged(usize),
 }
 
@@ -51,7 +51,8 @@ impl Segment {
 
 #[derive(Debug)]
 pub(super) struct SnapshotFile {
-    /// Link at which the snapshot was taken; the segment with the same number begins at this link.
+    /// Link (position in the chain of records) at which the snapshot was taken. The segment with the same number begins
+    /// at this link.
     pub(super) before: Link,
     pub(super) data: Value,
 }
@@ -105,8 +106,8 @@ impl JournalFiles {
     pub(super) fn require_complete(&self, directory: &Path) -> Result<(), Message> {
         let Some(number) = self.incomplete else { return Ok(()) };
         let text = format!(
-            "the journal cannot be resumed: it could not be written after {}, and the loop continued without it, so that the \
-             numbers of later effects would be used twice",
+            "the journal cannot be resumed: it could not be written after {}, and the loop continued without it, so \
+             the numbers of later effects would be assigned again",
             self.name(number)
         );
         let help = "free disk space, and start a journal in another directory; `metaplan journal show` lists the \
@@ -125,7 +126,7 @@ impl JournalFiles {
         })?;
         match self.segments.get(&number) {
             Some(Ok(segment)) if segment.before != snapshot.before => {
-                Err(format!("{name} is not of the same journal as {}", self::name("journal", number)))
+                Err(format!("{name} belongs to another journal than {}", self::name("journal", number)))
             }
             _ => Ok(snapshot),
         }
@@ -145,7 +146,7 @@ impl JournalFiles {
                 Some(Ok(segment)) => segment,
             };
             if let End::Damaged(line) = segment.end {
-                return Err(format!("line {line} of {name} is damaged, or does not belong there"));
+                return Err(format!("line {line} of {name} is damaged or out of order"));
             }
             if let Some(before) = chain.last()
                 && !follows(before, segment)
@@ -162,7 +163,7 @@ impl JournalFiles {
 }
 
 /// Returns `true` if `after` begins at the link (position in the chain of records) where `before` ends. If a crash has
-/// prevented the `end` record of `before`, the check assumes this record.
+/// prevented the `end` record of `before`, the check assumes this record, and `after` must have no records yet.
 pub(super) fn follows(before: &Segment, after: &Segment) -> bool {
     if before.is_closed() {
         return before.end == End::Whole && before.after == after.before;
@@ -194,7 +195,7 @@ fn segment(bytes: &[u8], number: u64) -> Result<Segment, String> {
         let whole = line.strip_suffix(b"\n");
         let mut read = segment.after.read(whole.unwrap_or(line));
         if read.is_none() && whole.is_none() {
-            // The last character is damaged: it should be a line break.
+            // Perhaps only the line break is damaged. Then the line without its last byte is a valid record.
             read = line.split_last().and_then(|(_, rest)| segment.after.read(rest));
         }
         match (read, whole) {
@@ -231,15 +232,18 @@ fn snapshot(bytes: &[u8], number: u64) -> Result<SnapshotFile, String> {
 fn check_opening(record: &Record, number: u64) -> Result<(), String> {
     match (record.text(0), record.count(2)) {
         (Some(FORMAT), Some(stated)) if stated == number => Ok(()),
-        (Some(FORMAT), stated) => Err(format!("has the number {} in it", stated.unwrap_or_default())),
+        (Some(FORMAT), stated) => Err(format!(
+            "has the number {} in its header, which differs from its name",
+            stated.unwrap_or_default()
+        )),
         (Some("metaplan-journal/2"), _) => Err(OLD_FORMAT.to_owned()),
         (format, _) => Err(format!("has the format `{}`, not `{FORMAT}`", format.unwrap_or_default())),
     }
 }
 
-pub(super) const OLD_FORMAT: &str = "is of the format `metaplan-journal/2` or older, which this version does not read; let the version that \
-                                     wrote it bring its mission to an end, or begin the mission anew with a journal in another \
-                                     directory";
+pub(super) const OLD_FORMAT: &str = "is of the format `metaplan-journal/2` or older, which this version does not \
+                                     read; finish the mission with the version that wrote it, or restart the mission \
+                                     with a journal in another directory";
 
 /// Describes the fault of a file whose first line is not a segment header.
 fn no_journal(first: &[u8]) -> String {
@@ -249,7 +253,7 @@ fn no_journal(first: &[u8]) -> String {
     match (old, damaged) {
         (true, _) => OLD_FORMAT.to_owned(),
         (false, true) => "is damaged in its first line".to_owned(),
-        (false, false) => "is not a journal; it was left as it is".to_owned(),
+        (false, false) => "is not a journal and was not changed".to_owned(),
     }
 }
 
@@ -265,17 +269,17 @@ pub(super) fn broken(place: &Path, text: &str) -> Message {
     Message::at("M321", &place.display().to_string(), None, format!("the journal cannot be used: {text}"))
 }
 
-/// Reads a regular file. Pipes and links are rejected, since a pipe may never end, and a link may
-/// lead outside the directory.
+/// Reads a regular file. Rejects pipes and symbolic links, since a pipe may never end, and a link may lead outside the
+/// directory.
 fn read_private(path: &Path) -> io::Result<Vec<u8>> {
     require_file(path)?;
     std::fs::read(path)
 }
 
-/// Checks that a path is a regular file or does not exist.
+/// Checks that a path is a regular file or does not exist. A symbolic link is not a regular file.
 ///
 /// # Errors
-/// The name belongs to something that is not a regular file.
+/// The path is something else, or cannot be examined.
 pub(super) fn require_file(path: &Path) -> io::Result<()> {
     match std::fs::symlink_metadata(path) {
         Ok(found) if !found.is_file() => Err(io::Error::other("is not a regular file")),
@@ -299,7 +303,7 @@ pub(super) fn open_private(path: &Path, options: &mut OpenOptions) -> io::Result
     options.open(path)
 }
 
-/// Creates a directory and its missing parents. On Unix, only their user can access them.
+/// Creates a directory and its missing parents. On Unix, only their user can access the created ones.
 pub(super) fn make_directory(path: &Path) -> io::Result<()> {
     let mut builder = std::fs::DirBuilder::new();
     builder.recursive(true);

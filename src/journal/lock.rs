@@ -1,4 +1,4 @@
-//! Lock file of a journal: only one process at a time uses the journal. The file also stores the
+//! Lock file of a journal: only one process at a time can have the journal open for writing. The file also stores the
 //! number of records, by which missing records are detected.
 
 use std::fs::{File, OpenOptions};
@@ -11,7 +11,7 @@ use fs4::{FileExt, TryLockError};
 use super::directory::{broken, open_private};
 use crate::message::Message;
 
-/// Number of attempts to lock; a killed process may still hold the lock for a short time.
+/// Number of further attempts to lock after a failed one; a killed process may still hold the lock for a short time.
 const LOCK_RETRIES: u32 = 10;
 const RETRY_INTERVAL: Duration = Duration::from_millis(20);
 /// Width in characters of the process number, which is in the first line of the lock file.
@@ -22,7 +22,7 @@ const COUNT_CHARACTERS: usize = 20;
 #[derive(Debug)]
 pub(super) struct Lock {
     file: File,
-    /// Number of records of the journal after the last write; 0 if unknown.
+    /// Number of records of the journal that the file stated when it was locked; 0 if unknown.
     pub(super) records: u64,
 }
 
@@ -31,7 +31,7 @@ impl Lock {
     /// other processes can name it in their error message.
     ///
     /// # Errors
-    /// M322 if another process has locked the journal.
+    /// M322 if another process has locked the journal, M321 if the lock file cannot be used.
     pub(super) fn take(directory: &Path) -> Result<Self, Message> {
         let name = directory.join("lock");
         let failed = |error: &io::Error| broken(&name, &error.to_string());
@@ -47,7 +47,7 @@ impl Lock {
             answer = FileExt::try_lock(&file);
         }
         let mut note = String::new();
-        // If the locked file cannot be read, the message omits the owner.
+        // If the file cannot be read, the owner and the number of records are unknown.
         let _ = (&mut file).take(64).read_to_string(&mut note);
         let mut lines = note.lines().map(str::trim);
         let (owner, records) = (lines.next().unwrap_or_default(), lines.next().unwrap_or_default());
@@ -61,7 +61,7 @@ impl Lock {
                 let owner =
                     owner.parse::<u32>().map_or_else(|_| String::new(), |id| format!(" (number {id})"));
                 let text = format!(
-                    "another process{owner} uses the journal in {}; end it first, or take another directory",
+                    "another process{owner} uses the journal in {}; stop that process, or use another directory",
                     directory.display()
                 );
                 Err(Message::error("M322", text))

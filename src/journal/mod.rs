@@ -1,24 +1,24 @@
 //! Write-ahead journal: every observation and every decision of a loop is written before its answers leave the program.
 //! [`Sync`] says when the written data is flushed to the disk.
 //!
-//! A directory contains segments `journal-N` and snapshots `snapshot-N`. Each segment except the
-//! first begins at the snapshot with its number. Two generations are kept. Records are numbered and
-//! chained by hashes, see `record`. An observation is written before it is handled, and the
-//! decision before any of its answers leaves the program \[1\]. Opening restores the loop from the
-//! newest sound snapshot and replays the later observations with the recorded plans. The answers
-//! must equal the recorded ones, except for explanations; otherwise the journal is rejected.
+//! A directory contains segments `journal-N` and snapshots `snapshot-N`. Each segment except segment 0 begins at the
+//! snapshot with its number. The last two segments and snapshots are kept. Records are numbered and chained by hashes,
+//! see `record`. An observation is written before it is handled, and the decision before any of its answers leaves the
+//! program \[1\]. Opening restores the loop from the newest sound snapshot that only sound segments follow, or from the
+//! beginning. It then replays the later observations with the recorded plans. The answers must equal the recorded ones,
+//! except for explanations; otherwise the journal is rejected.
 //!
-//! A crash may leave the last record incomplete. This record is cut off, kept in a separate file,
-//! and reported. A complete record is never cut off: any other fault in a needed file is an error,
-//! and a fault in a file that is not needed is a warning.
+//! A crash may leave the last record incomplete. This record is cut off, kept in a separate file, and reported. A
+//! complete record is never cut off. A missing line break or `end` record at the end of a segment is added. Any other
+//! fault in a needed segment is an error, and a fault in a file that is not needed is a warning.
 //!
 //! A checkpoint creates the new segment first, then writes the `end` record of the old segment,
 //! then the snapshot. So a missing segment is detected, and a crash during a checkpoint is not
 //! mistaken for a missing segment.
 //!
-//! Only one process at a time uses a journal. It holds a lock on the file `lock`, which the
-//! operating system releases when the process ends. The file also stores the number of records, by
-//! which missing records are detected.
+//! Only one process at a time can open a journal for writing. It holds a lock on the file `lock`, which the operating
+//! system releases when the process ends. The file also stores the number of records, by which missing records are
+//! detected.
 //!
 //! If a write fails, the loop stops, and no further answer leaves the program. With
 //! [`Unrecorded::Continue`], the segment is renamed instead, so that the journal cannot be resumed, and
@@ -51,16 +51,17 @@ use recover::{Replay, Unfinished, settle, usable};
 
 pub use report::{Entry, JournalReport};
 
-/// Policy for flushing the journal to the disk. If the program is killed, no policy loses data; if
-/// the machine loses power, data that was not flushed may be lost.
+/// Policy for flushing the journal to the disk before answers leave the program. If the program is killed, no policy
+/// loses data; if the machine loses power, data that was not flushed may be lost. The journal is also flushed when it
+/// is opened and at each snapshot.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Sync {
-    /// Flushes after every observation and its decision, before the answers leave the program.
+    /// Flushes before any answers leave the program.
     Always,
-    /// Flushes only if the answers contain an effect, before they leave the program.
+    /// Flushes before answers that contain an effect leave the program.
     #[default]
     Effects,
-    /// Never flushes; the operating system decides when data reaches the disk.
+    /// Does not flush before answers; the operating system decides when data reaches the disk.
     Never,
 }
 
@@ -91,8 +92,8 @@ pub struct Journal {
     lock: Lock,
     /// Number of observations in the current segment, i.e. since its snapshot.
     observations: u64,
-    /// Work that the previous process began and did not finish, until [`Journal::begin`] completes
-    /// it.
+    /// Work that the previous process began and did not finish, until [`Journal::begin`] or [`Journal::begin_reacting`]
+    /// handles it.
     unfinished: Option<Unfinished>,
     digest: String,
     unrecorded: Unrecorded,
@@ -108,8 +109,9 @@ impl Journal {
     /// exist. [`Journal::begin`] or [`Journal::begin_reacting`] has to be called next.
     ///
     /// # Errors
-    /// The directory cannot be used, or another process uses it; or the journal is damaged or
-    /// incomplete, or belongs to another mission. The journal is unchanged in these cases.
+    /// The directory cannot be used, or another process uses it; or the journal is damaged or incomplete, belongs to
+    /// another mission, or the mission leads to other decisions. Segments and snapshots are then unchanged, unless the
+    /// error occurs when they are repaired.
     pub fn open<C: Recoverable>(
         directory: &Path,
         policy: Policy,
@@ -123,32 +125,33 @@ impl Journal {
         let mut recovery = Recovery::default();
         let directory = directory.to_owned();
         let failed = |error: io::Error| broken(&directory, &error.to_string());
-        let (segment, (file, link), observations, unfinished) =
-            if contents.segments.is_empty() && contents.snapshots.is_empty() {
-                // The lock file proves that the journal had records before.
-                if lock.records > 0 {
-                    return Err(broken(&directory, &format!("{} is missing", name("journal", 0))));
-                }
-                let created = create_segment(&directory, &Link::first(), &digest, 0).map_err(failed)?;
-                (0, created, 0, Some(Unfinished::Agenda))
-            } else {
-                let Resumed { from, segments, observations, unfinished, missing_snapshots } =
-                    resume(&directory, &contents, control, &mut recovery)?;
-                let (file, link) = settle(&directory, &segments, &mut recovery).map_err(failed)?;
-                for (number, line) in missing_snapshots {
-                    write_snapshot(&directory, number, &line).map_err(failed)?;
-                }
-                // A machine that lost power may have lost records that were not flushed.
-                if lock.records > link.next {
-                    let text = format!(
-                        "the last {} records of the journal are missing; send again what follows `seq`",
-                        lock.records - link.next
-                    );
-                    recovery.warnings.push(Message::warning("M323", text));
-                }
-                let segment = segments.last().map_or(from, |last| last.number);
-                (segment, (file, link), observations, unfinished)
-            };
+        let (segment, (file, link), observations, unfinished) = if contents.segments.is_empty()
+            && contents.snapshots.is_empty()
+        {
+            // The lock file proves that the journal had records before.
+            if lock.records > 0 {
+                return Err(broken(&directory, &format!("{} is missing", name("journal", 0))));
+            }
+            let created = create_segment(&directory, &Link::first(), &digest, 0).map_err(failed)?;
+            (0, created, 0, Some(Unfinished::Agenda))
+        } else {
+            let Resumed { from, segments, observations, unfinished, missing_snapshots } =
+                resume(&directory, &contents, control, &mut recovery)?;
+            let (file, link) = settle(&directory, &segments, &mut recovery).map_err(failed)?;
+            for (number, line) in missing_snapshots {
+                write_snapshot(&directory, number, &line).map_err(failed)?;
+            }
+            // A machine that lost power may have lost records that were not flushed.
+            if lock.records > link.next {
+                let text = format!(
+                    "the last {} records of the journal are missing; send the events after this `seq` again",
+                    lock.records - link.next
+                );
+                recovery.warnings.push(Message::warning("M323", text));
+            }
+            let segment = segments.last().map_or(from, |last| last.number);
+            (segment, (file, link), observations, unfinished)
+        };
         let journal = Self {
             directory,
             policy,
@@ -221,7 +224,7 @@ impl Journal {
     }
 
     /// Flushes the journal. Returns `answers`, followed by all earlier effects that were not acknowledged, which have
-    /// to be output again. A message about a failed write comes first.
+    /// to be output again. If a write has failed and the loop continues, a message about this comes first.
     fn again<C: Recoverable>(
         &mut self,
         control: &C,
@@ -240,8 +243,8 @@ impl Journal {
         Ok(answers)
     }
 
-    /// Writes an observation, passes it to the loop, and writes the decision. The returned answers
-    /// may leave the program.
+    /// Writes an observation, passes it to the loop, and writes the decision. The returned answers may leave the
+    /// program. A snapshot is written if one is due.
     ///
     /// # Errors
     /// The journal cannot be written; the answers must not leave the program.
@@ -277,8 +280,8 @@ impl Journal {
         Ok(answers)
     }
 
-    /// Writes the answers that [`Journal::observe`] returned as a reaction. If the loop continues
-    /// without the journal after a failed write, adds an answer with this message.
+    /// Writes the answers that [`Journal::observe`] returned as a reaction. If a write fails and the loop continues
+    /// without the journal, adds an answer about this.
     ///
     /// # Errors
     /// The journal cannot be written; the answers must not leave the program.
@@ -296,9 +299,9 @@ impl Journal {
         Ok(())
     }
 
-    /// Writes `answers` as a decision: the answers of a deliberation, preceded by those of
-    /// [`Journal::observe`] if they were not written. If the loop continues without the journal
-    /// after a failed write, adds an answer with this message.
+    /// Writes `answers` as a decision: the answers of a deliberation, preceded by those of [`Journal::observe`] if they
+    /// were not written. Writes a snapshot if one is due. If a write fails and the loop continues without the journal,
+    /// adds an answer about this.
     ///
     /// # Errors
     /// The journal cannot be written; the answers must not leave the program.
@@ -402,7 +405,7 @@ impl Journal {
                 ["journal", "snapshot"].contains(&kind) && number.parse().is_ok_and(|n: u64| n + 1 < next)
             });
             if is_old {
-                // No segment depends on the removed file.
+                // A failure is harmless, because no later segment depends on the file.
                 let _ = std::fs::remove_file(self.directory.join(&name));
             }
         }
@@ -416,12 +419,12 @@ struct Resumed<'c> {
     segments: Vec<&'c Segment>,
     observations: u64,
     unfinished: Option<Unfinished>,
-    /// Numbers and lines of missing snapshots, which have to be written again.
+    /// Numbers and lines of missing or damaged snapshots, which have to be written again.
     missing_snapshots: Vec<(u64, String)>,
 }
 
-/// Restores a loop from the newest sound snapshot, and replays the later observations. Changes no
-/// files.
+/// Restores a loop from the newest usable snapshot, or from the beginning without one, and replays the later
+/// observations. Changes no files.
 fn resume<'c, C: Recoverable>(
     directory: &Path,
     contents: &'c JournalFiles,
@@ -471,7 +474,8 @@ fn create_segment(directory: &Path, after: &Link, digest: &str, number: u64) -> 
     Ok((file, link))
 }
 
-/// Writes a snapshot atomically. An existing snapshot with this number is damaged, and is kept under another name.
+/// Writes a snapshot atomically. An existing file of this name is a damaged snapshot, and is kept as
+/// `snapshot-N.damaged`.
 fn write_snapshot(directory: &Path, number: u64, line: &str) -> io::Result<()> {
     let name = path(directory, "snapshot", number);
     let mut file = tempfile::NamedTempFile::new_in(directory)?;

@@ -1,9 +1,9 @@
 //! Records of a journal as lines of text, linked by a hash chain.
 //!
-//! A line is sixteen hexadecimal digits, a space and a JSON array that begins with the record's
-//! number. The digits are the first half of the SHA-256 of the previous line's digits and this
-//! line's array. So a changed, missing, repeated or moved line is detected. The chain detects
-//! damage; it does not protect against an attacker with write access to the directory.
+//! A line is sixteen hexadecimal digits, a space and a JSON array that begins with the record's number. The digits are
+//! the first 8 bytes of the SHA-256 hash of the previous line's digits and this line's array. So a changed, missing,
+//! repeated or moved line before the end is detected. The chain detects damage; it does not protect against an attacker
+//! with write access to the directory.
 
 use serde_json::{Value, json};
 use sha2::{Digest as _, Sha256};
@@ -13,8 +13,7 @@ pub(super) const FORMAT: &str = "metaplan-journal/3";
 /// Number of hexadecimal digits of the hash in front of each record.
 const DIGITS: usize = 16;
 
-/// A position between two records: the number of the next record, and the chain digits of the
-/// previous one.
+/// A position between two records: the number of the next record, and the digits (hash) of the previous one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Link {
     pub(super) next: u64,
@@ -36,8 +35,8 @@ impl Link {
         (format!("{digits} {text}\n"), Self { next: self.next + 1, digits })
     }
 
-    /// Parses a line without its line break. Returns the record and the link after it, or `None` if
-    /// number or digits of the line do not continue the chain at this position.
+    /// Parses a line without its line break. Returns the record and the link after it. Returns `None` if the line is
+    /// malformed, or if its number or digits do not continue the chain at this position.
     pub(super) fn read(&self, line: &[u8]) -> Option<(Record, Self)> {
         let (record, digits) = parse(line)?;
         let text = line.get(DIGITS + 1..)?;
@@ -69,21 +68,21 @@ impl Record {
 }
 
 /// Returns the first line of a segment (file of records), and the link (position in the chain of records) after this
-/// line. The line repeats the link to the previous segment.
+/// line. The line repeats the digits of the previous record, which is in the previous segment.
 pub(super) fn header(after: &Link, digest: &str, segment: u64) -> (String, Link) {
     after.line("segment", &[json!(FORMAT), json!(digest), json!(segment), json!(after.digits)])
 }
 
-/// Returns the only line of a snapshot file for the position `after` of the record chain.
+/// Returns the only line of a snapshot file. `after` is the position in the chain of records at which the snapshot was
+/// taken.
 pub(super) fn snapshot(after: &Link, digest: &str, segment: u64, data: &Value) -> String {
     after
         .line("snapshot", &[json!(FORMAT), json!(digest), json!(segment), json!(after.digits), data.clone()])
         .0
 }
 
-/// Parses the first line of a file, a header or a snapshot, which contains the digits of its
-/// predecessor. Returns the record, the link before it and the link after it; `None` if it has
-/// another kind or is damaged.
+/// Parses the first line of a file: the header of a segment, or a snapshot. Both contain the digits of the record
+/// before. Returns the record, the link before it and the link after it; `None` if it has another kind or is damaged.
 pub(super) fn opening(line: &[u8], kind: &str) -> Option<(Record, Link, Link)> {
     let (record, _) = parse(line)?;
     let before = Link { next: record.number, digits: record.text(3)?.to_owned() };

@@ -1,5 +1,5 @@
-//! Restores a loop from a journal: selects the usable records, replays them, and completes the
-//! records that a crash has cut off.
+//! Restores a loop from a journal: selects the usable segments, replays their records, and repairs the ends of segments
+//! after a crash.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, Seek as _, Write as _};
@@ -12,13 +12,13 @@ use super::recovery::Recovery;
 use crate::mapek::{Observation, Recoverable};
 use crate::message::Message;
 
-/// Work that a crash has interrupted and that the loop completes when the journal is opened.
+/// Work that the previous process did not finish. It is completed after the journal is opened.
 #[derive(Debug)]
 pub(super) enum Unfinished {
     /// The loop has a pending deliberation: it has reacted to an observation, or has just been
     /// created.
     Agenda,
-    /// An observation without a recorded reaction or decision: its line, and its time in
+    /// An observation without a recorded reaction or decision: its line, and its time since the start of the mission in
     /// microseconds.
     Observation(String, u64),
 }
@@ -41,14 +41,14 @@ pub(super) fn usable<'a>(
         let start = if from == 0 { Ok(()) } else { contents.start(from).map(|_| ()) };
         match start.and_then(|()| contents.chain(from)) {
             Ok(segments) => {
-                // Older generations are not needed, so their damage is only a warning.
+                // Older segments and snapshots are not needed, so their damage is only a warning.
                 let older = (first..from).filter(|&number| number > 0);
                 problems.extend(older.filter_map(|number| contents.start(number).err()));
                 problems.extend(contents.chain(first).err());
                 problems.sort();
                 problems.dedup();
                 let warning = |text: &String| {
-                    Message::warning("M323", format!("the journal: {text}; it was not needed"))
+                    Message::warning("M323", format!("the journal: {text}; recovery did not need this file"))
                 };
                 warnings.extend(problems.iter().map(warning));
                 return Ok((from, segments));
@@ -62,8 +62,8 @@ pub(super) fn usable<'a>(
     if let Some(old) = problems.iter().find(|text| text.ends_with(OLD_FORMAT)) {
         return Err(format!("{old}; nothing was changed"));
     }
-    let way_out = "nothing was changed; `metaplan journal show` lists what is sound; restore what is damaged from a copy, or \
-                   take another directory";
+    let way_out = "nothing was changed; `metaplan journal show` lists the intact records; restore the damaged files \
+                   from a backup, or use another directory";
     Err(format!("{}; {way_out}", problems.join(", ")))
 }
 
@@ -78,11 +78,10 @@ pub(super) struct Replay<'a, C> {
 impl<C: Recoverable> Replay<'_, C> {
     pub(super) fn segment(&mut self, segment: &Segment) -> Result<(), Message> {
         self.observations = 0;
-        // The end record only links segments.
+        // The `end` record only links segments.
         let mut records = segment.records.iter().filter(|record| record.kind != "end").peekable();
         while let Some(record) = records.next() {
-            let wrong =
-                || broken(self.directory, &format!("record {} is not where it belongs", record.number));
+            let wrong = || broken(self.directory, &format!("record {} is out of order", record.number));
             // Only the last observation of a journal may lack its answers.
             if self
                 .unfinished
@@ -137,14 +136,13 @@ impl<C: Recoverable> Replay<'_, C> {
         if self.control.decision(answers).agrees(&written.list(0)) {
             return Ok(());
         }
-        let text =
-            format!("the mission now leads to another decision than the one in record {}", written.number);
+        let text = format!("replay gives a different decision than record {}", written.number);
         Err(broken(self.directory, &text))
     }
 }
 
-/// Repairs the ends of segments after a crash, and opens the last segment for appending. Returns
-/// its file and the link at its end.
+/// Repairs the ends of segments after a crash: removes an incomplete record, and adds a missing line break or `end`
+/// record. Opens the last segment for appending. Returns its file and the link at its end.
 pub(super) fn settle(
     directory: &Path,
     segments: &[&Segment],
@@ -176,7 +174,7 @@ pub(super) fn settle(
             return Ok((file, segment.after.clone()));
         }
     }
-    Err(io::Error::other("nothing is in it"))
+    Err(io::Error::other("it has no segments"))
 }
 
 /// Copies the incomplete record at the end of a file, i.e. all bytes from `sound` on, to a new file

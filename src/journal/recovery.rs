@@ -5,10 +5,10 @@ use crate::message::Message;
 /// Result of opening a journal.
 #[derive(Debug, Clone, Default)]
 pub struct Recovery {
-    /// Number of observations replayed when the journal was opened. `None` for a new journal.
+    /// Number of observations since the restored snapshot, or since the beginning. `None` for a new journal.
     pub replayed: Option<u64>,
     /// Number of bytes of an incomplete last record that were cut off.
     pub cut: u64,
-    /// Faults of the journal that did not affect the recovery.
+    /// Faults in files that were not needed, and a message if the last records of the journal are missing.
     pub warnings: Vec<Message>,
 }

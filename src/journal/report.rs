@@ -17,7 +17,7 @@ pub struct JournalReport {
     pub parts: Vec<String>,
     /// Faults: an error if the journal cannot be used, a warning otherwise.
     pub messages: Vec<Message>,
-    /// All sound records of all segments, in order.
+    /// All sound records of all segments, in order, without the headers of the segments.
     pub entries: Vec<Entry>,
 }
 
@@ -83,7 +83,7 @@ impl JournalReport {
         Ok(Self { parts, messages, entries })
     }
 
-    /// Returns `true` if the journal can be used.
+    /// Returns `true` if the journal can be used, i.e. if no message is an error.
     pub fn is_sound(&self) -> bool {
         self.messages.iter().all(|message| message.severity == "warning")
     }
@@ -98,6 +98,6 @@ fn describe(segment: &Segment) -> String {
         End::Incomplete(bytes) => {
             format!("{records}; then {bytes} bytes of a record that was not written completely")
         }
-        End::Damaged(line) => format!("{records}; line {line} is damaged, or does not belong there"),
+        End::Damaged(line) => format!("{records}; line {line} is damaged or out of order"),
     }
 }

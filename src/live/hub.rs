@@ -1,5 +1,5 @@
-//! Distributes the lines of a run to clients. It retains the last lines, and the line that defines
-//! the current state of each key.
+//! Distributes the lines of a run to clients. Retains the last lines, and for each key (part of the loop's state, such
+//! as `function f`) the line that defines its current state.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
@@ -12,7 +12,8 @@ use serde_json::{Value, json};
 use crate::live::keep::{design_key, keys};
 use crate::mapek::DesignChange;
 
-/// Maximum number of lines in the queue from the loop; further lines are dropped and counted.
+/// Maximum number of lines that the loop has queued and the thread of [`listen`] has not read. Further lines are
+/// dropped and counted.
 const MAX_QUEUED_LINES: usize = 4096;
 const MAX_QUEUED_BYTES: usize = 16 << 20;
 
@@ -67,8 +68,8 @@ impl Hub {
         (words.into_iter().map(|(_, line)| line).collect(), state.first)
     }
 
-    /// Returns the retained lines from number `from` on, at most [`MAX_BATCH`]. If no such line is retained, waits up to
-    /// `wait`.
+    /// Returns the retained lines from number `from` on, at most [`MAX_BATCH`]. If there is no such line yet, waits up
+    /// to `wait` for one or for the end of the run. If line `from` was dropped, returns [`News::Missed`].
     pub(super) fn news(&self, from: u64, wait: Duration) -> News {
         let is_waiting = |state: &mut RetainedLines| !state.ended && from == state.end();
         let state = self.more.wait_timeout_while(self.lock(), wait, is_waiting);
@@ -195,7 +196,7 @@ impl HubSender {
         let at = self.start.elapsed().as_secs_f64();
         let bytes = entry.bytes();
         let waiting = self.backlog.bytes.fetch_add(bytes, Ordering::Relaxed);
-        // The loop must not wait for slow clients, so lines beyond the limit are dropped.
+        // The loop must not wait until the queue is emptied, so lines beyond the limit are dropped.
         let is_taken = waiting.saturating_add(bytes) <= MAX_QUEUED_BYTES
             && !matches!(self.queue.try_send(Some((at, entry))), Err(TrySendError::Full(_)));
         if !is_taken {

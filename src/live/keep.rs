@@ -32,8 +32,7 @@ pub(super) fn design_key(design: &str) -> String {
     format!("design {design}")
 }
 
-/// Returns the keys of the state that an answer defines. Empty for answers that are not part of the
-/// state.
+/// Returns the keys of the parts of the state that an answer (as JSON) defines. Empty if it defines none.
 pub(super) fn keys(answer: &str) -> Vec<String> {
     let Ok(about) = serde_json::from_str::<About>(answer) else { return Vec::new() };
     match about.answer.as_ref() {

@@ -1,4 +1,4 @@
-//! Parses HTTP requests: the path and the two headers that are needed.
+//! Parses HTTP requests: the path without its query, and the headers `Host` and `Authorization`.
 
 use std::io::{self, Read};
 use std::net::TcpStream;
@@ -21,7 +21,7 @@ pub(super) type Refused = (u16, &'static str);
 
 impl Request {
     /// Reads a request from a connection. Returns a status code for a request that is malformed, too large, or not a
-    /// GET request. A request that is not complete within `patience` gives status 408 or a timeout error.
+    /// GET request. If the request is not complete within `patience`, returns status 408 or a timeout error.
     pub(super) fn read(stream: &mut TcpStream, patience: Duration) -> io::Result<Result<Self, Refused>> {
         let begun = Instant::now();
         let mut bytes = Vec::new();

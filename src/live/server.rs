@@ -1,4 +1,4 @@
-//! HTTP server: answers requests with the page or with the event stream.
+//! HTTP server: answers requests with the page, the picture of the plan, or the event stream.
 
 use std::io::{self, Write as _};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
@@ -15,7 +15,7 @@ use crate::mapek::{DesignChange, Outlook};
 use crate::message::Message;
 use crate::report::Painter;
 
-/// Read and write timeout of a connection.
+/// Time limit for reading a request, and for sending each text.
 const CLIENT_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Interval between keep-alive comments on an idle event stream.
@@ -55,7 +55,8 @@ impl Live {
     pub fn open(address: Address, token: Option<Token>, painter: Option<Painter>) -> Result<Self, Message> {
         // Other machines on the network could otherwise read the run.
         if !address.is_loopback() && token.is_none() {
-            let text = format!("who can reach {} can look at the run: a token is needed there", address.0);
+            let text =
+                format!("every machine that can reach {} could see the run: a token is required", address.0);
             return Err(Message::error("M332", text));
         }
         let failed = |error: io::Error| {
@@ -102,8 +103,7 @@ impl Live {
         self.sender.send_designs(designs);
     }
 
-    /// Replaces the current plan, or removes it. Never blocks; the plan is drawn on the next
-    /// request.
+    /// Replaces the current plan, or removes it. Never blocks; the plan is drawn when its picture is next requested.
     pub fn planned(&self, outlook: Option<Outlook>) {
         let under_way = outlook.as_ref().filter(|plan| plan.is_under_way).map(|plan| plan.first);
         let exists = outlook.is_some();
@@ -111,8 +111,7 @@ impl Live {
         self.sender.send_plan(exists, under_way);
     }
 
-    /// Reports the end of the run to all clients, and waits a short time until they have received
-    /// it.
+    /// Reports the end of the run to all clients, and waits up to half a second until they have received it.
     pub fn end(&self) {
         self.sender.end();
         let begun = Instant::now();
@@ -207,8 +206,8 @@ fn refuse(stream: &mut TcpStream, (status, words): Refused) -> io::Result<()> {
     send(stream, &(head + &text))
 }
 
-/// Sends the lines of the current state, the retained lines, and then all new lines, until the run
-/// ends or the client is too slow.
+/// Sends the lines of the current state, the retained lines, and then all new lines. Stops when the run ends, the
+/// client disconnects, or the client is too slow.
 fn events(shared: &SharedState, stream: &mut TcpStream) -> io::Result<()> {
     send(
         stream,
@@ -239,7 +238,7 @@ fn stanzas(lines: &[Arc<str>]) -> String {
     lines.iter().flat_map(|line| ["data: ", line, "\n\n"]).collect()
 }
 
-/// Sends a text. Fails if the client has not read the text within the timeout.
+/// Sends a text. Fails if the connection does not accept the whole text within [`CLIENT_TIMEOUT`].
 fn send(stream: &mut TcpStream, text: &str) -> io::Result<()> {
     let begun = Instant::now();
     let mut remaining = text.as_bytes();

@@ -1,4 +1,4 @@
-//! Access token for the web page. It is compared in constant time and never printed.
+//! Access token for the web page. Its digest is compared in constant time, and the token is never printed.
 
 use std::path::Path;
 

@@ -1,9 +1,10 @@
-//! Determines the believed design of each function from acknowledgements of reconfigurations.
+//! Determines the believed design of each function from acknowledgements and failures of reconfigurations.
 //!
-//! The believed design of a function is the design of its last acknowledged reconfiguration. An event with the number
-//! of a reconfiguration acknowledges it. Messages can cross, be duplicated or arrive out of order: of two acknowledged
-//! reconfigurations of one function, the later one counts. A superseded reconfiguration without an answer can still be
-//! acknowledged. Before this acknowledgement, its design is not believed, and the design of the function is uncertain.
+//! Unless another design is observed later, the believed design of a function is the design of its last acknowledged
+//! reconfiguration. An event with the number of a reconfiguration acknowledges it. Messages can cross, be duplicated or
+//! arrive out of order: of two acknowledged reconfigurations of one function, the one requested later counts. A
+//! superseded reconfiguration without an answer can still be acknowledged. Before this acknowledgement, its design is
+//! not believed, and the design of the function is uncertain.
 //!
 //! A report that an action has started, progressed or succeeded implies the arrival of its request, and nothing else.
 //! Under this rule alone, robots without acknowledgements would never have a believed design. Therefore, until an
@@ -32,14 +33,16 @@ pub(super) enum Failure {
 
 impl Beliefs {
     /// Records that the robot has acknowledged the effect (a request of the loop) with this number. The effect is then
-    /// no longer outstanding, i.e. waiting for its acknowledgement.
+    /// no longer outstanding, i.e. no longer waits for its acknowledgement. Returns [`Receipt::Unknown`] if the loop
+    /// has created no effect with this number.
     pub(super) fn acknowledge(&mut self, effect: u64) -> Receipt {
         if effect == 0 || effect > self.effects {
             return Receipt::Unknown;
         }
         self.waits.remove(&effect);
         self.receipts.by_number = true;
-        // A report of the action may have confirmed the effect before its acknowledgement came.
+        // The effect need not be outstanding: a report of the action may have confirmed it, or a later effect
+        // superseded it.
         if let Some(outstanding) = self.outstanding.remove(&effect) {
             if let Command::Reconfigure { function, to, .. } = outstanding.command {
                 return self.configured(effect, function, to);
@@ -120,9 +123,9 @@ impl Beliefs {
         Failure::Stale
     }
 
-    /// Records the failure of a reconfiguration to `design` that was not acknowledged. The function keeps its previous
-    /// design. If the function was observed with the new design in the meantime, the reconfiguration has failed after
-    /// it was carried out, and the design becomes unknown.
+    /// Records the failure of a reconfiguration to `design` that was not acknowledged. The function keeps its believed
+    /// design, unless this is `design`. In this case the reconfiguration has failed after the function was observed
+    /// with `design`, and the function's design becomes unknown.
     fn unanswered_failed(&mut self, function: &str, design: String) -> Failure {
         if self.configuration.get(function) == Some(&design) {
             self.configuration.remove(function);
@@ -130,9 +133,9 @@ impl Beliefs {
         Failure::Design(design)
     }
 
-    /// Records that a reconfiguration has arrived, unless its arrival or that of a later one of the function is already
-    /// recorded. If the function was observed with another design while the reconfiguration was pending, the order of
-    /// observation and reconfiguration is unknown, and so is the design.
+    /// Records that a reconfiguration has arrived, unless its arrival, or the arrival of a later reconfiguration of the
+    /// function, is already recorded. If the function was observed with another design while the reconfiguration was
+    /// pending, the order of observation and reconfiguration is unknown, and so is the design.
     fn configured(&mut self, effect: u64, function: String, design: String) -> Receipt {
         let history = self.receipts.functions.entry(function.clone()).or_default();
         // A superseded reconfiguration without an answer may have been carried out in between.

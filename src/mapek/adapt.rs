@@ -2,10 +2,10 @@
 //! [`crate::mapek`]).
 //!
 //! The paper plans whenever the available designs have changed or an objective is in error. Here, a plan that is still
-//! valid and uses none of the lost designs is kept. Such a plan is still optimal, because losing alternatives cannot
-//! improve the optimum. If the action under way loses a design, the designs of this action and of the remaining steps
-//! are chosen again together, see [`crate::mapek::resume`]. If no plan continues the action, or another plan is better,
-//! the action is suspended or cancelled, see [`crate::mapek::interrupt`].
+//! valid and uses none of the lost designs is kept. If such a plan was optimal, it still is, because losing
+//! alternatives cannot improve the optimum. If the action under way loses a design, the designs of this action and of
+//! the remaining steps are chosen again together, see [`crate::mapek::resume`]. If no plan continues the action, or
+//! another plan is better, the action is suspended or cancelled, see [`crate::mapek::interrupt`].
 
 use std::time::Duration;
 
@@ -28,8 +28,8 @@ use crate::number;
 /// Number of consecutive failures of one step after which planning pauses until something else changes.
 const MAX_FAILURES: u32 = 3;
 
-/// Minimum base of the pause before a search that hit its time limit is repeated. A greater time limit is used as the
-/// base instead.
+/// Lower limit on the base of the pauses before a search that hit its time limit is repeated. The base is the time
+/// limit of a search. The first pause is twice the base, and each further pause is twice the previous one.
 const MIN_RETRY: Duration = Duration::from_secs(10);
 
 /// Upper limit on the pause before a search that hit its time limit is repeated.
@@ -113,7 +113,7 @@ impl Adaptation<'_> {
             changes.reasons.push("the situation has changed, and there is no plan".to_owned());
         }
         if changes.reasons.is_empty() && self.beliefs.stuck && self.is_retry_due() {
-            changes.reasons.push("the last search for a plan was cut short".to_owned());
+            changes.reasons.push("the last search for a plan stopped at a limit".to_owned());
         }
         if changes.reasons.is_empty() {
             if !findings.lost.is_empty() && self.beliefs.plan.is_some() {
@@ -144,7 +144,8 @@ impl Adaptation<'_> {
     }
 
     /// Updates the reasons why a better plan may exist: designs that have become available and are not lost again, and
-    /// changed facts. If the current plan is not proved optimal, lost designs are a reason, too.
+    /// changed facts. If the current plan is not proved optimal, any change of the situation is a reason, even a lost
+    /// design.
     fn record_improvement_causes(&mut self, findings: &Findings, changes: &Changes) {
         let improvement_causes = &mut self.beliefs.improvement_causes;
         improvement_causes.retain(|design| !findings.lost.contains(design));
@@ -159,8 +160,8 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Resumes the action under way if it was suspended only until planning has finished, and its remainder is
-    /// executable.
+    /// Ends a suspension of the action under way that was to last only until planning has finished. If the action is
+    /// not being cancelled, its designs are available and its remainder is executable, the action is resumed.
     pub(super) fn release(&mut self, answers: &mut Vec<Answer>) {
         let Some(mut running) =
             self.beliefs.running.clone().filter(|running_action| running_action.provisional)
@@ -175,8 +176,8 @@ impl Adaptation<'_> {
         self.beliefs.running = Some(running);
     }
 
-    /// Searches for a better plan if the reasons why one may exist have lasted for the settle time, or if the
-    /// repetition of an unfinished search is due.
+    /// Searches for a better plan if the repetition of an unfinished search is due, or if the settle time has passed
+    /// since the last reason why a better plan may exist.
     fn improve(&mut self, answers: &mut Vec<Answer>) {
         let has_plan = self.beliefs.plan.is_some() && !self.beliefs.reached;
         if !has_plan {
@@ -210,7 +211,8 @@ impl Adaptation<'_> {
 
     /// Searches for a plan for the reasons `because`, and adopts it unless it is the current plan. With
     /// [`Need::Better`], the plan is adopted only if its benefit is sufficient. With the other needs, the action under
-    /// way may be cancelled or suspended instead. Decides nothing if a search is forbidden.
+    /// way may be cancelled or suspended instead. Decides nothing if a plan is missing and the planner may not search
+    /// for it.
     pub(super) fn replan(&mut self, because: Vec<String>, need: Need, answers: &mut Vec<Answer>) {
         let is_necessary = need != Need::Better;
         let reason = because.first().cloned().unwrap_or_default();
@@ -246,8 +248,8 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Requests the designs of the action under way again if one of them must be sent (see [`must_be_sent`]). Does
-    /// nothing if the action is suspended or being cancelled.
+    /// Requests those designs of the action under way that must be sent (see [`must_be_sent`]). Does nothing if the
+    /// action is suspended or being cancelled.
     fn configure_again(&mut self, answers: &mut Vec<Answer>) {
         let Some(mut running) = self.beliefs.running.take() else { return };
         let is_active = !running.suspended && !running.cancelling;
@@ -260,9 +262,9 @@ impl Adaptation<'_> {
         self.beliefs.running = Some(running);
     }
 
-    /// Cancels or suspends the action under way if this is better than `going_on`, the plan that starts with the
-    /// remainder of the action. Returns `true` if the action was interrupted, or if the decision needs a search that is
-    /// forbidden.
+    /// Cancels or suspends the action under way if it cannot continue, or if this is better than `going_on`. The plan
+    /// `going_on` starts with the remainder of the action. Returns `true` if the action was interrupted, or if the
+    /// decision needs a plan that the planner may not search for.
     fn interrupt(&mut self, reason: &str, need: Need, going_on: &Outcome, answers: &mut Vec<Answer>) -> bool {
         let Some(running) = self.beliefs.running.clone() else { return false };
         let can_go_on = goes_on_with(&running, going_on) || self.can_go_on(&running);
@@ -376,7 +378,8 @@ impl Adaptation<'_> {
         self.beliefs.plan = Some(steps);
     }
 
-    /// Reports that no plan was found. If `is_necessary`, also drops the current plan.
+    /// Reports that no plan was found. If `is_necessary`, also drops the current plan, and planning pauses until
+    /// something changes.
     fn report_no_plan(&mut self, is_necessary: bool, outcome: Outcome, answers: &mut Vec<Answer>) {
         let status = if outcome.proved { "unsolvable" } else { "unknown" };
         answers.push(Answer::PlanNone { status, because: outcome.because, blocking: outcome.blocking });

@@ -14,7 +14,7 @@ use crate::mapek::monitor::Base;
 pub(super) struct Findings {
     pub(super) lost: BTreeSet<String>,
     pub(super) gained: BTreeSet<String>,
-    /// Objectives that are newly in error, with their statuses, as sentences.
+    /// Sentences about the objectives that are in error and whose statuses have changed.
     pub(super) errors: Vec<String>,
 }
 
@@ -80,7 +80,8 @@ pub(crate) fn doubts(
     answers
 }
 
-/// Handles a change of the knowledge base: reports contradictions, and analyzes availability if it may have changed.
+/// Handles a change of the knowledge base: reports contradictions, and analyzes designs and objectives if their
+/// availability or statuses may have changed.
 pub(super) fn analyze_change(beliefs: &mut Beliefs, base: Base, answers: &mut Vec<Answer>) -> Findings {
     if base > Base::Nothing {
         report_contradictions(beliefs, answers);
@@ -146,7 +147,7 @@ pub(super) fn availability(knowledge: &Knowledge, design: &str, available: bool)
 /// Returns the message that conclusions are missing. Without conclusions, no design counts as available, and planning
 /// is impossible.
 pub(super) fn missing_conclusions(fault: &Fault) -> String {
-    format!("it is not known what follows: {}", fault.message)
+    format!("the conclusions are unknown: {}", fault.message)
 }
 
 fn statuses(knowledge: &Knowledge) -> BTreeMap<String, Vec<String>> {
@@ -155,12 +156,13 @@ fn statuses(knowledge: &Knowledge) -> BTreeMap<String, Vec<String>> {
     in_error.map(|objective| (objective.individual.name, objective.statuses)).collect()
 }
 
-/// Returns the rules and stated facts that make a design unavailable.
+/// Returns the rules and stated facts that make a design unavailable, as lines of text.
 pub(crate) fn ruled_out(knowledge: &Knowledge, design: &str) -> Vec<String> {
     unavailable(knowledge, design).iter().flat_map(|derivation| reasons(knowledge, derivation)).collect()
 }
 
-/// Returns derivations of the statements that a design is unavailable; empty if none can be derived.
+/// Returns a derivation of each statement that a design is unavailable, e.g. `fd_realisability(d, false)`; empty if no
+/// such statement holds.
 pub(crate) fn unavailable(knowledge: &Knowledge, design: &str) -> Vec<Derivation> {
     let engine = knowledge.engine();
     let symbols = engine.symbols();
@@ -204,7 +206,7 @@ fn reasons(knowledge: &Knowledge, derivation: &Derivation) -> Vec<String> {
     lines
 }
 
-/// Formats a fact with local names in place of IRIs.
+/// Formats a fact with local names in place of IRIs, e.g. `requiresC(fd_amcl_kinect, c_kinect)`.
 pub(crate) fn fact_text(fact: &Fact, symbols: &Symbols) -> String {
     let mut text = String::with_capacity(64);
     for (position, &symbol) in std::iter::once(&fact.predicate).chain(&fact.arguments).enumerate() {

@@ -21,13 +21,15 @@ pub enum Answer {
         /// Objectives whose status has changed.
         objectives: Vec<ObjectiveChange>,
     },
-    /// The knowledge has become inconsistent, or consistent again. Observed statements and their conclusions are kept.
+    /// The set of violated axioms and rules has changed: the knowledge has become inconsistent, consistent again, or
+    /// inconsistent in another way. Observed statements and their conclusions are kept.
     Contradicted {
         /// All current contradictions; empty if the knowledge is consistent again.
         contradictions: Vec<Contradiction>,
     },
-    /// The conclusions are incomplete because a rule has exceeded its budget, or they are complete again. Observed
-    /// statements are kept. With incomplete conclusions, no design counts as available, and no action is requested.
+    /// The conclusions are incomplete because reasoning has exceeded its budget or was interrupted, or they are
+    /// complete again. Observed statements are kept. With incomplete conclusions, no design counts as available, and no
+    /// action is requested.
     Unconcluded {
         /// Fault that stopped the reasoning; `None` once the conclusions are complete.
         fault: Option<Fault>,
@@ -51,15 +53,15 @@ pub enum Answer {
         /// Reason, as a sentence.
         because: String,
     },
-    /// Planning has found no plan.
+    /// Planning has found no plan, or pauses because an action has failed repeatedly.
     PlanNone {
         /// `unsolvable` if the absence of a plan is proved, `failed` if an action has failed repeatedly, and `unknown`
         /// otherwise.
         status: &'static str,
         /// Reason, as a sentence.
         because: String,
-        /// Minimal set of unavailable designs that blocks every plan, if computed. A plan would exist with any one of them
-        /// and with all designs outside the set.
+        /// Minimal set of unavailable designs that blocks every plan, if computed. A plan would exist with any one of
+        /// them and with all designs outside the set. Empty also if there is no plan even with all designs.
         blocking: Vec<String>,
     },
     /// A request to the managed system.
@@ -77,8 +79,8 @@ pub enum Answer {
     },
     /// The goal holds, and no further action is required.
     GoalReached,
-    /// A filter holds a report back. Reported for the first, tenth, hundredth … held report since the last change of
-    /// value or status.
+    /// A filter holds a report back. This answer is given if the number of held reports in `held` is 1, 10, 100 and so
+    /// on.
     Filtered {
         /// The attribute or component, by local name.
         name: String,
@@ -86,7 +88,8 @@ pub enum Answer {
         value: Value,
         /// Reason for holding the report: `range`, `jump`, `hysteresis`, `debounce`, `confirm` or `heal`.
         because: &'static str,
-        /// Number of held reports since the last change.
+        /// Number of held reports since the last believed crossing of a bound, or since the last believed change of the
+        /// component's status.
         held: u64,
         /// Time at which the report will be believed unless another report arrives; `None` if the passage of time does
         /// not confirm the report.
@@ -118,7 +121,7 @@ pub enum Answer {
         /// Description of the fault and its consequences.
         message: String,
     },
-    /// The line, or a part of it, was refused and has changed nothing.
+    /// The line, or a part of it, was refused and has changed nothing; or the knowledge base could not be updated.
     Error {
         /// Stable code of the error, such as `M305`.
         code: String,
@@ -142,14 +145,15 @@ pub enum OverdueOutcome {
     Waiting,
 }
 
-/// A design whose availability has changed.
+/// Availability of a design, usually reported because it has changed.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct DesignChange {
     /// Local name of the design.
     pub design: String,
     /// Whether the design is available from now on.
     pub available: bool,
-    /// Rules and facts that make the design unavailable; empty if the design is available.
+    /// Rules and facts that make the design unavailable, or a message that conclusions are missing; empty if the design
+    /// is available.
     pub because: Vec<String>,
 }
 
@@ -175,7 +179,8 @@ pub struct Effect {
     pub command: Command,
     /// Whether the effect is a repetition, so that the robot may have received it before.
     pub repeated: bool,
-    /// Numbers of unacknowledged effects that this effect replaces. The replaced effects need not be carried out.
+    /// Numbers of unacknowledged earlier effects that are obsolete once this effect has arrived, at most 64. The robot
+    /// need not carry them out.
     pub supersedes: Vec<u64>,
 }
 
@@ -226,7 +231,7 @@ impl Command {
         }
     }
 
-    /// Returns `true` if this command makes the command `earlier` obsolete. `same_action` says whether both commands
+    /// Returns `true` if this command makes the command `earlier` obsolete. `same_action` is `true` if both commands
     /// belong to the same action.
     pub(super) fn replaces(&self, earlier: &Self, same_action: bool) -> bool {
         match (self, earlier) {
@@ -334,7 +339,7 @@ impl Answer {
             Self::Duplicate { sequence } => object.serialize_entry("seq", sequence),
             Self::Stale { sequence, mark } => {
                 let because = format!(
-                    "too many numbers are missing: of those up to {mark} it is not known any more which were seen"
+                    "too many gaps in `seq`: which of the numbers up to {mark} were received is no longer recorded"
                 );
                 object.serialize_entry("seq", sequence)?;
                 object.serialize_entry("because", &because)

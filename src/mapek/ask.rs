@@ -11,23 +11,24 @@ use crate::mission::Mission;
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Outcome {
     pub steps: Option<Vec<PlannedStep>>,
-    /// Metric of the plan; 0 without a plan.
+    /// Metric of the plan; without meaning if there is no plan.
     pub cost: BigRational,
     /// Whether the plan is proved optimal, or its absence is proved.
     pub proved: bool,
     /// Reason for the absence of a plan.
     pub because: String,
-    /// Unavailable designs that block every plan, if computed; see [`planner::Replanner::blocking`].
+    /// Unavailable designs that block every plan. Empty if not computed, or if there is no plan even with all designs;
+    /// see [`planner::Replanner::blocking`].
     pub blocking: Vec<String>,
 }
 
-/// Planning problem: the believed situation and the first step, if one is fixed.
+/// Planning problem: the believed situation and, if one is fixed, the first step.
 #[derive(Debug)]
 pub(crate) struct Question<'a> {
     pub mission: &'a Mission,
     /// The believed problem, filled from the knowledge base.
     pub problem: &'a Problem,
-    /// The action under way. Its remainder is the first step of every plan.
+    /// The action under way, if every plan must begin with its remainder.
     pub running: Option<&'a Running>,
     /// Remaining steps of the current plan; `None` without a plan, or if the action under way is treated as cancelled.
     pub old: Option<&'a [PlannedStep]>,

@@ -1,5 +1,5 @@
-//! Shared state of the loop: the believed situation and outstanding effects. Loops of one mission with equal beliefs
-//! behave equally.
+//! Shared state of the loop: the believed situation, the plan and outstanding effects. After a deliberation, this is
+//! the whole state of the loop, apart from caches.
 //!
 //! While an action is under way, numeric values that the action increases or decreases change with its progress. The
 //! other effects of the action take place when it succeeds.
@@ -31,7 +31,7 @@ pub struct Beliefs {
     pub(super) goal: Option<String>,
     pub(super) available: BTreeSet<String>,
     pub(super) statuses: BTreeMap<String, Vec<String>>,
-    /// Axioms and rules that the known facts violate.
+    /// Axioms and rules that the known facts violate, as last reported.
     pub(super) violated: BTreeSet<String>,
     /// Fault that stopped the reasoning, as last reported; the conclusions are then incomplete. `None` if they are
     /// complete.
@@ -42,7 +42,7 @@ pub struct Beliefs {
     pub(super) reached: bool,
     /// Whether planning has failed and pauses until something changes.
     pub(super) stuck: bool,
-    /// Whether the plan is not proved optimal, because its search hit a limit.
+    /// Whether the plan is not proved optimal, e.g. because its search hit a limit.
     pub(super) unproved: bool,
     pub(super) retry: Option<Retry>,
     /// The step that failed last, with its number of consecutive failures.
@@ -65,7 +65,7 @@ pub struct Beliefs {
     pub(super) lines: u64,
     pub(super) numbers: Numbers,
     pub(super) now: Duration,
-    /// Time of the last line that was not refused, since the start of the mission.
+    /// Time of the last line or timer that was not refused, since the start of the mission.
     pub(super) considered: Duration,
     pub(super) filters: FilterStates,
 }
@@ -99,7 +99,7 @@ pub(super) struct Running {
 pub(super) struct Retry {
     /// Time at which the search is due, since the start of the mission.
     pub(super) at: Duration,
-    /// Number of consecutive searches that hit their time limit.
+    /// Number of consecutive searches without a proved outcome, e.g. because of the time limit.
     pub(super) attempt: u32,
 }
 
@@ -115,7 +115,8 @@ pub(super) struct Wait {
 pub struct Outlook {
     /// Domain of the mission. If an action is under way, the domain forces plans to begin with its remainder.
     pub domain: Domain,
-    /// The believed problem, filled from the knowledge base, with the goal.
+    /// The believed problem, filled from the knowledge base, with the current goal. If an action is under way, the goal
+    /// also requires the end of its remainder.
     pub problem: Problem,
     /// The action under way, if any, followed by the remaining steps of the plan.
     pub steps: Vec<PlannedStep>,
@@ -178,13 +179,14 @@ impl Beliefs {
         &self.statuses
     }
 
-    /// Returns the believed design of each function: the design that was acknowledged or observed last. Later requests
-    /// are [pending](Self::pending).
+    /// Returns the believed design of each function: usually the design that was acknowledged or observed last. Omits
+    /// functions whose design is unknown. Later requests are [pending](Self::pending).
     pub fn configuration(&self) -> &BTreeMap<String, String> {
         &self.configuration
     }
 
-    /// Returns a pair of function and requested design for each reconfiguration that is not acknowledged.
+    /// Returns a pair of function and requested design for each outstanding reconfiguration, i.e. one that is neither
+    /// acknowledged nor superseded.
     pub fn pending(&self) -> impl Iterator<Item = (&str, &str)> {
         self.outstanding.values().filter_map(|effect| match &effect.command {
             Command::Reconfigure { function, to, .. } => Some((function.as_str(), to.as_str())),
@@ -264,7 +266,7 @@ impl Beliefs {
         self.numbers.missing()
     }
 
-    /// Time of the last line, since the start of the mission.
+    /// Time of the last line or timer, since the start of the mission.
     pub fn now(&self) -> Duration {
         self.now
     }
@@ -274,8 +276,8 @@ impl Beliefs {
         self.reached
     }
 
-    /// Returns `true` if a design is believed to be available, or if the problem itself states that it is. Without a
-    /// knowledge base, all designs are.
+    /// Returns `true` if a design is believed to be available. For a design that the knowledge base lacks, the problem
+    /// has to state this. Without a knowledge base, all designs are available.
     pub(super) fn is_available(&self, design: &str) -> bool {
         self.mission.knowledge().is_none() || self.available.contains(design) || self.mission.provides(design)
     }

@@ -2,7 +2,7 @@
 
 use crate::mapek::answer::Answer;
 
-/// Changes caused by the observations since the last deliberation.
+/// Changes caused by one observation, or by all observations since the last deliberation.
 #[derive(Debug, Clone, Default)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub(super) struct Changes {
@@ -13,7 +13,7 @@ pub(super) struct Changes {
     pub(super) predicates: bool,
     /// Whether the goal has changed, which invalidates all remembered plans.
     pub(super) goal: bool,
-    /// Whether reported values of the problem differ from the expected ones.
+    /// Whether reported values of the problem differ from the believed ones.
     pub(super) values: bool,
     pub(super) ended: bool,
     /// Whether a function of the action under way was reported with a design that the loop has not requested.
@@ -43,7 +43,8 @@ impl Changes {
         self.base > Base::Nothing || self.facts || self.predicates || !self.reasons.is_empty()
     }
 
-    /// Returns `true` if the planning problem may differ from the previous one.
+    /// Returns `true` if the next deliberation may need a plan, because the planning problem has changed or an action
+    /// has ended.
     pub(super) fn is_news(&self) -> bool {
         self.facts || self.goal || self.ended || !self.interruptions.is_empty() || !self.reasons.is_empty()
     }

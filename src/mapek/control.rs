@@ -30,14 +30,15 @@ use crate::mapek::watch::Watch;
 use crate::message::{Errors, Message};
 use crate::mission::Mission;
 
-/// Limit on reasoning steps per observation; see [`rules::Limits`]. The robot waits during reasoning.
+/// Limit on reasoning steps per update of the knowledge base; see [`rules::Limits`]. The robot waits during reasoning.
 const MAX_REASONING_STEPS: u64 = 100_000_000;
 
-/// Number of unused interned names and values above which the knowledge base is rebuilt without them.
+/// Number of names and values interned since the start, or since the knowledge base was rebuilt, above which it is
+/// rebuilt. The rebuilt knowledge base lacks those that are not used any more.
 const MAX_GROWTH: usize = 1024;
 
-/// Upper limit on the lead of a line's own time over the later of the previous line's time and the clock. A line with a
-/// greater lead is refused. The number of seconds equals the limit on gaps between sequence numbers.
+/// A line is refused if its own time is later than the clock and also later than the previous line's time, both by more
+/// than this time. The number of seconds equals the limit on gaps between sequence numbers.
 const MAX_TIME_STEP: Duration = Duration::from_secs(1_000_000);
 
 /// Returns the time at which a line is handled, and an error if the line's own time skips too much. Such a time is
@@ -52,8 +53,8 @@ pub(crate) fn time_of_line(
     match own {
         Some(time) if time > latest => {
             let message = format!(
-                "`time` is {} s, but may be {} s at most: it is in seconds since the start of the mission, and skips a million at \
-                 most",
+                "`time` is {} s, but may be at most {} s: it is in seconds since the start of the mission and may \
+                 increase by at most a million",
                 time.as_secs_f64(),
                 latest.as_secs()
             );
@@ -94,6 +95,8 @@ pub struct Loop {
     /// Number of changes of the planning problem since the start, which identifies the current problem.
     pub(super) question: u64,
     digest: String,
+    /// Growth of the knowledge base directly after it was last rebuilt: the new names and values that are in use.
+    rebuilt_growth: usize,
 }
 
 impl Loop {
@@ -121,7 +124,7 @@ impl Loop {
             beliefs.available = available(base);
         }
         let agenda = Some(Agenda { is_start: true, ..Agenda::default() });
-        Ok(Self { settings, beliefs, monitor, planner, agenda, question: 0, digest })
+        Ok(Self { settings, beliefs, monitor, planner, agenda, question: 0, digest, rebuilt_growth: 0 })
     }
 
     /// Returns the settings of the loop.
@@ -148,7 +151,7 @@ impl Loop {
         self.planner.watch.clone()
     }
 
-    /// Makes the first plan and requests the first action.
+    /// Runs the first deliberation: makes the first plan and requests its first action.
     pub fn start(&mut self) -> Vec<Answer> {
         self.deliberate()
     }
@@ -240,7 +243,8 @@ impl Loop {
     }
 
     /// Searches for a plan if the changes since the last call require one, adopts the plan, and requests the next
-    /// action. Can take several times the time limit of plans. Without changes, this does nothing.
+    /// action. Can take several times the time limit of plans. Does nothing if no deliberation is
+    /// [pending](Self::has_agenda).
     pub fn deliberate(&mut self) -> Vec<Answer> {
         let _span = info_span!("deliberate", line = self.beliefs.lines).entered();
         let mut answers = Vec::new();
@@ -273,7 +277,7 @@ impl Loop {
             return;
         };
         let failed = Event::ReconfigurationFailed { effect };
-        // Without a knowledge base, the design cannot be marked as unrealisable.
+        // The event is refused without a knowledge base, where the design cannot be marked as not realisable.
         let _ = self.monitor.apply(&mut self.beliefs, &failed, changes);
         self.beliefs.outstanding.remove(&effect);
         self.beliefs.waits.remove(&effect);
@@ -315,7 +319,8 @@ impl Loop {
     /// releases a report, a sensor becomes silent, a search is due, or a deadline passes. The caller should handle a
     /// tick or a [timer](Observation::timer) at that time. Returns `None` if nothing is scheduled.
     pub fn due(&self) -> Option<Duration> {
-        // A refused line advances the time, but decides nothing that has become due.
+        // Times are compared with `considered` instead of `now`: a refused line advances the time, but decides nothing
+        // that has become due.
         let improvement = self.beliefs.improvement_since.saturating_add(self.settings.settle);
         let improvement = (!self.beliefs.improvement_causes.is_empty()
             && improvement > self.beliefs.considered)
@@ -339,10 +344,12 @@ impl Loop {
 
     fn compact_knowledge(&mut self) {
         let growth = self.beliefs.mission.knowledge().map_or(0, Knowledge::growth);
-        let Some(base) = self.beliefs.mission.knowledge_mut().filter(|_| growth > MAX_GROWTH) else { return };
+        let is_due = growth > self.rebuilt_growth + MAX_GROWTH;
+        let Some(base) = self.beliefs.mission.knowledge_mut().filter(|_| is_due) else { return };
         let statements = base.statements();
         // The statements were consistent and within the budget before, so that restoring them succeeds.
         let _ = base.restore(&statements);
+        self.rebuilt_growth = base.growth();
     }
 }
 
@@ -352,8 +359,8 @@ fn refused(Refusal { code, message }: Refusal) -> Answer {
 
 /// Recording and replay of decisions, for the journal.
 impl Loop {
-    /// Returns the journal's record of a step: the answers, and the plans computed for them. Must be called once after
-    /// each step.
+    /// Returns the journal's record of a reaction or deliberation: its answers, and the plans computed for them. A
+    /// second call returns no plans.
     pub fn decision(&mut self, answers: &[Answer]) -> Decision {
         let plans = std::mem::take(&mut self.planner.computed);
         Decision {
@@ -378,7 +385,8 @@ impl Loop {
         answers
     }
 
-    /// Returns a snapshot of the beliefs. Must be called only after deliberation.
+    /// Returns a snapshot of the beliefs. Must be called only after deliberation, because a pending deliberation is not
+    /// part of the snapshot.
     pub fn snapshot(&self) -> Snapshot {
         record::snapshot(&self.beliefs)
     }
@@ -396,7 +404,7 @@ impl Loop {
 
 /// Single stages, for strategies of a simulation that observe, plan and request actions separately.
 impl Loop {
-    /// Applies an observation to the beliefs without a reaction.
+    /// Applies an observation to the beliefs without a reaction. Discards a pending deliberation.
     pub(crate) fn observe(&mut self, observation: &Observation, now: Duration) {
         self.beliefs.lines += 1;
         self.beliefs.now = self.beliefs.now.max(now);
@@ -432,7 +440,8 @@ impl Loop {
         request(&mut self.beliefs, step, answers);
     }
 
-    /// Requests the designs of `step` for the action under way. Does nothing without an action under way.
+    /// Replaces the step of the action under way by `step`, and requests those of its designs that must be sent. Does
+    /// nothing without an action under way.
     pub(crate) fn reconfigure_now(&mut self, step: PlannedStep, answers: &mut Vec<Answer>) {
         if let Some(mut running) = self.beliefs.running.take() {
             running.step = step;

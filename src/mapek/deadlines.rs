@@ -2,8 +2,9 @@
 //!
 //! Deadlines are checked at each line, including ticks. Messages that a robot never sends have no deadline:
 //! acknowledgements are expected only after the first acknowledgement of an effect by its number. An action is
-//! cancelled only if a message about it is overdue that this robot has sent before in similar cases: progress, the
-//! start of an action, or an acknowledgement. The end of a cancelled action is expected from every robot.
+//! cancelled only if a message about it is overdue that can be expected: progress, if the action has reported progress
+//! before; a start or acknowledgement, if the robot has sent such messages before. The end of a cancelled action is
+//! expected from every robot.
 
 use std::time::Duration;
 
@@ -18,7 +19,7 @@ use crate::number;
 pub(super) type Expired = Vec<u64>;
 
 /// Repeats overdue effects, and repeats or cancels an overdue action. Returns the reconfigurations that count as
-/// failed. Does nothing if deadlines are disabled.
+/// failed. Does nothing if deadlines are disabled, i.e. if the setting is 0.
 pub(super) fn handle_overdue(
     beliefs: &mut Beliefs,
     settings: &Settings,
@@ -72,8 +73,8 @@ fn suspended_request(beliefs: &Beliefs) -> Option<u64> {
 }
 
 /// Repeats effects that were not acknowledged in time. Returns the reconfigurations that count as failed. Requests of
-/// actions are skipped, because the deadline of the action applies, unless the action is suspended. Does nothing if the
-/// robot has never acknowledged an effect by its number.
+/// actions are skipped unless the action is suspended, because the deadline of the action applies to them. Does nothing
+/// if the robot has never acknowledged an effect by its number.
 fn check_effects(beliefs: &mut Beliefs, deadline: Duration, answers: &mut Vec<Answer>) -> Expired {
     let mut expired = Expired::new();
     // This robot may never acknowledge effects.
@@ -154,15 +155,15 @@ fn check_action(beliefs: &mut Beliefs, settings: &Settings, answers: &mut Vec<An
     answers.push(Answer::Overdue { effect: is_unacknowledged.then_some(request), action, seconds, outcome });
     match outcome {
         OverdueOutcome::Repeated => {
-            // A robot that has never acknowledged anything gets no other repetitions. Therefore, reconfigurations
-            // before the request are repeated here.
+            // A robot that has never acknowledged an effect by its number gets no other repetitions of these effects.
+            // Therefore, reconfigurations before the request are repeated here.
             let from = if beliefs.receipts.are_sent() { request } else { 0 };
             let effects = beliefs.outstanding.range(from..=request).map(|(_, effect)| effect.clone());
             answers.extend(effects.map(|effect| Answer::Effect(Effect { repeated: true, ..effect })));
         }
         OverdueOutcome::Cancelled => {
             let running = running.clone();
-            let because = format!("nothing was heard of action {action} for {seconds} s");
+            let because = format!("no event about action {action} arrived for {seconds} s");
             // An action that has never started may be waiting for a design that its function was wrongly believed to
             // have.
             if !running.started {

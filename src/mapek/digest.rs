@@ -7,8 +7,8 @@ use crate::mapek::event::FORMAT;
 use crate::mapek::settings::{Settings, Unrecorded};
 use crate::mission::Mission;
 
-/// Hashes everything that initial decisions depend on: name, facts, rules, domain, filled problem, bindings, settings,
-/// and the versions of program and format.
+/// Returns a hash of everything that initial decisions depend on: name, facts, rules, domain, filled problem, bindings,
+/// settings, and the versions of program and format.
 pub(super) fn digest(mission: &Mission, settings: &Settings) -> String {
     // A journal that can be resumed is complete. Therefore, the reaction to a failed write does not matter.
     let settings = settings.clone().with_unrecorded(Unrecorded::default());

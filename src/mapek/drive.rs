@@ -47,7 +47,8 @@ impl Clock for SystemClock {
     }
 }
 
-/// Runs a loop until the observer returns `None`: passes each observation to the loop, and its answers to the effector.
+/// Starts a loop and runs it until the observer returns `None`: passes each observation to the loop, and its answers to
+/// the effector. Sets no timers, so filters and deadlines take effect at the next observation.
 ///
 /// # Errors
 /// Errors of the observer and of the effector.

@@ -18,7 +18,7 @@ pub(super) fn finish(beliefs: &mut Beliefs, answers: &mut Vec<Answer>) {
     answers.push(Answer::GoalReached);
 }
 
-/// Requests the action of a step, preceded by the reconfigurations for its designs.
+/// Requests the action of a step, preceded by the reconfigurations that its designs need.
 pub(super) fn request(beliefs: &mut Beliefs, step: PlannedStep, answers: &mut Vec<Answer>) {
     beliefs.actions += 1;
     let action = beliefs.actions;
@@ -62,8 +62,8 @@ pub(super) fn reconfigure(beliefs: &mut Beliefs, running: &mut Running, answers:
 }
 
 /// Returns `true` if the design in `pair` (function, design) must be requested for the action under way. This is the
-/// case if the function is expected to have another design, or if the action may be waiting for a design requested
-/// before.
+/// case if the function is not expected to have this design, or if the action may be waiting for another design
+/// requested before.
 pub(super) fn must_be_sent(beliefs: &Beliefs, running: &Running, pair: &(String, String)) -> bool {
     let may_wait = !running.suspended && (!running.started || running.resumed);
     let (function, design) = pair;
@@ -85,8 +85,8 @@ pub(super) fn effect(beliefs: &mut Beliefs, action: u64, command: Command, answe
     let mut supersedes: BTreeSet<u64> = replaced.iter().copied().collect();
     supersedes
         .extend(replaced.iter().filter_map(|number| outstanding.get(number)).flat_map(|old| &old.supersedes));
-    // Superseded reconfigurations without an answer may still arrive, too. A request or resumption may arrive without the
-    // last reconfiguration, which supersedes them.
+    // Superseded reconfigurations without an answer may still arrive, too. A request or resumption lists them, because
+    // it may arrive without the reconfiguration that supersedes them.
     match &command {
         Command::Reconfigure { function, .. } => supersedes.extend(beliefs.receipts.unanswered(function)),
         Command::Request { step: PlannedStep { configuration, .. } } | Command::Resume { configuration } => {
@@ -116,8 +116,9 @@ pub(super) fn effect(beliefs: &mut Beliefs, action: u64, command: Command, answe
 }
 
 /// Makes the functions of a step, and no others, the objectives of the knowledge base, grounded by the step's designs.
-/// Designs on whose availability the problem itself decides are omitted with their functions. Without a step, removes
-/// all objectives. An error of the knowledge base is added to `answers`. Does nothing without a knowledge base.
+/// Omits functions with a design that the knowledge base lacks, i.e. on whose availability the problem itself decides.
+/// Without a step, removes all objectives. Then analyzes the knowledge base and adds changes to `answers`, and also an
+/// error of the knowledge base. Does nothing without a knowledge base.
 pub(super) fn objectives(beliefs: &mut Beliefs, step: Option<&PlannedStep>, answers: &mut Vec<Answer>) {
     let mission = &beliefs.mission;
     let mut objectives_with_designs = step.map_or_else(Vec::new, |step| step.configuration.clone());
@@ -143,7 +144,7 @@ pub(super) fn suspend(beliefs: &mut Beliefs, running: Running, reason: &str, ans
     beliefs.plan = None;
     beliefs.stuck = true;
     if !running.suspended {
-        let because = format!("{reason}; no other design serves, and there is no plan without it");
+        let because = format!("{reason}; no other design can be used, and no plan exists without the action");
         effect(beliefs, running.action, Command::Suspend { because }, answers);
     }
     beliefs.running = Some(Running { suspended: true, provisional: false, ..running });

@@ -1,7 +1,7 @@
 //! Events: reports of the managed system, one JSON object per line, in the format `metaplan-events/1`.
 //!
 //! Objects in the form of `diagnostic_msgs/DiagnosticArray`, as published by the MROS observers \[1\], are accepted,
-//! too. Other input is a [`Refusal`], which changes nothing.
+//! too. Other input is refused (see [`Refusal`]) and changes nothing.
 //!
 //! \[1\] Bozhinoski et al., MROS: Runtime Adaptation For Robot Control Architectures, Advanced Robotics 36, 2022.
 
@@ -248,7 +248,7 @@ impl Observation {
         let value: Value = serde_json::from_str(text)
             .map_err(|error| Refusal::new("M301", format!("this is not JSON: {error}")))?;
         if let Some(key) = doubled_key(text) {
-            return Err(Refusal::new("M302", format!("the field `{key}` is there twice")));
+            return Err(Refusal::new("M302", format!("the field `{key}` is repeated")));
         }
         let Value::Object(mut fields) = value else {
             return Err(Refusal::new("M301", "an event is a JSON object"));
@@ -381,7 +381,8 @@ fn status(text: &str) -> Option<Status> {
     }
 }
 
-/// Returns the measurements and component statuses of a diagnostic array. Other statuses are ignored.
+/// Returns the measurements and component statuses of a diagnostic array. Malformed values become refusals in the
+/// result. Other statuses, and repetitions of a key within one status, are ignored.
 fn diagnostics(fields: &Map<String, Value>) -> Result<Vec<Result<Event, Refusal>>, Refusal> {
     let Some(statuses) = fields.get("status").and_then(Value::as_array) else {
         return Err(Refusal::new("M304", "`status` of a diagnostic array is a list"));
@@ -424,7 +425,10 @@ fn measured(attribute: &str, value: &str) -> Result<Event, Refusal> {
 
 fn component(component: &str, value: &str) -> Result<Event, Refusal> {
     let wrong = || {
-        Refusal::new("M304", format!("the status `{value}` of {component} is none; it should be {STATUSES}"))
+        Refusal::new(
+            "M304",
+            format!("the status `{value}` of {component} is not valid; it should be {STATUSES}"),
+        )
     };
     Ok(Event::Component { component: component.to_owned(), status: status(value).ok_or_else(wrong)? })
 }

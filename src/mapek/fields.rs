@@ -58,8 +58,8 @@ pub(super) fn seconds(value: &Value) -> Option<Duration> {
     number::from_json(value).and_then(|value| Duration::try_from_secs_f64(number::to_f64(&value)).ok())
 }
 
-/// Removes a field and parses its value with `read`. Returns `None` if the field is missing. The error message says
-/// that the value should be `wanted`.
+/// Removes a field and parses its value with `read`. Returns `None` if the field is missing. `wanted` describes the
+/// expected value in the error message, e.g. "the name of a component".
 pub(super) fn take<T>(
     fields: &mut Map<String, Value>,
     name: &str,

@@ -22,13 +22,14 @@ pub(super) enum Interruption {
         /// `unsolvable` if the absence of a plan is proved, and `unknown` otherwise.
         status: &'static str,
         because: String,
-        /// Minimal set of unavailable designs that blocks every plan.
+        /// Minimal set of unavailable designs that blocks every plan. Empty if not computed, or if there is no plan
+        /// even with all designs.
         blocking: Vec<String>,
     },
 }
 
 /// Decides about the action under way, given the `reason` why it may have to be interrupted. `going_on` is the plan
-/// that continues the action, and `without` the plan after its cancellation. `can_go_on` says whether the current
+/// that continues the action, and `without` the plan after its cancellation. `can_go_on` is `true` if the current
 /// designs of the action are available and its remainder is executable. `gained` is the benefit of cancelling, if it is
 /// sufficient.
 pub(super) fn weigh(
@@ -42,12 +43,16 @@ pub(super) fn weigh(
         (Some(_), Some(_)) => gained.map_or(Interruption::None, |gained| {
             let gained = number::decimal(&gained);
             Interruption::Cancel {
-                because: format!("{reason}; the mission is better without it by {gained}"),
+                because: format!("{reason}; cancelling the action improves the metric by {gained}"),
             }
         }),
         (Some(_), None) => Interruption::None,
         (None, Some(_)) => {
-            let because = if can_go_on { "no plan goes on with it" } else { "no other design serves" };
+            let because = if can_go_on {
+                "no plan exists that continues the action"
+            } else {
+                "no other design can be used"
+            };
             Interruption::Cancel { because: format!("{reason}; {because}") }
         }
         (None, None) if can_go_on => Interruption::None,
@@ -91,10 +96,10 @@ mod tests {
             blocking: vec!["fd_a".to_owned()],
         };
         check(false, true, true, None, &Interruption::None);
-        check(false, true, true, Some(3), &cancel("the mission is better without it by 3"));
+        check(false, true, true, Some(3), &cancel("cancelling the action improves the metric by 3"));
         check(false, true, false, None, &Interruption::None);
-        check(false, false, true, None, &cancel("no other design serves"));
-        check(true, false, true, None, &cancel("no plan goes on with it"));
+        check(false, false, true, None, &cancel("no other design can be used"));
+        check(true, false, true, None, &cancel("no plan exists that continues the action"));
         check(true, false, false, None, &Interruption::None);
         check(false, false, false, None, &suspend);
     }

@@ -23,7 +23,8 @@ pub(super) enum Live {
     #[default]
     Untried,
     Unsuited,
-    /// Planner built for one problem. Also accepts problems that differ only in initial values and available designs.
+    /// Planner built for one problem. Also accepts other problems, e.g. if they differ only in initial values and
+    /// available designs.
     Ready(Replanner),
 }
 
@@ -103,7 +104,7 @@ impl Live {
 }
 
 /// Returns the outcome that proves the absence of a plan. `blocking` is a set of unavailable designs that blocks every
-/// plan.
+/// plan. It is empty if not computed, or if there is no plan even with all designs.
 fn none(blocking: Vec<String>) -> Outcome {
     Outcome {
         steps: None,

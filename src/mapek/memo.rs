@@ -1,8 +1,8 @@
-//! Cache of optimal plans for recurring situations: components that fail and recover, and measurements that oscillate
-//! around a bound.
+//! Cache of proved outcomes of planning (optimal plans, or the absence of a plan) for recurring situations: components
+//! that fail and recover, and measurements that oscillate around a bound.
 //!
-//! A plan that is proved optimal depends only on the situation. Therefore, the cached plan equals the plan of a new
-//! search.
+//! An outcome that is proved for a planning problem also holds for an equal planning problem, so that no new search is
+//! needed.
 
 use std::collections::VecDeque;
 

@@ -43,7 +43,7 @@ impl Loop {
             let waiting = former.mission.knowledge().map(Knowledge::waiting);
             base.set_waiting(waiting.cloned().unwrap_or_default());
         }
-        // The filters continue from what the robot has reported.
+        // The filters start from the values and statuses that the robot has reported; held reports are lost.
         beliefs.filters = self.monitor.filters().states(beliefs.mission.knowledge());
         let init = merged(
             &initial.beliefs.mission.problem().init,
@@ -81,8 +81,8 @@ impl Loop {
     }
 }
 
-/// Merges initial states: elements in which `robot` differs from `former` replace those of `new`. Timed elements are
-/// those of `new`.
+/// Merges initial states: elements in which `robot` differs from `former` replace those of `new`. An element of
+/// `former` that `robot` lacks is removed. Timed elements are those of `new`.
 fn merged(
     former: &[InitialElement],
     robot: &[InitialElement],

@@ -1,14 +1,16 @@
 //! The adaptation loop: Monitor, Analyze, Plan, Execute over shared Knowledge (MAPE-K) \[1, 2\].
 //!
 //! A [`Loop`] receives [`Observation`]s and returns [`Answer`]s. Some answers are [`Effect`]s: requests to the managed
-//! system. The loop has no clock, thread, file or global state: the same observations at the same times produce the
-//! same answers. [`drive`] connects the loop to an [`Observer`], an [`Effector`] and a [`Clock`].
+//! system. The loop has no thread, file or global state, and receives the time with each observation. The same
+//! observations at the same times produce the same answers, unless a search ends at its time limit. [`drive`] connects
+//! the loop to an [`Observer`], an [`Effector`] and a [`Clock`].
 //!
 //! The loop replans if the current plan cannot be kept: the plan uses an unavailable design, an objective is in error,
 //! an action has failed, the goal has changed, or the validator rejects the plan in the current state (Algorithm 1 of
-//! \[2\]). The loop also replans if a design becomes available again, and adopts the new plan if its benefit is at
-//! least the minimum benefit of the mission. The loss of a design that the plan does not use is no reason to replan,
-//! because losing alternatives cannot improve the optimum.
+//! \[2\]). The loop also searches for a better plan some time after a design has become available again or facts have
+//! changed. It adopts this plan if its benefit is at least the minimum benefit of the mission. If the current plan is
+//! proved optimal, the loss of a design that the plan does not use is no reason to replan: losing alternatives cannot
+//! improve the optimum.
 //!
 //! - \[1\] J. Kephart, D. Chess: The vision of autonomic computing, Computer 36, 2003.
 //! - \[2\] Bozhinoski et al., MROS: Runtime Adaptation For Robot Control Architectures, Advanced Robotics 36, 2022.

@@ -4,7 +4,6 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 
 use num_rational::BigRational;
 use ontology::vocab::local_name;
-use pddl::ast::{InitialElement, Name, Term};
 use pddl::validate::{Advance, advance};
 use rules::{Delta, Fact};
 
@@ -66,8 +65,8 @@ impl Monitor {
         &self.filters
     }
 
-    /// Applies reports that filters have held back and that are due now. Returns refusals of reports that do not fit
-    /// the mission.
+    /// Applies the changes of belief that filters make because of the time, e.g. reports that were held back and are
+    /// due now. Returns refusals of changes that do not fit the mission.
     pub(super) fn elapse(&mut self, beliefs: &mut Beliefs, changes: &mut Changes) -> Vec<Refusal> {
         let due = self.filters.elapse(&mut beliefs.filters, beliefs.now, &mut changes.filtered);
         let mut update = BeliefUpdate { monitor: self, beliefs, changes };
@@ -132,8 +131,10 @@ impl BeliefUpdate<'_> {
             Event::Fact { name, value } => self.fact(name, value),
             Event::Acknowledged { effect } => self.acknowledged(*effect),
             Event::ObjectiveAdded { .. } | Event::ObjectiveRemoved { .. } => {
-                let text =
-                    format!("`{}` goes with `run --configure`; here the plan needs functions", event.kind());
+                let text = format!(
+                    "`{}` requires `run --configure`; here the plan determines the required functions",
+                    event.kind()
+                );
                 Err(Refusal::new("M306", text))
             }
             Event::Tick | Event::Note { .. } => Ok(()),
@@ -143,7 +144,7 @@ impl BeliefUpdate<'_> {
     /// Updates the knowledge base with a report about the individual `name`. `kind` is the noun for error messages.
     pub(super) fn report(&mut self, kind: &str, name: &str, report: RobotReport) -> Result<(), Refusal> {
         let Some(knowledge) = self.beliefs.mission.knowledge_mut() else {
-            let text = format!("there is no knowledge base that has a {kind} `{name}`");
+            let text = format!("without a knowledge base there is no {kind} `{name}`");
             return Err(Refusal::new("M306", text));
         };
         let was_known = knowledge.fault().is_none();
@@ -154,12 +155,14 @@ impl BeliefUpdate<'_> {
 
     fn acknowledged(&mut self, effect: u64) -> Result<(), Refusal> {
         match self.beliefs.acknowledge(effect) {
-            Receipt::Unknown => Err(Refusal::new("M305", format!("there was no effect {effect}"))),
+            Receipt::Unknown => {
+                Err(Refusal::new("M305", format!("no effect with the number {effect} was requested")))
+            }
             Receipt::Recorded => Ok(()),
             Receipt::Doubtful(function) => {
                 let running = self.beliefs.running.as_ref();
                 if running.is_some_and(|running_action| running_action.step.design(&function).is_some()) {
-                    self.changes.reasons.push(format!("it is not certain which design {function} has"));
+                    self.changes.reasons.push(format!("the current design of {function} is uncertain"));
                 }
                 Ok(())
             }
@@ -171,14 +174,15 @@ impl BeliefUpdate<'_> {
     /// effect.
     fn failed_reconfiguration(&mut self, effect: u64) -> Result<(), Refusal> {
         if self.beliefs.mission.knowledge().is_none() {
-            return Err(Refusal::new("M306", "there is no knowledge base that has designs"));
+            return Err(Refusal::new("M306", "without a knowledge base there are no designs"));
         }
         match self.beliefs.reconfiguration_failed(effect) {
             Failure::Design(design) => self.report("design", &design, RobotReport::Design(false)),
             Failure::Stale => Ok(()),
-            Failure::NotReconfiguration => {
-                Err(Refusal::new("M305", format!("no reconfiguration {effect} was asked for")))
-            }
+            Failure::NotReconfiguration => Err(Refusal::new(
+                "M305",
+                format!("no reconfiguration with the number {effect} was requested"),
+            )),
         }
     }
 
@@ -220,7 +224,7 @@ impl BeliefUpdate<'_> {
     }
 
     /// Records in `changes` which conclusions and plan inputs are affected by a delta of the knowledge base.
-    /// `was_known` says whether the conclusions were complete before.
+    /// `was_known` is `true` if the conclusions were complete before.
     fn record_delta(&mut self, delta: &Delta, was_known: bool) {
         let Some(knowledge) = self.beliefs.mission.knowledge() else { return };
         let is_known = knowledge.fault().is_none();
@@ -267,8 +271,9 @@ impl BeliefUpdate<'_> {
         Ok(running)
     }
 
-    /// Removes and returns the action under way, or returns a refusal if it has another number. The effects of this
-    /// action and of earlier ones are no longer outstanding, except reconfigurations, which belong to functions.
+    /// Removes and returns the action under way, or returns a refusal if no action with this number is under way. The
+    /// effects of this action and of earlier ones are no longer outstanding, except reconfigurations, which belong to
+    /// functions.
     fn end(&mut self, action: u64) -> Result<Running, Refusal> {
         self.running(action)?;
         let is_moot = |effect: &Effect| {
@@ -299,7 +304,9 @@ impl BeliefUpdate<'_> {
         self.beliefs.failures = None;
         if running.cancelling || running.suspended {
             let expected_end = if running.cancelling { "cancelled" } else { "suspended" };
-            self.changes.reasons.push(format!("action {action} was to be {expected_end}, but has succeeded"));
+            self.changes
+                .reasons
+                .push(format!("action {action} should have been {expected_end}, but has succeeded"));
         }
         Ok(())
     }
@@ -350,11 +357,8 @@ impl BeliefUpdate<'_> {
         let mut words = name.split_whitespace();
         let name = words.by_ref().collect::<Vec<_>>().join(" ");
         if !self.beliefs.mission.is_function(&name) {
-            let predicate = name.split(' ').next().unwrap_or(&name).to_owned();
-            let before = self.facts(&predicate);
-            self.set(&name, value)?;
             // A report of a known fact is not a change.
-            if self.facts(&predicate) != before {
+            if self.set(&name, value)? {
                 self.changes.predicates = true;
                 self.changes.facts = true;
             }
@@ -370,35 +374,23 @@ impl BeliefUpdate<'_> {
         Ok(())
     }
 
-    fn facts(&self, predicate: &str) -> BTreeSet<Vec<String>> {
-        let predicate = Name::new(predicate);
-        let word = |term: &Term| match term {
-            Term::Constant(identifier) | Term::Variable(identifier) => identifier.name.to_string(),
-        };
-        let words = |element: &InitialElement| match element {
-            InitialElement::Fact(atom) if atom.predicate.name == predicate => {
-                Some(atom.arguments.iter().map(word).collect())
-            }
-            _ => None,
-        };
-        self.beliefs.mission.problem().init.iter().filter_map(words).collect()
-    }
-
-    /// Sets a fact or a value of the problem. The previous state is restored if the result does not fit the domain.
-    fn set(&mut self, name: &str, value: &str) -> Result<(), Refusal> {
+    /// Sets a fact or a value of the problem. Returns `true` if this changes the believed state. If the result does
+    /// not fit the domain, restores the previous state and returns a refusal.
+    fn set(&mut self, name: &str, value: &str) -> Result<bool, Refusal> {
         let mission = &mut self.beliefs.mission;
-        let before = mission.problem().init.clone();
-        mission.set_in_problem(name, value).map_err(|message| fault(&message))?;
         let key = if mission.is_function(name) { name.to_owned() } else { format!("{name} {value}") };
-        if self.monitor.checked.contains(&key) {
-            return Ok(());
+        let is_checked = self.monitor.checked.contains(&key);
+        let before = if is_checked { Vec::new() } else { mission.problem().init.clone() };
+        let is_change = mission.set_in_problem(name, value).map_err(|message| fault(&message))?;
+        if is_checked || !is_change {
+            return Ok(is_change);
         }
         if let Err(messages) = mission.filled() {
             mission.set_init(before);
             return Err(first(&messages));
         }
         self.monitor.checked.insert(key);
-        Ok(())
+        Ok(true)
     }
 }
 

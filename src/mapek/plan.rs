@@ -1,4 +1,5 @@
-//! Plan (of MAPE-K): computes an optimal plan of actions and designs, or the reason for its absence.
+//! Plan (of MAPE-K): computes an optimal plan of actions and designs, or the best one found in time. Without a plan,
+//! gives the reason for its absence.
 //!
 //! During replay, plans are read from the journal and not computed again, because a search that ends at a time limit is
 //! not reproducible.
@@ -25,8 +26,8 @@ const MAX_DOUBLINGS: u32 = 3;
 pub(crate) struct Planner {
     /// Time limit of one search for a plan; `None` for no limit.
     pub time_limit: Option<Duration>,
-    /// Number of consecutive searches that reached their time limit. Each doubles the next time limit, up to
-    /// `MAX_DOUBLINGS` times.
+    /// Number of consecutive searches before this one that ended without a proved outcome, e.g. at their time limit.
+    /// Each doubles the time limit, up to [`MAX_DOUBLINGS`] times.
     pub attempt: u32,
     /// Limits in addition to the time limit of one search.
     pub limits: Limits,
@@ -66,9 +67,9 @@ impl Planner {
         outcome
     }
 
-    /// Removes the next outcome computed by another thread. Returns `None` if the outcome is about a different action
-    /// under way. If the situation has changed, for example by progress of the action, the plan is not reported as
-    /// optimal.
+    /// Removes and returns the next outcome computed by another thread. Returns `None` if there is none, or if the
+    /// outcome is about a different action under way. If the situation has changed, for example by progress of the
+    /// action, the plan is not reported as optimal.
     fn prepared(&mut self, question: &Question<'_>) -> Option<Outcome> {
         let (answered, mut outcome) = self.prepared.pop_front()?;
         if !answered.has_same_action(question) {
@@ -128,6 +129,6 @@ pub(super) fn from_scratch(question: &Question<'_>, limits: Limits, watch: &Watc
             blocking: Vec::new(),
         },
         (Status::Unsolvable, None) => no_plan(true, "no plan reaches the goal".to_owned()),
-        _ => no_plan(false, "the time limit came before any plan".to_owned()),
+        _ => no_plan(false, "the time limit was reached before a plan was found".to_owned()),
     }
 }

@@ -22,7 +22,8 @@ use crate::mapek::monitor::Changes;
 use crate::mapek::settings::{SafeReaction, Settings};
 use crate::mapek::step::PlannedStep;
 
-/// Reconfigures or suspends the action under way if the action cannot continue unchanged.
+/// Reconfigures or suspends the action under way if it cannot continue unchanged, and adds the reason to the
+/// interruptions in `changes`. Does nothing if the action is already suspended or being cancelled.
 pub(super) fn react(
     beliefs: &mut Beliefs,
     settings: &Settings,
@@ -53,8 +54,8 @@ pub(super) fn react(
     changes.interruptions.push(reason);
 }
 
-/// Returns the reason why the action under way cannot continue unchanged, or `None` if it can. `facts` says whether
-/// facts in its conditions may have changed.
+/// Returns the reason why the action under way cannot continue unchanged, or `None` if it can. `facts` is `true` if
+/// facts in its conditions may have changed; otherwise only its designs are checked.
 pub(super) fn trouble(beliefs: &Beliefs, running: &Running, facts: bool) -> Option<String> {
     let lost = running.step.configuration.iter().find(|(_, design)| !beliefs.is_available(design));
     if let Some((_, design)) = lost {

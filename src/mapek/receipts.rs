@@ -44,8 +44,8 @@ pub(super) struct Acknowledged {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Before {
     pub(super) design: String,
-    /// Effect number of the reconfiguration that had set this design; `None` if the design was observed without a
-    /// request.
+    /// Effect number of the reconfiguration that had set this design; `None` if it is unknown or failed later, or if
+    /// the design was observed without a request.
     pub(super) effect: Option<u64>,
 }
 

@@ -16,7 +16,7 @@ use crate::mapek::sequence::Numbers;
 use crate::mapek::step::{PlannedStep, configuration_from_record};
 use crate::message::Message;
 
-/// Answers to one observation, with the plans computed for them, as stored in the journal.
+/// Answers of one reaction or deliberation, with the plans computed for them, as stored in the journal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Decision {
     /// Answers, as JSON objects of the loop's output.
@@ -26,9 +26,8 @@ pub struct Decision {
 }
 
 impl Decision {
-    /// Returns `true` if the answers equal `written`, the recorded answers to the same observation, apart from
-    /// explanations. Explanations are not compared because the choice among several correct ones depends on events
-    /// before the snapshot.
+    /// Returns `true` if the answers equal `written`, the recorded answers, apart from explanations. Explanations are
+    /// not compared because the choice among several correct ones depends on events before the snapshot.
     pub fn agrees(&self, written: &[Value]) -> bool {
         let essence = |answers: &[Value]| answers.iter().cloned().map(essence).collect::<Vec<_>>();
         essence(&self.answers) == essence(written)

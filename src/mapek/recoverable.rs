@@ -23,7 +23,8 @@ pub trait Recoverable {
     /// Returns the reaction to a journal that cannot be written.
     fn unrecorded(&self) -> Unrecorded;
 
-    /// Returns `true` if a decision is pending: the loop has not begun, or has not deliberated since its last reaction.
+    /// Returns `true` if a decision is pending: the loop has not begun, or its reactions since the last deliberation
+    /// have left a decision open.
     fn has_agenda(&self) -> bool;
 
     /// Reacts to an observation; `now` is the time since the start.
@@ -44,8 +45,8 @@ pub trait Recoverable {
     /// Deliberates with the recorded `plans` instead of a search.
     fn deliberate_again(&mut self, plans: &[Value]) -> Vec<Self::Answer>;
 
-    /// Returns the journal's record of a step: the answers, and the plans computed for them. The journal calls this
-    /// once after each step.
+    /// Returns the journal's record of a reaction or deliberation: its answers, and the plans computed for them. Called
+    /// once after each of them.
     fn decision(&mut self, answers: &[Self::Answer]) -> Decision;
 
     /// Returns the effects that were not acknowledged, for repetition after a restart.

@@ -2,11 +2,11 @@
 //! remainder of this action, under any designs.
 //!
 //! The paper (see [`crate::mapek`]) plans from the state in which the action has ended. Here, planning starts in the
-//! current state, with the remainder of the action as the first step, so that the designs of all remaining steps are
-//! chosen together. A copy of the action's schema fixes all arguments except designs. Its duration, increases and
-//! decreases are scaled to the remainder. The copy adds a gate fact that all other actions require. A condition of the
-//! action may mention a value that the action changes. In such conditions, the past changes are subtracted from the
-//! value, which restores the value before the action.
+//! current state, with the remainder of the action as the first step. So the designs of all remaining steps are chosen
+//! together. A copy of the action's schema fixes all arguments except designs. Its duration, increases and decreases
+//! are scaled to the remainder. The copy adds a gate fact that all other actions require. A condition of the action may
+//! mention a value that the action changes. In such conditions, except those at the end, the past changes are
+//! subtracted from the value, which restores the value before the action.
 
 use num_rational::BigRational;
 use pddl::ast::{
@@ -20,7 +20,7 @@ use crate::mapek::step::PlannedStep;
 /// 1/`LEAST_LEFT` of its duration to go. The share is below the resolution of progress, 1/100.
 const LEAST_LEFT: u32 = 1000;
 
-/// Predicate that holds once the action under way has ended. No input file declares it.
+/// Predicate that holds once the action under way has ended. Input files are assumed not to declare it.
 pub(super) const GATE: &str = "metaplan_resumed";
 
 /// Returns `domain` with the gate and, as the first action, a copy of the schema of `running` that is shortened to the
@@ -48,7 +48,7 @@ pub(crate) fn resume(domain: &Domain, running: &PlannedStep, done: &BigRational)
         // The gate opens only once, so that the remainder occurs exactly once.
         require(&mut copy, Condition::Not(Box::new(Condition::Atom(gate()))));
         open(&mut copy);
-        // Among schemas with the same name, the first applicable one is used.
+        // The copy comes first: among schemas with the same name, the first applicable one is used.
         gated.actions.insert(0, copy);
     }
     gated

@@ -10,10 +10,10 @@ use crate::mapek::monitor::BeliefUpdate;
 use crate::message::did_you_mean;
 
 impl BeliefUpdate<'_> {
-    /// Applies a report that a function has a design without a request of the loop; `None` if it has no design. The
-    /// function has this design from now on, and so has the action under way, unless a reconfiguration is pending. The
-    /// loop later considers another design in the same way as after a design has become available. If the action under
-    /// way has lost its design, a new plan is needed.
+    /// Applies a report that a function has a design, or has none (`None`), without a request of the loop. The report
+    /// is believed from now on. Unless a reconfiguration of the function is pending, the action under way adopts the
+    /// reported design. The loop then searches for a better plan later, as if a design had become available. If the
+    /// function has no design, but the action under way needs one, a new plan is needed.
     pub(super) fn observed(&mut self, function: &str, design: Option<&str>) -> Result<(), Refusal> {
         let designs = self.beliefs.mission.designs_of(function);
         if designs.is_empty() {
@@ -56,7 +56,7 @@ impl BeliefUpdate<'_> {
             let action = running.action;
             self.changes
                 .reasons
-                .push(format!("{function} has no design any more, and action {action} needs it"));
+                .push(format!("{function} no longer has a design, but action {action} needs {function}"));
         }
         Ok(())
     }

@@ -60,7 +60,8 @@ impl Numbers {
             Classification::Stale(mark) => Some(Answer::Stale { sequence, mark }),
             Classification::Ahead(limit) => {
                 let text = format!(
-                    "`seq` is {sequence}, but may be {limit} at most: numbers grow from line to line, and skip a million at most"
+                    "`seq` is {sequence}, but may be at most {limit}: numbers increase from line to line by at \
+                     most a million"
                 );
                 Some(Answer::Error { code: "M307".to_owned(), message: text })
             }

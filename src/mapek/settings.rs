@@ -88,10 +88,11 @@ struct Section {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum SafeReaction {
-    /// Other available designs if what is left of the action can be done with them; a standstill otherwise.
+    /// Request other available designs with which the rest of the action can be executed. Without such designs,
+    /// suspend the action.
     #[default]
     Reconfigure,
-    /// A standstill.
+    /// Suspend the action.
     Suspend,
 }
 
@@ -110,7 +111,8 @@ impl AdaptationSection {
     /// Returns the settings, with defaults for missing keys.
     ///
     /// # Errors
-    /// A value is not a number, is negative, or is too long for a duration.
+    /// The first value that is not a number, is negative where it must not be, or is too long for a duration; or a
+    /// `maximum` below its `minimum`.
     pub fn settings(&self, origin: &ManifestPath) -> Result<Settings, Message> {
         let filters = filters(&self.confirm_time, &self.heal_time, &self.components, &self.measured, origin)?;
         let (stay_close, safe_reaction, unrecorded) = (self.stay_close, self.safe_reaction, self.unrecorded);
@@ -157,9 +159,11 @@ pub struct Settings {
     /// Minimum benefit of a new plan over a valid current plan, in the metric's unit. With 0, any benefit is
     /// sufficient.
     pub minimum_benefit: BigRational,
-    /// Time for which a design must be available again before a better plan is sought. Default: 5 s.
+    /// Time for which a design must be available again, or that must pass after a change of facts, before a better plan
+    /// is sought. Default: 5 s.
     pub settle: Duration,
-    /// Time limit of one search for a plan. At the limit, the incumbent is used. Default: 10 s.
+    /// Time limit of one search for a plan. At the limit, the best plan found is used. A repetition after a search
+    /// without a proved outcome has twice the limit of that search, at most 8 times this limit. Default: 10 s.
     pub time_limit: Option<Duration>,
     /// Whether to prefer, among optimal plans of equal length, one that shares most steps with the current plan. The
     /// choice then depends on the history, and not only on the situation.
@@ -189,8 +193,8 @@ impl Settings {
     /// in the file must occur in `knowledge`.
     ///
     /// # Errors
-    /// The file cannot be read or contains errors. Unknown keys and unknown names are all returned; of the wrong
-    /// numbers, only the first.
+    /// The file cannot be read or contains errors. Either all unknown keys, or the first wrong value, or all unknown
+    /// names are returned.
     pub fn read(file: &Path, knowledge: Option<&Knowledge>) -> Result<Self, Errors> {
         let (section, origin) = manifest::read::<Section>(file)?;
         let settings = section.adaptation.settings(&origin)?;
@@ -215,9 +219,10 @@ impl Settings {
     pub(crate) fn doubts(&self, knowledge: Option<&Knowledge>) -> Vec<Message> {
         let mut doubts = self.filters.doubts(knowledge);
         if self.settle.is_zero() && knowledge.is_some() {
-            let text = "each design that comes back is followed by a search for a better plan at once: `settle` is 0";
+            let text = "each design that becomes available again starts a search for a better plan immediately: \
+                        `settle` is 0";
             doubts.push(
-                Message::warning("M144", text).with_help("set `settle` in `[adaptation]` to some seconds"),
+                Message::warning("M144", text).with_help("set `settle` in `[adaptation]` to a few seconds"),
             );
         }
         doubts
@@ -301,5 +306,5 @@ const SETTLE: Duration = Duration::from_secs(5);
 
 const DEADLINE: Duration = Duration::from_secs(10);
 
-/// Default time limit of one search for a plan. The robot waits during planning.
+/// Default time limit of one search for a plan. The robot may wait during planning.
 const TIME_LIMIT: Duration = Duration::from_secs(10);

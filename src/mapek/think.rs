@@ -101,8 +101,8 @@ impl Loop {
     }
 
     /// Runs [`Loop::deliberate`] with the plans in `thoughts`. Returns `None` and leaves the loop unchanged if planning
-    /// was interrupted, if the planning problem has changed since, or if a plan is missing or does not fit the
-    /// situation. With `is_late`, plans for an earlier planning problem are accepted, too.
+    /// was interrupted, or if a plan is missing or does not fit the situation. Unless `is_late` is `true`, this is also
+    /// the case if the planning problem has changed since.
     pub fn deliberate_with(&mut self, thoughts: Thoughts, is_late: bool) -> Option<Vec<Answer>> {
         if thoughts.is_stopped || !self.is_answered_by(&thoughts) && !is_late {
             return None;

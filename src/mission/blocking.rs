@@ -34,12 +34,12 @@ impl fmt::Display for Blocking {
         match self {
             Self::Designs(designs) => write!(
                 f,
-                "it is for designs that are not available: there is no plan without {}; with any one of them, and all \
-                 others, there would be",
+                "unavailable designs are the cause: there is no plan without {}; with all other designs, any one of \
+                 these would be sufficient",
                 designs.join(", ")
             ),
             Self::Other => {
-                f.write_str("it is not for designs: with all of them available there would be none either")
+                f.write_str("designs are not the cause: no plan exists even if all designs are available")
             }
         }
     }
@@ -71,8 +71,8 @@ pub fn blocking(mission: &Mission, problem: &Problem, config: &Config) -> Option
     Some(Blocking::Other)
 }
 
-/// Returns `true` if there is a plan when the designs in `available` are available in addition to the present ones.
-/// `None` if the planner cannot decide this within the limits.
+/// Returns `true` if there is a plan when the designs in `available` are available in addition to those that are
+/// available now. `None` if the planner cannot decide this within the limits.
 fn solvable_with(
     mission: &Mission,
     problem: &Problem,

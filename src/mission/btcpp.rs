@@ -1,10 +1,10 @@
 //! Exports a plan as a behaviour tree of BehaviorTree.CPP 4: a sequence of actions, with the
 //! changes of designs between them.
 //!
-//! An action is a node with the name of its schema and a port for each parameter. A node
-//! `ChangeMode` activates a design before the first action that needs it. Its ports are
-//! `service_name`, the `system_modes` service of the function, and `mode_name`. `TreeNodesModel`
-//! declares all nodes, as Groot2 requires.
+//! An action is a node with the name of its schema and a port for each parameter. Before an action that needs another
+//! design of a function than the one chosen last, a node `ChangeMode` activates this design. Its ports are
+//! `service_name`, the `system_modes` service of the function, and `mode_name`. `TreeNodesModel` declares all nodes, as
+//! Groot2 requires.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;

@@ -60,8 +60,8 @@ pub fn function(mission: &Mission, text: &str) -> Result<Atom, Vec<Fault>> {
     Err(vec![Fault { offset: None, message: Message::error("M135", text) }])
 }
 
-/// Checks a setting that [`Mission::set`] has accepted. Returns a message if the objects in its
-/// name do not exist or have wrong types.
+/// Checks a setting that [`Mission::set`] has accepted. Returns a message if the objects in its name or value do not
+/// exist or have wrong types.
 pub(super) fn setting(mission: &Mission, name: &str, value: &str) -> Option<Message> {
     if mission.knowledge().is_some_and(|knowledge| knowledge.has_attribute(name.trim())) {
         return None;

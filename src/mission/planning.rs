@@ -23,7 +23,7 @@ pub trait Planning {
     /// metric.
     ///
     /// # Errors
-    /// All constructs that the planner does not support, or a limit that was reached.
+    /// Constructs or numbers that the planner does not support, or a limit that was reached.
     fn ground(&self, problem: &Problem, objectives: &[Metric], limits: &Limits) -> Result<Task, Errors>;
 
     /// Grounds a problem as [`Planning::ground`] does, but with exact rationals, so that numbers of
@@ -42,7 +42,7 @@ pub trait Planning {
     /// (starts and ends of actions) are at least `separation` apart, in the domain's time unit.
     ///
     /// # Errors
-    /// All constructs that the planner does not support, with their places; or a limit that was reached.
+    /// Constructs or numbers that the planner does not support, or a limit that was reached.
     fn ground_concurrent(
         &self,
         problem: &Problem,

@@ -1,5 +1,4 @@
-//! Converts plans to the format of PlanSys2: actions with start and duration in seconds, as the
-//! planner POPF writes them.
+//! Converts plans to the format of PlanSys2: actions with start and duration, as the planner POPF writes them.
 //!
 //! PlanSys2 orders actions only by their times. So an action has to begin strictly after the end of
 //! its predecessor, and no action may have the duration 0. As in POPF, the smallest difference
@@ -25,8 +24,8 @@ pub struct PlanLine {
     pub duration: Exact,
 }
 
-/// Delays actions so that the end of an action and each later start are at least a thousandth apart, and so that equal
-/// actions start at different times. Returns the given plan if the delayed plan is invalid, or if a limit is reached.
+/// Delays actions so that each action that starts after the end of another starts at least a thousandth after it. Equal
+/// actions get different starts. Returns the given plan if the delayed plan is invalid, or if a limit is reached.
 #[must_use]
 pub fn spaced(mission: &Mission, problem: &Problem, plan: Plan, reading: &Reading, limits: &Limits) -> Plan {
     let mut later = plan.clone();
@@ -52,7 +51,8 @@ pub fn spaced(mission: &Mission, problem: &Problem, plan: Plan, reading: &Readin
     if verdict.is_ok_and(|verdict| verdict.violation.is_none()) { later } else { plan }
 }
 
-/// Converts a plan to lines for PlanSys2. The plan's arguments must be as in the domain's file.
+/// Converts a plan to lines for PlanSys2; a duration of 0 becomes a thousandth. The plan's arguments must be those of
+/// the domain's file, without the designs that the knowledge base has added.
 pub fn plan_lines(plan: &Plan) -> Vec<PlanLine> {
     let line = |step: &Step| {
         let (start, duration) = step.times();

@@ -112,7 +112,7 @@ impl fmt::Display for TimeUnit {
 /// individuals.
 #[derive(Debug, Clone, Default)]
 pub struct BindingsSection {
-    /// Query of each bound PDDL symbol, in addition to the default bindings.
+    /// Query of each bound PDDL symbol, in addition to the default bindings or in place of them.
     symbols: BTreeMap<String, Spanned<String>>,
     /// Individuals with the names of their objects in PDDL. The span of an individual is its
     /// position in the manifest.
@@ -267,11 +267,11 @@ impl Mistake {
 }
 
 impl<S> Scenario<S> {
-    /// Applies the settings of the scenario to a mission. Settings that do not fit the mission are
-    /// omitted.
+    /// Applies the settings of the scenario to a mission. A setting that does not fit the mission does not prevent the
+    /// others.
     ///
     /// # Errors
-    /// All settings that do not fit the mission.
+    /// All settings that do not fit the mission; see [`Scenario::mistakes`].
     pub fn apply(&self, mission: &mut Mission) -> Result<(), Errors> {
         Errors::unless_empty(self.mistakes(mission).into_iter().map(|mistake| mistake.message))
     }
@@ -303,8 +303,8 @@ impl<S> Scenario<S> {
     }
 }
 
-/// Sets a value of a mission by name. Returns the mistake in the setting, if any; `path` gives its
-/// keys in the manifest.
+/// Sets a value of a mission by name. Returns the mistake in the setting, if any; the value may be set nevertheless.
+/// `path` gives the keys of the setting in the manifest.
 pub fn setting(
     mission: &mut Mission,
     name: &str,

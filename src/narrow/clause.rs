@@ -1,5 +1,5 @@
-//! Converts derived predicates of a domain to clauses: a head, and a conjunction of atoms,
-//! equalities and inequalities.
+//! Clauses of derived predicates: a head, and a body that is a conjunction of atoms and inequalities. Converts
+//! axioms of a domain to clauses, and replaces atoms in the body of a clause by their definitions (unfolding).
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -145,8 +145,8 @@ pub(super) fn operand(term: &Term) -> Operand {
 }
 
 impl Clause {
-    /// Returns `true` if each variable of the clause occurs in an atom that is not a type test. The
-    /// extension is then small, independent of the number of objects.
+    /// Returns `true` if each variable of the clause occurs in an atom that is not a type test. The facts of
+    /// these atoms then limit what the clause derives, however many objects there are.
     pub fn is_bound(&self) -> bool {
         let atoms = self.body.iter().filter(|part| matches!(part, Literal::Holds(..)) && !part.is_type());
         let bound: BTreeSet<&Operand> = atoms.flat_map(Literal::operands).collect();
@@ -154,8 +154,8 @@ impl Clause {
         operands.into_iter().all(|operand| matches!(operand, Operand::Constant(_)) || bound.contains(operand))
     }
 
-    /// Eliminates equalities by substitution, and removes repeated conjuncts. Returns `None` if the
-    /// body is unsatisfiable.
+    /// Eliminates equalities by substitution, and removes repeated conjuncts and true inequalities of
+    /// constants. Returns `None` if an equality or inequality can never hold, e.g. `a = b` for two constants.
     fn resolved(mut self) -> Option<Self> {
         while let Some(at) = self.body.iter().position(|part| matches!(part, Literal::Equal(true, ..))) {
             let Literal::Equal(_, left, right) = self.body.remove(at) else { continue };
@@ -203,9 +203,9 @@ impl Clause {
         }
     }
 
-    /// Replaces the conjunct at position `at` by the body of the clause `by`, whose head unifies
-    /// with it. The variables of `by` are renamed with the suffix `depth`. Returns `None` if the
-    /// two do not unify.
+    /// Replaces the atom at position `at` of the body by the body of `by`, a clause for the atom's predicate.
+    /// The variables of `by` are renamed with the suffix `~depth`. Returns `None` if the atom and the head of
+    /// `by` do not unify, or if the result contains an inequality that can never hold.
     pub fn unfolded(&self, at: usize, by: &Self, depth: usize) -> Option<Self> {
         let Literal::Holds(_, operands_of_atom) = &self.body[at] else { return None };
         let operands = by.body.iter().flat_map(Literal::operands).chain(&by.arguments);

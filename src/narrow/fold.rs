@@ -1,9 +1,9 @@
-//! Partial evaluation of derived predicates: predicates that no action can change become initial
-//! facts.
+//! Partial evaluation of derived predicates: predicates that no action can change become initial facts. Other
+//! derived predicates get upper bounds, where possible.
 //!
-//! The clauses of settled predicates, which no action can change (`settle`), have no negated atoms.
-//! Their extension is therefore the least fixpoint over the stated facts, the same set in every state. It
-//! is computed by naive evaluation; each clause matches its most restrictive atoms first.
+//! The clauses of settled predicates, which no action can change (`settle`), have no negated atoms. Their
+//! extension is therefore the least fixpoint over the initial facts, the same set in every state. It is
+//! computed by repeated evaluation of the clauses; each clause matches its most restrictive atoms first.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
@@ -22,10 +22,11 @@ pub(super) struct Folded {
 }
 
 impl Folded {
-    /// Settles as many predicates as possible, i.e. determines their facts, which no action can change. Candidates are
-    /// the predicates in `vocabulary_of_base`, and predicates whose axioms mention only candidates and bind all their
-    /// variables. `changed` contains the predicates that actions or timed initial literals change, `timed` those that
-    /// timed initial literals change.
+    /// Determines which derived predicates of the domain are settled, i.e. no action can change them, and which
+    /// others get an upper bound. Candidates for both are the predicates in `vocabulary_of_base`, and
+    /// predicates whose axioms mention only candidates and bind all their variables. `changed` contains the
+    /// predicates that actions or timed initial literals change, `timed` those that timed initial literals
+    /// change.
     pub fn new(
         domain: &Domain,
         (changed, timed): (&BTreeSet<Name>, &BTreeSet<Name>),
@@ -54,9 +55,9 @@ impl Folded {
         self.possible.restrict(domain);
     }
 
-    /// Returns the facts of settled predicates, and the bounds of the other derived predicates as
-    /// facts. `stated` are the initial facts; `is_of(object, type)` returns `true` if an object has
-    /// a type.
+    /// Returns the derived facts of settled predicates, without those in `stated` (the initial facts), and the
+    /// bounds of other derived predicates as facts, e.g. `(possible-p a)`. `is_of(object, type)` returns `true`
+    /// if an object has a type.
     pub fn facts(
         &self,
         stated: &BTreeSet<Fact>,

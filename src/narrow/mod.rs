@@ -1,10 +1,9 @@
 //! Narrowing: computes a smaller task with the same plans, for the planner.
 //!
-//! The knowledge base completes a domain in PLANTA's form with hundreds of axioms, but actions
-//! change few of their conclusions. Derived predicates that no action can change become initial
-//! facts (`settle`, `fold`). Each other derived predicate gets an upper bound: a static predicate
-//! that is true wherever the derived predicate can be true (`possible`), so that grounding
-//! enumerates few objects.
+//! The knowledge base completes a domain in PLANTA's form with hundreds of axioms, but actions change few of
+//! their conclusions. Derived predicates that no action can change become initial facts (`settle`, `fold`).
+//! Other derived predicates get an upper bound where possible: a static predicate that is true wherever the
+//! derived predicate can be true (`possible`), so that grounding enumerates few objects.
 //!
 //! Only the planner uses narrowing. Messages, exports and certificates are about the task before
 //! narrowing, with which the checker compares the ground task.
@@ -25,8 +24,8 @@ use clause::Fact;
 use fold::Folded;
 use settle::Guards;
 
-/// Returns a domain and a problem with the same plans as the given ones. They are smaller if the
-/// mission's knowledge base has completed the domain, otherwise unchanged.
+/// Returns a domain and a problem with the same plans as the given ones. They are narrowed if the mission's
+/// knowledge base has completed the domain (PLANTA's form), otherwise unchanged.
 ///
 /// `domain` and `problem` may be variants of the mission's own files, with another state or goal.
 pub(crate) fn narrowed<'t>(
@@ -43,9 +42,9 @@ pub(crate) fn narrowed<'t>(
     }
 }
 
-/// Narrows the predicates in `completed`, which come from the knowledge base, and predicates
-/// derived from them. Other predicates, e.g. of maps and tasks, may have large extensions, so they
-/// remain derived and grounding handles them.
+/// Narrows the predicates in `completed`, which come from the knowledge base, and predicates whose axioms
+/// mention only narrowed predicates and bind all their variables. Other predicates, e.g. of maps and tasks, may
+/// have large extensions, so they remain derived and grounding handles them.
 fn narrow(domain: &Domain, problem: &Problem, completed: &HashSet<Name>) -> (Domain, Problem) {
     let mentioned = Mentioned::by_domain(domain).and_problem(problem);
     let facts: BTreeSet<Fact> = problem

@@ -1,11 +1,10 @@
 //! Computes upper bounds on the extensions of derived predicates in all reachable states.
 //!
-//! An open predicate, which actions can change, stays derived. Its parameters have no types, but
-//! only facts that actions add can extend it, which often leaves few candidates. So each such
-//! predicate gets a companion `possible-…`, a static predicate that is true wherever the open
-//! predicate can be true. In every state, an atom of the predicate is equivalent to its conjunction
-//! with the companion's atom. With this conjunction, grounding and the certificate checker
-//! enumerate few objects for each variable.
+//! An open predicate, which actions can change, stays derived. Its parameters have no types, but only facts
+//! that actions add can extend it, which often leaves few candidates. If its facts can be bounded, the
+//! predicate gets a companion `possible-…`: a static predicate that is true wherever the open predicate can be
+//! true. In every state, an atom of the predicate is equivalent to its conjunction with the companion's atom.
+//! With this conjunction, grounding enumerates few objects for each variable.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -100,8 +99,9 @@ impl Possible {
         self.clauses.iter()
     }
 
-    /// Returns all facts that actions may add. `fixed` are the facts that are true in every state:
-    /// stated facts that no action changes, and facts of settled predicates.
+    /// Returns the facts that actions may add, except additions with an argument that no class restricts.
+    /// `fixed` contains the initial facts and those of settled predicates. It is only searched for members of
+    /// classes, which never change.
     pub fn added(&self, fixed: &BTreeSet<Fact>) -> BTreeSet<Fact> {
         let members = |class: &Name| -> BTreeSet<Name> {
             let unary = fixed.iter().filter(|(name, row)| name == class && row.len() == 1);

@@ -138,8 +138,8 @@ fn is_bound(term: &Term, bound: &[&Name]) -> bool {
     matches!(term, Term::Variable(variable) if bound.contains(&&variable.name))
 }
 
-/// Clauses of the settled predicates, and clauses of the open predicates (`None` if an axiom is not
-/// a clause).
+/// Clauses of the settled predicates, and clauses of the open predicates (`None` if an axiom is not a clause,
+/// or if the predicate may have a large extension).
 pub(super) type Parted = (BTreeMap<Name, Vec<Clause>>, BTreeMap<Name, Option<Vec<Clause>>>);
 
 /// Unfolds clauses until no further predicate becomes settled, i.e. has only clauses without open

@@ -28,7 +28,8 @@ pub use ::planner::{
     Statistics, Status, Step, Strategy, alternatives, optimize, optimize_concurrent, optimize_exact,
 };
 
-/// Callback with a short description of the work that follows the proof of the best plan.
+/// Callback that is called before further optimal plans are searched for, with a short description of this
+/// work.
 type Stage<'a> = dyn FnMut(&str) + 'a;
 
 /// Callback for each better plan or better lower bound. `Break` ends planning.
@@ -117,8 +118,8 @@ impl<'m, 'r> Planner<'m, 'r> {
         self.limits(limits)
     }
 
-    /// Replaces the metric of the problem by objectives, the most important first. An objective is
-    /// an expression as in a metric, or the name of a numeric function.
+    /// Replaces the metric of the problem by objectives, the most important first. An objective is an
+    /// expression as in a metric, or the name of a numeric function. Without objectives, the metric is kept.
     #[must_use]
     pub fn minimize(mut self, objectives: impl IntoIterator<Item = impl Into<String>>) -> Self {
         self.minimize = objectives.into_iter().map(Into::into).collect();
@@ -133,23 +134,25 @@ impl<'m, 'r> Planner<'m, 'r> {
         self
     }
 
-    /// Requests up to `most` further plans of the optimal cost, or none if `most` is `None`.
-    /// Requires sequential plans and a single objective.
+    /// Requests up to `most` further plans of the optimal cost, or none if `most` is `None`. Requires
+    /// sequential plans, a single objective, and numbers that are not too large for integers.
     #[must_use]
     pub fn alternatives(mut self, most: impl Into<Option<usize>>) -> Self {
         self.alternatives = most.into();
         self
     }
 
-    /// Sets the callback for every better plan and better bound. If the callback returns `Break`,
-    /// planning ends with the best plan found.
+    /// Sets the callback for better plans and better bounds. If the callback returns `Break`, planning ends
+    /// with the best plan found. The search in exact rationals, for numbers that are too large for integers,
+    /// does not call it.
     #[must_use]
     pub fn on_improvement(mut self, report: impl FnMut(&Improvement) -> ControlFlow<()> + 'r) -> Self {
         self.report = Box::new(report);
         self
     }
 
-    /// Sets the callback for work that follows the proof of the best plan. It receives a short description.
+    /// Sets the callback that is called before the search for alternatives (see [`Planner::alternatives`]). It
+    /// receives a short description of this work.
     #[must_use]
     pub fn on_stage(mut self, stage: impl FnMut(&str) + 'r) -> Self {
         self.stage = Box::new(stage);
@@ -197,7 +200,7 @@ impl<'m, 'r> Planner<'m, 'r> {
         let front = planner::pareto(&task, &config, &mut self.improvement_listener());
         let reading = Reading::sequential(task.is_timed());
         for point in &front.points {
-            // No plan is shown before the validator has accepted it.
+            // A plan that the validator does not accept must not be returned.
             objectives.confirm(self.mission, &self.problem, point, &reading, &config.limits)?;
         }
         let Self { mission, problem, .. } = self;
@@ -218,7 +221,8 @@ impl<'m, 'r> Planner<'m, 'r> {
         if let Some(plan) = solution.plan.take() {
             let mut problem = self.problem.clone();
             problem.metric = objectives.metrics.first().cloned().or(problem.metric);
-            // The other half of the extended time remains for the validator.
+            // The removal of superfluous actions may take half of the extended time; the other half is for the
+            // validator.
             solution.plan = Some(lean(self.mission, &problem, plan, &reading, &limits.extended().half()));
         }
         let point = valued(solution, &objectives);
@@ -242,7 +246,7 @@ impl<'m, 'r> Planner<'m, 'r> {
         let reading = Reading::sequential(task.is_timed());
         let alternatives = match self.alternatives {
             Some(limit) => {
-                (self.stage)("the plan is proved; other plans that are as good are looked for");
+                (self.stage)("the plan is proved optimal; searching for other equally good plans");
                 self.further_plans(&task, &point.solution, limit)?
             }
             None => None,
@@ -274,8 +278,9 @@ impl<'m, 'r> Planner<'m, 'r> {
         Ok(planned)
     }
 
-    /// Computes further optimal plans, and executes each of them with the validator. Plans that are not validated
-    /// within the limits are omitted. Returns `None` if the solution has no proved optimal plan.
+    /// Computes further optimal plans, and executes each of them with the validator. Plans that are not
+    /// validated within the limits are omitted. Returns `None` if the solution is not proved optimal, or if its
+    /// metric has parts that are not costs of actions.
     fn further_plans(
         &self,
         task: &Task,
@@ -383,8 +388,8 @@ fn is_too_large(messages: &[Message]) -> bool {
     !messages.is_empty() && messages.iter().all(|message| message.code == "E304")
 }
 
-/// Converts the solution of a single objective to a point with its cost as the only value; without
-/// a value if no objective replaces the metric.
+/// Converts the solution for a single objective to a point whose only value is the cost of the plan. The point
+/// has no value if there is no plan, or if no objective replaces the metric.
 fn valued(solution: Solution, objectives: &Objectives) -> Point {
     let cost = solution.plan.as_ref().map(|plan| plan.cost.clone());
     Point { values: cost.into_iter().filter(|_| !objectives.metrics.is_empty()).collect(), solution }

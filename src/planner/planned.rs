@@ -33,16 +33,18 @@ pub struct Planned<'m> {
     /// knowledge base has added as parameters to a plain domain; [`Planned::written`] omits these
     /// arguments.
     pub solution: Solution,
-    /// Value of each objective for the plan. Empty if there is no plan, or if the problem's own
-    /// metric is minimised.
+    /// Value of the plan under each objective that replaces the problem's metric. Without such objectives, the
+    /// list is empty or contains only the cost of the plan. Empty if there is no plan.
     pub values: Vec<Exact>,
     /// Further optimal plans, if requested and if the plan is proved optimal.
     pub alternatives: Option<Alternatives>,
-    /// If the mission is proved unsolvable: unavailable designs that prevent a plan, or the information that designs
-    /// are not the reason. Always `None` for overlapping actions, and for costs that are too large for integers.
+    /// If the mission is proved unsolvable: unavailable designs that prevent a plan, or the information that
+    /// designs are not the reason. `None` also if this is not decided within the limits, and always without a
+    /// knowledge base, for overlapping actions, and for costs that are too large for integers.
     pub blocking: Option<Blocking>,
-    /// If the mission is proved unsolvable: numeric functions that actions need and that have no value. Empty in the
-    /// same cases as [`Planned::blocking`].
+    /// If the mission is proved unsolvable: numeric functions that actions need and that have no value. If some
+    /// of them are probable mistakes or have no value for any arguments, only these. Always empty for
+    /// overlapping actions, and for costs that are too large for integers.
     pub missing_values: Vec<MissingValue>,
     /// Messages about numbers that are too large for integers. If there are any, planning used only
     /// search in exact rationals.
@@ -116,8 +118,8 @@ impl Planned<'_> {
         self.solution.plan.clone().map(|plan| self.mission.written(plan))
     }
 
-    /// Returns the plan with the gaps between actions that PlanSys2 needs. Its arguments are as in
-    /// the domain's file, see [`Planned::written`].
+    /// Returns the plan with the gaps between actions that PlanSys2 needs, or unchanged if gaps would make the
+    /// plan invalid or a limit is reached. The arguments are as in the domain's file, see [`Planned::written`].
     pub fn spaced(&self) -> Option<Plan> {
         let plan = self.solution.plan.clone()?;
         let limits = self.limits.extended();

@@ -1,7 +1,7 @@
 //! ROS 2 messages in recordings: their definitions, and their encoding in CDR \[1\].
 //!
-//! - \[1\] OMG: DDS Interoperability Wire Protocol 2.5, 2022, section 10. The octets 0 and 1
-//!   identify the representation.
+//! - \[1\] OMG: DDS Interoperability Wire Protocol 2.5, 2022, section 10. The first two bytes of a message identify the
+//!   representation.
 
 use byteorder::{BigEndian, LittleEndian};
 use serde::de::DeserializeOwned;
@@ -88,9 +88,8 @@ const OK: u8 = 0;
 const ERROR: u8 = 2;
 
 impl DiagnosticArray {
-    /// Converts an observation of measurements or component states to a message as MROS's monitors
-    /// send it. Returns `None` for any other observation. `time` is in nanoseconds of the system's
-    /// clock.
+    /// Converts the measurements and component states of an observation to a message as MROS's monitors send it.
+    /// Returns `None` if the observation has neither. `time` is in nanoseconds of the system's clock.
     pub(super) fn of(observation: &Observation, time: u64) -> Option<Self> {
         let status: Vec<_> = observation.events.iter().flatten().filter_map(DiagnosticStatus::of).collect();
         let stamp = Time {

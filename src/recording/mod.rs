@@ -29,5 +29,5 @@ pub use replay::{Replay, Replayed};
 pub use schema::answer_schema;
 pub use write::{Form, Recording};
 
-/// First byte of every MCAP file. No line of text begins with it.
+/// First byte of every MCAP file. No UTF-8 text begins with it.
 pub const FIRST_BYTE: u8 = mcap::MAGIC[0];

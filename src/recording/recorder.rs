@@ -1,4 +1,4 @@
-//! Writes a recording on a separate thread, so that the loop does not wait for the disk.
+//! Writes a recording on a separate thread, so that the loop waits for the disk only while the queue is full.
 
 use std::fs::{File, OpenOptions};
 use std::io;
@@ -83,8 +83,7 @@ impl Recorder {
         }
     }
 
-    /// Sends an entry to the writer thread. After an error the channel is closed and the entry is
-    /// lost.
+    /// Sends an entry to the writer thread. If this thread has ended, e.g. after an error, the entry is lost.
     fn send(&self, entry: Entry) {
         let _ = self.entries.send(entry);
     }

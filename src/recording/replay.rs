@@ -23,7 +23,8 @@ use crate::recording::write::EventMessage;
 pub struct Replayed {
     /// Text of the line, for a loop.
     pub text: String,
-    /// Time of the line since the start of the mission.
+    /// Time of the line since the start of the mission. In a file that Metaplan has not recorded: since the first
+    /// diagnostics message.
     pub now: Duration,
 }
 

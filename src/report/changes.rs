@@ -1,5 +1,5 @@
-//! Differences between two situations of a mission (as its files define it, and now), with their
-//! causes.
+//! Differences between two situations of a mission (as its files define it, and now). Reasons are given for
+//! changes of the availability of designs.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,7 +11,7 @@ use crate::number::decimal;
 use crate::report::designs::because;
 
 /// Text in place of an unknown status of a component or an unknown value of an attribute.
-const UNKNOWN: &str = "not said";
+const UNKNOWN: &str = "unknown";
 
 /// The cost of a plan, or the reason why there is no cost.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -24,9 +24,9 @@ pub enum Cost {
     NotFound,
 }
 
-/// Returns the differences between two situations of a mission, each with its plan. The order is
-/// from causes to effects: components and measurements, the task, availability of designs, and
-/// costs of the plans.
+/// Returns the differences between two situations of a mission, each with its plan. The order is from causes to
+/// effects: components and measurements, the task, availability of designs, and the plans (costs, designs and
+/// common actions).
 pub fn changes(before: (&Mission, &Plan), after: (&Mission, &Plan), costs: &[Cost; 2]) -> Vec<Change> {
     let mut changes = Vec::new();
     let mut say = |text: String| changes.push(Change { text, because: Vec::new() });

@@ -24,9 +24,9 @@ pub fn comparison_sheet(mission: &str, comparisons: &[(Option<Pair>, Comparison)
     parts.push(table(rows));
     let front: usize = comparisons.iter().map(|(_, comparison)| comparison.front.len()).sum();
     Sheet {
-        name: format!("{mission}: plans beside policies"),
-        description: "All candidates are measured in one decision process, exactly.".to_owned(),
-        verdict: format!("{} rows, {front} vertices of fronts.", rows.len()),
+        name: format!("{mission}: plans and policies"),
+        description: "All candidates are evaluated exactly in one decision process.".to_owned(),
+        verdict: format!("{} rows, {front} vertices of Pareto fronts.", rows.len()),
         parts,
     }
 }
@@ -65,8 +65,8 @@ fn front(comparison: &Comparison) -> Points {
     }
 }
 
-/// Returns sentences about the costs of deviating from the best policy, with the compared values as
-/// reasons.
+/// Returns sentences about differences of penalised time between candidates, with the compared values as
+/// reasons, and about the loss of a component.
 fn prices(comparison: &Comparison) -> Vec<Change> {
     let leaf = |text: String| Reason { text, supports: Vec::new() };
     let price = |name: &str, value: Option<f64>, because: Vec<Reason>| Change {
@@ -101,8 +101,7 @@ fn prices(comparison: &Comparison) -> Vec<Change> {
         let steps = steps.map(|loss| {
             after(loss.moves, [loss.open_loop, loss.replanned, loss.solved_again, loss.anticipated])
         });
-        let text =
-            format!("What the loss of {} costs, at a rate of {} for each move", loss.component, loss.rate);
+        let text = format!("Cost of the loss of {}, at a rate of {} per move", loss.component, loss.rate);
         prices.push(Change { text, because: steps.collect() });
     }
     prices
@@ -122,8 +121,8 @@ fn table(rows: &[Row]) -> Part {
     Part::Table("measures".to_owned(), header.collect(), rows.iter().zip(labels(&kinds)).map(line).collect())
 }
 
-/// Returns the picture of simulated missions: distributions of costs, reaction times and
-/// reconfigurations over the seeds, for each strategy.
+/// Returns the picture of simulated missions: for each strategy, the distributions of costs (of accomplished
+/// missions), reaction times and reconfigurations over the seeds, and a table of figures.
 pub fn simulation_sheet(mission: &str, scenario: &str, strategies: &[Strategy], runs: &[Run]) -> Sheet {
     let cost = |run: &Run| run.accomplished.then_some(run.cost);
     let changes = |run: &Run| Some(run.reconfigurations as f64);

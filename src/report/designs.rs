@@ -72,11 +72,11 @@ fn required(requirement: &Requirement, measurements: &[Measurement]) -> String {
 /// rule it out, with derivations, or the fault that stopped the reasoning.
 pub(super) fn because(knowledge: &Knowledge, design: &str, available: bool) -> Vec<Reason> {
     if available {
-        let text = "nothing says that it is not realisable, and nothing that it is not available".to_owned();
+        let text = "no fact states or implies that the design is not realisable or not available".to_owned();
         return vec![Reason { text, supports: Vec::new() }];
     }
     if let Some(fault) = knowledge.fault() {
-        let text = format!("it is not known what follows: {}", fault.message);
+        let text = format!("the conclusions are unknown: {}", fault.message);
         return vec![Reason { text, supports: Vec::new() }];
     }
     let designs = knowledge.view().function_designs();
@@ -85,9 +85,9 @@ pub(super) fn because(knowledge: &Knowledge, design: &str, available: bool) -> V
     let Causes { causes, are_all_needed } = causes(knowledge, design);
     let count = causes.len();
     let introduction = if are_all_needed {
-        format!("{count} causes rule it out, and all of them have to go before it is available:")
+        format!("{count} causes make the design unavailable, and all of them must be removed:")
     } else {
-        format!("{count} causes rule it out:")
+        format!("{count} causes make the design unavailable:")
     };
     let introduction = (count > 1).then(|| Reason { text: introduction, supports: Vec::new() });
     // If neither a component nor a measurement is a cause, the conclusions from the unchanged

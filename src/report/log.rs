@@ -44,18 +44,20 @@ fn happening(answer: &Value) -> (Kind, String, Vec<Reason>) {
         "inferred" => inferred(answer),
         "contradicted" => (
             Kind::Inference,
-            "what is known contradicts itself, or no more".to_owned(),
+            "the knowledge has become inconsistent, or consistent again".to_owned(),
             lines(&answer["contradictions"]),
         ),
-        "unconcluded" => (Kind::Inference, format!("not concluded: {}", word("message")), Vec::new()),
-        "plan_requested" => (Kind::Plan, "a plan is looked for".to_owned(), lines(&answer["because"])),
+        "unconcluded" => {
+            (Kind::Inference, format!("the conclusions are unknown: {}", word("message")), Vec::new())
+        }
+        "plan_requested" => (Kind::Plan, "planning has started".to_owned(), lines(&answer["because"])),
         "plan_found" => {
             let steps: Vec<Reason> =
                 list(&answer["steps"]).iter().map(|step| leaf(action(step, "action"))).collect();
             let proved = if answer["optimal"] == Value::Bool(true) { ", optimal" } else { "" };
             (Kind::Plan, format!("a plan of {} steps, cost {}{proved}", steps.len(), word("cost")), steps)
         }
-        "plan_kept" => (Kind::Plan, format!("the plan stays: {}", word("because")), Vec::new()),
+        "plan_kept" => (Kind::Plan, format!("the plan is kept: {}", word("because")), Vec::new()),
         "plan_none" => (
             Kind::Plan,
             format!("no plan ({}): {}", word("status"), word("because")),
@@ -75,7 +77,7 @@ fn happening(answer: &Value) -> (Kind, String, Vec<Reason>) {
         "suspend_action" => (Kind::Effect, format!("suspend: {}", word("because")), Vec::new()),
         "resume_action" => (Kind::Effect, "resume".to_owned(), Vec::new()),
         "filtered" => {
-            let text = format!("{} {} is held back: {}", word("name"), word("value"), word("because"));
+            let text = format!("{} {} is not adopted yet: {}", word("name"), word("value"), word("because"));
             (Kind::Inference, text, Vec::new())
         }
         "silent" => {
@@ -96,7 +98,7 @@ fn inferred(answer: &Value) -> (Kind, String, Vec<Reason>) {
     });
     let objectives = list(&answer["objectives"]).iter().map(|objective| {
         let statuses: Vec<String> = list(&objective["statuses"]).iter().map(plain).collect();
-        let statuses = if statuses.is_empty() { "all is well".to_owned() } else { statuses.join(", ") };
+        let statuses = if statuses.is_empty() { "no error".to_owned() } else { statuses.join(", ") };
         Reason {
             text: format!("{}: {statuses}", plain(&objective["objective"])),
             supports: lines(&objective["because"]),

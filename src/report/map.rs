@@ -1,9 +1,9 @@
 //! Infers the places of a mission, their neighbours, and the route of a plan.
 //!
-//! PDDL does not mark places. This module assumes that something moves if an action deletes `(p … a)` and adds `(p …
-//! b)` with parameters `a` and `b` of one type. Of these types, the objects of the type that the plan uses most are
-//! places. Two places are neighbours if a fact of the problem, or a value if there is no such fact, has exactly these
-//! two places among its arguments.
+//! PDDL does not mark places. This module assumes that something moves if an action deletes `(p … a)` and adds
+//! `(p … b)` with parameters `a` and `b` of one type. Of these types, the objects of the type that the plan
+//! uses most are places. Two places are neighbours if a fact of the problem has exactly these two places among
+//! its arguments. If no places are connected by facts, numeric values are used instead.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -181,9 +181,10 @@ fn goals(goal: &Condition) -> impl Iterator<Item = &Atom> {
     })
 }
 
-/// Returns the pairs of neighbouring places, as numbers of places. Two places are neighbours if an initial fact has
-/// exactly these two places among its arguments; if there is no such fact, initial numeric values are used instead.
-/// `moving` are the predicates that movements change, such as `robot_at`; they are ignored.
+/// Returns the pairs of neighbouring places, as numbers of places. Two places are neighbours if an initial fact
+/// has exactly these two places among its arguments. If no two places are connected by a fact, initial numeric
+/// values are used instead. `moving` are the predicates that movements change, such as `robot_at`; they are
+/// ignored.
 fn ways(problem: &Problem, number: &BTreeMap<&Name, usize>, moving: &BTreeSet<&Name>) -> Vec<(usize, usize)> {
     let (mut facts, mut values) = (BTreeSet::new(), BTreeSet::new());
     for element in &problem.init {

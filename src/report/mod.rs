@@ -1,7 +1,7 @@
-//! Pictures of answers: a plan with its configuration, its numbers, its route on the map, and the
-//! reasons.
+//! Pictures of answers: plans (configuration, numbers, route on the map, reasons), Pareto fronts, differences
+//! between two situations, comparisons, simulations and journals.
 //!
-//! Pictures contain the same data as the JSON answers. The crate `picture` draws them.
+//! This module collects the data of pictures. The crate `picture` draws them.
 
 mod changes;
 mod compared;

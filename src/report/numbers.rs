@@ -1,5 +1,5 @@
-//! Curves for a plan's picture: the cost, the numbers that the plan changes, and the limits that
-//! its conditions impose.
+//! Curves for a plan's picture: the cost, the numbers that the plan changes, and the limits that the conditions
+//! of its actions and the goal impose.
 
 use std::collections::BTreeMap;
 

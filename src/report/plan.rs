@@ -94,9 +94,9 @@ fn steps(functions_of_designs: &Designs, plan: &Plan, axis: Axis) -> Vec<picture
     drawn
 }
 
-/// Returns the designs of a step by function. If the domain does not assign designs to functions,
-/// the arguments that are designs are assigned by the knowledge base. Of several designs for one
-/// function, the last one is used.
+/// Returns the designs of a step, as pairs of function and design. If the planner has assigned no designs to
+/// functions, each argument that is a design of the knowledge base is assigned to the first function that it
+/// solves. Of several designs for one function, the last one is used.
 fn configuration(step: &Step, functions_of_designs: &Designs) -> Vec<(String, String)> {
     if !step.configuration.is_empty() {
         return step.configuration.clone();

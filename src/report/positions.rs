@@ -49,7 +49,7 @@ impl ReportSection {
     /// Reads the coordinates of places.
     ///
     /// # Errors
-    /// The file cannot be read; otherwise all lines that are not coordinates.
+    /// The file cannot be read; otherwise all lines that are not coordinates or repeat a place.
     pub fn positions(&self, origin: &ManifestPath) -> Result<Positions, Errors> {
         match &self.positions {
             None => Ok(Positions::Unknown),
@@ -88,8 +88,8 @@ fn values(problem: &Problem, function: &str) -> BTreeMap<Name, f64> {
     problem.init.iter().filter_map(value).collect()
 }
 
-/// Reads the coordinates of places from a CSV file with lines `place,x,y`. A first line without
-/// numbers is a heading.
+/// Reads the coordinates of places from a CSV file with lines `place,x,y`. A first line without numbers is a
+/// heading; lines that begin with `#` are comments.
 fn read(file: &Path) -> Result<BTreeMap<Name, (f64, f64)>, Errors> {
     let source = source(file)?;
     let mut reader = csv::ReaderBuilder::new()

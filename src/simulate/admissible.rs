@@ -1,10 +1,10 @@
 //! Designs with which an action can be executed now, for strategies that choose the design of each
 //! function separately.
 //!
-//! A design is *admissible* for a function of an action if it is available and all conditions of
-//! the action hold now with this design. These conditions include the quality bounds of the action
-//! in the current context (`t:requiresQuality`) and a sufficient battery level. A condition that
-//! mentions the design of another function is omitted until that design is chosen.
+//! A design is *admissible* for a function of an action if it is available, and if all conditions of the action hold
+//! with it when the action is executed now. These conditions include the quality bounds of the action in the current
+//! context (`t:requiresQuality`) and a sufficient battery level. A condition that mentions the design of another
+//! function is omitted until that design is chosen.
 
 use num_rational::BigRational;
 use pddl::ast::{Action, ActionBody, Atom, Condition, Domain, Name, Problem, Term};

@@ -1,5 +1,4 @@
-//! Baseline strategies for comparison with the adaptation loop. Each baseline lacks one capability
-//! of the loop.
+//! Baseline strategies for comparison with the adaptation loop. Each baseline lacks a capability of the loop.
 //!
 //! All strategies receive the same observations as the loop, request actions in the same way, and
 //! use the same planner. They differ in when they plan and in how they choose designs:
@@ -9,8 +8,8 @@
 //!   \[1\];
 //! - *greedy* chooses the design of each function separately: the admissible design with the lowest
 //!   cost of the next action. It chooses at each request of an action, and when a running action
-//!   loses a design. MROS chooses similarly: the design of greatest utility among those that fulfil
-//!   the requirements \[2\]. The task is planned again when an action has failed;
+//!   loses a design. MROS chooses similarly: the design of greatest utility among those that no
+//!   failure or measurement excludes \[2\]. The task is planned again when an action has failed;
 //! - *random* works as *greedy*, but chooses a random admissible design.
 //!
 //! All baselines except *none* also plan again if no step is left, the goal is not reached, and other designs are
@@ -234,7 +233,7 @@ impl Controller {
     }
 }
 
-/// Returns the design with which the action alone has the lowest cost, even if the action is not possible with it. Of
+/// Returns the design with which the action alone has the best metric, even if the action is not possible with it. Of
 /// equal designs, returns the first. Returns `None` if no cost is defined.
 fn cheapest(
     mission: &Mission,

@@ -113,8 +113,8 @@ impl Checker<'_> {
                 self.wrong(path(&[]), text);
             }
             (Some(_), Some(_)) => {
-                let text =
-                    "the event has both `at` and `when`; make two events of it, or take one of them away";
+                let text = "the event has both `at` and `when`; split it into two events, or remove one of the \
+                            two keys";
                 self.wrong(path(&["when"]), text);
             }
             (Some(at), None) => {

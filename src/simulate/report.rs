@@ -22,7 +22,8 @@ pub enum Ending {
     GaveUp,
 }
 
-/// Writes a phrase for several missions with this ending, such as "lost the robot".
+/// Writes the ending as a verb phrase that can follow a number of missions, such as "lost the robot" in
+/// "2 lost the robot".
 impl fmt::Display for Ending {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
@@ -67,8 +68,8 @@ pub struct Run {
     pub reconfigurations: usize,
     /// Number of distinct configurations with which actions were requested.
     pub distinct: usize,
-    /// Reaction times: for each stall of the running action, the time until the next effect of the
-    /// controller.
+    /// Reaction times: the time from each stall of the running action to the next effect of the controller, if there
+    /// was one.
     pub reactions: Vec<f64>,
     /// Time at which the pipeline was found. `None` if it was not found.
     pub found: Option<f64>,
@@ -102,15 +103,16 @@ impl Default for Run {
 }
 
 impl Run {
-    /// Returns the mean reaction time. `None` if no action stalled; an immediate reaction gives 0.
+    /// Returns the mean reaction time. `None` if the controller did not react to a stalled action; an immediate
+    /// reaction gives 0.
     pub fn mean_reaction(&self) -> Option<f64> {
         let count = self.reactions.len();
         (count > 0).then(|| self.reactions.iter().sum::<f64>() / count as f64)
     }
 
-    /// Returns the texts for [`SUAVE_COLUMNS`]. The first three are empty if the mission does not
-    /// inspect a pipeline; the last is `no event` if no reaction was needed. As in SUAVE, the
-    /// search time of a pipeline that was not found is the duration of the mission.
+    /// Returns the texts for [`SUAVE_COLUMNS`]. The first three are empty if the mission does not inspect a pipeline;
+    /// the last is `no event` if there was no reaction. As in SUAVE, the search time of a pipeline that was not found
+    /// is the duration of the mission.
     pub fn suave(&self) -> [String; 4] {
         let Some(distance) = self.distance else {
             return [String::new(), String::new(), String::new(), self.reaction()];

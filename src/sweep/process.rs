@@ -22,7 +22,7 @@ const MAX_MESSAGE_CHARACTERS: usize = 2000;
 /// towards the time limit of the run.
 ///
 /// # Errors
-/// The program, or the generator of its files, cannot be executed.
+/// The program cannot be executed, or the generator of its files cannot be executed or fails.
 pub fn perform(
     program: &Path,
     study: &Study,
@@ -49,8 +49,8 @@ pub fn perform(
         }
     }
     let mut command = Command::new(program);
-    // This program handles Ctrl-C and ends the run. An interrupted run would give a partial answer,
-    // which would falsify the study.
+    // Ctrl-C must reach only this program, which then kills the run. A run that is interrupted itself would
+    // give a partial answer, which would falsify the study.
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
     let mut child = command

@@ -61,8 +61,8 @@ impl Results {
     /// and removes an incomplete last line.
     ///
     /// # Errors
-    /// The file exists and `resume` is `false`, another process writes it, it belongs to another
-    /// study, or a line before the last one is damaged.
+    /// The file cannot be created or read, it exists and `resume` is `false`, another process writes it, it
+    /// belongs to another study, or a complete line is damaged.
     pub fn open(directory: &Path, study: &Study, shard: Shard, resume: bool) -> Result<Self, Message> {
         let path = directory.join(format!("shard-{:04}-of-{:04}.jsonl", shard.index, shard.of));
         let failed = |error: io::Error| wrong(&path, &error.to_string());
@@ -89,7 +89,7 @@ impl Results {
             if !resume {
                 return Err(wrong(
                     &path,
-                    "it is there already; go on with `--resume`, or take another directory",
+                    "it exists already; continue with `--resume`, or use another directory",
                 ));
             }
             let (found, lines) = parse(&path, &text[..whole])?;
@@ -146,7 +146,8 @@ fn parse(path: &Path, text: &str) -> Result<(Header, Vec<Line>), Message> {
 /// Reads the results in all shard files of a directory, sorted by run, without duplicates.
 ///
 /// # Errors
-/// All faults: files that are missing, unreadable, damaged or of another study, and runs with differing answers.
+/// The directory has no result file; or all faults: files that are unreadable, damaged or of another study, and
+/// runs with differing answers.
 pub fn read_lines(directory: &Path, study: &Study) -> Result<Vec<Line>, Errors> {
     let failed = |error: io::Error| Errors::from(wrong(directory, &error.to_string()));
     let mut files = Vec::new();

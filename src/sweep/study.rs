@@ -125,8 +125,8 @@ pub struct Study {
     sections: Sections,
     /// Directory of the study's file, which is the working directory of the runs.
     pub directory: PathBuf,
-    /// Checksum of the study's command, generator, time limit and values, of the files that the command names, and of
-    /// the program's version.
+    /// Checksum of the study's command, generator, time limit and values, of the files whose paths are words of
+    /// the command, and of the program's version.
     pub digest: String,
     /// Varied keys with their values. The value of the last key changes from each run to the next.
     keys: Vec<(String, Vec<Value>)>,
@@ -439,7 +439,6 @@ fn places(mission: &Path, most: Option<usize>) -> Result<Vec<Value>, Errors> {
         })
         .collect();
     let count = most.unwrap_or(pairs.len()).clamp(1, pairs.len().max(1)).min(pairs.len());
-    // A limited number of pairs is spread evenly over all pairs.
     Ok((0..count).map(|number| json!(pairs[number * pairs.len() / count])).collect())
 }
 

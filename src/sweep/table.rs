@@ -26,7 +26,7 @@ pub struct Row {
 /// All rows of a study's table. The columns are the union of the fields of all rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
-    /// Column names, sorted: first the varied keys, then the fields of answers.
+    /// Column names: first the varied keys, then the status and the fields of answers; both parts are sorted.
     pub columns: Vec<String>,
     /// Number of columns that are varied keys; they come first.
     pub keys: usize,
@@ -37,21 +37,22 @@ pub struct Table {
 /// Pairs of a column's name and the value that all rows of a group have in it.
 type Common = Vec<(String, Value)>;
 
-/// Rows that differ only in repetitions, i.e. in the seed or another key that only repeats a run.
+/// Rows with equal texts and equal values of all varied keys except those that only repeat a run, such as a
+/// seed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Group {
     /// Values that all rows of the group have: varied keys and texts.
     pub common: Common,
     /// Number of rows in the group.
     pub count: usize,
-    /// Statistics of each numeric column over the rows.
+    /// Statistics of each column of numbers or truth values over the rows.
     pub samples: Vec<(String, Sample)>,
 }
 
 impl Table {
-    /// Builds the table. `rows` is the JSON pointer to an object, or a list of objects, in each
-    /// answer; each object becomes a row. With `measured`, includes the fields that depend on the
-    /// machine, such as times.
+    /// Builds the table. `rows` is the JSON pointer to an object, or a list of objects, in each answer; each
+    /// object becomes a row. A run whose answer has nothing there gives one row without fields of an answer.
+    /// With `measured`, includes the fields that depend on the machine, such as times.
     pub fn new(lines: &[Line], rows: &str, measured: bool) -> Self {
         let mut rows_of_lines: Vec<(&Line, Map<String, Value>)> = Vec::new();
         for line in lines {

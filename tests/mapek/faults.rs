@@ -267,7 +267,7 @@ fn files_other_than_journals_are_not_changed() {
     // Header of the previous format version. The file is not damaged, so nothing must be repaired.
     let first = "6bcb2ca5 [\"mission\",\"metaplan-journal/1\",\"302a8d68\"]\n";
     std::fs::write(&file, first).expect("a file");
-    let words = "or begin the mission anew with a journal in another directory; nothing was changed";
+    let words = "or restart the mission with a journal in another directory; nothing was changed";
     refused(directory.path(), &pristine, words);
     assert_eq!(std::fs::read_to_string(&file).expect("a file"), first);
     std::fs::remove_file(&file).expect("removed");

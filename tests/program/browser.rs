@@ -26,7 +26,7 @@ pub fn browser() -> Option<PathBuf> {
 }
 
 /// Opens a page in the browser. Returns the console messages and the final document.
-fn open(browser: &Path, page: &Path, profile: &Path) -> (Vec<String>, String) {
+pub fn open(browser: &Path, page: &Path, profile: &Path) -> (Vec<String>, String) {
     let output = Command::new(browser)
         .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--hide-scrollbars"])
         .args([

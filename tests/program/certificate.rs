@@ -135,7 +135,7 @@ fn modified_certificates_are_rejected_with_the_first_error() {
                 steps.remove(derived);
                 document.to_string()
             },
-            "and is missing\nknowledge   failed",
+            "but is missing\nknowledge   failed",
         ),
         (
             "derivations.json",
@@ -150,7 +150,7 @@ fn modified_certificates_are_rejected_with_the_first_error() {
         (
             "problem.pddl",
             |text| text.replace("(fd_available fd_aruco)", ""),
-            "knowledge   failed: the knowledge says",
+            "knowledge   failed: the knowledge implies",
         ),
         (
             "plan.txt",

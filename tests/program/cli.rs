@@ -103,7 +103,7 @@ fn unsupported_features_are_refused_with_their_position() {
         .replace("(:action", "(:functions (used)) (:action")
         .replace("(at ?b))", "(at ?b) (increase (used) 1))");
     let unset = PROBLEM.replace("(at c)))", "(at c)) (:metric minimize (used)))");
-    check(&plan(&counting, &unset, &[]), 3, &["domain.pddl:7:", "E301", "`used` without an initial value"]);
+    check(&plan(&counting, &unset, &[]), 3, &["domain.pddl:7:", "E301", "`used` has no initial value"]);
     check(
         &plan(&counting, &unset.replace("(at a)", "(at a) (= (used) 0)"), &[]),
         0,
@@ -178,7 +178,11 @@ fn invalid_arguments_are_usage_errors() {
     check(&metaplan(&["plan", "missions/ugv.toml", "--time-limit", "-1"]), 2, &["negative"]);
     check(&metaplan(&["plan", "missions/ugv.toml", "--set", "safety=1"]), 2, &["nothing measures it"]);
     check(&metaplan(&["plan", "missions/ugv.toml", "--set", "fd_available fd_aruco=false"]), 2, &["--fail"]);
-    check(&metaplan(&["plan", "missions/ugv.toml", "--directory", "."]), 2, &["manifest names its own"]);
+    check(
+        &metaplan(&["plan", "missions/ugv.toml", "--directory", "."]),
+        2,
+        &["manifest of a mission has keys for them"],
+    );
     check(&metaplan(&["reason", "ontology/kb/ugv.ttl", "--directory", "nowhere"]), 2, &["no directory"]);
     check(&metaplan(&["validate", "missions/ugv.toml"]), 2, &["and a plan"]);
     check(&metaplan(&["plan", "missions/ugv.toml", "--time-limit", "soon"]), 2, &["not a number of seconds"]);
@@ -350,7 +354,7 @@ fn all_solvers_give_the_same_answer() {
         assert_eq!((answer.status, &answer.stdout), (0, &cheapest.stdout), "{strategy}");
     }
     let answer = metaplan(&["plan", "missions/ugv.toml", "--solver", "no-such-solver -q"]);
-    check(&answer, 2, &["M113", "`no-such-solver` does not serve", "varisat, batsat"]);
+    check(&answer, 2, &["M113", "`no-such-solver` cannot be used", "varisat, batsat"]);
     check(&metaplan(&["plan", "missions/ugv.toml", "--solver", " "]), 2, &["needs a name"]);
 }
 
@@ -367,10 +371,10 @@ fn claims_of_external_solvers_are_not_proofs() {
         metaplan(&[&["plan", "missions/ugv.toml", "--solver", &solver], options].concat())
     };
     let unchecked = plan("20", &["--horizon", "2"]);
-    check(&unchecked, 11, &["no plan with up to 2 steps, by the word of `sh ", "solver.sh 20`, unchecked"]);
+    check(&unchecked, 11, &["no plan with up to 2 steps, according to `sh ", "solver.sh 20`, not checked"]);
     // A claim that the search has already proved does not depend on the external solver.
     check(&plan("20", &[]), 0, &["optimal, proved: the"]);
-    check(&plan("7", &[]), 2, &["does not serve", "it failed: exit status: 7"]);
+    check(&plan("7", &[]), 2, &["cannot be used", "it failed: exit status: 7"]);
 }
 
 #[test]
@@ -428,8 +432,8 @@ fn alternatives_are_listed_with_forced_steps() {
         &unique,
         0,
         &[
-            "the only one that is as good, idle actions apart, proved",
-            "step 1: in every plan that is as good: move",
+            "no other plan is equally good, apart from plans with idle actions",
+            "step 1: in every equally good plan: move",
         ],
     );
     let problem = PROBLEM.replace("(way b c)", "(way b c) (way a d) (way d c)").replace("a b c", "a b c d");
@@ -440,8 +444,8 @@ fn alternatives_are_listed_with_forced_steps() {
         &[
             "alternative 1",
             "go a d",
-            "no others that are as good, idle actions apart, proved",
-            "step 1: in every plan that is as good: nothing",
+            "no other equally good plans, apart from plans with idle actions",
+            "step 1: in every equally good plan: nothing",
         ],
     );
     let answer = plan(DOMAIN, &problem, &["--alternatives", "0", "--format", "json"]).json();
@@ -466,8 +470,8 @@ fn alternatives_exclude_idle_actions() {
         &answer,
         0,
         &[
-            "the plan is the only one that is as good, idle actions apart, proved",
-            "step 1: in every plan",
+            "proved: no other plan is equally good, apart from plans with idle actions",
+            "step 1: in every equally good plan",
             idle,
         ],
     );

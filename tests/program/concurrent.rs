@@ -44,7 +44,7 @@ fn plans_in_every_format() {
     assert_eq!(starts, [&json!(0), &json!(0), &json!(2.001)]);
     let text = plan(DOMAIN, PROBLEM, &[]);
     assert_eq!(text.status, 0);
-    assert!(text.stdout.ends_with("dominated or too dear\nmakespan 5\n"), "{}", text.stdout);
+    assert!(text.stdout.ends_with("dominated or too expensive\nmakespan 5\n"), "{}", text.stdout);
 }
 
 #[test]

@@ -71,6 +71,25 @@ fn all_unknown_names_are_reported() {
 }
 
 #[test]
+fn a_requirement_needs_an_objective_of_the_command() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let objective = directory.path().join("objective.ttl");
+    let text =
+        "@prefix t: <http://metacontrol.org/tomasys#> . @prefix u: <http://metacontrol.org/metaplan/ugv#> .
+        u:o_localization a t:Objective ; t:typeF u:f_localization .";
+    std::fs::write(&objective, text).expect("a file");
+    let objective = objective.display().to_string();
+    let base = ["configure", "ontology/kb/ugv.ttl", &objective, "--rules", "coadaptation"];
+    let require = ["--require", "f_localization.safety=0.5"];
+    assert_eq!(metaplan(&base).status, 0);
+    let outcome = metaplan(&[&base[..], &require].concat());
+    assert_eq!(outcome.status, 2, "{}", outcome.stderr);
+    assert!(outcome.stderr.contains("needs `--objective f_localization`"), "{}", outcome.stderr);
+    let outcome = metaplan(&[&base[..], &["--objective", "f_localization"], &require].concat());
+    assert_eq!(outcome.status, 0, "{}", outcome.stderr);
+}
+
+#[test]
 fn the_loop_reconfigures() {
     let arguments =
         ["run", "--configure", "ontology/kb/ugv.ttl", "--rules", "coadaptation", "--most", "safety"];

@@ -217,7 +217,7 @@ fn control_characters_in_names_are_escaped() {
 fn duplicate_fields_and_missing_simulations_are_reported() {
     let doubled = "{\"event\":\"tick\",\"event\":\"tick\"}\n";
     let outcome = metaplan_in(&root(), &["run", "missions/ugv.toml"], doubled);
-    assert!(outcome.stdout.contains("the field `event` is there twice"), "{outcome:#?}");
+    assert!(outcome.stdout.contains("the field `event` is repeated"), "{outcome:#?}");
     let outcome = metaplan(&["simulate", "missions/ugv.toml", "--scenario", "bright_sun"]);
     assert!(outcome.stderr.contains("has no `simulation` section; these can: "), "{outcome:#?}");
 }

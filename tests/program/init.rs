@@ -79,7 +79,7 @@ fn nothing_is_overwritten() {
         let outcome = metaplan_in(here, &["init", name], "");
         assert_eq!(outcome.status, 3, "{outcome:#?}");
         assert!(
-            headlines(&outcome.stderr).starts_with(&format!("{name}: error[M133]: this is there already")),
+            headlines(&outcome.stderr).starts_with(&format!("{name}: error[M133]: this exists already")),
             "{outcome:#?}"
         );
     }

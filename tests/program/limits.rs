@@ -174,7 +174,7 @@ fn incomplete_comparisons_are_reported_in_text_output() {
         assert_eq!(outcome.status, 12, "{outcome:#?}");
         assert!(outcome.stderr.contains("M130"), "{outcome:#?}");
         if !outcome.stdout.is_empty() {
-            assert!(outcome.stderr.contains("what is shown is incomplete"), "{outcome:#?}");
+            assert!(outcome.stderr.contains("the results are incomplete"), "{outcome:#?}");
             assert!(outcome.stdout.contains("best policy by penalised time"), "{outcome:#?}");
             return;
         }

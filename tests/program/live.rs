@@ -376,7 +376,10 @@ fn page_inserts_data_as_text_only() {
 fn remote_clients_need_the_token() {
     let refused = metaplan_in(&root(), &["run", "missions/ugv.toml", "--serve=0.0.0.0:0"], "");
     assert_eq!((refused.status, refused.stdout.as_str()), (3, ""), "{refused:#?}");
-    assert!(refused.stderr.contains("M332") && refused.stderr.contains("a token is needed"), "{refused:#?}");
+    assert!(
+        refused.stderr.contains("M332") && refused.stderr.contains("a token is required"),
+        "{refused:#?}"
+    );
     let directory = tempfile::tempdir().expect("a directory");
     let file = directory.path().join("token");
     let name = file.display().to_string();

@@ -35,6 +35,7 @@ mod outputs;
 mod paper;
 mod phases;
 mod probabilistic;
+mod proved;
 mod reaction;
 mod real;
 mod reason;

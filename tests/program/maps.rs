@@ -63,7 +63,7 @@ fn maps_of_2017_become_missions() {
         "warning[M132]",
         "no measurements of time",
         "no probabilities",
-        "the rectangles in `unsafe-rects` are not taken over",
+        "the rectangles in `unsafe-rects` are ignored",
     ] {
         assert!(outcome.stderr.contains(word), "no `{word}`: {outcome:#?}");
     }
@@ -113,7 +113,7 @@ fn map_errors_have_a_position() {
     check("\"x\" : 0", "\"x\" : 1e999", "2:42", "this is not a map");
     check("\"coord\" :", "\"coords\": {\"x\": 1, \"y\": 1}, \"coord\" :", "2:56", "duplicate field");
     check("\"node-id\": \"h1\"", "\"node-id\": 1", "2:15", "the name of a place is a string");
-    check("\"node-id\": \"h3\"", "\"node-id\": \"h1\"", "4:15", "the place `h1` is there twice");
+    check("\"node-id\": \"h3\"", "\"node-id\": \"h1\"", "4:15", "the place `h1` is repeated");
     check("\"node-id\": \"h3\"", "\"node-id\": \"H1\"", "4:15", "`H1` and `h1` would be one object in PDDL");
     check("\"node-id\": \"hs\"", "\"node-id\": \"7\"", "7:15", "it should begin with a letter");
     check(
@@ -125,7 +125,7 @@ fn map_errors_have_a_position() {
     check("[\"h1\", \"h3\"]", "[\"h1\", \"h2\"]", "3:76", "`h2` leads to itself");
     check("],\n", "],,\n", "8:3", "this is not a map");
     check("\n}\n", "\n", "12:1", "EOF");
-    check("],\n", "],\n\"time\": [{\"from\": \"h1\"}],\n", "9:24", "needs a place `to`");
+    check("],\n", "],\n\"time\": [{\"from\": \"h1\"}],\n", "9:24", "needs the place `to`");
 }
 
 #[test]
@@ -156,7 +156,7 @@ fn places_are_drawn_at_their_coordinates() {
     let outcome =
         metaplan_in(directory.path(), &["report", "out/camara.toml", "--svg", "pictures", "-q"], "");
     assert_eq!(outcome.status, 0, "{outcome:#?}");
-    assert!(!outcome.stdout.contains("laid out by the ways"));
+    assert!(!outcome.stdout.contains("the layout of places"));
     let picture = std::fs::read_to_string(directory.path().join("pictures/map.svg")).expect("a map");
     let document = roxmltree::Document::parse(&picture).expect("XML");
     let at = |name: &str| {

@@ -151,7 +151,7 @@ fn certificates_depend_on_the_name_map() {
     change(&copy.path().join("c").display().to_string(), "origin.json", &exchange);
     let outcome = verify_in(copy.path(), &["c"]);
     assert_eq!(outcome.status, 30, "{outcome:#?}");
-    assert!(outcome.stdout.contains("the knowledge says"), "{outcome:#?}");
+    assert!(outcome.stdout.contains("the knowledge implies"), "{outcome:#?}");
 }
 
 fn check(entries: &str, status: i32, words: &[&str]) -> Outcome {
@@ -177,7 +177,7 @@ fn invalid_entries_are_reported_with_their_position() {
     check(
         &with_entry("\"x_*\" = \"fd_*\""),
         3,
-        &[&place(1), "M223", "the pattern `x_*` meets no individual"],
+        &[&place(1), "M223", "the pattern `x_*` matches no individual"],
     );
     check(
         &with_entry("  kd_search_low = \"fd_serach_low\""),
@@ -252,11 +252,11 @@ fn unmatched_names_are_listed_from_both_sides() {
     let outcome = metaplan_in(unmapped.path(), &["plan", MANIFEST], "");
     assert_eq!(outcome.status, 3, "{outcome:#?}");
     for word in [
-        "error[M222]: no design of the required function `kf_maintain_motion` is known to both sides; in the problem only: \
-         `fd_speed_low`, ",
+        "error[M222]: the problem and the knowledge base have no common design of the required function \
+         `kf_maintain_motion`; in the problem only: `fd_speed_low`, ",
         "in the knowledge base only: `kd_speed_high`, `kd_speed_low`, `kd_speed_medium`",
         "problem.pddl:4:13",
-        "warning[M221]: the knowledge base does not know all functions of the problem; in the problem only: `f_maintain_motion`",
+        "warning[M221]: the knowledge base lacks functions of the problem; in the problem only: `f_maintain_motion`",
     ] {
         assert!(outcome.stderr.contains(word), "no `{word}`: {outcome:#?}");
     }
@@ -266,7 +266,7 @@ fn unmatched_names_are_listed_from_both_sides() {
     let outcome = metaplan_in(misspelt.path(), &["plan", MANIFEST], "");
     assert_eq!(outcome.status, 0, "{outcome:#?}");
     for word in [
-        "warning[M221]: the knowledge base does not know all designs of the problem",
+        "warning[M221]: the knowledge base lacks designs of the problem",
         "problem.pddl:4:56",
         "in the problem only: `fd_serach_low`; in the knowledge base only: `fd_search_low`",
         "write in `[bindings.names]`: fd_search_low = \"fd_serach_low\"",
@@ -279,7 +279,9 @@ fn unmatched_names_are_listed_from_both_sides() {
     edit(incomplete.path(), PROBLEM, "fd_search_low ", "");
     let outcome = metaplan_in(incomplete.path(), &["plan", MANIFEST], "");
     assert_eq!(outcome.status, 0, "{outcome:#?}");
-    for word in ["uuv.ttl:", "M221", "the problem names designs, but not all", "only: `fd_search_low`"] {
+    for word in
+        ["uuv.ttl:", "M221", "the problem lacks designs of the knowledge base", "only: `fd_search_low`"]
+    {
         assert!(outcome.stderr.contains(word), "no `{word}`: {outcome:#?}");
     }
     let unknown_action = declared();
@@ -290,8 +292,7 @@ fn unmatched_names_are_listed_from_both_sides() {
         "a_recharge a_rest - action",
     );
     let outcome = metaplan_in(unknown_action.path(), &["plan", MANIFEST], "");
-    for word in ["domain.pddl:7:", "does not know all actions of the problem; in the problem only: `a_rest`"]
-    {
+    for word in ["domain.pddl:7:", "lacks actions of the problem; in the problem only: `a_rest`"] {
         assert!(outcome.stderr.contains(word), "no `{word}`: {outcome:#?}");
     }
 }
@@ -352,8 +353,8 @@ fn journals_depend_on_the_name_map() {
 fn name_options_require_a_knowledge_base() {
     let (domain, problem) = ("encodings/uuv/domain.pddl", "encodings/uuv/problem.pddl");
     for (arguments, status, words) in [
-        (&["plan", domain, problem, "--name", "a=b"][..], 2, "`--name` goes with `--kb`"),
-        (&["plan", "missions/uuv.toml", "--name", "a=b"], 2, "a mission's manifest names its own"),
+        (&["plan", domain, problem, "--name", "a=b"][..], 2, "`--name` requires `--kb`"),
+        (&["plan", "missions/uuv.toml", "--name", "a=b"], 2, "the manifest of a mission has keys for them"),
         (&["plan", domain, problem, "--kb", KB, "--name", "a"], 2, "is not of the form NAME=VALUE"),
         (&["plan", domain, problem, "--kb", KB, "--name", "a=b"], 3, "error[M223]: `--name a=b`: "),
         (

@@ -271,9 +271,9 @@ fn recordings_do_not_replace_files() {
     assert!(Command::new("mkfifo").arg(&pipe).status().expect("mkfifo runs").success());
     symlink("nothing", &link).expect("a link");
     for (file, reason) in [
-        (pipe.display().to_string(), "is there already"),
-        (link.display().to_string(), "is there already"),
-        ("-".to_owned(), "standard output has the answers"),
+        (pipe.display().to_string(), "exists already"),
+        (link.display().to_string(), "exists already"),
+        ("-".to_owned(), "standard output is used for the answers"),
     ] {
         let outcome = metaplan(&["run", "missions/ugv.toml", "--mcap", &file]);
         assert_eq!(outcome.status, 3, "{outcome:#?}");

@@ -116,7 +116,7 @@ fn problem_of_the_paper_works_with_the_knowledge_base_of_suave() {
     assert_eq!(outcome.status, 10, "{outcome:#?}");
     let outcome =
         plan(&files, &[&options, &names, &["--set", "fd_available fd_search_low=false"][..]].concat());
-    assert!(outcome.status == 2 && outcome.stdout.contains("the knowledge base decides"), "{outcome:#?}");
+    assert!(outcome.status == 2 && outcome.stdout.contains("the knowledge base determines"), "{outcome:#?}");
     // The water is too murky for all search designs. The mission is unsolvable because of the knowledge base,
     // not because of unmatched names.
     let outcome = plan(&files, &[&options, &names, &["--set", "water_visibility=1"][..]].concat());

@@ -141,7 +141,7 @@ fn queries_are_answered_with_derivations() {
         0,
         &["does not hold", "(SubClassOf(<http://x#StoneCat>"],
     );
-    check(&query(&["--why", "tim a Cat"], ""), 2, &["nothing is called `tim`"]);
+    check(&query(&["--why", "tim a Cat"], ""), 2, &["nothing has the name `tim`"]);
     check(&query(&["--why", "tom Cat"], ""), 2, &["SUBJECT a CLASS"]);
     for arguments in [&["--schema"][..], &["--why", "tom a Pet"], &["--entails", "zoo.ttl"]] {
         let json = query(&[arguments, &["--format", "json"]].concat(), "").json();

@@ -218,7 +218,7 @@ fn without_any_sensor_there_is_no_plan() {
         "{outcome:#?}"
     );
     let empty = metaplan(&["plan", "missions/ugv.toml", "--set", "battery=3"]);
-    assert!(empty.status == 10 && empty.stdout.contains("it is not for designs"), "{empty:#?}");
+    assert!(empty.status == 10 && empty.stdout.contains("designs are not the cause"), "{empty:#?}");
 }
 
 #[test]

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 /// Required value of the field [`Argument::format`].
 pub const ARGUMENT_FORMAT: &str = "metaplan-argument/1";
 
-/// A proof that no plan is cheaper than the claimed cost. All costs and numbers are in the integer
-/// units of the task.
+/// A proof that no plan is cheaper than the claimed cost or, without a claimed cost, that there is no plan. All costs
+/// and numbers are in the integer units of the task.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Argument {

@@ -16,8 +16,8 @@ use crate::references;
 use crate::semantics::{State, holds_without_numbers};
 use crate::table::{Table, check_need, check_potential};
 
-/// Upper limit on the number of non-dominated combinations of designs, summed over all operators.
-/// Operators with equal tables are counted once.
+/// Upper limit on the number of non-dominated combinations of designs, summed over all operators. Operators with equal
+/// slots, exclusions, costs and numeric expressions are counted once.
 const CHOICE_LIMIT: usize = 1 << 20;
 /// Upper limit on the number of pairwise comparisons of design combinations, summed over all
 /// operators; about 1 s of work.

@@ -6,10 +6,10 @@
 //! lower bounds on the remaining cost, as tables over a few variables. *Needs* are lower bounds on
 //! a required resource.
 //!
-//! Three conditions are checked. The initial state is covered or pruned, no label is a goal state
-//! cheaper than the claim, and each successor of a label is covered or pruned. Then no plan of any
-//! length is cheaper than the claim, by induction over its steps. A claim without a cost states
-//! that the task has no plan.
+//! Three conditions are checked. The initial state is covered or pruned (by a potential or a need),
+//! no label is a goal state cheaper than the claim, and each successor of a label is covered or
+//! pruned. Then no plan of any length is cheaper than the claim, by induction over its steps. A
+//! claim without a cost states that the task has no plan.
 //!
 //! [`faithful()`] checks that a ground task is faithful to its PDDL files, without grounding them.
 //! [`check_refutation`] checks an additional proof for small tasks: a formula, its refutation, and

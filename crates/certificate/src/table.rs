@@ -128,7 +128,7 @@ impl<'t> Table<'t> {
                 // value suffices.
                 let finite = self.values.iter().flatten().max();
                 if finite.is_some() && !check(operator, finite, finite) {
-                    return Err(format!("operator {position}, which changes nothing that the table knows"));
+                    return Err(format!("operator {position}, which changes no variable of the table"));
                 }
                 continue;
             }

@@ -1,5 +1,4 @@
-//! Entries of `[bindings.names]` and `--name`, which give individuals of the knowledge base object
-//! names.
+//! Entries of `[bindings.names]` and `--name`, which give object names to individuals of the knowledge base.
 //!
 //! An entry is exact (`fd_spiral_low = "fd_search_low"`), or a pattern with one star on each side
 //! (`"fd_spiral_*" = "fd_search_*"`). Module `names` resolves the entries for a knowledge base and

@@ -35,8 +35,8 @@ impl Mission {
         doubts
     }
 
-    /// Warns about bindings to classes, attributes or actions that the knowledge base does not
-    /// have.
+    /// Warns about bindings to classes without individuals, to attributes without an estimation or measurement, and to
+    /// unknown actions.
     fn idle_bindings(&self, knowledge: &Knowledge) -> Vec<Message> {
         let (view, catalogue) = (knowledge.view(), knowledge.catalogue());
         let estimated: BTreeSet<&str> = catalogue.designs().iter().flat_map(estimates).collect();
@@ -54,7 +54,7 @@ impl Mission {
             let empty = BTreeSet::new();
             let (lacks, names) = match kind {
                 "estimation" | "chosen" | "reconfigured" => ("no design has an estimation of", &estimated),
-                "measured" => ("nothing has been measured of", &measured),
+                "measured" => ("there is no measurement of", &measured),
                 "action" | "requires" => ("the knowledge base has no action", &actions),
                 "class" if catalogue.members(&view, name).is_empty() => {
                     ("the knowledge base has no individuals of", &empty)
@@ -88,10 +88,13 @@ impl Mission {
             let candidates = schemas.iter().map(|schema| schema.as_str());
             let nearest_schema = nearest(name.strip_prefix("a_").unwrap_or(name), candidates);
             let nearest_schema = nearest_schema.map_or_else(String::new, |nearest_schema| {
-                format!("; if it is `{nearest_schema}`, name it so, or bind `{nearest_schema} = \"action:{name}\"`")
+                format!(
+                    "; if it corresponds to `{nearest_schema}`, use this name, or bind `{nearest_schema} = \
+                         \"action:{name}\"`"
+                )
             });
             let text = format!(
-                "no action of the domain stands for <{}>, so what it requires is not asked of any{nearest_schema}",
+                "no action of the domain corresponds to <{}>, so its requirements are ignored{nearest_schema}",
                 action.individual.iri
             );
             doubts.push(doubt_about(knowledge, "M205", &action.individual.iri, text));
@@ -137,10 +140,10 @@ impl Mission {
         });
         let warning = |identifier: &pddl::ast::Identifier| {
             let sources = match self.knowledge {
-                Some(_) => "neither the problem nor the knowledge base, by its name or a binding",
-                None => "the problem does not, and there is no knowledge base",
+                Some(_) => "neither the problem nor the knowledge base gives one, by name or by a binding",
+                None => "the problem does not give one, and there is no knowledge base",
             };
-            let text = format!("nothing gives `{}` a value: {sources}", identifier.name);
+            let text = format!("`{}` has no value: {sources}", identifier.name);
             let diagnostic =
                 Diagnostic::new(&self.domain_source, identifier.span, Severity::Warning, "M206", text);
             Message::from_pddl(&[diagnostic], &[&self.domain_source])
@@ -170,8 +173,8 @@ fn stated(engine: &Engine, iri: &str) -> (Vec<Fact>, Vec<Fact>) {
     facts.partition(|fact| fact.arguments.first() == Some(&symbol))
 }
 
-/// Warns about components without facts of their own, and about components that no design requires. A
-/// component counts as unrequired only if other components are required and no other fact links it.
+/// Warns about components that occur only as values in facts about other individuals, and about components that no
+/// design requires. A component counts as unrequired only if other components are required and no other fact links it.
 fn components(knowledge: &Knowledge) -> Vec<Message> {
     let (engine, view) = (knowledge.engine(), knowledge.view());
     let designs = view.function_designs();
@@ -190,7 +193,7 @@ fn components(knowledge: &Knowledge) -> Vec<Message> {
             let suggestion =
                 nearest(&component.name, candidates).map(|name| format!("; did you mean `{name}`?"));
             let text = format!(
-                "the component <{}> is only mentioned, and nothing else is said of it{}",
+                "the component <{}> is only mentioned and has no other statement{}",
                 component.iri,
                 suggestion.unwrap_or_default()
             );
@@ -235,16 +238,14 @@ fn attributes(knowledge: &Knowledge) -> Vec<Message> {
         let candidates =
             attributes.iter().filter(|candidate| candidate.iri != kind.iri && !mentioned(&candidate.iri));
         let suggestion = did_you_mean(&kind.name, candidates.map(|candidate| candidate.name.as_str()));
-        let text = format!(
-            "the attribute <{}> is only mentioned, and nothing else is said of it{suggestion}",
-            kind.iri
-        );
+        let text =
+            format!("the attribute <{}> is only mentioned and has no other statement{suggestion}", kind.iri);
         doubts.push(doubt_about(knowledge, "M229", &kind.iri, text));
     }
     for kind in attributes {
         let used = estimated.contains(kind.name.as_str()) || bounded.contains(kind.name.as_str());
         if !used && stated(engine, &kind.iri).1.is_empty() {
-            let text = format!("nothing gives the attribute <{}> a value, and nothing bounds it", kind.iri);
+            let text = format!("the attribute <{}> has neither values nor bounds", kind.iri);
             doubts.push(doubt_about(knowledge, "M209", &kind.iri, text));
         }
     }
@@ -255,7 +256,7 @@ fn attributes(knowledge: &Knowledge) -> Vec<Message> {
             let suggestion =
                 suggestion.map_or_else(String::new, |suggestion| format!("; did you mean `{suggestion}`?"));
             let text = format!(
-                "<{}> bounds `{attribute}`, of which no design has an estimation, so every design meets it{suggestion}",
+                "<{}> bounds `{attribute}`, which no design estimates, so every design satisfies it{suggestion}",
                 quality.individual.iri
             );
             doubts.push(doubt_about(knowledge, "M210", &quality.individual.iri, text));

@@ -1,5 +1,5 @@
-//! Reads input files and detects their kind. Apart from standard input, only regular files of limited size
-//! are read. Messages never quote a file of another kind than expected, because a hostile manifest may name
+//! Reads input files and detects their kind. Apart from standard input, only regular files of limited size are read. A
+//! file that is recognised as another kind than expected is not quoted in messages, because a hostile manifest may name
 //! any file.
 
 use std::collections::BTreeMap;
@@ -17,7 +17,7 @@ mod output;
 /// Error code for a file of an unexpected kind.
 pub(crate) const CODE: &str = "M131";
 
-/// Size limit of input files, in bytes. It does not apply to standard input.
+/// Limit on the size of the files that `read` reads, in bytes. It does not apply to standard input.
 const LARGEST: u64 = 1 << 28;
 
 /// Reads a regular file.

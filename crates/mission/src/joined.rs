@@ -156,7 +156,7 @@ impl Mission {
             Some(knowledge) => knowledge.fail(component),
             None => Err(Message::error(
                 "M103",
-                format!("there is no knowledge base that has a component `{component}`"),
+                format!("without a knowledge base there is no component `{component}`"),
             )),
         }
     }

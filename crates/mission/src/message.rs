@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::visible::visible;
 
-/// All errors of an input.
+/// All errors of an input, possibly with warnings.
 pub type Errors = diagnostics::Errors<Message>;
 
 /// A message about an input.

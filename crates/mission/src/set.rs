@@ -2,9 +2,9 @@
 //! facts of the problem.
 
 use num_rational::BigRational;
-use pddl::ast::{InitialElement, Name, Span, Term};
+use pddl::ast::{Atom, InitialElement, Name, Span, Term};
 
-use crate::binding::atom;
+use crate::binding::identifier;
 use crate::joined::Mission;
 use crate::knowledge::Knowledge;
 use crate::message::{Message, did_you_mean};
@@ -35,17 +35,16 @@ impl Mission {
             }
             return knowledge.measure(name.trim(), value).map(|_| ());
         }
-        self.set_in_problem(name, value)
+        self.set_in_problem(name, value).map(|_| ())
     }
 
     /// Sets a numeric function or fact of the problem. Like [`Mission::set`], but ignores the
-    /// measured attributes of the knowledge base.
+    /// measured attributes of the knowledge base. Returns `false` if the initial state already has this value or fact.
     ///
     /// # Errors
     /// No symbol of the problem matches, a value is not a decimal number, or the knowledge base decides on
     /// the availability of the design.
-    pub fn set_in_problem(&mut self, name: &str, value: &str) -> Result<(), Message> {
-        self.current.take();
+    pub fn set_in_problem(&mut self, name: &str, value: &str) -> Result<bool, Message> {
         let value = value.trim();
         let words: Vec<&str> = name.split_whitespace().collect();
         let Some((symbol, arguments)) = words.split_first() else {
@@ -54,64 +53,91 @@ impl Mission {
         let symbol = Name::new(symbol);
         let is_own = matches!(arguments, [design] if self.decides_on(design));
         if self.knowledge.is_some() && self.bindings.is_availability(&symbol) && !is_own {
-            let text = format!("the knowledge base decides on `{symbol}`; let components fail with `--fail`");
+            let text =
+                format!("the knowledge base determines `{symbol}`; use `--fail` for failed components");
             return Err(Message::error("M106", text));
         }
         let arity = |declared: &[pddl::ast::Declaration]| {
             declared.iter().find(|d| d.identifier.name == symbol).map(|d| d.parameters.len())
         };
+        let arguments: Vec<Name> = arguments.iter().map(|argument| Name::new(argument)).collect();
         if arity(&self.domain.functions) == Some(arguments.len()) {
-            return self.set_value(&symbol, arguments, value);
+            return self.set_value(&symbol, &arguments, value);
         }
         match (arity(&self.domain.predicates), value.to_ascii_lowercase().as_str()) {
             (Some(arity), truth @ ("true" | "false")) if arity == arguments.len() => {
-                self.set_fact(&symbol, arguments, truth == "true");
-                Ok(())
+                Ok(self.set_fact(&symbol, &arguments, truth == "true"))
             }
             (Some(arity), _) if arity == arguments.len() + 1 => {
-                self.replace_last(&symbol, arguments, value);
-                Ok(())
+                Ok(self.replace_last(&symbol, arguments, Name::new(value)))
             }
             _ => Err(self.unknown_setting(name)),
         }
     }
 
-    fn set_value(&mut self, function: &Name, arguments: &[&str], value: &str) -> Result<(), Message> {
+    fn set_value(&mut self, function: &Name, arguments: &[Name], value: &str) -> Result<bool, Message> {
         let Some(number) = decimal(value) else {
             return Err(Message::error(
                 "M102",
                 format!("the value `{value}` of {function} is not a decimal number"),
             ));
         };
-        let target = atom(function, arguments);
         let is_target = |element: &InitialElement| matches!(element, InitialElement::Value(a, _, _) if same_atom(a, function, arguments));
-        self.problem.init.retain(|element| !is_target(element));
-        self.problem.init.push(InitialElement::Value(target, number, Span::default()));
-        Ok(())
+        let is_equal = |element: &InitialElement| matches!(element, InitialElement::Value(_, value, _) if *value == number);
+        if self.has_only(is_target, is_equal) {
+            return Ok(false);
+        }
+        let value = InitialElement::Value(constants(function, arguments), number, Span::default());
+        self.replace(is_target, Some(value));
+        Ok(true)
     }
 
-    fn set_fact(&mut self, predicate: &Name, arguments: &[&str], holds: bool) {
+    fn set_fact(&mut self, predicate: &Name, arguments: &[Name], holds: bool) -> bool {
+        let is_fact = |element: &InitialElement| matches!(element, InitialElement::Fact(a) if same_atom(a, predicate, arguments));
+        if self.problem.init.iter().any(is_fact) == holds {
+            return false;
+        }
         let is_target = |element: &InitialElement| match element {
             InitialElement::Fact(a) | InitialElement::NegatedFact(a) => same_atom(a, predicate, arguments),
             _ => false,
         };
-        self.problem.init.retain(|element| !is_target(element));
-        if holds {
-            self.problem.init.push(InitialElement::Fact(atom(predicate, arguments)));
-        }
+        self.replace(is_target, holds.then(|| InitialElement::Fact(constants(predicate, arguments))));
+        true
     }
 
-    fn replace_last(&mut self, predicate: &Name, prefix: &[&str], last: &str) {
+    fn replace_last(&mut self, predicate: &Name, mut arguments: Vec<Name>, last: Name) -> bool {
+        let prefix = arguments.clone();
         let is_target = |element: &InitialElement| match element {
             InitialElement::Fact(a) => {
                 let shorter = &a.arguments[..a.arguments.len().saturating_sub(1)];
-                a.predicate.name == *predicate && same_terms(shorter, prefix)
+                a.predicate.name == *predicate && same_terms(shorter, &prefix)
             }
             _ => false,
         };
+        arguments.push(last);
+        let is_equal = |element: &InitialElement| matches!(element, InitialElement::Fact(a) if same_terms(&a.arguments, &arguments));
+        if self.has_only(is_target, is_equal) {
+            return false;
+        }
+        self.replace(is_target, Some(InitialElement::Fact(constants(predicate, &arguments))));
+        true
+    }
+
+    /// Returns `true` if the initial state has an element that fits `is_target`, and all of these fit `is_equal`.
+    fn has_only(
+        &self,
+        is_target: impl Fn(&InitialElement) -> bool,
+        is_equal: impl Fn(&InitialElement) -> bool,
+    ) -> bool {
+        let mut targets = self.problem.init.iter().filter(|element| is_target(element)).peekable();
+        targets.peek().is_some() && targets.all(is_equal)
+    }
+
+    /// Removes the elements of the initial state that fit `is_target`, and appends the replacement.
+    fn replace(&mut self, is_target: impl Fn(&InitialElement) -> bool, replacement: Option<InitialElement>) {
+        self.current.take();
         self.problem.init.retain(|element| !is_target(element));
-        let arguments: Vec<&str> = prefix.iter().copied().chain([last]).collect();
-        self.problem.init.push(InitialElement::Fact(atom(predicate, &arguments)));
+        self.problem.init.extend(replacement);
     }
 
     fn unknown_setting(&self, name: &str) -> Message {
@@ -142,13 +168,18 @@ impl Mission {
     }
 }
 
-fn same_atom(atom: &pddl::ast::Atom, predicate: &Name, arguments: &[&str]) -> bool {
+fn constants(symbol: &Name, arguments: &[Name]) -> Atom {
+    let arguments = arguments.iter().map(|argument| Term::Constant(identifier(argument))).collect();
+    Atom { predicate: identifier(symbol), arguments, span: Span::default() }
+}
+
+fn same_atom(atom: &Atom, predicate: &Name, arguments: &[Name]) -> bool {
     atom.predicate.name == *predicate && same_terms(&atom.arguments, arguments)
 }
 
-fn same_terms(terms: &[Term], arguments: &[&str]) -> bool {
-    let is_equal = |(term, argument): (&Term, &&str)| match term {
-        Term::Constant(identifier) | Term::Variable(identifier) => identifier.name == Name::new(argument),
+fn same_terms(terms: &[Term], arguments: &[Name]) -> bool {
+    let is_equal = |(term, argument): (&Term, &Name)| match term {
+        Term::Constant(identifier) | Term::Variable(identifier) => identifier.name == *argument,
     };
     terms.len() == arguments.len() && terms.iter().zip(arguments).all(is_equal)
 }

@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
-/// Escapes marks of bidirectional text, characters of zero width, and control characters except line breaks
-/// and tabs. Such characters could change what a terminal displays, and names originate from files that may
+/// Escapes invisible characters (e.g. those of zero width), marks of bidirectional text, and control characters except
+/// line breaks and tabs. Such characters could change what a terminal displays, and names originate from files that may
 /// be hostile. Zero-width joiners and non-joiners are kept, because some languages need them.
 pub fn visible(text: &str) -> Cow<'_, str> {
     escaped(text, |character, all| {

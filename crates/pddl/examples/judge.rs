@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         Some(file) => std::fs::read_to_string(file).map(|text| Source::new(file, text)),
         None => Ok(Source::new(DEFAULT_FILES[index].0, DEFAULT_FILES[index].1)),
     };
-    // `read` returns all errors of both files as one value, each with its line and column.
+    // `read` returns the errors of both files as one value, each with its line and column.
     let (domain, problem, warnings) = read(&source(0)?, &source(1)?)?;
     for warning in &warnings {
         println!("{warning}");

@@ -10,7 +10,7 @@ use super::ast::Span;
 use super::excerpt::{Excerpt, Shown};
 use super::source::Source;
 
-/// All diagnostics about PDDL files or a plan, including warnings.
+/// Diagnostics about PDDL files or a plan, including warnings.
 pub type Errors = diagnostics::Errors<Diagnostic>;
 
 /// Severity of a diagnostic.
@@ -29,7 +29,7 @@ impl fmt::Display for Severity {
 }
 
 impl Severity {
-    /// `error` or `warning`.
+    /// Returns `error` or `warning`.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Warning => "warning",
@@ -195,7 +195,7 @@ impl<'s> Sink<'s> {
         self.source
     }
 
-    /// Number of reported diagnostics, including those beyond [`MAX_DIAGNOSTICS`] that are only counted.
+    /// Returns the number of reported diagnostics, including those beyond [`MAX_DIAGNOSTICS`] that are only counted.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(crate) fn len(&self) -> usize {
         self.diagnostics.len() + self.beyond_limit

@@ -1,8 +1,7 @@
 //! PDDL parser, checker and printer, and a plan validator.
 //!
 //! The parser accepts the extensions of real files, with a warning where they deviate from the standard, and
-//! reports all errors of a file at once. [`validate`] executes plans on the syntax tree with exact rational
-//! numbers.
+//! continues after an error. [`validate`] executes plans on the syntax tree with exact rational numbers.
 //!
 //! Absent: grounding, solvers, and the file system.
 //!
@@ -54,7 +53,7 @@ use ast::{Direction, Domain, Metric, Problem};
 ///
 /// # Errors
 ///
-/// Returns all errors and warnings about the objective if there is an error.
+/// Returns the errors and warnings about the objective if there is an error.
 pub fn read_objective(
     direction: Direction,
     expression: &Source,
@@ -86,8 +85,8 @@ pub fn read_objective(
 ///
 /// # Errors
 ///
-/// Returns all errors and warnings if a file has an error. Diagnostics about the domain come first; those
-/// about one file are sorted by position.
+/// Returns the errors and warnings of both files if a file has an error. Diagnostics about the domain come first;
+/// those about one file are sorted by position.
 pub fn read(domain: &Source, problem: &Source) -> Result<(Domain, Problem, Vec<Diagnostic>), Errors> {
     let parsed_domain = parse::domain(domain);
     let parsed_problem = match &parsed_domain.tree {

@@ -13,7 +13,8 @@ use super::ast::{
 use super::types::TypeHierarchy;
 use super::visit::{Node, Visit};
 
-/// Returns the portable form of a domain and a problem that have passed [`check`](super::check()).
+/// Converts a domain and a problem that have passed [`check`](super::check()) to a form that other planners
+/// accept (see the head of this file).
 pub fn portable(domain: &Domain, problem: &Problem) -> (Domain, Problem) {
     let (mut domain, mut problem) = (domain.clone(), problem.clone());
     declare_types(&mut domain);

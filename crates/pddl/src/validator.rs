@@ -54,7 +54,7 @@ impl<'a> Validator<'a> {
     /// Parses and executes a plan. An invalid plan is not an error: see [`Verdict::violation`].
     ///
     /// # Errors
-    /// Returns an error for each line that is neither a step nor empty nor a comment.
+    /// Returns the errors of [`PlanText::parse`].
     pub fn validate(&self, plan: &Source) -> Result<Verdict, Errors> {
         Ok(validate(self.domain, self.problem, &PlanText::parse(plan)?, &self.options))
     }

@@ -266,8 +266,8 @@ fn lines_that_are_not_steps_are_reported() {
     insta::assert_snapshot!(messages.join("\n"), @r"
     1:1 this is not a step of a plan
     2:1 the `)` of this step is missing
-    3:1 expected `:` behind the time
-    4:1 expected a duration such as `[5.000]` behind the action
+    3:1 expected `:` after the time
+    4:1 expected a duration such as `[5.000]` after the action
     5:1 `x` is not a number
     6:1 the name of the action is missing
     ");

@@ -80,7 +80,7 @@ pub(crate) fn search(search: &[Progress], canvas: Canvas) -> Picture {
         }
         text
     };
-    let title = format!("how the search went, in {} messages", search.len());
+    let title = format!("progress of the search, in {} messages", search.len());
     let description =
         "The cost of the best plan falls, the lower bound rises; where they meet, the plan is optimal."
             .to_owned();

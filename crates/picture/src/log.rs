@@ -32,18 +32,22 @@ impl Log {
             @for message in &self.messages { p class="bad" { (message) } }
             h2 { "What happened" }
             (shown("log", &PAGE, &|canvas| self.picture(canvas)))
-            p class="dim" { "A mark may stand for several happenings that lie close together; the list has each of them." }
-            h2 { "One after another" }
+            p class="dim" {
+                "A mark can represent several entries that are close together; the list shows each of them."
+            }
+            h2 { "List" }
             @let listed: Vec<&Happening> = self.listed();
             @if listed.len() < self.happenings.len() {
                 p class="dim" {
-                    "The journal has " (self.happenings.len()) " happenings, " (marked) " of them more than a report of the robot. Here are "
-                    (listed.len()) ": the first, and of these what the loop concluded, planned and did before what it only heard."
+                    "The journal has " (self.happenings.len()) " entries, " (marked)
+                    " of which are not reports of the robot. The list shows "
+                    (listed.len()) " of them: the earliest ones, and conclusions, plans and effects of the loop \
+                                    rather than reports."
                 }
             }
             (list(&listed))
         };
-        page(&self.name, "What a loop heard, concluded, planned and asked for.", &body)
+        page(&self.name, "Events, conclusions, plans and effects of an adaptation loop.", &body)
     }
 
     /// Renders the timeline of the page as an SVG file.
@@ -84,8 +88,8 @@ impl Log {
                 (draw(*kind, marks, (left, right), TOP + LANE * f64::from(lane)))
             }
         };
-        let title = format!("{} happenings in {} seconds", self.happenings.len(), number(last));
-        let description = "A lane for each kind of happening. The list says the same.".to_owned();
+        let title = format!("{} entries in {} seconds", self.happenings.len(), number(last));
+        let description = "One lane for each kind of entry. The list has the same content.".to_owned();
         Picture { width: canvas.width, height: bottom + 24.0, title, description, body }
     }
 

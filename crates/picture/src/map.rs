@@ -58,7 +58,7 @@ type Line = (Point, Point);
 struct Leg {
     from: usize,
     to: usize,
-    /// The numbers of the steps that are these moves, from 1.
+    /// The numbers of the steps that move from `from` to `to`, from 1.
     steps: Vec<usize>,
     names: Vec<String>,
     shape: Shape,
@@ -94,8 +94,9 @@ pub(crate) fn map(plan: &Plan, map: &Map, palette: &Palette, canvas: Canvas) -> 
     let moves: usize = legs.iter().map(|leg| leg.steps.len()).sum();
     let title =
         format!("{} places, {} ways, and the {moves} moves of the plan", map.places.len(), map.ways.len());
-    let description = "A thick line is taken by the plan, in the colour of the configuration; the number at its arrow is the step. A ring is \
-                       where it begins, a double ring where it is to end. The table of steps says the same."
+    let description = "Thick lines are the moves of the plan, in the colour of the configuration; the number at an \
+                       arrow is the step. A ring marks the start, a double ring the goal. The table of steps has the \
+                       same content."
         .to_owned();
     let body = html! {
         @for (one, other) in &map.ways {

@@ -41,12 +41,12 @@ pub(crate) fn page(title: &str, description: &str, body: &Markup) -> String {
                     h1 { (title) }
                     @if !description.is_empty() { p class="dim" { (description) } }
                     p class="controls" {
-                        button id="unfold" type="button" { "Unfold all" } " "
-                        button id="fold" type="button" { "Fold all" }
+                        button id="unfold" type="button" { "Expand all" } " "
+                        button id="fold" type="button" { "Collapse all" }
                     }
                 }
                 main { (body) }
-                footer { p class="dim" { "Made by metaplan. This page is a single file: it loads nothing." } }
+                footer { p class="dim" { "Created by metaplan. This page is a single file and loads nothing." } }
                 script { (PreEscaped(SCRIPT)) }
             }
         }

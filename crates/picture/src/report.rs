@@ -109,7 +109,7 @@ fn plan(plan: &Plan, name: &str, palette: &Palette, (span, canvases): (&Span, &[
             }
             @if !plan.curves.is_empty() {
                 h3 { "Numbers" }
-                p class="dim" { "Dashes are what conditions demand." }
+                p class="dim" { "Dashed lines are the bounds of conditions." }
                 @for (own, number) in plan.curves.iter().zip(1..) {
                     (shown(&format!("{name}-number-{number}"), canvases, &|canvas| curve(plan, own, span, canvas)))
                 }
@@ -118,14 +118,16 @@ fn plan(plan: &Plan, name: &str, palette: &Palette, (span, canvases): (&Span, &[
                 h3 { "Map" }
                 (shown(&format!("{name}-map"), canvases, &|canvas| map(plan, own, palette, canvas)))
                 @if own.places.iter().any(|place| place.position.is_none()) {
-                    p class="dim" { "The mission has no coordinates: places are laid out by the ways between them." }
+                    p class="dim" {
+                        "The mission has no coordinates: the layout of places follows from the ways between them."
+                    }
                 }
             }
         }
         @if !plan.search.is_empty() {
             h3 { "Search" }
             @if let [only] = &plan.search[..] {
-                p { "The planner knew at once: " (only.text) "." }
+                p { "The search has a single message: " (only.text) "." }
             } @else {
                 (shown(&format!("{name}-search"), canvases, &|canvas| search(&plan.search, canvas)))
                 details {
@@ -249,9 +251,9 @@ fn verified(checked: &Checked) -> Markup {
     };
     html! {
         section aria-labelledby="verified" {
-            h2 id="verified" { "What was verified" }
+            h2 id="verified" { "Verification" }
             p class={ "verdict " (if checked.verified { "good" } else { "bad" }) } { (checked.verdict) }
-            (table("verification", &["part", "result", "what was found"], &rows))
+            (table("verification", &["part", "result", "details"], &rows))
         }
     }
 }

@@ -139,7 +139,7 @@ fn points(own: &Points, canvas: Canvas) -> Picture {
             }
         }
     };
-    let description = format!("{} points; the table says the same.", own.points.len());
+    let description = format!("{} points; the table has the same content.", own.points.len());
     Picture { width: right + RIGHT, height: bottom + 40.0, title: own.title.clone(), description, body }
 }
 

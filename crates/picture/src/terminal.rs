@@ -22,8 +22,8 @@ const NAME: usize = 24;
 type Columns = Vec<(usize, (usize, usize))>;
 
 impl Plan {
-    /// Draws the plan in this number of columns. Returns `None` if there are too few columns, if
-    /// actions overlap, or if the picture needs too many lines.
+    /// Draws the plan in this number of columns. Returns `None` if there are too few columns or no
+    /// steps, if actions overlap, or if the picture needs too many lines.
     ///
     /// The widths of steps are proportional to their durations if each step then has enough
     /// columns. Otherwise short steps are widened, and a plan of many steps continues in further

@@ -69,7 +69,8 @@ pub(crate) fn timeline(plan: &Plan, palette: &Palette, span: &Span, canvas: Canv
     let changes = plan.steps.iter().map(|step| step.reconfigured.len()).sum::<usize>();
     let title = format!("{} steps, {changes} reconfigurations", plan.steps.len());
     let description = lanes.iter().map(|lane| lane.name).collect::<Vec<_>>().join(", ");
-    let description = format!("A lane for each of: {description}. The table of steps says the same.");
+    let description =
+        format!("One lane for each of: {description}. The table of steps has the same content.");
     let body = html! {
         (frame.axis(TOP + canvas.name_height(), bottom))
         @for ((lane, top), number) in lanes.iter().zip(&tops).zip(0..) {

@@ -1,4 +1,5 @@
-//! Anytime planning: prints every improvement, then the proof and the plan in the standard format.
+//! Anytime planning: prints every reported improvement, then the verdict (e.g. that the plan is optimal) and the plan
+//! in the standard format. Without files, a built-in task is planned.
 //!
 //! `cargo run -p metaplan-planner --example anytime -- DOMAIN PROBLEM`
 #![expect(clippy::print_stdout, reason = "an example prints")]

@@ -1,5 +1,5 @@
 //! Finds plans of PDDL tasks and proves their optimality: a portfolio of heuristic search and SAT, multiple
-//! objectives, alternative plans, replanning, and certificates.
+//! objectives, alternative plans, replanning, certificates, and the selection of designs without a plan.
 //!
 //! Absent: OWL. The availability of designs is part of the problem as facts.
 

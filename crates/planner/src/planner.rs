@@ -47,14 +47,15 @@ pub struct Planner<'a> {
 }
 
 impl<'a> Planner<'a> {
-    /// Creates a planner with default options, without limits and without a callback.
+    /// Creates a planner with default options, without a time limit and without a callback. The memory limit of
+    /// searches is 2 GiB.
     pub fn new(domain: &'a Domain, problem: &'a Problem) -> Self {
         let (grounding, config) = (GroundConfig::default(), Config::default());
         Self { domain, problem, grounding, config, report: Box::new(|_| ControlFlow::Continue(())) }
     }
 
     /// Sets a time limit, counted from now and including grounding. At the limit, the best known plan is
-    /// returned.
+    /// returned, or during grounding an error.
     #[must_use]
     pub fn time_limit(self, time: Duration) -> Self {
         let limits = self.config.limits.clone().with_time(time);
@@ -99,10 +100,9 @@ impl<'a> Planner<'a> {
         self
     }
 
-    /// Calls `report` for every better plan and lower bound. If `report` returns `Break`, planning ends with
-    /// the best known plan. `report` is not called if the task is solved in exact rationals (see
-    /// [`Planner::plan`]), if actions can reduce the cost, or if the metric contains fluents with
-    /// state-dependent changes.
+    /// Calls `report` for better plans, and if the SAT solver raises the lower bound. If `report` returns `Break`,
+    /// planning ends with the best known plan. `report` is not called if the task is solved in exact rationals (see
+    /// [`Planner::plan`]), if actions can reduce the cost, or if only a part of the metric is minimised.
     #[must_use]
     pub fn on_improvement(mut self, report: impl FnMut(&Improvement) -> ControlFlow<()> + 'a) -> Self {
         self.report = Box::new(report);

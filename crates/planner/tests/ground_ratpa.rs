@@ -1,5 +1,6 @@
 //! Compares ground tasks of generated missions with brute-force instantiation. Both must have the same
-//! reachable atoms, and the same operators after the designs of all slots are expanded.
+//! relevant reachable atoms. After the designs of all slots are expanded, the ground task must have every
+//! reachable action instance, and may have few others (see `compare`).
 //!
 //! The brute-force oracle reads only the syntax tree. It binds parameters one by one, evaluates static
 //! conditions, and computes relaxed reachability with intervals of numbers until a fixpoint. It removes atoms
@@ -103,7 +104,8 @@ impl<'d> World<'d> {
         world
     }
 
-    /// Returns the atom under a binding, or `None` while one of its variables is unbound.
+    /// Returns the atom under a binding, or `None` if one of its variables is unbound or one of its constants
+    /// is unknown.
     fn fact(&self, atom: &Atom, parameters: &[(Name, Vec<usize>)], bound: &[usize]) -> Option<Fact> {
         let object = |term: &Term| match term {
             Term::Variable(variable) => {
@@ -216,7 +218,8 @@ impl<'d> World<'d> {
             })
     }
 
-    /// Returns the instances that are reachable in the delete relaxation, and the reachable atoms.
+    /// Returns the instances that are reachable in the delete relaxation, and the reachable atoms. Without
+    /// `with_numbers`, a number that some action changes may have any value.
     fn reached<'i>(
         &self,
         instances: &'i [Instance],
@@ -328,8 +331,9 @@ fn mentions(expression: &Expression, name: &str) -> bool {
     }
 }
 
-/// Removes instances without influence on the goal: effects that nothing reads, and then instances that
-/// change nothing (costs are never negative). Returns the facts that are read.
+/// Removes instances without influence on the goal until none is left: their effects are read by no remaining
+/// instance and not by the goal (costs are never negative). Returns the remaining instances, and the facts
+/// that they or the goal read.
 fn relevant<'i>(
     world: &World<'_>,
     mut instances: Vec<&'i Instance>,
@@ -372,7 +376,8 @@ fn compare(name: &str, domain: &Domain, problem: &Problem, task: &Task) {
     let cores: BTreeSet<_> = strict.iter().map(|key| world.core(key)).collect();
     let ours: BTreeSet<_> = task.actions().collect();
     assert_eq!(strict.difference(&ours).next(), None, "{name}: reached, and not ground");
-    // The comparisons of battery levels for a combination of designs are evaluated in each state.
+    // The ground task may have more instances, because it compares battery levels for each combination of
+    // designs only in the states of the search.
     let more: Vec<_> = ours.difference(&strict).collect();
     assert!(
         more.iter().all(|key| loose.contains(key) && cores.contains(&world.core(key))),

@@ -1,5 +1,5 @@
-//! Formulas of generated missions and their refutations: a true claim has a refutation, a false claim has
-//! none, and changes of the files are detected.
+//! Formulas of generated missions and their refutations: a false claim has no refutation, and a true claim has
+//! one, unless it would need too many steps. Changes of the files are detected.
 
 #[allow(dead_code, reason = "another suite uses the rest")]
 use std::cell::RefCell;
@@ -153,8 +153,8 @@ fn mutate(text: &str, random: &mut Random) -> String {
     lines.join("\n") + "\n"
 }
 
-/// A changed formula or legend must not be accepted for the task. A changed proof must prove nothing false,
-/// and a truncated proof nothing at all.
+/// A changed formula or legend must not be accepted for the task. A proof or hints that are replaced by other
+/// text, e.g. an empty text, must prove nothing.
 #[test]
 fn changed_refutations_are_rejected() {
     for seed in 0..40 {

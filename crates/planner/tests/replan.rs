@@ -212,7 +212,7 @@ fn named(steps: &[metaplan_planner::Step]) -> Named {
 }
 
 /// After a change, the plan that stays close to the old plan must be optimal with the fewest steps. No
-/// optimal plan of this length, as enumerated with the SAT solver, may share more steps with the old plan.
+/// optimal plan of this length, as enumerated by `alternatives`, may share more steps with the old plan.
 fn check_close(seed: u64) {
     let mission = Mission::random(seed);
     let (domain, mut problem) = parse(&mission.domain(), &mission.problem());
@@ -325,6 +325,7 @@ fn the_old_plan_serves_when_time_is_up() {
 }
 
 /// Checks that the blocking set is minimal: it makes the mission unsolvable, and no proper subset does.
+/// Returns `true` if the mission is unsolvable and the set is not empty.
 fn check_blocking(seed: u64) -> bool {
     let mission = Mission::random(seed);
     let (domain, mut problem) = parse(&mission.domain(), &mission.problem());

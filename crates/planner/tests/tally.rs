@@ -1,4 +1,4 @@
-//! Statistics of random tasks that are compared with an oracle: rejected tasks, and tasks with a proof.
+//! Statistics of random tasks that are compared with an oracle: tasks with a proof, and all tasks.
 
 use std::time::Duration;
 

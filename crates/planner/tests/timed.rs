@@ -16,7 +16,7 @@ fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
     (domain, problem)
 }
 
-/// Returns the best plan, or `None` if there is no plan within the limits. With `Engine::Sat`, only the SAT
+/// Returns the plan that the planner finds, or `None` if it finds none. With `Engine::Sat`, only the SAT
 /// solver is used, up to horizon 8.
 fn plan(domain: &Domain, problem: &Problem, engine: Engine) -> Option<Plan> {
     let task =

@@ -1,4 +1,5 @@
-//! Plans of tasks with times of all widths, and tasks whose times need wide integers.
+//! Planning with narrow and with wide integers for times, which must give equal answers, and tasks whose times
+//! need wide integers.
 
 use std::fmt::Write as _;
 

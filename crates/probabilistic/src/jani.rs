@@ -147,7 +147,7 @@ fn recursion(model: &Model, formula: &Named) -> Option<Diagnostic> {
     for at in 0.. {
         let Some((name, _)) = used.get(at).copied() else { break };
         if name == formula.name {
-            let text = format!("`{name}` stands for something with itself in it");
+            let text = format!("the definition of `{name}` contains `{name}` itself");
             return Some(Diagnostic::new("Q204", formula.place, text));
         }
         if !used[..at].iter().any(|(earlier, _)| *earlier == name)
@@ -355,7 +355,8 @@ impl Writer<'_> {
     }
 }
 
-/// Converts a rational to JANI: a decimal as a number literal, another fraction as a division.
+/// Converts a rational to JANI: a decimal as a number literal, another fraction as a division. A fraction whose
+/// parts do not fit into 64 bits is rounded.
 fn number(value: &num_rational::BigRational) -> Value {
     let (text, _) = crate::prism::decimal(value);
     text.parse::<serde_json::Number>().map_or_else(

@@ -144,7 +144,9 @@ impl<'a, N: Number> Pareto<'a, N> {
             (0..self.mdp.choice_count()).map(|choice| mix([reward(0, choice), reward(1, choice)])).collect()
         });
         if !self.has_costs {
-            // For two probabilities, never reaching a target is admissible and loses both.
+            // Both objectives are probabilities: a path may avoid both targets forever, and then loses both. So
+            // the weighted sum of the probabilities is maximised, which is 0 for such a path, instead of
+            // minimising the losses.
             let total = weights[0].plus(&weights[1]);
             for worth in &mut worth {
                 *worth = total.minus(worth);

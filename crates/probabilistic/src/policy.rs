@@ -36,7 +36,7 @@ pub fn conserving<N: Number>(problem: &Problem<'_, N>, solution: &Solution<N>) -
         }
         let value = &solution.values[state];
         for choice in problem.choices(state) {
-            // The value is finite, so that a choice with a possibly infinite value is not optimal.
+            // The value is finite, so a choice with a possibly infinite value is not optimal.
             if mdp.targets(choice).iter().any(|target| solution.infinite.contains(*target as usize)) {
                 continue;
             }

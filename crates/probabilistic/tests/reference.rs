@@ -39,8 +39,8 @@ fn rational(text: &str) -> BigRational {
     parse_decimal(numerator).expect("number") / parse_decimal(denominator).expect("number")
 }
 
-/// Checks the value, the bounds and the exact value of an answer. `exact` is the expected fraction,
-/// or `inf`.
+/// Checks the value and the bounds of an answer, and its fraction if `is_exact`. `exact` is the expected
+/// fraction, or `inf`.
 fn expect(description: &str, answer: &Answer, exact: &str, is_exact: bool) {
     match answer {
         Answer::Infinite => assert_eq!(exact, "inf", "{description}"),

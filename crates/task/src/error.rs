@@ -1,9 +1,9 @@
-//! Errors that occur between a checked PDDL task and its ground task. Each has a stable code.
+//! Errors of grounding, i.e. of the conversion of a checked PDDL task to a ground task. Each has a stable code.
 
 use crate::limits::Interrupted;
 use pddl::ast::Span;
 
-/// The PDDL file that contains a place.
+/// The PDDL file that contains a source location.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum File {
     /// The domain file.
@@ -21,7 +21,7 @@ pub struct Place {
     pub span: Span,
 }
 
-/// All errors found in a task.
+/// The errors that were found in a task.
 pub type Errors = diagnostics::Errors<Error>;
 
 /// Reason why a task cannot be grounded or encoded.
@@ -29,7 +29,7 @@ pub type Errors = diagnostics::Errors<Error>;
 #[non_exhaustive]
 pub enum Error {
     /// A construct that the planner does not support, although it can be parsed and possibly validated.
-    #[error("{construct} cannot be planned with: {instead}")]
+    #[error("the planner does not support {construct}; supported: {instead}")]
     Unsupported {
         /// The construct in the file.
         construct: String,
@@ -39,7 +39,7 @@ pub enum Error {
         place: Place,
     },
     /// A numeric fluent that is read but has no initial value.
-    #[error("`{name}` without an initial value cannot be planned with: a value for it in `:init`")]
+    #[error("`{name}` has no initial value; state it in `:init`")]
     NoValue {
         /// Name of the function.
         name: String,
@@ -62,14 +62,15 @@ pub enum Error {
         /// Source location.
         place: Place,
     },
-    /// A number that exceeds the exact integer arithmetic of the planner.
+    /// A number that exceeds the integers of the planner after scaling, or fractions that no common factor
+    /// makes integers.
     #[error(
         "{what}: a number exceeds 2^118 after scaling to integers, or has fractions that no scale makes integers"
     )]
     Overflow {
         /// Description of the quantity that contains the number.
         what: String,
-        /// The action or metric that contains the number, if known.
+        /// Source location of the action that contains the number, if known.
         place: Option<Place>,
     },
     /// The deadline passed or the run was interrupted before grounding was complete.

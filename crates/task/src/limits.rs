@@ -1,9 +1,9 @@
 //! Limits of a computation: a deadline, an interrupt flag, and the memory limit of a search.
 //!
 //! Ctrl-C sets the flag, and so does the memory limit of the process. Long loops iterate through
-//! [`Limits::watch`] or call [`LimitPoll::beat`]. Both check the deadline and the flag, and return
-//! [`Interrupted`] at a limit. Callers propagate this error with `?`, so an interrupted function never
-//! returns a partial result as an answer. Searches compare their estimated memory with [`Limits::room`].
+//! [`Limits::watch`] or call [`LimitPoll::beat`]. Both check the deadline and the flag every few iterations,
+//! and return [`Interrupted`] at a limit. Callers usually propagate this error with `?`, so that an incomplete
+//! result is not taken for an answer. Searches compare their estimated memory with [`Limits::room`].
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -19,7 +19,8 @@ pub struct Limits {
     deadline: Option<Instant>,
     time: Duration,
     interrupt: Arc<AtomicBool>,
-    /// Interrupt flag of the limits from which limits with a flag of their own were derived.
+    /// Interrupt flag of the whole computation, if these limits are for a part with its own flag (see
+    /// [`Limits::with_own_interrupt`]).
     outer: Option<Arc<AtomicBool>>,
     room: Option<usize>,
     thresholds: Thresholds,
@@ -84,7 +85,8 @@ impl Limits {
         self
     }
 
-    /// Sets the task sizes from which optional parts of the search are used.
+    /// Sets the thresholds (numbers of states, nodes or labels, or amounts of work) at which searches switch
+    /// optional parts on or off.
     #[doc(hidden)]
     #[must_use]
     pub fn with_thresholds(mut self, thresholds: Thresholds) -> Self {
@@ -92,18 +94,19 @@ impl Limits {
         self
     }
 
-    /// Returns the task sizes from which optional parts of the search are used.
+    /// Returns the thresholds (numbers of states, nodes or labels, or amounts of work) at which searches switch
+    /// optional parts on or off.
     pub fn thresholds(&self) -> &Thresholds {
         &self.thresholds
     }
 
-    /// Returns the memory limit of a search in bytes, which has a default.
+    /// Returns the memory limit of a search in bytes; 2 GiB if none was set.
     pub fn room(&self) -> usize {
         self.room.unwrap_or(DEFAULT_MEMORY)
     }
 
-    /// Returns limits with an interrupt flag of their own, which ends a part of a computation. The present flag
-    /// also ends this part.
+    /// Returns limits for a part of a computation, with a new interrupt flag that ends only this part. The flag
+    /// of `self` also ends the part.
     #[must_use]
     pub fn with_own_interrupt(&self) -> Self {
         Self { interrupt: Arc::default(), outer: Some(Arc::clone(&self.interrupt)), ..self.clone() }
@@ -114,7 +117,8 @@ impl Limits {
         self.interrupt.load(Ordering::Relaxed) || outer.is_some_and(|flag| flag.load(Ordering::Relaxed))
     }
 
-    /// Returns the interrupt flag of the run.
+    /// Returns the interrupt flag of these limits. Setting it to `true` interrupts the computations that use
+    /// it.
     pub fn interrupt(&self) -> Arc<AtomicBool> {
         Arc::clone(&self.interrupt)
     }
@@ -127,8 +131,8 @@ impl Limits {
         if self.reached() { Err(Interrupted) } else { Ok(()) }
     }
 
-    /// Iterates over the items until the deadline passes or the interrupt flag is set; then yields a single
-    /// error and ends.
+    /// Iterates over the items. If the deadline passes or the interrupt flag is set, yields a single error and
+    /// ends; fast loops may notice this some items later.
     pub fn watch<I: IntoIterator>(&self, items: I) -> LimitedIter<'_, I::IntoIter> {
         LimitedIter { items: items.into_iter(), pulse: self.pulse(), is_over: false }
     }
@@ -161,8 +165,8 @@ impl From<&Limits> for Interrupt {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Interrupted;
 
-/// Polls the limits with an adaptive stride. Slow loops check the clock at every beat; fast loops check it
-/// rarely, because reading the clock would dominate the loop.
+/// Polls the limits with an adaptive stride (number of beats between two checks). Slow loops check the limits
+/// at every second beat; fast loops check them rarely, because reading the clock would dominate the loop.
 #[derive(Debug)]
 pub struct LimitPoll<'a> {
     limits: &'a Limits,

@@ -1,8 +1,8 @@
-//! A list of lists of numbers, stored in one allocation.
+//! A list of lists of numbers. The numbers of all lists are stored in one vector.
 
 use crate::number::dense;
 
-/// Lists of numbers, stored one after another.
+/// Lists of numbers, which are stored one after another in a single vector.
 #[derive(Debug, Clone, Default)]
 pub struct Lists {
     /// End position of each list in `items`.

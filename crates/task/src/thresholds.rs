@@ -1,18 +1,20 @@
-//! Task sizes from which optional parts of a search are used.
+//! Thresholds at which optional parts of a search are switched on or off.
 
-/// Sizes from which optional parts of the search are used. The planner's answers do not depend on them. Tests
-/// lower the sizes, so that small tasks, whose answers are known by brute force, exercise every pruning.
+/// Thresholds at which optional parts of a search are switched on or off: numbers of states, nodes or labels, or
+/// amounts of work. They affect the running time, not the correctness of the answers. Tests use other thresholds
+/// ([`Thresholds::NONE`]), so that small tasks, whose answers are known by brute force, exercise every pruning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Thresholds {
-    /// Number of stored states without a plan after which additional components support A\*: first a greedy
-    /// search, then stubborn sets, object symmetries and landmarks. Applies only if no other component
-    /// alternates with A\*. `Config::head_start` of the planner is the corresponding number for the whole
-    /// planner.
+    /// Number of stored states after which further components support A\*: LM-cut, stubborn sets and object
+    /// symmetries and, if no plan is known, a greedy search, which may store as many states. Applies only if no
+    /// satisficing search or SAT solver alternates with A\*. `Config::head_start` of the planner is the
+    /// corresponding number for the whole planner.
     pub states: usize,
     /// Number of stored states at which A\* first estimates whether its memory will suffice.
     pub progress: usize,
-    /// Work, in work units, after which the search component that lags behind gets only half of its share.
+    /// Work, in work units, after which the slower of two alternating A\* searches gets only half of its share,
+    /// if its lower bound lags behind.
     pub behind: u64,
     /// Number of states after which stubborn sets are disabled if they have pruned too little.
     pub stubborn: u64,
@@ -26,14 +28,14 @@ pub struct Thresholds {
     /// Number of nodes after which the greedy search and the search for sequential plans alternate with the
     /// exact temporal search.
     pub concurrent: usize,
-    /// Number of bits of the temporal unit up to which times are 128-bit integers. A larger unit, as other
-    /// reasons, leads to wider integers.
+    /// Upper limit on the number of bits of the temporal unit (common denominator of all times) with which
+    /// times are 128-bit integers. With a larger unit, or if 128 bits do not suffice, times are wider integers.
     pub narrow_times: u64,
     /// Number of nodes in the first turn of the greedy search. The turns of the other searches are
     /// proportional.
     pub turn: usize,
-    /// Number of sequences after which the exhaustive search with chosen durations alternates with other
-    /// searches. Also the length of its first turn.
+    /// Number of sequences (partial plans) that the exhaustive search with chosen durations evaluates before
+    /// other searches alternate with it.
     pub chosen: u64,
 }
 
@@ -56,7 +58,8 @@ impl Default for Thresholds {
 }
 
 impl Thresholds {
-    /// Thresholds with which all parts are used from the start, and stubborn sets are never disabled.
+    /// Thresholds with which all optional parts of the search are used from the start, times are always the wider
+    /// integers, and stubborn sets are never disabled.
     pub const NONE: Self = Self {
         states: 0,
         progress: 0,

@@ -1,4 +1,5 @@
-//! Search for concurrent plans: A* over happenings with a simple temporal network.
+//! Search for concurrent plans: A* over happenings with a simple temporal network, incomplete searches for
+//! good plans, and linear programs for durations that the planner chooses.
 //!
 //! Absent: SAT and OWL.
 

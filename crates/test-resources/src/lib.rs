@@ -39,6 +39,10 @@ pub enum Resource {
     Owlready2,
     /// The program `popf` of `metaplan-ros`.
     Popf,
+    /// The programs of the proved checker, built by `proved/build.sh`.
+    Proved,
+    /// The page of the proved checker, built by `proved/page.sh`.
+    ProvedPage,
     /// Public files that are not part of the project, as listed in `data/sources.toml` ([`data`]).
     PublicData,
     /// Python 3, with its standard library.
@@ -61,7 +65,7 @@ pub enum Resource {
 
 impl Resource {
     /// All resources, each with its name and with a way to get it.
-    pub const ALL: [(Self, &str, &str); 17] = [
+    pub const ALL: [(Self, &str, &str); 19] = [
         (Self::Bash, "bash", "install bash"),
         (Self::Browser, "browser", "install Chromium (Debian: apt-get install chromium)"),
         (Self::Data, "data", "set METAPLAN_DATA to a directory with the test data"),
@@ -74,6 +78,8 @@ impl Resource {
             "python3 -m venv pellet && pellet/bin/pip install owlready2==0.47, and METAPLAN_PYTHON=$PWD/pellet/bin/python",
         ),
         (Self::Popf, "popf", "cargo build -p metaplan-ros --bins, and add target/debug to PATH"),
+        (Self::Proved, "metaplan-proved-check", "run proved/build.sh, and add proved/ocaml to PATH"),
+        (Self::ProvedPage, "proved-page", "run proved/page.sh, which needs js_of_ocaml"),
         (
             Self::PublicData,
             "public-data",

@@ -90,7 +90,8 @@ impl Generator {
         let mut text = String::from(
             "(define (domain d) (:constants o1 o2) (:predicates (p ?x) (q ?x ?y) (r) (d1 ?x) (d2 ?x)) (:functions (n) (total-cost))",
         );
-        // d1 depends only on itself, without negation, and d2 may negate d1. The axioms are stratified.
+        // Of the derived predicates, d1 depends only on itself, and without negation; d2 may negate d1. So the
+        // axioms are stratified.
         let seed = self.condition(1, &["?x"], 0);
         let _ = write!(
             text,

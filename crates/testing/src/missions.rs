@@ -1,4 +1,5 @@
-//! Random small missions in PDDL, with reference costs of an optimal plan by dynamic programming.
+//! Random small missions in PDDL, with reference costs of an optimal plan by Dijkstra's algorithm and by
+//! dynamic programming.
 
 use std::collections::{BTreeMap, BinaryHeap};
 use std::fmt::Write as _;

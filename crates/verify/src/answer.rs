@@ -30,7 +30,8 @@ pub struct VerificationAnswer<'a> {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 struct PartAnswer<'a> {
     /// `files`, `derivations`, `knowledge`, `task`, `plan`, `argument`, `formula`, `proof`, `steps`,
-    /// `mission`; or `limits` if a time or memory limit was reached.
+    /// `mission`; or `limits` if a time or memory limit was reached; or `theorem` if the proved
+    /// checker disagrees.
     part: &'static str,
     /// Whether the part is verified.
     verified: bool,

@@ -69,8 +69,8 @@ pub fn is_shipped(name: &str, text: &str) -> bool {
     [(COADAPTATION, rules::COADAPTATION_RULES), (TOMASYS, rules::TOMASYS_RULES)].contains(&(name, text))
 }
 
-/// Describes each rule file: shipped, changed or own. Returns an error if the recorded digest of a shipped
-/// rule file differs from the digest of its text, or if this file is missing.
+/// Describes for each rule file whether it is shipped, a changed version of a shipped file, or another file. Returns an
+/// error if the recorded digest of a shipped rule file differs from the digest of its text, or if this file is missing.
 fn provenance(origin: &Origin) -> Result<String, String> {
     let mut descriptions = Vec::new();
     for (name, text) in &origin.rules {
@@ -92,7 +92,7 @@ fn provenance(origin: &Origin) -> Result<String, String> {
     let missing =
         origin.shipped.keys().find(|name| !origin.rules.iter().any(|(rule_name, _)| rule_name == *name));
     match missing {
-        Some(name) => Err(format!("the rules `{name}` are named and not there")),
+        Some(name) => Err(format!("the rules `{name}` are named, but their file is missing")),
         None if descriptions.is_empty() => Ok("no rule files".to_owned()),
         None => Ok(format!("rules: {}", descriptions.join(", "))),
     }
@@ -181,18 +181,25 @@ fn filled(
     let unchanged_metric = print_problem(&filled);
     filled.metric.clone_from(&problem.metric);
     if print_domain(mission.domain()) != print_domain(domain) {
-        return Err("the mission's domain is another one".to_owned());
+        return Err("the domain differs from that of the mission".to_owned());
     }
     let (actual, expected) = (print_problem(&filled), print_problem(problem));
     if let Some((actual, expected)) =
         actual.lines().zip(expected.lines()).find(|(actual, expected)| actual != expected)
     {
-        return Err(format!("the knowledge says `{}`, the problem `{}`", actual.trim(), expected.trim()));
+        return Err(format!(
+            "the knowledge implies `{}`, but the problem states `{}`",
+            actual.trim(),
+            expected.trim()
+        ));
     }
     if actual != expected {
-        return Err("the knowledge says more or less than the problem".to_owned());
+        return Err("the knowledge implies more or fewer facts than the problem states".to_owned());
     }
     // The metric is the only part of a problem that a user chooses for each plan.
     let metric = if unchanged_metric == expected { "" } else { ", with another metric than the mission's" };
-    Ok(format!("the problem is what follows{metric}; on trust: {}", shared(&mission)))
+    Ok(format!(
+        "the problem follows from the knowledge{metric}; trusted without a check: {}",
+        shared(&mission)
+    ))
 }

@@ -13,9 +13,9 @@
 //! | `task.json` | the ground task |
 //! | `witness.json` | the witness, an over-approximation of the reachable states (possible atoms and ranges of numbers): the reason why other instances of actions need no operator |
 //! | `formula.cnf`, `legend.txt`, `proof.drat`, `hints.txt` | for small tasks: the formula "some plan of at most T steps is cheaper" in DIMACS, the meaning of its variables, its refutation, the antecedents (numbers of clauses) of each line of the refutation |
-//! | `argument.json` | the proof that no plan is cheaper: labels, potentials, needs (see `metaplan-certificate`) |
+//! | `argument.json` | the proof that no plan is cheaper: labels (states), potentials (lower bounds on the remaining cost) and needs (lower bounds on numbers that are required to reach the goal; see `metaplan-certificate`) |
 //!
-//! Absent: planner code. The crate links none.
+//! The crate does not link the planner.
 //!
 #![doc = include_str!("../README.md")]
 

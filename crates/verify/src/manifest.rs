@@ -24,7 +24,8 @@ pub const TASK: &str = "task.json";
 /// Name of the file with the witness, an over-approximation of the reachable states: possible atoms
 /// and ranges of numbers.
 pub const WITNESS: &str = "witness.json";
-/// Name of the file with the optimality proof: labels, potentials and needs.
+/// Name of the file with the optimality proof: labels (states), potentials (lower bounds on the
+/// remaining cost) and needs (lower bounds on numbers that are required to reach the goal).
 pub const ARGUMENT: &str = "argument.json";
 /// Name of the file with the formula "some plan of at most T steps is cheaper" in DIMACS; for small
 /// tasks only.
@@ -158,7 +159,7 @@ impl Subject {
 pub struct VerifiedPart {
     /// Name of the part: `files`, `derivations`, `knowledge`, `task`, `plan`, `argument`,
     /// `formula`, `proof`, `steps` or `mission`; or `limits` if the time or memory limit was
-    /// reached.
+    /// reached; or `theorem` if the proved checker disagrees.
     pub part: &'static str,
     /// A summary of the check, or a description of the first defect as an error.
     pub result: Result<String, String>,

@@ -31,8 +31,8 @@ pub fn same_task(
     match faithful(domain, problem, task, witness, stop) {
         Faithful::Yes { instances, idle, timed } => {
             let summary = format!(
-                "it stands for the files: {instances} instances of actions can be executed, {idle} of which change nothing \
-                 that it knows"
+                "it represents the files: {instances} instances of actions can be executed, {idle} of which change \
+                 no variable of the task"
             );
             Ok((summary, timed))
         }

@@ -10,8 +10,8 @@ use crate::memory;
 
 /// Upper limit on the memory of the process, in megabytes of 2^20 bytes.
 const MEMORY_LIMIT: u64 = 4096;
-/// Time after reaching a limit, in addition to a tenth of the time limit, after which a
-/// verification that is still running is aborted.
+/// After a limit is reached, a verification that does not end is aborted after this time plus a tenth of the time
+/// limit.
 const GRACE: Duration = Duration::from_millis(100);
 const LATE: &str = "it takes longer than `--time-limit` allows";
 const INTERVAL: Duration = Duration::from_millis(50);

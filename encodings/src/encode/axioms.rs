@@ -1,11 +1,11 @@
 //! Clauses for derived variables: the least fixpoint of their rules, by completion and level
 //! constraints.
 //!
-//! - body: `b@t ↔ ⋀ l@t` for the body b of each rule;
+//! - body: `b@t ↔ ⋀ l@t` for the body b of each rule, with the literals l, in the state before step t;
 //! - completion: `h@t ↔ ⋁ b@t` over the bodies b of the rules with head h \[1\];
-//! - levels: in a layer of n variables that depend on each other, a true `h@t` needs a supporting
-//!   rule whose body variables from this layer are derived in an earlier round: `h@t → ⋁ s@t`, `s@t
-//!   → b@t`, `s@t ∧ r(h) ≤ k → r(a) ≤ k−1` with the round r in order encoding \[2\].
+//! - levels: in a layer of variables that depend on each other, a true `h@t` needs a supporting rule s whose
+//!   body variables a from this layer are derived in earlier rounds: `h@t → ⋁ s@t`, `s@t → b@t`, and
+//!   `s@t ∧ r(h) ≤ k → r(a) ≤ k−1`, where r is the round in order encoding \[2\].
 //!
 //! \[1\] K. Clark: Negation as failure, Logic and Data Bases, 1978.
 //! \[2\] T. Janhunen: Representing normal programs with clauses, ECAI 2004.

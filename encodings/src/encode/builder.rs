@@ -1,8 +1,8 @@
 //! Formula under construction, to which the families of clauses are added.
 //!
-//! A group of operators has one variable, which is true at a step if one of its members is
-//! executed: `o@t → g@t` for each member, and `g@t → ⋁ o@t`. With groups, clauses about designs,
-//! costs and consumption do not have to be repeated for each operator.
+//! A group g of operators has one variable `g@t` per step t, which is true if one of the group's
+//! members o is executed at the step (`o@t`): `o@t → g@t` for each member, and `g@t → ⋁ o@t`. With
+//! groups, clauses about designs, costs and consumption do not have to be repeated for each operator.
 
 use std::collections::BTreeMap;
 
@@ -27,8 +27,8 @@ pub(super) struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
-    /// Creates a formula without clauses. `allowed[step][operator]` is `true` if the operator may
-    /// occur at the step.
+    /// Creates a formula with the variables of the task, but without clauses except that of the constant true.
+    /// `allowed[step][operator]` is `true` if the operator may occur at the step.
     pub(super) fn new(
         context: Context<'a>,
         allowed: &[Vec<bool>],

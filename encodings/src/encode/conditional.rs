@@ -1,6 +1,7 @@
-//! Clauses for conditional effects.
+//! Clauses for conditional effects (notation: head of `encode`).
 //!
-//! - `f@t ↔ o@t ∧ ⋀ l@t` for a conditional effect f of operator o with the literals l as condition;
+//! - `f@t ↔ o@t ∧ ⋀ l@t` for a conditional effect f of operator o with the literals l as condition:
+//!   `f@t` means that f occurs at step t;
 //! - `f@t → e@t+1` for each fact e that the effect sets, unless a later effect of the operator sets
 //!   the same variable to another value.
 

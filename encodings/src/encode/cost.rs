@@ -23,8 +23,8 @@ use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::encode::interference::Interference;
 use crate::sat::Lit;
 
-/// Maximum number of different accumulated amounts in the order encoding. Beyond it, the sum is
-/// encoded by binary addition.
+/// Maximum number of different accumulated amounts in the order encoding. Beyond it, or if a source
+/// requires more than 50 times as many additions of amounts, the sum is encoded by binary addition.
 const AMOUNT_LIMIT: usize = 1_000;
 
 /// Cost limit of an encoding: only plans with a cost of at most `limit` are admitted. With
@@ -42,8 +42,8 @@ pub struct CostLimit<'a> {
 pub enum CostEncoding {
     /// The sum of the costs, bounded by the limit.
     Sum,
-    /// Weighted literals for core-guided search. Clauses exclude only single reduced costs above the gap
-    /// between limit and lower bound.
+    /// Weighted literals for core-guided search, without a bound on their sum. Clauses exclude only an amount
+    /// that alone exceeds the gap between the limit and the lower bound.
     Apart,
 }
 
@@ -67,7 +67,7 @@ pub(super) struct Cost {
 }
 
 enum Spent {
-    /// Literal that is implied by "at least this amount is spent", for every positive amount that
+    /// Literal that is implied by "at least this amount is spent", for every positive amount up to the gap that
     /// can occur.
     Order(BTreeMap<Int, Lit>),
     Binary(Bits),

@@ -47,9 +47,10 @@ pub struct Encoding<'a> {
 }
 
 impl<'a> Encoding<'a> {
-    /// Encodes plans with symmetry breaking: of plans that differ only by exchanging interchangeable designs
-    /// or objects, not all are admitted. `symmetry` caches the symmetries of the task. Returns `None` if the
-    /// deadline passes or the run is interrupted, there are too many clauses, or numbers are too large.
+    /// Encodes plans with symmetry breaking: of plans that differ only by exchanging interchangeable designs or
+    /// objects, at least one is admitted, but usually not all. `symmetry` caches the symmetries of the task.
+    /// Returns `None` if the deadline passes or the run is interrupted, there are too many clauses, or numbers
+    /// are too large.
     pub fn new(
         context: Context<'a>,
         plans: PlanConstraints<'_>,
@@ -96,9 +97,9 @@ impl<'a> Encoding<'a> {
         self.cost.as_ref().map_or((0, &[]), Cost::payments)
     }
 
-    /// Returns the literal for a choice of a plan at the step `at`: the operator if `slot` is `None`,
-    /// otherwise the design of this slot. Returns the constant false if the operator is impossible at the
-    /// step.
+    /// Returns the literal for a choice of a plan at the step `at`: the operator if `slot` is `None`, otherwise
+    /// the design of this slot. Action number `at` of the plan must be at this step (sequential semantics).
+    /// Returns the constant false if the operator is impossible at the step.
     pub fn choice(&self, plan: &[GroundStep], (at, slot): (usize, Option<u32>)) -> Lit {
         let step = &plan[at];
         match slot {
@@ -111,7 +112,8 @@ impl<'a> Encoding<'a> {
         }
     }
 
-    /// Returns a clause that excludes exactly this plan.
+    /// Returns a clause that excludes exactly this plan. The encoding must have sequential semantics, so that
+    /// each action of the plan has its own step.
     pub fn blocking_clause(&self, plan: &[GroundStep]) -> Vec<Lit> {
         // A longer plan that begins with this plan is a different plan, so it stays admitted.
         let longer = self.variables.busy.get(plan.len()).copied();

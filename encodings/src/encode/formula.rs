@@ -98,7 +98,7 @@ pub enum VariableMeaning {
     /// The accumulated reduced cost (cost beyond the lower bound), after the source of cost `stage` of the
     /// step `step` − 1, is at least the amount. The literal is implied by this condition, not equivalent.
     CostAtLeast { amount: Int, step: u32, stage: u32 },
-    /// A source of cost at the step adds this amount. It is implied by the choices that cause the
+    /// A source of cost at the step adds this amount. The literal is implied by the choices that cause the
     /// amount.
     Increment { amount: Int, step: u32, stage: u32 },
     /// The conditional effect with this index of the operator takes place at the step.

@@ -1,8 +1,8 @@
 //! Detects interchangeable designs of a slot (a parameter for a function design) by hashing.
 //!
 //! Each design has a signature: a hash of its entries in all tables and forbidden combinations of the task.
-//! Only designs with equal signatures are compared. The running time is linear in the size of the tables,
-//! independent of the number of designs.
+//! Only designs with equal signatures are compared. So not every pair of designs is compared, and the running
+//! time is about linear in the size of the tables.
 
 use std::hash::{BuildHasher, Hash};
 

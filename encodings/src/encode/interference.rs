@@ -1,18 +1,21 @@
 //! Clauses that exclude interference between operators of the same step.
 //!
-//! In ∀-step semantics \[1\] the operators of a step can be executed in any order with the same
-//! result. In ∃-step semantics \[2\] they can be executed in at least one order; here this is the
-//! order of the ground task. In both semantics, all conditions hold before the step and all effects
-//! hold after the step. For each fact, let E be the operators that change the fact, and R the
-//! operators that need the fact. For a variable that is read in another way than by a plain
-//! condition, E contains all its writers:
+//! In ∀-step semantics \[1\] the operators of a step can be executed in any order with the same result. In
+//! ∃-step semantics \[2\] they can be executed in at least one order; here this is the order of the ground
+//! task. In both semantics, all conditions hold before the step and all effects hold after the step.
 //!
-//! - ∃-step: `¬o@t ∨ ¬p@t` for o ∈ E before p ∈ R in the order, by a ladder: `o@t → a@t`,
-//!   `a@t → a'@t`, `a@t → ¬p@t`;
+//! `o@t` means that operator o is executed at step t. For each fact, let R be the operators with the fact as a
+//! condition, and E the operators that set its variable to another value. For each variable that is also read
+//! otherwise (in a clause, by a conditional effect or through a derived variable), there is a second pair: these
+//! readers as R, and all writers of the variable as E.
+//!
+//! - ∃-step: `¬o@t ∨ ¬p@t` for o ∈ E before p ∈ R in the order. A ladder of auxiliary variables a ("an earlier
+//!   operator has changed the fact", one for each further operator of E) encodes this with few clauses:
+//!   `o@t → a@t`, `a@t → a'@t` for the next variable a', and `a@t → ¬p@t`;
 //! - ∀-step: these clauses, and again in the reverse order;
-//! - exclusion: at most one of the operators that use the same slot or the same numeric variable, at most
-//!   one that changes the abstract state of the cost potential (the projection that reduces costs), and at
-//!   most one with a comparison that contains no numeric variable. So numbers, designs and costs are
+//! - exclusion: at most one of the operators that use the same slot or the same numeric variable; at most one
+//!   that changes the abstract state in the projection by whose goal distances costs are reduced; and at most
+//!   one with a comparison of constants, which can depend on its designs. So numbers, designs and costs are
 //!   encoded as in sequential semantics.
 //!
 //! Every sequential plan is also a plan in these semantics, so bounds on the length of sequential

@@ -1,11 +1,11 @@
 //! Clauses for exact numeric variables in binary arithmetic.
 //!
 //! At every step, an effect `x := Σ f·y + q` of the operator at the step determines the next value.
-//! Here q is a constant plus entries of tables, which are selected by designs. Numbers that no
-//! operator changes keep their values. A condition `Σ f·y + q ≥ 0` requires the sign bit of the sum
-//! to be 0 if its operator is executed. If a condition has the same expression as an effect of the
-//! same operator (a battery that must not fall below 0), the sign bit of the next value is used
-//! instead.
+//! Here x and y are numeric variables, f are constant factors, and q is a constant plus entries of
+//! tables, which are selected by designs. Numbers that no operator changes keep their values. A
+//! condition `Σ f·y + q ≥ 0` requires the sign bit of the sum to be 0 if its operator is executed. If a
+//! condition has the same expression as an effect of the same operator (a battery that must not fall
+//! below 0), the sign bit of the next value is used instead.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

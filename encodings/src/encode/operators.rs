@@ -1,9 +1,10 @@
-//! Operators: their order, conditions and effects.
+//! Clauses for operators: their order, conditions and effects (notation: head of `encode`).
 //!
-//! - sequence: at most one operator per step in sequential semantics; `o@t → busy@t`,
-//!   `busy@t → ⋁ o@t`, `busy@t+1 → busy@t`;
-//! - condition: `o@t → p@t` for each fact, `o@t → ⋁ l@t` for each clause;
-//! - effect: `o@t → e@t+1`, unless a conditional effect of the operator prevails.
+//! - sequence: at most one operator per step in sequential semantics. `busy@t` means that an operator is
+//!   executed at step t, and idle steps come last: `o@t → busy@t`, `busy@t → ⋁ o@t`, `busy@t+1 → busy@t`;
+//! - condition: `o@t → p@t` for each fact p in the condition of o, `o@t → ⋁ l@t` for each clause with the
+//!   literals l;
+//! - effect: `o@t → e@t+1` for each fact e that o sets, unless a conditional effect of o prevails.
 
 use task::number::dense;
 

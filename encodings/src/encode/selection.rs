@@ -1,9 +1,11 @@
 //! Clauses for the selection of function designs, factored by slots.
 //!
-//! The operators that admit the same designs D of a slot form a group. Let `g@t` be true if an operator of the
-//! group is executed at step t. Then `g@t → ⋁_{d ∈ D} slot=d@t`, at most one design of a slot is true, and
-//! `slot=d@t → ⋁ {g@t : d ∈ D}`, so an unused slot has no design. Each forbidden combination is excluded for
-//! the group `h` of the operators that forbid it, e.g. `¬h@t ∨ ¬slot=d@t ∨ ¬slot'=d'@t` for two slots.
+//! The operators that admit the same designs D of a slot form a group g. Let `g@t` be true if an
+//! operator of the group is executed at step t, and `slot=d@t` if design d is selected for the slot at
+//! step t. Then `g@t → ⋁_{d ∈ D} slot=d@t`, at most one design of a slot is true, and
+//! `slot=d@t → ⋁ {g@t : d ∈ D}`, so an unused slot has no design. Each forbidden combination is
+//! excluded for the group `h` of the operators that forbid it, e.g. `¬h@t ∨ ¬slot=d@t ∨ ¬slot'=d'@t`
+//! for two slots.
 
 use task::limits::Interrupted;
 

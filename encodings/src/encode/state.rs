@@ -1,8 +1,11 @@
 //! Clauses for state variables: their domains at every step, and the frame axioms.
 //!
-//! - domain: `⋁_d v=d@t`, and at most one of them;
-//! - frame (explanatory, after Haas \[1\]): `v=d@t+1 → v=d@t ∨ ⋁ {o@t : o sets v to d}`. With the domain
-//!   constraints on both sides this also preserves unchanged values.
+//! `v=d@t` means that variable v has the value d in the state before step t, and `o@t` that operator o is
+//! executed at step t.
+//!
+//! - domain: `⋁_d v=d@t` over the values d of each variable v, and at most one of these values;
+//! - frame (explanatory, after Haas \[1\]): `v=d@t+1 → v=d@t ∨ ⋁ {o@t : o sets v to d}` for variables that are
+//!   not derived. With the domain constraints before and after the step, this also preserves unchanged values.
 //!
 //! \[1\] A. Haas: The case for domain-specific frame axioms, The Frame Problem in AI, 1987.
 

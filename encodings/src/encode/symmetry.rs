@@ -1,13 +1,14 @@
 //! Symmetry breaking for interchangeable designs and objects: of symmetric plans, at least one
 //! stays admitted.
 //!
-//! - designs: of interchangeable designs of a slot, only the first is used: `¬slot=d@t` for all
-//!   others. Designs are chosen independently at every step, so each step has its own symmetry;
-//! - objects: objects x₁ < x₂ < …, any two of which can be exchanged without changing the task
-//!   \[1\], are first used in this order: `o@t → s_i@t` for each operator o with x_{i+1} but not
-//!   `x_i` among its arguments. Here `s_i@t → s_i@t−1 ∨ u_i@t` states that `x_i` has been used, and
-//!   `u_i@t ↔ ⋁ o@t` that it is used now. Renaming the objects of a plan in the order of their
-//!   first use yields a plan that satisfies this at the same cost.
+//! - designs: of interchangeable designs of a slot, only the first is used: `¬slot=d@t` (design d is
+//!   not selected for the slot at step t) for all others. Designs are chosen independently at every
+//!   step, so each step has its own symmetry;
+//! - objects: objects x₁ < x₂ < …, any two of which can be exchanged without changing the task \[1\],
+//!   are first used in this order: `o@t → s_i@t` for each operator o with x_{i+1} but not `x_i` among
+//!   its arguments, where `o@t` means that o is executed at step t. Here `s_i@t → s_i@t−1 ∨ u_i@t`
+//!   states that `x_i` has been used, and `u_i@t ↔ ⋁ o@t` that it is used now. Renaming the objects of
+//!   a plan in the order of their first use yields a plan that satisfies this at the same cost.
 //!
 //! Objects are not considered interchangeable if they have different numeric variables, or if the
 //! task has derived variables.

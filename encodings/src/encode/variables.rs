@@ -1,6 +1,6 @@
 //! Variables of a formula for each step: operators, values of state variables, and designs.
 //!
-//! A value that is unreachable at a step has no variable at this step.
+//! A value that is unreachable at a step, or the only reachable value of its variable, is a constant instead.
 
 use task::context::Context;
 use task::limits::Interrupted;

@@ -51,7 +51,7 @@ pub enum BackendError {
     #[error("a solver needs a name; built in are: {}", Backend::BUILT_IN.join(", "))]
     Empty,
     /// The program does not behave like a SAT solver.
-    #[error("`{command}` does not serve as a SAT solver: {reason}; built in are: {}", Backend::BUILT_IN.join(", "))]
+    #[error("`{command}` cannot be used as a SAT solver: {reason}; built in are: {}", Backend::BUILT_IN.join(", "))]
     Unusable {
         /// The program as named by the user.
         command: String,

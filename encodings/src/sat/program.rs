@@ -20,7 +20,7 @@ use task::limits::Limits;
 
 use crate::sat::solver::{Answer, Lit, Solver};
 
-/// Time limit of a run of the external program. It takes the place of a conflict budget.
+/// Time limit of a run of the external program if there is a conflict budget, which it replaces.
 const BUDGET_TIME: Duration = Duration::from_secs(2);
 /// Time between two checks of the limits while the program runs.
 const INTERVAL: Duration = Duration::from_millis(5);
@@ -154,7 +154,7 @@ impl Program {
 /// may be incomplete, so the result is an error.
 fn has_ended(child: &mut Child, is_over: &dyn Fn() -> bool) -> Result<bool, String> {
     while !is_over() {
-        match child.try_wait().map_err(|error| format!("how it ended is not known: {error}"))? {
+        match child.try_wait().map_err(|error| format!("its exit status is unknown: {error}"))? {
             Some(status) if matches!(status.code(), Some(0 | 10 | 20)) => return Ok(true),
             Some(status) => return Err(format!("it failed: {status}")),
             None => thread::sleep(INTERVAL),

@@ -187,7 +187,7 @@ impl Solver for Varisat {
 enum Part {
     /// The code of a step is next.
     Code,
-    /// The length of a list is next. Its items have `each` numbers; `and_list` is `true` if another
+    /// The length of a list is next. Each item consists of `each` numbers; `and_list` is `true` if another
     /// list follows.
     Length { each: u64, and_list: bool },
     /// The numbers of a list are next: `left` of them remain. `and_list` is `true` if another list
@@ -216,7 +216,7 @@ impl Steps {
         let place = self.bytes.saturating_mul(8);
         self.number |= u128::from(byte).checked_shl(place).unwrap_or(0);
         self.bytes = self.bytes.saturating_add(1);
-        // The low end of a number of n bytes consists of n - 1 zeros and a one.
+        // The lowest n bits of a number of n bytes are n - 1 zeros and, above them, a one.
         let total = self.number.trailing_zeros().saturating_add(1);
         if self.number == 0 || self.bytes < total {
             return false;

@@ -28,7 +28,7 @@ const UPKEEP: Duration = Duration::from_secs(5);
 
 type Response = (&'static str, String);
 
-/// Serves the endpoints at `address` until the program ends.
+/// Starts to serve the endpoints at `address`, until the program ends.
 ///
 /// # Errors
 /// The address cannot be used, or the process already records metrics.

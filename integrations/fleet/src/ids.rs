@@ -12,10 +12,11 @@ const MAX_SESSIONS: usize = 16;
 
 const MAX_RANGES: usize = 16;
 
-/// Maximum length of a text in bytes. Longer ids are not stored.
+/// Maximum length of a text in bytes. Ids with longer texts are not stored.
 const MAX_LENGTH: usize = 128;
 
-/// Set of message ids, which errs on the side of forgetting old texts.
+/// Approximate set of message ids. It forgets texts that have not been used for a long time, and also contains the
+/// numbers between merged ranges.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Ids(Vec<Session>);
 
@@ -85,7 +86,7 @@ fn add(ranges: &mut Vec<(u64, u64)>, number: u64) {
         return;
     }
     ranges.insert(position, (number, number));
-    // A number with a greater one behind it is below 10^19, so that its successor exists.
+    // If a range follows, `number` is less than its first number, so `number + 1` cannot overflow.
     if ranges.get(position + 1).is_some_and(|(first, _)| *first == number + 1) {
         ranges[position].1 = ranges.remove(position + 1).1;
     }

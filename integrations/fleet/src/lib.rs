@@ -1,14 +1,15 @@
 //! Adaptation loops of many robots on several machines, with NATS JetStream as the journal and
 //! stateless workers.
 //!
-//! Robots append events to the subject `ev.PARTITION.ROBOT`, and receive decisions on
-//! `dec.PARTITION.ROBOT`, in other fleets than the default one after the name of the fleet. A partition is a fixed group of robots. Both streams are persistent, and
-//! the stream of events is the journal. A worker leases partitions and runs the
-//! [loops](metaplan::mapek::Loop) of their robots. Every event that is not refused leads to exactly
-//! one decision, unless the robot is stopped because it cannot continue. A decision is appended
-//! only if the robot's previous decision is still the last one (compare-and-set on the last
-//! sequence of the subject). So a worker that still relies on an expired lease cannot decide an
-//! event twice: leases are for efficiency, and the chain of decisions guarantees correctness.
+//! Robots append events to the subject `ev.PARTITION.ROBOT`, and receive decisions on `dec.PARTITION.ROBOT`. Except in
+//! the default fleet, both subjects begin with the name of the fleet. A partition is a fixed group of robots. Both
+//! streams are persistent, and the stream of events is the journal. A worker leases partitions and runs the
+//! [loops](metaplan::mapek::Loop) of their robots.
+//!
+//! Every event that is not refused leads to exactly one decision, unless the robot is suspended because it cannot
+//! continue. A decision is appended only if the robot's previous decision is still the last one (compare-and-set on the
+//! last sequence of the subject). So a worker that still relies on an expired lease cannot decide an event twice:
+//! leases are for efficiency, and the chain of decisions guarantees correctness.
 //!
 //! ```
 //! use std::{path::Path, sync::Arc, time::Duration};

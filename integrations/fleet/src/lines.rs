@@ -94,12 +94,12 @@ async fn feed<S: Store>(store: &S, session: &str, mut stop: watch::Receiver<bool
     match (wrong, lost) {
         (0, 0) => Ok(()),
         (_, 0) => {
-            let text = format!("{wrong} lines were not understood; {stored} events were stored");
+            let text = format!("{wrong} lines could not be parsed; {stored} events were stored");
             Err(Message::error("N314", text))
         }
         _ => {
             let text = format!(
-                "{lost} events were not stored, {wrong} lines not understood; {stored} events were stored"
+                "{lost} events were not stored, {wrong} lines could not be parsed; {stored} events were stored"
             );
             Err(unstored(text))
         }

@@ -24,10 +24,10 @@ use tracing::level_filters::LevelFilter;
 mod endpoints;
 mod lines;
 
-/// The adaptation loops of many robots: on NATS JetStream, or in one directory without a server.
+/// Run the adaptation loops of many robots, on NATS JetStream or in one directory without a server.
 ///
-/// Lines in are `ROBOT EVENT`, lines out `ROBOT DECISION`; events are those of `metaplan run`, after
-/// `{"event": "enrol", "mission": NAME}`.
+/// Input lines have the form `ROBOT EVENT`, output lines `ROBOT DECISION`. The first event of a robot is
+/// `{"event": "enrol", "mission": NAME}`; the others are those of `metaplan run`.
 #[derive(Debug, Parser)]
 #[command(version)]
 struct Arguments {
@@ -40,31 +40,31 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Take partitions of robots, run their loops, and store what they decide, until SIGTERM.
+    /// Take over partitions of robots, run their loops and store the decisions, until SIGTERM.
     Worker {
         #[command(flatten)]
         server: Server,
         #[command(flatten)]
         work: Work,
-        /// A name that no other worker has; host and process, unless it is given.
+        /// Set the name of the worker, which must be unique. [default: host name and process id]
         #[arg(long, value_name = "NAME")]
         name: Option<String>,
     },
-    /// All in one process: events from standard input, decisions to standard output.
+    /// Run a whole fleet in one process: events from standard input, decisions to standard output.
     Up {
-        /// The directory that takes the place of a server.
+        /// Store the fleet in this directory instead of on a server.
         #[arg(long, value_name = "DIR", num_args = 0..=1, default_missing_value = "metaplan-fleet", required = true)]
         local: PathBuf,
-        /// Also write decisions after that number that were made before.
+        /// Also write the stored decisions with higher numbers than this one.
         #[arg(long, value_name = "DECISION")]
         after: Option<u64>,
         #[command(flatten)]
         work: Work,
         #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=65536))]
-        /// Partitions of a directory that is made.
+        /// Set the number of partitions if the directory is created.
         partitions: u32,
     },
-    /// Store events: lines `ROBOT EVENT` from standard input. Ends when all are stored.
+    /// Store events, which are lines `ROBOT EVENT` from standard input.
     Send {
         #[command(flatten)]
         server: Server,
@@ -72,14 +72,14 @@ enum Command {
         #[arg(long, value_name = "WORD")]
         session: Option<String>,
     },
-    /// Write decisions as they are made.
+    /// Print decisions as they are made.
     Follow {
         #[command(flatten)]
         server: Server,
-        /// Only that robot's.
+        /// Print only the decisions for this robot.
         #[arg(value_name = "ROBOT")]
         robot: Option<String>,
-        /// Begin after that decision; with 0, at the first one.
+        /// Begin after the decision with this number; 0 begins with the first decision. [default: only new decisions]
         #[arg(long, value_name = "DECISION")]
         after: Option<u64>,
     },
@@ -87,7 +87,7 @@ enum Command {
     Status {
         #[command(flatten)]
         server: Server,
-        /// Text for people, JSON for programs.
+        /// Set the format of the answer.
         #[arg(long, default_value = "text", value_parser = ["text", "json"])]
         format: String,
     },
@@ -96,22 +96,22 @@ enum Command {
 /// Options of the missions and of the amount of work at a time.
 #[derive(Debug, Args)]
 struct Work {
-    /// A directory of manifests; a robot is enrolled with the name of one, without `.toml`.
+    /// Read missions from the manifests in this directory. The name of a mission is its file name without `.toml`.
     #[arg(long, value_name = "DIR")]
     missions: PathBuf,
-    /// A directory of former manifests, with which robots finish that were enrolled with them. Repeatable.
+    /// Read former versions of missions from this directory (repeatable). Robots enrolled with one of them keep it.
     #[arg(long, value_name = "DIR")]
     former: Vec<PathBuf>,
-    /// Loops that search for plans at the same time; as many as there are processors, unless it is given.
+    /// Set the number of loops that search for plans at the same time. [default: number of processors]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
-    /// Robots that are kept ready; others are kept as snapshots, and made ready when they are needed.
+    /// Set the number of robots that are kept in memory. Others are restored from snapshots when they have events.
     #[arg(long, value_name = "N", default_value_t = Settings::default().warm)]
     ready: usize,
-    /// Save a robot after so many decisions.
+    /// Save a snapshot of a robot after this number of decisions.
     #[arg(long, value_name = "N", default_value_t = Settings::default().save_every as u64, value_parser = clap::value_parser!(u64).range(1..))]
     save_every: u64,
-    /// Serve `/metrics` for Prometheus, `/live` and `/ready` at this address, as `HOST:PORT`.
+    /// Serve `/metrics` for Prometheus, `/live` and `/ready` at this `HOST:PORT`.
     #[arg(long, value_name = "ADDRESS")]
     metrics: Option<SocketAddr>,
 }
@@ -119,31 +119,31 @@ struct Work {
 /// Options of the connection to the servers.
 #[derive(Debug, Args)]
 struct Server {
-    /// One or several by comma: `nats://HOST:PORT`, or `tls://HOST:PORT`.
+    /// Connect to these servers: `nats://HOST:PORT` or `tls://HOST:PORT`, separated by commas.
     #[arg(long, value_name = "URL", env = "NATS_URL")]
     nats: String,
-    /// A credentials file of NATS.
+    /// Authenticate with a credentials file of NATS.
     #[arg(long, value_name = "FILE")]
     creds: Option<PathBuf>,
-    /// A user; the password is in `NATS_PASSWORD`.
+    /// Authenticate as this user, with the password in the environment variable `NATS_PASSWORD`.
     #[arg(long, value_name = "NAME")]
     user: Option<String>,
-    /// Authorities that are trusted besides those of the system.
+    /// Trust the certificate authorities in this file besides those of the system.
     #[arg(long, value_name = "FILE")]
     tls_ca: Option<PathBuf>,
-    /// An own certificate, and its key.
+    /// Authenticate with a client certificate and its key.
     #[arg(long, value_names = ["CERTIFICATE", "KEY"], num_args = 2)]
     tls_cert: Vec<PathBuf>,
-    /// The name of the fleet. Its streams, buckets and subjects begin with it, except for subjects of the fleet `fleet`.
+    /// Set the name of the fleet. Its streams, buckets and subjects begin with this name, except for subjects of the fleet `fleet`.
     #[arg(long, value_name = "NAME", default_value = DEFAULT_FLEET)]
     fleet: String,
-    /// Partitions of a fleet that is made; they never change.
+    /// Set the number of partitions if the fleet is created. It cannot be changed later.
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=65536))]
     partitions: u32,
-    /// On how many servers a fleet that is made is kept: 1, 3 or 5.
+    /// Set the number of servers that store the data (1, 3 or 5) if the fleet is created.
     #[arg(long, value_name = "N", default_value_t = 1)]
     replicas: usize,
-    /// Seconds after which a worker that is not heard of has lost its partitions, in a fleet that is made.
+    /// Set the time in seconds after which a silent worker loses its partitions if the fleet is created.
     #[arg(long, value_name = "S", default_value_t = 10, value_parser = clap::value_parser!(u64).range(2..=3600))]
     lease: u64,
     /// Wait this many seconds for servers that are starting. [default: 60 for `worker`, 10 otherwise]
@@ -183,7 +183,7 @@ impl Work {
         }
     }
 
-    /// Serves the endpoints for probes and metrics, unless they are disabled.
+    /// Starts the endpoints for probes and metrics if `--metrics` is given. Returns the health that the probes report.
     async fn open_endpoints(&self) -> Result<Arc<Health>, Errors> {
         let health = Arc::<Health>::default();
         if let Some(address) = self.metrics {
@@ -298,6 +298,6 @@ fn signals() -> Result<watch::Receiver<bool>, Errors> {
         }
     };
     ctrlc::set_handler(handler)
-        .map_err(|error| vec![Message::error("N302", format!("signals cannot be heard: {error}"))])?;
+        .map_err(|error| vec![Message::error("N302", format!("signals cannot be handled: {error}"))])?;
     Ok(heard)
 }

@@ -280,7 +280,8 @@ impl Robot {
         if let Some(before) = before
             && !is_same(&decided, before)
         {
-            let text = format!("what is written of event {} is not what follows from it", event.sequence);
+            let text =
+                format!("the stored decision of event {} differs from the computed one", event.sequence);
             return Err(Faulted(text));
         }
         Ok(Begun::Decided(decided))
@@ -323,9 +324,10 @@ impl Robot {
         is_complete
     }
 
-    /// Changes to another version of the mission if this was requested, the version is available, and the
-    /// loop is at the requested point. A recorded decision determines whether the robot changes. Returns `true` if the robot has changed; the new loop then has to deliberate. An error about a
-    /// version that does not fit is an answer.
+    /// Changes to another version of the mission if this was requested, the version is available, and the loop is at
+    /// the requested point. A recorded decision determines whether the robot changes. Returns `true` if the robot has
+    /// changed; the new loop then has to deliberate. If the version does not fit, an error becomes an answer, and the
+    /// request is dropped.
     fn migrate(
         &mut self,
         name: &str,
@@ -438,7 +440,8 @@ fn request(head: &Value) -> Request<'_> {
     }
 }
 
-/// Returns `true` if two decisions are equal except for the wording of explanations.
+/// Returns `true` if two decisions have equal answers, except for the wording of explanations, and equally enrol,
+/// retire or migrate the robot.
 fn is_same(left: &Decided, right: &Decided) -> bool {
     left.enrolled == right.enrolled
         && left.retired == right.retired

@@ -165,7 +165,10 @@ impl<S: Store> Worker<S> {
                 // Another worker has written data that only the owner writes, although this worker
                 // has the lease; or there was a panic. The partition is recovered again.
                 (Ok(End::Fenced) | Err(_), Order::Go) => {
-                    tracing::warn!(partition, "somebody else has written in it: it is read again");
+                    tracing::warn!(
+                        partition,
+                        "another worker has written to the partition: it is recovered again"
+                    );
                     metrics::counter!("metaplan_fleet_fenced_total").increment(1);
                     let restarted = self.serve(partition, held.revision, held.renewed);
                     self.held.insert(partition, restarted);

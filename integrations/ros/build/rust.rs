@@ -1,4 +1,5 @@
-//! Generates Rust modules `[VARIANT::]PACKAGE::{msg, srv, action}` from interfaces and their hashes.
+//! Generates the Rust modules `[VARIANT::]PACKAGE::{msg, srv, action}` of interfaces, their type hashes, and tables of
+//! types and definitions.
 
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -155,7 +156,7 @@ fn constants(text: &mut String, name: &str, constants: &[Constant]) -> Result<()
     Ok(())
 }
 
-/// Writes the implementation for a message, service or action as a whole.
+/// Writes the trait implementation of a message, or the type of a service or action with its trait implementation.
 fn whole(text: &mut String, interface: &Interface, hashes: &Hashes) -> Result<(), Box<dyn Error>> {
     let Interface { package, folder, name, .. } = interface;
     let of = |suffix: &str| hash(hashes, interface, suffix);

@@ -118,8 +118,7 @@ impl Controller {
                 }
                 Outcome::Stopped => return Ok(()),
                 Outcome::Lost(designs) => {
-                    let text =
-                        format!("the plan is given up: {} lost; another one is made", designs.join(", "));
+                    let text = format!("the plan is abandoned: {} lost; replanning", designs.join(", "));
                     self.node.log(Severity::Warn, &text);
                     failures = 0;
                 }
@@ -127,7 +126,9 @@ impl Controller {
                     failures += 1;
                     self.node.log(Severity::Error, &because);
                     if failures == MAX_FAILURES {
-                        let text = format!("{failures} plans on end have failed, the last one so: {because}");
+                        let text = format!(
+                            "{failures} consecutive plans have failed, the last one because: {because}"
+                        );
                         return Err(Message::error("N150", text));
                     }
                     self.pause(FAILURE_PAUSE, stop).await;
@@ -174,7 +175,7 @@ impl Controller {
             let _ = sender.try_send(solve(Request { domain, problem, joint: Some(&mission) }, &manner));
         };
         on_a_thread("plan", work)
-            .map_err(|error| NoPlan::None(format!("there is no further thread: {error}")))?;
+            .map_err(|error| NoPlan::None(format!("no thread can be started: {error}")))?;
         let outcome =
             receiver.recv().await.unwrap_or_else(|_| Err(NoPlan::Fault("the planner has ended".to_owned())));
         self.plan_publisher.publish_result(&outcome);
@@ -201,7 +202,7 @@ impl Controller {
                 Some(Progress::Ended(_)) if !lost.is_empty() => return Outcome::Lost(lost),
                 Some(Progress::Ended(End::Failed(because))) => return Outcome::Failed(because),
                 Some(Progress::Ended(End::Canceled)) => {
-                    return Outcome::Failed("somebody has cancelled the plan".to_owned());
+                    return Outcome::Failed("another client has cancelled the plan".to_owned());
                 }
                 None if !stopped && stop.load(Ordering::Relaxed) => {
                     stopped = true;

@@ -1,9 +1,9 @@
 //! Rules of `ros.toml` that translate a robot's own diagnostics into statuses of components and measurements
 //! of attributes.
 //!
-//! A driver publishes `diagnostic_msgs/DiagnosticStatus` with a level and a text of its own. A rule selects
-//! such statuses by patterns. It names the component whose status the level is, or the attribute whose value
-//! one of the key/value pairs is.
+//! A driver publishes `diagnostic_msgs/DiagnosticStatus` with a level and a text of its own. A rule selects such
+//! statuses by patterns. It names the component whose status follows from the level, or the attribute whose value is in
+//! one of the key/value pairs.
 
 use serde::{Deserialize, Deserializer};
 

@@ -18,51 +18,52 @@ use metaplan_ros::{controller, discover, manager, planner, reasoner};
 
 /// Metaplan on a ROS 2 robot, over DDS and without a ROS installation.
 ///
-/// What stands behind `--ros-args` is as for every node: `-r from:=to`, `-p name:=value`, `--params-file FILE`, `--log-level LEVEL`.
-/// `ROS_DOMAIN_ID`, `ROS_LOCALHOST_ONLY` and `ROS_AUTOMATIC_DISCOVERY_RANGE` count.
+/// Arguments after `--ros-args` have the form that all ROS 2 nodes use: `-r from:=to`, `-p name:=value`, `--params-file FILE`,
+/// `--log-level LEVEL`. The environment variables `ROS_DOMAIN_ID`, `ROS_LOCALHOST_ONLY` and `ROS_AUTOMATIC_DISCOVERY_RANGE`
+/// take effect.
 #[derive(Debug, Parser)]
 #[command(version)]
 struct Arguments {
-    /// A mission's manifest; a planner can do without, and takes domains as they are then.
+    /// Read the manifest of the mission. Optional for the planner, which otherwise plans with the received domain alone.
     #[arg(long, value_name = "FILE", required_if_eq_any = [("role", "manager"), ("role", "reasoner"), ("role", "controller")])]
     mission: Option<PathBuf>,
-    /// Whose place to take.
+    /// Set the role of this node.
     #[arg(long = "as", value_enum, default_value_t = Role::Manager)]
     role: Role,
-    /// How the mission meets the robot; `ros.toml` beside the mission, if there is one, unless said otherwise.
+    /// Read the mapping between mission and robot from this file. [default: `ros.toml` beside the manifest, if it exists]
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
-    /// Write events and decisions there first, and go on from there after a crash.
+    /// Write events and decisions to a journal in this directory before acting on them, and resume from it after a crash.
     #[arg(long, value_name = "DIR")]
     journal: Option<PathBuf>,
-    /// With `--as discover`: how long the robot is observed, in seconds.
+    /// Set how long `--as discover` observes the robot, in seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 30.0, value_parser = seconds)]
     seconds: f64,
-    /// With `--as discover`: the new file for the settings; standard output without it.
+    /// Write the settings of `--as discover` to a new file instead of standard output.
     #[arg(long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// How services are mapped: as the discovered participants say, or as this middleware does.
+    /// Set the ROS middleware whose encoding of service requests is used. By default, it is detected from the other participants.
     #[arg(long, value_enum, default_value_t = Rmw::Auto)]
     rmw: Rmw,
-    /// Let the steps of designs in the settings execute commands on this machine.
+    /// Allow steps of designs in the settings to execute commands on this machine.
     #[arg(long)]
     allow_commands: bool,
-    /// With `--as controller`: whose types PlanSys2's executor has.
+    /// Set the version of PlanSys2 whose message types the executor has, for `--as controller`.
     #[arg(long, value_enum, default_value_t)]
     executor: PlanVersion,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Role {
-    /// Of the manager of tasks: SUAVE's task bridge, MROS's reasoner and the planner in one.
+    /// Task manager: replaces SUAVE's task bridge, MROS's reasoner and the planner.
     Manager,
-    /// Of MROS's reasoner: the action `/mros/objective`.
+    /// MROS reasoner: serves the action `/mros/objective`.
     Reasoner,
-    /// Of PlanSys2's planner; with a mission, its knowledge base joins in.
+    /// PlanSys2 planner: uses the knowledge base of the mission, if a mission is given.
     Planner,
-    /// Of whoever has PlanSys2's executor carry out what its experts want: with a knowledge base, and again when a design is lost.
+    /// PlanSys2 controller: plans for the goal of the problem expert, has the executor carry out the plan, and replans when a design is lost.
     Controller,
-    /// Observation of a robot: writes settings to start from.
+    /// Observer of a robot: writes commented settings to start from.
     Discover,
 }
 
@@ -121,11 +122,11 @@ fn start() -> Result<(), Errors> {
         }
     };
     ctrlc::set_handler(handler)
-        .map_err(|error| vec![Message::error("N100", format!("signals cannot be heard: {error}"))])?;
+        .map_err(|error| vec![Message::error("N100", format!("signals cannot be handled: {error}"))])?;
     let Arguments { role, mission, settings, journal, executor, allow_commands, seconds, output, .. } =
         arguments;
     if journal.is_some() && matches!(role, Role::Planner | Role::Controller | Role::Discover) {
-        let text = "`--journal` is for a manager and a reasoner: nothing of a planner has to be known after a restart";
+        let text = "`--journal` is for a manager and a reasoner: a planner has no persistent state";
         return Err(vec![Message::error("N100", text)].into());
     }
     if output.is_some() && role != Role::Discover {

@@ -121,7 +121,7 @@ impl Running {
 
     /// Waits for the next message. The last message is [`Progress::Ended`].
     pub async fn next(&self) -> Progress {
-        let lost = || Progress::Ended(End::Failed("whoever carried it out is gone".to_owned()));
+        let lost = || Progress::Ended(End::Failed("its performer is gone".to_owned()));
         self.events.recv().await.unwrap_or_else(|_| lost())
     }
 

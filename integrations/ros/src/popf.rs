@@ -63,11 +63,7 @@ pub fn run(
         Err(text) => Said::reason(&text),
     };
     if !invocation.ignored.is_empty() {
-        let _ = writeln!(
-            output.error,
-            "arguments of POPF that mean nothing here: {}",
-            invocation.ignored.join(" ")
-        );
+        let _ = writeln!(output.error, "ignored arguments of POPF: {}", invocation.ignored.join(" "));
     }
     output
 }

@@ -36,8 +36,8 @@ const SELECTION_TIME_LIMIT: std::time::Duration = std::time::Duration::from_secs
 pub struct Options {
     /// Manifest of the mission, of which only the knowledge base is used.
     pub mission: PathBuf,
-    /// Names of functions and designs on the robot; by default a file `ros.toml` in the directory
-    /// of the mission.
+    /// Settings of the robot, such as the names of its functions and designs; by default a file `ros.toml` in the
+    /// directory of the mission.
     pub settings: Option<PathBuf>,
     /// Directory of the state that must survive a restart.
     pub journal: Option<PathBuf>,

@@ -233,7 +233,7 @@ fn by_rules(mut engine: Engine, class: &ClassExpression, individual: &Iri) -> Re
         |rule: &rules::Rule| !old.iter().any(|other| other.head == rule.head && other.body == rule.body);
     let mut new: Vec<rules::Rule> = lowered.program.rules.into_iter().filter(is_new).collect();
     for rule in &mut new {
-        // No other rule has this identity.
+        // Distinguishes these rules from those of the knowledge base.
         rule.identity.source = "urn:metaplan:assumed".into();
     }
     if !new.is_empty() {

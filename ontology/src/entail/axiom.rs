@@ -13,7 +13,7 @@ impl Prover {
     /// reason why the axiom is open.
     pub(super) fn axiom(&self, axiom: &Axiom) -> Result<Answer, Error> {
         if let Axiom::DatatypeDefinition(..) = axiom {
-            return Ok(Answer::Open("what a datatype is defined to be is not asked for"));
+            return Ok(Answer::Open("definitions of datatypes are not decided"));
         }
         let reason = match self.classes(axiom)? {
             Some(reason) => Some(reason),

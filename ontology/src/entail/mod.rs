@@ -37,7 +37,7 @@ pub struct Entailment {
 /// entailed. For annotations see [`annotations`].
 ///
 /// # Errors
-/// Returns an error if a rule exceeds its budget.
+/// Returns an error if the evaluation of the rules exceeds its budget or is interrupted.
 pub fn entailments(engine: &Engine, conclusions: &Ontology) -> Result<Vec<Entailment>, Error> {
     let prover = Prover::new(engine)?;
     let inconsistency = contradiction(&prover.base);

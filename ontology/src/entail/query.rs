@@ -13,15 +13,15 @@ const MAX_PARTIAL_ANSWERS: usize = 100_000;
 type Assignment = BTreeMap<Iri, Iri>;
 
 impl Prover {
-    /// Decides if the conjunctive query `statements` has an answer. Its variables are the anonymous
-    /// individuals.
+    /// Searches for an answer of the conjunctive query `statements`, whose variables are the anonymous individuals.
+    /// The query is open if there is no answer, or if the budget of partial answers is exhausted.
     pub(super) fn conjunctive_query(&self, statements: &[&Axiom]) -> Result<Answer, Error> {
         let mut budget = MAX_PARTIAL_ANSWERS;
         let explanation = self.extend(&Assignment::new(), statements.to_vec(), &mut budget)?;
         Ok(match explanation {
             Some(reason) => Answer::Follows(reason),
-            None if budget == 0 => Answer::Open("too many individuals come into question"),
-            None => Answer::Open("the rules do not conclude it of anybody"),
+            None if budget == 0 => Answer::Open("there are too many candidate individuals"),
+            None => Answer::Open("the rules do not conclude it for any individual"),
         })
     }
 

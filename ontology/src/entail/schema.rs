@@ -35,12 +35,12 @@ pub struct Schema {
     pub data_properties: Vec<SchemaEntity>,
 }
 
-/// Computes the hierarchy of the classes and properties in `named`, without OWL's own ones, from the
-/// consequences for a fresh instance of each class, and for a fresh pair of each property. If the knowledge
-/// is inconsistent, `empty` is always `None`.
+/// Computes the hierarchy of the classes and properties in `named`, except those in the namespace of OWL, from the
+/// consequences for a fresh instance of each class, and for a fresh pair of each property. If the knowledge is
+/// inconsistent, `empty` is always `None`.
 ///
 /// # Errors
-/// Returns an error if a rule exceeds its budget.
+/// Returns an error if the evaluation of the rules exceeds its budget or is interrupted.
 pub fn schema(engine: &Engine, named: &[(EntityKind, Iri)]) -> Result<Schema, Error> {
     let mut base = Prover::new(engine)?.base;
     Ok(Schema {

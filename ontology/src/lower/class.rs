@@ -112,9 +112,9 @@ fn some_value(
 /// use auxiliary relations.
 pub(crate) const MAX_ALTERNATIVES: usize = 16;
 
-/// Replaces the alternative conjunctions for `x` in `class` by one atom of an auxiliary relation. A rule for
-/// each alternative derives the relation. Fewer than two alternatives are returned unchanged; if one is
-/// empty, `x` is always in `class`, and the result is the empty conjunction.
+/// Replaces the alternative conjunctions for `x` in `class` by one atom of an auxiliary relation. A rule for each
+/// alternative derives the relation. Fewer than two alternatives are returned unchanged. If one of several
+/// alternatives is empty, `x` is always in `class`, and the result is the empty conjunction.
 pub(crate) fn abbreviated(
     context: &mut Context,
     class: &ClassExpression,
@@ -265,8 +265,8 @@ fn all_values(
     inner.into_iter().map(|(body, head)| (with_atom(edge.clone(), body), head)).collect()
 }
 
-/// Concludes that `x` is in the auxiliary relation of the restriction `class`, if a restriction that is a
-/// condition of an axiom or rule includes `class`.
+/// Returns the conclusion that `x` is in the auxiliary relation of the restriction that follows from `class`. Empty
+/// if no condition of an axiom or rule includes this restriction.
 fn included(context: &mut Context, class: &ClassExpression, x: Term) -> Conclusions {
     let restriction = context.inclusions.conclusion(class);
     let atom = restriction.map(|restriction| context.relation(&relation_of(&restriction), [x]));

@@ -1,9 +1,9 @@
 //! Equality and difference of individuals: table 4 of OWL 2 RL.
 //!
-//! OWL makes no unique name assumption: two names can denote the same individual, and two values of a
-//! functional property imply that they do. The engine then treats `sameAs` as equality. `differentFrom` holds
-//! if it is stated, or follows from disjoint classes or from different values of functional or inverse
-//! functional properties. It is derived only if a rule depends on it.
+//! OWL makes no unique name assumption: two names can denote the same individual. If a functional property has two
+//! values, for example, both names denote one individual. The engine then treats `sameAs` as equality.
+//! `differentFrom` holds if it is stated, or follows from disjoint classes or from different values of functional or
+//! inverse functional properties. It is derived only if a rule depends on it.
 //!
 //! Under the unique name assumption ([`UniqueNames`](super::Equality::UniqueNames)) the rules of this file are
 //! not added: a functional object property has no consequences, and any two names differ.
@@ -40,9 +40,9 @@ pub(crate) fn lower(axioms: &[AnnotatedAxiom], context: &mut Context) -> bool {
     merges
 }
 
-/// Adds rule eq-rep of OWL 2 RL for classes and properties that are individuals, too: names that become equal
-/// have the same members. If names are stated to be equal, the lowering of `SameIndividual` adds these rules
-/// instead. If a kind has more than [`MAX_PUNNED_NAMES`] such names, adds a warning instead.
+/// Adds rule eq-rep of OWL 2 RL for classes and properties that are individuals, too: names that become equal have
+/// the same members. (For names that are stated to be equal, the lowering of `SameIndividual` also adds rules without
+/// a condition.) If a kind has more than [`MAX_PUNNED_NAMES`] such names, adds a warning instead.
 fn entities(context: &mut Context) {
     let identity = RuleIdentity { source: AXIOM_SOURCE.into(), label: Some("eq-rep".into()), position: 0 };
     let mut variables = Variables::default();

@@ -28,7 +28,7 @@ impl Inclusions {
     pub(crate) fn new(ontology: &Ontology) -> Self {
         let mut uses = Uses::default();
         uses.collect(ontology);
-        // Most ontologies have no such pairs and skip the rest.
+        // In most ontologies, either no condition or no conclusion is such a restriction.
         if uses.conditions.is_empty() || uses.concluded.is_empty() {
             return Self::default();
         }
@@ -197,7 +197,7 @@ struct InclusionGraph {
     properties: HashMap<Property, Vec<Property>>,
     subproperties: HashMap<Property, Vec<Property>>,
     conditions: HashSet<ClassExpression>,
-    /// Nesting depth to which restrictions are compared; 0 if no condition contains another restriction.
+    /// Nesting depth to which restrictions are compared; 0 if the filler of every condition is a named class.
     depth: usize,
     condition_properties: HashSet<Property>,
     thing: ClassExpression,

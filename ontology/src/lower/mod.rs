@@ -38,7 +38,7 @@ pub struct Lowered {
     /// SWRL rules of the knowledge base, then rules lowered from axioms, then the semantics of OWL's own
     /// vocabulary, then additional rules.
     pub program: Program,
-    /// Facts of the assertions.
+    /// Facts of the assertions, and facts of auxiliary relations, for example the members of enumerations.
     pub facts: Vec<Fact>,
     /// Number of SWRL rules omitted because an equal rule occurs before, in any of the ontologies.
     pub duplicates: usize,
@@ -111,9 +111,9 @@ impl Context<'_> {
         }
     }
 
-    /// Removes the rules that the engine rejects, for example because of unsafe variables, since one such
-    /// rule would make the engine reject the whole program. A rule lowered from an axiom is not tested if its
-    /// body has a relation atom, or an equality with a constant, because lowering then binds all variables.
+    /// Removes the rules that the engine rejects, for example because of unsafe variables, each with a warning, since
+    /// one such rule would make the engine reject the whole program. A rule lowered from an axiom is not tested if
+    /// its body has a relation atom, or an equality with a constant, because lowering then binds all variables.
     fn drop_unusable(&mut self) {
         let binds = |atom: &Atom| match atom {
             Atom::Relation { .. } => true,

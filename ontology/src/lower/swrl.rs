@@ -125,9 +125,9 @@ fn lower_rule(rule: &Rule, identity: &RuleIdentity, context: &mut Context) -> Re
     Ok(())
 }
 
-/// Binds the variables of `owl:Thing` atoms, which are otherwise dropped, and of equalities: adds an
-/// `owl:Thing` atom if neither a relation atom nor an equality binds the variable, so that it ranges over all
-/// individuals.
+/// Adds an `owl:Thing` atom for the variable of each `owl:Thing` atom (which is otherwise dropped), and for the first
+/// variable of each equality of two variables, unless a relation atom or an equality binds the variable. The variable
+/// then ranges over all individuals.
 fn individuals(context: &mut Context, rule: &Rule, body: &mut Conjunction, variables: &mut Variables) {
     for atom in &rule.body {
         let argument = match atom {

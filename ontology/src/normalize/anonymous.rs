@@ -40,7 +40,7 @@ pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) {
     }
     warnings.extend(stray.into_iter().map(|(predicate, count)| Warning::Unread {
         statement: format!("{predicate} of {count} blank nodes"),
-        reason: "nothing else is said of them".to_owned(),
+        reason: "there are no other statements about them".to_owned(),
     }));
 }
 

@@ -25,8 +25,9 @@ const NESTING_PROPERTIES: [&str; 10] = [
     rdf::REST,
 ];
 
-/// Returns the index of the first triple whose object is nested deeper than [`MAX_NESTING`], and an IRI
-/// that the nested expression describes. Returns `None` if no triple is nested too deeply.
+/// Returns the index of the first triple by which an expression is nested deeper than [`MAX_NESTING`], and an IRI
+/// that a too deeply nested expression describes, if there is one. Returns `None` if no expression is nested too
+/// deeply.
 pub(crate) fn too_deep(graph: &Graph) -> Option<(usize, Option<String>)> {
     let mut depths: FxHashMap<NamedOrBlankNode, usize> = FxHashMap::default();
     for (index, triple) in graph.iter() {

@@ -1,9 +1,9 @@
-//! Adds a declaration for every entity, because horned-owl drops assertions of properties whose kind is
+//! Adds a declaration for every class and property, because horned-owl drops assertions of properties whose kind is
 //! unknown.
 //!
-//! An entity that the imports closure does not declare gets a kind from its use, with a warning: a property
-//! with literals as values is a data property, a property between individuals an object property, and a
-//! property that describes only classes, properties or ontologies an annotation property.
+//! A class or property that the imports closure does not declare gets a kind from its use, with a warning: a property
+//! with literals as values is a data property, a property between individuals an object property, and a property that
+//! describes only classes, properties or ontologies an annotation property.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -26,7 +26,7 @@ struct Use {
     individual: bool,
     data: bool,
     object: bool,
-    /// Used in a restriction of unknown kind.
+    /// Used in a restriction that may be about an object property or about a data property.
     restricted: bool,
     /// Used with a subject that is not an individual, as annotation properties are.
     entity: bool,

@@ -120,8 +120,8 @@ fn chain_fault(graph: &Graph, item: &Term) -> Option<String> {
     }
 }
 
-/// Copies a list for every triple that refers to the list, because horned-owl consumes lists. Removes
-/// the types of list nodes.
+/// Replaces a list by a copy in every triple that refers to it, except the first, because horned-owl consumes lists.
+/// Removes the types of list nodes.
 fn unshare(graph: &mut Graph) {
     let references = graph.references();
     let mut visited = std::collections::HashSet::new();

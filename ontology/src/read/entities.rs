@@ -28,7 +28,8 @@ struct Declarations<'a> {
     end: usize,
 }
 
-/// Returns the document without the document type declaration and with expanded entity references.
+/// Returns the document without the document type declaration and with expanded entity references. A document without
+/// declarations ([`declarations`]) is returned unchanged.
 pub(super) fn expanded(text: &[u8]) -> Result<Flattened<'_>, EntityError> {
     let Some(declarations) = declarations(text) else { return Ok(Flattened::unchanged(text)) };
     let mut expansion = Expansion {

@@ -19,7 +19,7 @@ pub(super) fn recognized(text: &[u8]) -> Option<&'static str> {
             "Manchester syntax, which is not read; convert it with ROBOT: `robot convert --input FILE --output FILE.ofn`",
         )
     } else if starts(&[b"<!DOCTYPE html", b"<!doctype html", b"<html", b"<HTML"]) {
-        Some("a web page and no ontology")
+        Some("a web page, not an ontology")
     } else {
         None
     }

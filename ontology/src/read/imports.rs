@@ -8,9 +8,9 @@
 //! 2. among the documents already read, by ontology or version IRI;
 //! 3. in the given catalogs, then in `catalog-v001.xml` in the directory of the importing document (OASIS XML
 //!    Catalogs);
-//! 4. in the directory of the importing document, then in the given directories and their subdirectories: by
-//!    ontology IRI, then by the last segment of the URL; among several files with this name, the one whose path
-//!    has most segments of the URL;
+//! 4. in the directory of the importing document, then in the given directories and their subdirectories: by ontology
+//!    IRI, then by the last segment of the URL; among several matching files, the one whose path has most segments of
+//!    the URL;
 //! 5. in a directory that is named like one of the first two segments of the URL's path and lies next to a
 //!    directory of the importing document, because repositories are often checked out side by side;
 //! 6. among the documents already read, by file name;

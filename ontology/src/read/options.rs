@@ -16,8 +16,8 @@ pub struct ReadOptions {
     pub allow_missing_imports: bool,
     /// If `true`, documents may be empty (for documents with additions or retractions).
     pub allow_empty: bool,
-    /// If `true`, documents must be N-Triples, and their imports are not resolved. For untrusted documents: no
-    /// other file is opened, and the text cannot expand.
+    /// If `true`, documents must be N-Triples, and their imports are not resolved. For untrusted documents: they
+    /// cannot cause other files to be opened, and their text cannot expand.
     pub closed: bool,
     /// If `true`, imports are not followed (for documents that change a knowledge base).
     pub without_imports: bool,

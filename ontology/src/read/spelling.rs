@@ -1,5 +1,5 @@
-//! Finds positions for warnings about names. Parsers return triples without positions, so the text is searched
-//! for the name: for the whole IRI, or for the local name after a prefix.
+//! Finds positions for warnings and errors about names. Parsers return triples without positions, so the text is
+//! searched for the name: for the whole IRI, or for the local name after a prefix.
 
 use super::text::Text;
 use crate::error::{Error, Position, Warning};
@@ -29,8 +29,8 @@ pub(super) fn locate(warnings: &mut [Warning], texts: &[(String, Text)]) {
     }
 }
 
-/// Adds a position to an error without one, if its document contains the IRI that is the subject of the
-/// error.
+/// Adds a position to an error about too deep nesting (O112) without one, if its document contains the IRI that the
+/// expression describes.
 pub(super) fn placed(error: Error, texts: &[(String, Text)]) -> Error {
     match error {
         Error::TooDeep { file, about: Some(iri), position: None, deepest } => {

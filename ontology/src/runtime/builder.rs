@@ -82,8 +82,8 @@ impl RuntimeBuilder {
     /// warnings.
     ///
     /// # Errors
-    /// Returns all errors of all documents and rules: the errors of [`read_files`], and
-    /// [`Error::Engine`] for errors of rules and of the engine.
+    /// Returns the errors of the documents and rules: the errors of [`read_files`], and [`Error::Engine`] for errors
+    /// of rules and of the engine.
     pub fn build(self) -> Result<(Runtime, Vec<Warning>), Errors> {
         let mut symbols = Symbols::new();
         let texts: Vec<(&str, &str)> =

@@ -1,5 +1,5 @@
-//! The designs for an objective, with their utility and the reasons that exclude them: the selection rule of
-//! MROS.
+//! Lists the designs for an objective, with the reasons that exclude them and their utility, both as in MROS. Also
+//! lists the requirements that each design misses, which MROS does not use for its choice.
 //!
 //! A design is excluded if it is unavailable, if the error log contains its failure for the objective,
 //! or if a measurement excludes one of its estimations. The last condition compares both values by the

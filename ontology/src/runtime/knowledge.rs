@@ -18,11 +18,10 @@ pub enum Mode {
     /// The conclusion is retracted.
     #[default]
     Retract,
-    /// The conclusion remains, as in the MROS reasoner. Each [`Runtime::conclude`] turns conclusions
-    /// into assertions, and only assertions count for queries. A design's realisability is removed when
-    /// a component that had failed or recovered reports again. The status of a grounding is removed with
-    /// the grounding, and the status of an objective when the objective is grounded. A design's error
-    /// log is never removed.
+    /// The conclusion remains, as in the MROS reasoner. Each [`Runtime::conclude`] turns conclusions into assertions,
+    /// and only assertions count for queries. The realisability of all designs is removed when a component that had
+    /// failed or recovered reports again. The status of a grounding is removed with the grounding, and the status of
+    /// an objective when the objective is grounded. A design's error log is never removed.
     Latch,
 }
 
@@ -70,7 +69,7 @@ impl Runtime {
     /// Changes assertions. Returns the resulting change of all facts that hold.
     ///
     /// # Errors
-    /// Returns [`Error::Engine`] if the rules exceed their limits; the runtime is then unchanged.
+    /// Returns [`Error::Engine`] if the rules exceed their limits; the facts are then unchanged.
     pub fn apply(&mut self, delta: Delta) -> Result<Delta, Error> {
         self.relations.extend(delta.insert.iter().map(|fact| (fact.predicate, fact.arguments.len())));
         if self.mode == Mode::Retract {

@@ -19,7 +19,7 @@ pub struct Objective {
     pub individual: Individual,
     /// The function to provide, if one is stated.
     pub function: Option<Individual>,
-    /// Statuses that the rules conclude (`UNGROUNDED`, `IN_ERROR_COMPONENT`, …); empty if there is no problem.
+    /// Statuses that are stated or concluded (`UNGROUNDED`, `IN_ERROR_COMPONENT`, …); empty if there is no problem.
     /// Our metamodel allows several statuses; two are a contradiction only if a metamodel declares `o_status`
     /// functional.
     pub statuses: Vec<String>,
@@ -32,7 +32,7 @@ pub struct Objective {
 }
 
 impl Objective {
-    /// Returns `true` if a status of the objective is an error.
+    /// Returns `true` if a status of the objective requires another design, for example `IN_ERROR_FR`.
     pub fn is_in_error(&self) -> bool {
         self.statuses.iter().any(|status| ERRORS.contains(&status.as_str()))
     }

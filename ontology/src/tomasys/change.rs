@@ -57,7 +57,7 @@ pub fn component_status(engine: &mut Engine, component: &str, status: Status) ->
     let property = engine.symbols_mut().name(term_for(terms::STATUS, class));
     let spellings: Vec<Symbol> =
         spellings(status).into_iter().map(|literal| engine.symbols_mut().literal(literal)).collect();
-    // Without a constraint, the spelling of MROS is used.
+    // If all spellings are allowed, or none is, the spelling of MROS is used.
     let fitting = spellings.iter().copied().find(|&value| allows(engine, property, value));
     let value = fitting.unwrap_or(spellings[0]);
     Ok(replace(engine, property, subject, Some(value)))

@@ -98,7 +98,7 @@ fn several_values(ontology: &Ontology) -> Vec<Warning> {
             property: property.to_string(),
             values: values.into_iter().collect(),
             consequence: if individuals {
-                "they are taken for one individual"
+                "they are treated as one individual"
             } else if any_differ(axioms) {
                 "this is a contradiction"
             } else {

@@ -45,13 +45,12 @@ impl Individual {
 pub struct FunctionDesign {
     /// The design.
     pub individual: Individual,
-    /// The functions that the design solves. There is one, unless the knowledge base states that several
+    /// The functions that the design solves: usually one, and several if the knowledge base states that these
     /// functions are the same.
     pub solves: Vec<Individual>,
     /// The components that the design requires.
     pub components: Vec<Individual>,
-    /// Maps the local name of each estimated attribute type to the estimated value, in the unit of the
-    /// type.
+    /// Maps the name of each estimated attribute type to the estimated value, in the unit of the type.
     pub estimations: BTreeMap<String, BigRational>,
     /// Bounds on measured attributes.
     pub requirements: Vec<Requirement>,
@@ -64,7 +63,7 @@ pub struct FunctionDesign {
 /// Bounds on the value of an attribute.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Requirement {
-    /// Local name of the attribute type.
+    /// Name of the attribute type (as in `Individual::name`).
     pub attribute: String,
     /// Minimum, inclusive.
     pub minimum: Option<BigRational>,
@@ -86,7 +85,7 @@ pub struct Component {
 pub struct Measurement {
     /// The individual that holds the value.
     pub individual: Individual,
-    /// Local name of the attribute type.
+    /// Name of the attribute type (as in `Individual::name`).
     pub attribute: String,
     /// The value in the unit of the attribute type, if there is one.
     pub value: Option<BigRational>,

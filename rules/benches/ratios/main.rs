@@ -2,7 +2,8 @@
 //! written by hand for these rules; transitive closure; single updates of a small and a large knowledge
 //! base; equality by representatives and by rules.
 //!
-//! Times are processor time of the thread (Linux), so that other load on the machine has little influence.
+//! Times from scratch are processor time of the thread (Linux), so that other load on the machine has little
+//! influence. Times of updates and of equality are wall-clock times.
 
 #![allow(clippy::print_stdout, reason = "a program whose result is what it prints")]
 

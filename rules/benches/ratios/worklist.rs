@@ -8,7 +8,7 @@ use super::{Random, Task};
 
 const TOMASYS: &str = "http://metacontrol.org/tomasys#";
 
-/// Knowledge base with sixteen facts per design. Every second component has failed.
+/// Knowledge base with about fourteen facts per design. Every second component has failed.
 pub(crate) fn knowledge_base(designs: u64) -> Task {
     let mut symbols = Symbols::new();
     let program = parse_rules(TOMASYS_RULES, "tomasys", &mut symbols, &Prefixes::new()).expect("rules");
@@ -63,7 +63,7 @@ pub(crate) fn knowledge_base(designs: u64) -> Task {
     (symbols, program, facts)
 }
 
-/// Rows by the value of one column, as linked lists in a vector. This is the layout of the engine's store.
+/// Rows by the value of one column, as linked lists in a vector, similar to the engine's store.
 #[derive(Default)]
 struct Index {
     heads: FxHashMap<Symbol, u32>,

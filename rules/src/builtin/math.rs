@@ -1,6 +1,6 @@
-//! Numeric and boolean functions. On decimals, results are exact up to 34 fractional digits; sines, cosines,
-//! tangents and powers with fractional exponents are doubles. On other numbers, functions are computed in the
-//! widest floating-point type of the arguments.
+//! Numeric and boolean functions. On decimals, results are exact up to 34 fractional digits; sines, cosines, tangents
+//! and powers with fractional exponents are doubles. On other numbers, the result has the widest floating-point type
+//! of the arguments.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;

@@ -95,12 +95,12 @@ const NAME_START: &str = ":A-Z_a-z\\x{C0}-\\x{D6}\\x{D8}-\\x{F6}\\x{F8}-\\x{2FF}
 /// Additional characters within an XML name.
 const NAME_CONTINUE: &str = "\\-.0-9\\x{B7}\\x{300}-\\x{36F}\\x{203F}-\\x{2040}";
 
-/// Translates a pattern of `XPath` to the syntax of the `regex` crate. Subtraction of classes is written
-/// `--`, and `\i` and `\c` are expanded. Returns an error for a back reference, and for a class within a
-/// class that is not subtracted.
+/// Translates a pattern of `XPath` to the syntax of the `regex` crate: `[a-z-[aeiou]]` (subtraction of classes)
+/// becomes `[a-z--[aeiou]]`, and `\i` and `\c` are expanded. Returns an error for a back reference, and for a class
+/// within a class that is not subtracted.
 fn translate(pattern: &str) -> Result<String, String> {
     let mut translated = String::new();
-    // Nesting depth of classes, and a flag for an innermost class without members.
+    // Nesting depth of classes, and a flag that is set while the innermost class has no members yet.
     let (mut depth, mut is_empty) = (0, false);
     let mut characters = pattern.chars().peekable();
     while let Some(character) = characters.next() {

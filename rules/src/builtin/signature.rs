@@ -18,7 +18,8 @@ macro_rules! built_ins {
         }
 
         impl BuiltIn {
-            /// All built-ins of SWRL and the two data range tests, but no custom built-ins.
+            /// All built-ins of SWRL except those on lists, and the two data range tests. Custom built-ins are not
+            /// included.
             pub const ALL: &'static [Self] = &[$(Self::$variant,)*];
 
             /// Returns the local name in the `swrlb` namespace, or the IRI of a custom built-in.
@@ -123,7 +124,7 @@ built_ins! {
     Substring "substring" 3..=4 Function,
     /// Number of characters of the second argument.
     StringLength "stringLength" 2..=2 Function,
-    /// Second argument without white space at the ends, and with each white space inside collapsed to one
+    /// Second argument without white space at the ends, and with each sequence of white space inside replaced by one
     /// space.
     NormalizeSpace "normalizeSpace" 2..=2 Function,
     /// Second argument in upper case.

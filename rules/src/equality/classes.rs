@@ -15,8 +15,8 @@ use crate::fact::{Arguments, Fact};
 use crate::rule::RuleIdentity;
 use crate::symbol::Symbol;
 
-/// A derivation step: a fact with its reason. A derived equality occurs in it like a stated fact,
-/// because its edge keeps its own derivation.
+/// A derivation step: a fact with its reason. A derived equality counts as a stated fact in a step, because its own
+/// derivation is recorded in its edge.
 pub(super) type Step = DerivationStep;
 
 /// Number of an edge (recorded equality of two names), in the order of creation.
@@ -162,8 +162,8 @@ impl Classes {
         }
     }
 
-    /// Returns a shortest path between two names, by breadth-first search over the edges (recorded
-    /// equalities) with a number below `before`. Empty if there is no path.
+    /// Returns a shortest path between two names, by breadth-first search over the edges (recorded equalities) with a
+    /// number below `before`. Empty if there is no path, or if both names are the same.
     pub fn path(&self, from: Symbol, to: Symbol, before: EdgeId) -> Vec<EdgeId> {
         let mut predecessors: FxHashMap<Symbol, (EdgeId, Symbol)> = FxHashMap::default();
         let (mut visited, mut front) = (FxHashSet::from_iter([from]), vec![from]);

@@ -31,7 +31,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::fact::Fact;
 use crate::rule::{Atom, Program, Rule, RuleIdentity, Term, Variable};
-use crate::safety::bound_variables;
+use crate::safety::binding;
 use crate::symbol::{Symbol, Symbols};
 use crate::vocabulary::{DIFFERENT_FROM, SAME_AS};
 use classes::Classes;
@@ -41,16 +41,16 @@ impl Program {
     /// rule bodies matches stated and derived facts of `owl:differentFrom`. Without equality,
     /// `differentFrom` compares names.
     ///
-    /// `sameAs` in a body compares individuals if one of its terms is a variable that another atom
-    /// binds. Otherwise (two constants, or variables that no other atom binds) the atom matches pairs of
-    /// names of individuals with several names. An individual with one name then equals itself only if
-    /// this pair is stated.
+    /// `sameAs` in a body compares individuals if one of its terms is a variable that another atom binds. Otherwise (two
+    /// constants, or variables that no other atom binds) the atom matches pairs of names of individuals with several
+    /// names. An individual with one name then equals itself only if this pair is stated.
     #[must_use]
     pub fn with_equality(&self, symbols: &mut Symbols) -> Self {
         let (same_as, different) = (symbols.name(SAME_AS), symbols.name(DIFFERENT_FROM));
         let mut program = Self { equality: true, ..self.clone() };
         for rule in &mut program.rules {
-            let bound = bound_variables(rule);
+            // The rules are not checked yet, so that their variables need not be bound.
+            let bound = binding(rule).bound.0;
             let is_bound = |term: Term| term.as_variable().is_some_and(|v| bound[usize::from(v.0)]);
             for atom in &mut rule.body {
                 match *atom {

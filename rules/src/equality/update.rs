@@ -154,8 +154,8 @@ impl<'e> Update<'e> {
         }
     }
 
-    /// Splits the classes whose equalities depend on removed facts or rules, merges the classes of the
-    /// pairs in `added`, and updates the store.
+    /// Splits the classes whose equalities depend on removed facts or rules, merges the classes of the pairs in
+    /// `added`, updates the store, and runs the rules.
     fn change_classes(&mut self, added: &[Fact], removed: &[Fact]) -> Result<(), Error> {
         let old_program = Arc::clone(&self.engine.program);
         let mut removed_rules = FxHashSet::default();
@@ -362,7 +362,7 @@ impl<'e> Update<'e> {
             self.record_class(representative);
         }
         connect(&mut self.equality.classes);
-        // Facts move only from classes that lost their representative to a larger class.
+        // Facts move only from classes whose representative is replaced.
         let superseded: BTreeSet<Symbol> =
             merged.iter().copied().filter(|&name| self.equality.classes.find(name) != name).collect();
         for fact in self.take_originals(&superseded) {

@@ -1,4 +1,5 @@
-//! Facts of an engine under equality, about all names of each individual.
+//! Queries about facts with any names of individuals. The engine stores each fact only with the representatives
+//! of the equality classes.
 
 use smallvec::SmallVec;
 
@@ -65,8 +66,8 @@ impl Equality {
         rows.map(|arguments| Fact { predicate, arguments }).collect()
     }
 
-    /// Returns all facts that hold, in no particular order. For a class of more than `max_names` names,
-    /// the result contains only the equalities with its first name.
+    /// Returns all facts that hold, in no particular order. Of the equalities in a class of more than `max_names`
+    /// names, the result contains only those with the first name.
     pub fn facts(&self, engine: &Engine, max_names: usize) -> Vec<Fact> {
         let names = |symbol| self.names(symbol);
         let mut facts: Vec<Fact> = Vec::new();

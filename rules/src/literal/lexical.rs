@@ -106,7 +106,7 @@ fn parse_float<F: std::str::FromStr>(lexical: &str) -> Option<F> {
     normal.parse().ok()
 }
 
-/// Parses an `owl:rational` of the form `numerator / denominator`. The result is a decimal if 34 fractional
+/// Parses an `owl:rational`: an integer, or `numerator / denominator`. The result is a decimal if 34 fractional
 /// digits suffice, and otherwise a [`Literal::Opaque`] in lowest terms.
 fn parse_rational(lexical: &str) -> Parsed {
     let text = lexical.trim_matches([' ', '\t', '\n', '\r']);

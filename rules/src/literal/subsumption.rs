@@ -78,8 +78,8 @@ fn primitive(local: &str) -> Option<&'static str> {
     DISJOINT.iter().find(is_ancestor).copied()
 }
 
-/// Returns `true` if every value in the intersection of some datatypes lies in another datatype. Returns
-/// `false` if that is undecided.
+/// Returns `true` if every value in the intersection of some datatypes lies in another datatype. Returns `false` if
+/// this is not so, or undecided.
 pub fn is_subsumed(datatypes: &[&str], by: &str) -> bool {
     if by == RDFS_LITERAL || datatypes.contains(&by) {
         return true;

@@ -78,10 +78,10 @@ impl Moment {
         &self.seconds
     }
 
-    /// Returns the moment plus a duration, with the same time zone; the calculation is in local time. Months
-    /// are added first; a day that does not exist in the new month becomes its last day. Then seconds are
-    /// added. A time of day wraps around at midnight. A date is rounded down to whole days. Returns `None` if
-    /// months are added to a time of day, or if the year is out of range after the months are added.
+    /// Returns the moment plus a duration, with the same time zone; the calculation is in local time. Months are
+    /// added first; a day that does not exist in the new month becomes its last day. Then seconds are added. A time
+    /// of day wraps around at midnight. A date is rounded down to whole days. Returns `None` if months are added to a
+    /// time of day, or if the result is out of range.
     pub(crate) fn later(&self, duration: &Duration) -> Option<Self> {
         let local = self.local();
         let (day, _) = split_day(&local);
@@ -121,8 +121,8 @@ impl Moment {
         comparable.then(|| Duration { months: 0, seconds: add(&self.seconds, &negate(&other.seconds)) })
     }
 
-    /// Returns the duration `self - other` in whole months, truncated toward zero. Returns `None` under
-    /// the conditions of [`Moment::since`].
+    /// Returns the duration `self - other` in whole months, truncated toward zero. Returns `None` under the
+    /// conditions of [`Moment::since`], and if [`Moment::later`] has no result.
     pub(crate) fn months_since(&self, other: &Self) -> Option<Duration> {
         let negative = self.since(other)?.seconds < Decimal::from(0);
         let (late, early) = if negative { (other, self) } else { (self, other) };

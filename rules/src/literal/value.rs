@@ -9,7 +9,8 @@ use super::binary;
 use super::decimal::Decimal;
 use super::temporal::{Duration, Moment};
 
-/// A literal. `Eq` and `Hash` compare values, not lexical forms.
+/// A literal. `Eq` and `Hash` compare values, not lexical forms, unless the datatype is unsupported or the literal is
+/// ill-typed.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 #[non_exhaustive]
 pub enum Literal {
@@ -125,8 +126,8 @@ impl Literal {
         }
     }
 
-    /// Returns the canonical lexical form, or the form as written for an unsupported datatype and for an
-    /// ill-typed literal.
+    /// Returns a lexical form that depends only on the value, or the form as written for an unsupported datatype and
+    /// for an ill-typed literal.
     pub fn lexical(&self) -> String {
         match self {
             Self::String(text) | Self::Uri(text) | Self::Language { text, .. } | Self::Recurring(text, _) => {
@@ -144,7 +145,7 @@ impl Literal {
         }
     }
 
-    /// Returns the number of bytes that a value needs in addition to its fixed size.
+    /// Returns approximately the number of bytes that a value needs in addition to its fixed size.
     pub(crate) fn size(&self) -> u64 {
         let size = match self {
             Self::String(text) | Self::Uri(text) | Self::Language { text, .. } | Self::Recurring(text, _) => {

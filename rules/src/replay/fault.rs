@@ -20,10 +20,10 @@ pub enum Fault {
         reason: String,
     },
     /// A stated fact has no step.
-    #[error("{0} is stated, and missing")]
+    #[error("{0} is stated, but missing")]
     MissingStatement(String),
     /// A conclusion of a rule has no step.
-    #[error("{fact} follows by rule {rule}, and is missing")]
+    #[error("{fact} follows by rule {rule}, but is missing")]
     MissingConclusion {
         /// Missing fact.
         fact: String,
@@ -31,7 +31,7 @@ pub enum Fault {
         rule: RuleIdentity,
     },
     /// A rule tests that two names differ, although they may be equal.
-    #[error("a rule asks whether names differ that may be one")]
+    #[error("a rule tests whether names differ that may denote one individual")]
     Difference,
     /// A rule, or an aggregate in it, has too many matches to enumerate.
     #[error("rule {0} has too many matches")]

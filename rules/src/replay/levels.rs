@@ -10,8 +10,8 @@ use crate::symbol::Symbol;
 
 type Relation = (Symbol, usize);
 
-/// Head relations and body relations of a rule. The number of a body relation is the minimum difference
-/// between its level and the levels of the heads: 1 if the atom is negated or aggregated, otherwise 0.
+/// Head relations and body relations of a rule. The number of a body relation states by how many levels the heads
+/// must at least exceed it: by 1 if the atom is negated or aggregated, otherwise by 0.
 struct Uses {
     heads: Vec<Relation>,
     body: Vec<(Relation, usize)>,
@@ -73,8 +73,8 @@ fn uses(rule: &Rule, equality: bool, same_as: Symbol, different: Symbol) -> Uses
                 body.extend(inner.iter().filter_map(relation).map(|used| (used, 1)));
             }
             Atom::Same(..) if equality => body.push(((same_as, 2), 0)),
-            // Under equality, only literals differ by this atom, and literals are never equal to anything
-            // else.
+            // These atoms depend on no relation. Under equality, `differentFrom` holds only for literals, which never
+            // equal anything else.
             Atom::Same(..) | Atom::Different(..) | Atom::BuiltIn { .. } => {}
         }
     }

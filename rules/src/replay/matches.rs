@@ -46,7 +46,8 @@ pub(super) struct Matcher<'m> {
     pub too_many: bool,
 }
 
-/// Returns the variables that the aggregate at `position` shares with the other atoms of the body.
+/// Returns the variables that the aggregate at `position` shares with the other atoms of the body. Of other
+/// aggregates, only the results count.
 fn group(body: &[Atom], position: usize) -> Vec<Term> {
     let outer_atoms = body.iter().enumerate().filter(|(other, _)| *other != position);
     let outer_terms: BTreeSet<Term> = outer_atoms
@@ -60,8 +61,9 @@ fn group(body: &[Atom], position: usize) -> Vec<Term> {
 }
 
 impl Matcher<'_> {
-    /// Returns the matches of a rule's body: all of them, unless [`Matcher::too_many`] is set because there
-    /// are more than [`MATCH_LIMIT`]. The values are first names of individuals.
+    /// Returns the matches of a rule's body. If [`Matcher::too_many`] is set, matches may be missing, because the
+    /// enumeration was stopped at [`MATCH_LIMIT`]. An individual with several names is represented by its
+    /// smallest name ([`Names::find`]).
     pub fn matches_of(&mut self, rule: &Rule) -> Vec<Values> {
         let mut matches = Vec::new();
         let open: Vec<usize> = (0..rule.body.len()).collect();
@@ -181,8 +183,8 @@ impl Matcher<'_> {
         Some(values)
     }
 
-    /// Returns `true` if an atom that is not a relation atom holds. `names` contains the equalities of
-    /// earlier steps.
+    /// Returns `true` if an atom that is not a relation atom holds. `sameAs` uses only the equalities in `names`,
+    /// i.e. those of earlier steps.
     pub fn holds(&mut self, atom: &Atom, rule: &Rule, values: &Values, names: &Names) -> bool {
         let position = rule.body.iter().position(|other| std::ptr::eq(other, atom));
         position.is_some_and(|position| self.holds_at(&rule.body, position, values, names))
@@ -243,7 +245,8 @@ impl Matcher<'_> {
     }
 }
 
-/// Returns the aggregate function, applied to the only column of the rows.
+/// Returns the aggregate with the variable 0 as its term: the only column of the rows to which the aggregate is
+/// applied.
 fn column(aggregate: Aggregate) -> Aggregate {
     aggregate.map(&|_| Term::Variable(Variable(0)))
 }

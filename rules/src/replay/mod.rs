@@ -43,7 +43,7 @@ const DIFFERENT_FROM: &str = "http://www.w3.org/2002/07/owl#differentFrom";
 /// Statistics of a successful [`replay`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Replayed {
-    /// Number of facts that hold.
+    /// Number of facts in the derivation.
     pub facts: usize,
     /// Number of these facts that a rule derives.
     pub derived: usize,
@@ -51,8 +51,9 @@ pub struct Replayed {
     pub matches: usize,
 }
 
-/// Checks that the steps of a derivation are exactly the facts that hold for a program and stated facts.
-/// Each step must come after its supports. Values that rules compute are interned in `symbols`.
+/// Checks that the steps of a derivation are exactly the facts that hold for a program and stated facts. (Under
+/// equality, a fact may be present under any names of its individuals.) Each step must come after its supports.
+/// Values that rules compute are interned in `symbols`.
 ///
 /// # Errors
 /// Returns the first [`Fault`]: rules without stratification, a step that does not follow, a missing fact, a

@@ -2,7 +2,7 @@
 
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(super) enum Token {
-    /// `@prefix`, or `prefix` before a name.
+    /// `@prefix`, or `prefix` or `PREFIX` before white space.
     Prefix,
     /// `<iri>`, without the brackets.
     Iri(String),
@@ -51,7 +51,8 @@ struct Lexer {
     column: u32,
 }
 
-/// Splits a text into tokens, terminated by [`Token::End`]. Unreadable characters are reported and skipped.
+/// Splits a text into tokens, terminated by [`Token::End`]. Unexpected characters and incomplete tokens are reported
+/// and skipped.
 pub(super) fn tokens(text: &str) -> (Vec<Spanned>, Vec<Fault>) {
     let mut lexer = Lexer { characters: text.chars().collect(), cursor: 0, line: 1, column: 1 };
     let (mut tokens, mut faults) = (Vec::new(), Vec::new());

@@ -1,5 +1,5 @@
-//! Recursive-descent parser of rule texts. After an error, the parser continues with the next rule, so
-//! that all errors are reported.
+//! Recursive-descent parser of rule texts. After an error, the parser continues with the next rule, so that the
+//! errors of several rules are reported together.
 
 use std::sync::Arc;
 
@@ -35,7 +35,8 @@ pub struct Syntax {
 /// ```
 ///
 /// # Errors
-/// Returns all errors of the text: R101, R102, R104.
+/// Returns the errors of the text: R101, R102, R104. After the first syntax error in a rule, the rest of the rule is
+/// not checked.
 pub fn parse_rules(
     text: &str,
     source: &str,

@@ -1,5 +1,5 @@
-//! Prints rules as text. [`super::parse_rules`] parses the text to the same rules, except for names of
-//! variables and labels that the syntax cannot express.
+//! Prints rules as text. [`super::parse_rules`] parses the text to the same rules, except for names of variables and
+//! labels that the syntax cannot express. Built-ins defined by the caller also need `Syntax::built_ins`.
 
 use std::fmt::Write;
 

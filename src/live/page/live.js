@@ -1,8 +1,8 @@
-// The lines of /events to tables, and the picture of the plan beside them. What comes in lines becomes text, never markup; the
-// picture is drawn by the program.
+// Shows the lines of /events as tables, and the picture of the plan, which the program draws (/plan). Strings from lines become text
+// nodes, never markup.
 "use strict";
 
-const SHOWN = 500; // lines of what happens
+const SHOWN = 500; // maximum number of rows in the table of events and answers
 const QUIET = new Set(["handled", "ready", "planning", "plan_kept"]);
 const BAD = new Set(["error", "plan_none", "contradicted", "unconcluded", "unrecorded", "suspend_action", "cancel_action"]);
 const $ = (id) => document.getElementById(id);
@@ -28,13 +28,13 @@ function row(cells, attributes = {}) {
 const pairs = (object) => Object.entries(object ?? {}).map(([key, value]) => `${key}: ${value}`).join(", ");
 const reasons = (list) => (list ?? []).join("; ");
 
-// Arguments without the functions and designs, which have a column of their own.
+// Returns the arguments of a step without functions and designs, which are shown as its configuration.
 function context(step) {
   const known = new Set(Object.entries(step.configuration ?? {}).flat());
   return (step.arguments ?? []).filter((word) => !known.has(word)).join(" ");
 }
 
-// The headline follows from the state of things, never from the last message alone: what is over is not shown any longer.
+// Returns the headline and its style. Both depend on `state`, not on the last message alone, so that nothing outdated is shown.
 function headline() {
   const { action, suspended, planning } = state;
   if (state.lost) return ["The connection is lost; what was last seen stays here", "stuck"];
@@ -60,7 +60,7 @@ function reset() {
   showState();
 }
 
-// What is done, and what is under way, wherever it is drawn.
+// Marks completed steps as `done` and the current step as `now` in every drawing of the plan.
 function markSteps() {
   const now = state.reached ? Infinity : state.requested - Number($("drawn")?.dataset.first) + 1;
   for (const own of $("plan").querySelectorAll("[data-step]")) {
@@ -68,7 +68,7 @@ function markSteps() {
     own.classList.toggle("now", steps.includes(now));
     own.classList.toggle("done", steps.every((step) => step < now));
   }
-  // Each picture is drawn in several widths, of which one is shown.
+  // Each picture exists in several widths, only one of which is visible. Its pane is scrolled to the current step.
   const bar = [...$("plan").querySelectorAll(".bar.now")].find((own) => own.getClientRects().length > 0);
   const pane = bar?.closest(".scroll");
   if (pane) pane.scrollLeft += bar.getBoundingClientRect().left - pane.getBoundingClientRect().left - pane.clientWidth / 3;
@@ -86,7 +86,7 @@ async function drawPlan() {
     $("plan").querySelectorAll("details").forEach((own, index) => { own.open = open[index] ?? false; });
     markSteps();
   } catch {
-    // That the connection is lost is said elsewhere.
+    // The headline reports a lost connection.
   }
   drawing = false;
   if (again) drawPlan();
@@ -117,11 +117,11 @@ function know(designs) {
   for (const own of designs) state.designs.set(own.design, { text: own.available ? "is available" : "is not available", because: own.because });
 }
 
-// What an answer says, in words.
+// Text of an answer in the last column of the table, by the kind of the answer.
 const WORDS = {
   inferred: (it) => [
     ...it.designs.map((own) => `${own.design} is ${own.available ? "available" : "not available"}`),
-    ...it.objectives.map((own) => `${own.objective}: ${own.statuses.join(", ") || "all is well"}`),
+    ...it.objectives.map((own) => `${own.objective}: ${own.statuses.join(", ") || "no error"}`),
   ].join("; "),
   plan_requested: (it) => reasons(it.because),
   plan_found: (it) => `${it.steps.length} steps, cost ${it.cost}${it.optimal ? ", proved optimal" : ""}`,
@@ -135,12 +135,12 @@ const WORDS = {
   suspend_action: (it) => `${it.action}: ${it.because}`,
   resume_action: (it) => `${it.action}`,
   error: (it) => `${it.code}: ${it.message}`,
-  unconcluded: (it) => it.message ?? "it is known again what follows",
+  unconcluded: (it) => it.message ?? "the conclusions are known again",
   unrecorded: (it) => it.message,
   contradicted: (it) => it.contradictions.map((own) => own.violated).join("; ") || "consistent again",
 };
 
-// What an answer changes.
+// Changes of `state` and of the page by an answer, by the kind of the answer.
 const CHANGES = {
   ready: (it) => ($("mission").textContent = it.mission ?? ""),
   planning: (it) => (state.planning = it.seconds),
@@ -168,7 +168,7 @@ const CHANGES = {
   },
   inferred(it) {
     know(it.designs);
-    for (const own of it.objectives) state.designs.set(own.objective, { text: own.statuses.join(", ") || "is well", because: own.because });
+    for (const own of it.objectives) state.designs.set(own.objective, { text: own.statuses.join(", ") || "has no error", because: own.because });
     showDesigns();
   },
 };
@@ -187,13 +187,13 @@ function take(message) {
   if (news.known) return know(news.known), showDesigns();
   if (news.planned) {
     state.requested = Math.max(state.requested, news.planned.under_way ?? 0);
-    // Where a search for a better plan finds none, the plan at hand stays.
+    // A search for a better plan can end with `plan_none` although the current plan is kept.
     if (news.planned.exists) state.plan = "found";
     showState();
     return drawPlan();
   }
   const said = news.said;
-  // Whatever follows the progress of a search says that it is over.
+  // Any answer other than `planning` means that the search has ended.
   state.planning = undefined;
   CHANGES[said.answer]?.(said);
   showState();

@@ -3,9 +3,9 @@
 //! Bounds of designs divide the values of an attribute into *cells*: within a cell, each bound is either satisfied
 //! (kept) or violated (missed). A sample in the cell of the believed value is accepted at once. A bound counts as
 //! violated as soon as a sample violates it. It counts as satisfied again only after a sample that satisfies it by at
-//! least its band (a Schmitt trigger whose lower threshold is the bound \[1\]). If a lower bound of one design and an
-//! upper bound of another are within one band, each crossing makes a design unavailable. In this case, only a sample
-//! beyond the band leaves either cell. Crossings are debounced.
+//! least its band (a Schmitt trigger whose lower threshold is the bound \[1\]). A lower bound of one design and an
+//! upper bound of another can be within one band of each other, so that each crossing makes one of the designs
+//! unavailable. Then a sample changes the cell only if it lies beyond the band. Crossings are debounced.
 //!
 //! Times are in microseconds and monotonic. Additional calls of [`AttributeFilter::elapse`] do not change the accepted
 //! values.
@@ -50,7 +50,7 @@ pub enum Stale {
     Keep,
     /// The measurement is withdrawn. The shipped rules do not violate a requirement without a measurement.
     Unknown,
-    /// The value with which the fewest designs can be used.
+    /// The value that satisfies the fewest bounds of designs.
     #[default]
     Worst,
 }
@@ -251,7 +251,8 @@ impl AttributeFilter {
         self.is_confirmed(state, confirmed).then_some(confirmed)
     }
 
-    /// Starts the period of silence at `now`, unless it was started before or a sample has arrived.
+    /// Starts to measure the sensor's silence at `now`, unless the measurement has started before or a sample has
+    /// arrived.
     pub(crate) fn begin(state: &mut AttributeState, now: Micros) {
         state.last_sample_time.get_or_insert(now);
     }

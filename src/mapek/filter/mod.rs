@@ -1,4 +1,5 @@
-//! Noise filters between the robot's reports and the beliefs. The output depends only on the reports and their times.
+//! Noise filters between the robot's reports and the beliefs. For given settings and bounds, the output depends only on
+//! the reports and their times.
 //!
 //! [`Filters`] is the configuration, from the section `adaptation` of a manifest and the bounds of the knowledge base.
 //! [`FilterStates`] is the state, a part of the beliefs and of snapshots. Filters have no clock: observations provide
@@ -32,7 +33,7 @@ use crate::number;
 
 impl FilterSettings {
     /// Returns warnings, for `lint`, about settings with which noise causes reconfigurations: attributes without
-    /// hysteresis and debounce, and a default `heal_time` of 0 if the knowledge base has components.
+    /// hysteresis and debounce, and a general `heal_time` of 0 if the knowledge base has components.
     pub(crate) fn doubts(&self, knowledge: Option<&Knowledge>) -> Vec<Message> {
         let filters = Filters::new(self, knowledge);
         let is_noisy = |(_, filter): &(&String, &AttributeFilter)| {
@@ -48,9 +49,10 @@ impl FilterSettings {
         });
         let mut doubts: Vec<Message> = noisy.collect();
         if self.heal_time.is_zero() && filters.has_components {
-            let text = "a component that comes and goes switches designs with every report: `heal_time` is 0";
+            let text = "an intermittent component switches designs with every report: `heal_time` is 0";
             doubts.push(
-                Message::warning("M144", text).with_help("set `heal_time` in `[adaptation]` to some seconds"),
+                Message::warning("M144", text)
+                    .with_help("set `heal_time` in `[adaptation]` to a few seconds"),
             );
         }
         doubts
@@ -75,7 +77,7 @@ pub(crate) struct FilterStates {
 pub(crate) enum Accepted {
     /// Value of an attribute, by local name.
     Value(String, BigRational),
-    /// Status of a component, by local name or IRI.
+    /// Status of a component, by local name.
     Status(String, Status),
     /// An attribute whose value has become unknown.
     Unknown(String),

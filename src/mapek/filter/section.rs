@@ -76,7 +76,7 @@ pub struct MeasuredSection {
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     period: Number,
-    /// Value of a silent sensor: `worst` (the value with which the fewest designs can be used), `keep`
+    /// Value of a silent sensor: `worst` (the value that satisfies the fewest bounds of designs), `keep`
     /// (the last value), `unknown` (no value, which violates no requirement).
     #[serde(default)]
     stale: Stale,
@@ -85,7 +85,7 @@ pub struct MeasuredSection {
 /// Parses the settings of all filters, with defaults for missing keys.
 ///
 /// # Errors
-/// The first value that is not a number, or out of range.
+/// The first value that is not a number or out of range, or a `maximum` below the `minimum`.
 pub(crate) fn filters(
     confirm_time: &Number,
     heal_time: &Number,

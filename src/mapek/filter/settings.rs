@@ -88,8 +88,9 @@ impl FilterSettings {
         Self { heal_time: Duration::ZERO, band: BigRational::default(), ..Self::default() }
     }
 
-    /// Returns an error for each name that the knowledge base does not have. Each error comes with its key in the
-    /// section `adaptation` (`measured` or `components`) and the unknown name.
+    /// Returns an error for each attribute or component that the knowledge base does not have; without a knowledge
+    /// base, for all. Each error follows its key in the section `adaptation` (`measured` or `components`) and the
+    /// unknown name.
     pub(crate) fn mistakes(&self, knowledge: Option<&Knowledge>) -> Vec<(&'static str, String, Message)> {
         let view = knowledge.map(Knowledge::view);
         let attributes: Vec<String> = view

@@ -136,8 +136,8 @@ struct Tally {
 }
 
 impl Tally {
-    /// Plans incrementally and from scratch, and asserts that the plans are equal. `goes_on` says whether the action
-    /// under way is continued.
+    /// Plans incrementally and from scratch, and asserts that the plans are equal. With `goes_on`, the plans continue
+    /// the action under way.
     fn compare(&mut self, control: &mut Loop, goes_on: bool, context: &dyn Fn() -> String) {
         let problem = control.beliefs.filled();
         let running = control.beliefs.running.as_ref().filter(|_| goes_on);

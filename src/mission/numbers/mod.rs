@@ -54,8 +54,8 @@ pub fn missing_values(mission: &Mission) -> Vec<MissingValue> {
     values.into_iter().filter(|value| !is_any || is_told(value)).collect()
 }
 
-/// Returns sentences with the reasons why a design can never be used, even if it is available:
-/// missing estimations and negative durations.
+/// Returns sentences with the reasons why some actions can never use a design, even if it is available: missing
+/// estimations and negative durations.
 pub fn against(mission: &Mission, design: &str) -> Vec<String> {
     let (missing, negative) = Numbers::new(mission).check();
     let missing = missing.iter().filter_map(|value| {
@@ -66,7 +66,10 @@ pub fn against(mission: &Mission, design: &str) -> Vec<String> {
     });
     let negative = negative.iter().filter(|duration| duration.design.as_deref() == Some(design));
     let negative = negative.map(|duration| {
-        format!("with it {} would take {}, less than no time", duration.action, duration.duration)
+        format!(
+            "with it the duration of {} would be {}, which is negative",
+            duration.action, duration.duration
+        )
     });
     missing.chain(negative).collect()
 }

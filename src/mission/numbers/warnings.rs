@@ -23,7 +23,8 @@ impl Numbers<'_> {
         let individual = self.design(design);
         let estimated = individual.iter().flat_map(|design| design.estimations.keys().map(String::as_str));
         let text = format!(
-            "the design `{design}` has no estimation of `{attribute}`, which {} needs, so it can never be used there{}",
+            "the design `{design}` has no estimation of `{attribute}`, which {} needs, so the design cannot be \
+             used there{}",
             quoted(&missing_value.needed_by),
             did_you_mean(attribute, estimated)
         );
@@ -39,7 +40,7 @@ impl Numbers<'_> {
         let actions: Vec<String> = actions.into_iter().cloned().collect();
         let have = if missing.len() == 1 { "has" } else { "have" };
         let text = format!(
-            "{}{omitted} {have} no value, so {} can never be done where it is needed",
+            "{}{omitted} {have} no value, so {} is impossible where it is needed",
             names.join(", "),
             quoted(&actions)
         );
@@ -56,7 +57,8 @@ impl Numbers<'_> {
             format!(" ({})", negative_duration.causes.join(", "))
         };
         let text = format!(
-            "`{}` would take {}, less than no time{because}, so it can never be done so",
+            "the duration of `{}` would be {}, which is negative{because}, so the action is impossible with \
+             these arguments",
             negative_duration.action, negative_duration.duration
         );
         if let Some(design) = &negative_duration.design {

@@ -269,7 +269,7 @@ fn files_are_not_overwritten_and_invalid_recordings_are_refused() {
     let refused = run(&["--mcap", &name], "");
     assert_eq!((refused.status, refused.stdout.as_str()), (3, ""), "{refused:#?}");
     assert!(
-        refused.stderr.contains("M331") && refused.stderr.contains("no recording is overwritten"),
+        refused.stderr.contains("M331") && refused.stderr.contains("recordings are never overwritten"),
         "{refused:#?}"
     );
     assert_eq!(std::fs::read_to_string(&file).expect("the file"), "mine");

@@ -175,7 +175,7 @@ impl LineComparer<'_> {
         }
         let (number, what) = (self.number, self.what);
         let expected = String::from_utf8_lossy(expected.trim_ascii_end());
-        Err(format!("line {number} of the {what} is another one, `{expected}` is expected"))
+        Err(format!("line {number} of the {what} differs, `{expected}` is expected"))
     }
 
     fn end(&mut self) -> Result<(), String> {

@@ -95,7 +95,7 @@ pub fn check_refutation(
         Ok(formula) => {
             let comparison = formula.compare(written, legend).map(|()| {
                 format!(
-                    "what the task comes to for {steps} steps: {} variables, {} clauses",
+                    "encoding of the task for {steps} steps: {} variables, {} clauses",
                     formula.variables(),
                     formula.count()
                 )

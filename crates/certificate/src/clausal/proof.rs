@@ -3,8 +3,8 @@
 //!
 //! A clause follows if its negation leads to a contradiction. Each hint names a clause with at most
 //! one literal that is not false. This literal becomes true; without such a literal, the clause is the
-//! contradiction. The check does not search and visits each hint once. The clauses of the formula
-//! are numbered from 1, followed by the clauses of the proof.
+//! contradiction. The check does not search and visits each hint at most once. The clauses of the formula are numbered
+//! from 1, followed by the clauses of the proof.
 
 use std::io::BufRead;
 use std::ops::Range;

@@ -107,8 +107,9 @@ impl Timeline {
             formula.at_most_one(&literals, &format!("the designs of slot {slot} at step {number}"));
             self.chosen.push(literals);
         }
-        // Operators with equal slots and exclusions share a variable, which reduces the number of
-        // clauses.
+        // Operators with the same suitable designs in the same slots and the same excluded combinations
+        // imply one common auxiliary variable. The clauses are stated for this variable only, which
+        // reduces their number.
         let mut kinds: BTreeMap<(u32, u32), Vec<Literal>> = BTreeMap::new();
         for (operator, literal) in model.operators.iter().zip(&self.operators) {
             kinds.entry((operator.uses, operator.exclusions)).or_default().push(*literal);

@@ -320,8 +320,8 @@ impl Moment {
         truths
     }
 
-    /// Returns the cases (outcomes under a condition) of an action instance whose last happening
-    /// has these effects. `applied` contains the changes by the start of the action and by events.
+    /// Returns the cases (outcomes under a condition) of an action instance whose last happening has the effects
+    /// `self`. `applied` contains the changes by the start of the action and by events.
     fn last(
         &self,
         structure: &Structure,

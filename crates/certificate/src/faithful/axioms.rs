@@ -16,8 +16,8 @@ pub(super) struct Axioms {
     pub(super) must: FxHashSet<Key>,
     /// A superset of `may`, from which the candidate objects of variables are taken.
     pub(super) bound: Relation,
-    /// The derived atoms on dependency cycles or between cycles that are variables of the task.
-    /// Every other derived atom is replaced by its rules.
+    /// The derived atoms that are variables of the task and lie on dependency cycles or between cycles. Every other
+    /// derived atom is replaced by its rules.
     pub(super) linked: FxHashSet<Key>,
     pub(super) reads: FxHashMap<u32, FxHashSet<u32>>,
 }

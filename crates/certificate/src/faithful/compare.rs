@@ -23,7 +23,8 @@ use pddl::ast::{Action, Direction};
 
 type Result<T> = std::result::Result<T, Obstacle>;
 
-/// Upper limit on the number of case splits for one condition.
+/// Upper limit on the number of partial states that are examined for one condition ([`Comparison::follows`]) or
+/// for one case of an action instance ([`Comparison::find`]). A case split replaces a partial state by several.
 const SPLIT_LIMIT: usize = 256;
 
 /// The positions of operators by action name and arguments; an argument is `None` if it is a slot
@@ -41,8 +42,7 @@ pub(super) struct Comparison<'c> {
     /// length.
     metric: Option<Linear>,
     timed: bool,
-    /// If there are timed events, a number of which all times of events and all durations are
-    /// multiples.
+    /// If there are timed events, a common divisor of all their times and of all durations.
     unit: BigRational,
 }
 
@@ -195,7 +195,8 @@ impl<'c> Comparison<'c> {
     }
 
     /// Returns `true` if `known` implies the condition `wanted`, by case splits on the leaves that
-    /// `admits` accepts. `false` means refuted, or not proved within [`SPLIT_LIMIT`] splits.
+    /// `admits` accepts. `false` means refuted, or not proved after [`SPLIT_LIMIT`]
+    /// partial states.
     fn follows(&self, known: Known, wanted: &Formula, admits: &dyn Fn(&Formula) -> bool) -> bool {
         let structure = &self.task.names.structure;
         let mut open = vec![known];
@@ -253,8 +254,8 @@ impl<'c> Comparison<'c> {
     }
 
     /// Checks that in every state in which a case (outcome of an action instance under a condition)
-    /// can be executed, one of the candidate operators simulates the case. Fails if this takes more
-    /// than [`SPLIT_LIMIT`] case splits.
+    /// can be executed, one of the candidate operators simulates the case. Fails if this is not proved
+    /// after [`SPLIT_LIMIT`] partial states.
     fn find(&self, candidates: &[(&Operator, Vec<u32>)], case: &Case, instance: &Instance<'_>) -> Result<()> {
         let structure = &self.task.names.structure;
         let conditions: Vec<Formula> = candidates

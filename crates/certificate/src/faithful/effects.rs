@@ -10,7 +10,8 @@ use crate::faithful::linear::Linear;
 use crate::faithful::translation::Translation;
 use crate::model::Operator;
 
-/// Upper limit on the number of case splits for one variable.
+/// Upper limit on the number of partial states that are examined when one variable is compared in one case (see
+/// [`Variable::agrees`]). A case split replaces a partial state by several.
 const SPLIT_LIMIT: usize = 1_024;
 
 #[derive(Clone, Copy)]
@@ -22,7 +23,7 @@ pub(super) struct Made<'m> {
 pub(super) enum Mismatch {
     Differs(String),
     /// The atoms of this variable are not proved to be mutually exclusive after the case (outcome
-    /// of an action instance under a condition), or there are too many case splits.
+    /// of an action instance under a condition), or too many partial states have to be examined.
     Unknown(String),
 }
 
@@ -114,7 +115,7 @@ impl<'v> Variable<'v> {
 
     /// Returns `Some(true)` if the case and the operator agree in all states that satisfy `known`,
     /// `Some(false)` if they differ in a partial state that extends `known`, and `None` if neither
-    /// is proved within [`SPLIT_LIMIT`] case splits.
+    /// is proved after [`SPLIT_LIMIT`] partial states.
     fn agrees(&self, known: &Known) -> Option<bool> {
         let structure = &self.task.names.structure;
         let mut open = vec![known.clone()];

@@ -22,7 +22,8 @@ use crate::faithful::formula::Structure;
 use crate::faithful::key::Key;
 use crate::faithful::world::World;
 
-/// Upper limit on the number of case splits for one instance and group.
+/// Upper limit on the number of partial states that are examined for one case (outcome of an action
+/// instance under a condition) and one group.
 const SPLIT_LIMIT: usize = 1_024;
 /// Upper limit on the number of checks whether a case (outcome of an action instance under a
 /// condition) preserves a group, during the whole search.
@@ -42,7 +43,7 @@ pub(super) fn holds_initially(world: &World<'_>, group: &Group) -> bool {
 
 /// Returns `true` if at most one atom of a group holds after a case (outcome of an action
 /// instance), given that at most one holds before the case. `false` means violated or not proved
-/// within the limits on case splits.
+/// after [`SPLIT_LIMIT`] partial states.
 pub(super) fn keeps(
     structure: &Structure,
     may_hold: &dyn Fn(&Key) -> bool,

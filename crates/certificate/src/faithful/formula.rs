@@ -122,8 +122,8 @@ impl Known {
         groups.iter().any(|group| self.holding.contains_key(group)).then_some(false)
     }
 
-    /// Returns the truth value of a condition, or `None` if the partial state is not found to imply
-    /// one. The test is incomplete: each comparison is tested against single known comparisons.
+    /// Returns the truth value that the partial state implies for a condition, or `None` if neither value is found to
+    /// follow. The test is incomplete: each comparison is tested against single known comparisons.
     pub(super) fn decide(&self, structure: &Structure, formula: &Formula) -> Option<bool> {
         match formula {
             Formula::All(parts) => self.junction(structure, parts, true),
@@ -273,8 +273,8 @@ fn implies(structure: &Structure, known: &(Linear, bool), wanted: &Linear, stric
     least.is_positive() || least.is_zero() && (is_strict || !strict)
 }
 
-/// Returns a number of which the variable part of the expression (without its constant term) is a
-/// multiple in every state. Returns `None` if a fluent has no known factor that makes it an integer.
+/// Returns a common divisor of all values that the variable part of an expression (without its constant term) has in
+/// any state. Returns `None` if a fluent has no known factor that makes it an integer.
 fn unit(structure: &Structure, linear: &Linear) -> Option<BigRational> {
     let mut unit: Option<BigRational> = None;
     for (key, factor) in &linear.factors {

@@ -44,7 +44,7 @@ impl<'r> Reader<'r> {
         }
         let length = Length { least: low.0, most: high.map(|(most, _)| most) };
         if length.fixed().is_none() && length.least.is_zero() {
-            return Err(Cause::unsupported("durations that are chosen, and may be as short as one likes"));
+            return Err(Cause::unsupported("chosen durations without a positive lower bound"));
         }
         if length.fixed().is_none() && !self.world.timeline.is_empty() {
             return Err(Cause::unsupported(

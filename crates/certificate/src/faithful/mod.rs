@@ -7,16 +7,15 @@
 //! the task also holds for plans of the files. The task may permit more than the files and omit
 //! irrelevant parts.
 //!
-//! The check visits all instances of all actions. `instances` enumerates them by joins over static
-//! atoms. `reader` and `action` compute their conditions and effects case by case. `compare`
-//! searches for the operator, and `effects` compares its effects. `translation` expresses the task
-//! in terms of the files. A variable of the task represents atoms of which at most one holds; this
-//! is checked initially and for every instance.
+//! The check visits all action instances whose static conditions hold. `instances` enumerates them by joins over static
+//! atoms. `reader` and `action` compute their conditions and effects case by case. `compare` searches for the operator,
+//! and `effects` compares its effects. `translation` expresses the task in terms of the files. A variable of the task
+//! represents atoms of which at most one holds; this is checked initially and for every instance.
 //!
-//! An instance needs no operator if it does not change the task state. Neither does an instance
-//! whose conditions contradict static facts, each other, the variables or the witness. The witness
-//! (`invariant`) over-approximates the possible atoms and the ranges of numbers; the check proves
-//! that no instance leaves it.
+//! An instance needs no operator if it does not change the task state and its cost is not negative. Neither does an
+//! instance whose conditions contradict static facts, each other, the variables or the witness. The witness
+//! (`invariant`) over-approximates the possible atoms and the ranges of numbers; the check proves that no instance
+//! leaves it.
 //!
 //! Supported: all kinds of conditions; conditional and universal effects; linear numbers; derived
 //! predicates, including recursive ones that are variables of the task with equivalent rules;
@@ -297,8 +296,8 @@ impl<'f> Files<'f> {
         Ok(Faithful::Yes { instances, idle, timed })
     }
 
-    /// Returns a number of which the times of events and all durations are multiples. Without timed
-    /// events, returns 1, which is not used.
+    /// Returns a common divisor of the times of events and of all durations. Without timed events, returns 1, which is
+    /// not used.
     fn unit(&self, invariant: &Invariant, axioms: &Axioms) -> Result<BigRational> {
         let mut durations = BTreeSet::new();
         if !self.world.timeline.is_empty() {

@@ -95,8 +95,8 @@ impl<'r> Reader<'r> {
         }
     }
 
-    /// Returns a condition (or its negation, if `holds` is `false`), evaluated after the start
-    /// effects, as a formula over the state before the start effects.
+    /// Returns a condition (or its negation, if `holds` is `false`), evaluated after the start effects, as a formula
+    /// over the state before the start effects. A comparison with an undefined value is false, even if negated.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "conditions nest no deeper than what is read recursively"

@@ -42,8 +42,9 @@ pub(super) struct Timeline {
     pub(super) begun: usize,
 }
 
-/// The position of an action relative to the events: the phases of its start (`from`) and its end
-/// (`to`).
+/// The position of an action relative to the events: the phases (periods between events) in which it
+/// starts (`from`) and ends (`to`), whether start and end coincide with an event, and the times that
+/// this permits.
 #[derive(Debug, Clone)]
 pub(super) struct Passage {
     from: usize,
@@ -145,8 +146,7 @@ impl Timeline {
         (!range.is_empty()).then_some(Passage { from, to, at_start, at_end, latest: range.high, end })
     }
 
-    /// Returns the greatest unit of the form 1/n of which the times of events and the given
-    /// durations are multiples.
+    /// Returns the greatest fraction 1/n that divides the times of all events and the given durations.
     pub(super) fn unit<'d>(&'d self, durations: impl Iterator<Item = &'d BigRational>) -> BigRational {
         let times = self.events.iter().map(|event| &event.time);
         let common = times.chain(durations).fold(BigInt::one(), |common, time| common.lcm(time.denom()));

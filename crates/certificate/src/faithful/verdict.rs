@@ -34,7 +34,7 @@ pub enum Difference {
         reason: String,
     },
     /// The initial states differ.
-    #[error("{what} is another one at first")]
+    #[error("{what} differs in the initial state")]
     Initial {
         /// Description of the variable, number, or metric.
         what: String,
@@ -43,7 +43,7 @@ pub enum Difference {
     #[error("the goal of the files can hold where that of the task does not")]
     Goal,
     /// An action instance can be executed, but no operator has its action and arguments.
-    #[error("{instance}: no operator stands for it")]
+    #[error("{instance}: no operator corresponds to it")]
     NoOperatorFor {
         /// The action with its arguments.
         instance: String,
@@ -55,7 +55,7 @@ pub enum Difference {
         instance: String,
     },
     /// The operator changes a variable or number differently than the instance.
-    #[error("{instance}: the operator makes something else of {what}")]
+    #[error("{instance}: the operator has a different effect on {what}")]
     WrongEffect {
         /// The action with its arguments.
         instance: String,
@@ -63,7 +63,7 @@ pub enum Difference {
         what: String,
     },
     /// The operator costs more than the instance.
-    #[error("{instance}: it costs {cost}, and the operator more")]
+    #[error("{instance}: it costs {cost}, but the operator costs more")]
     WrongCost {
         /// The action with its arguments.
         instance: String,
@@ -71,20 +71,20 @@ pub enum Difference {
         cost: String,
     },
     /// The rules of the task and of the PDDL files for a derived atom are not equivalent.
-    #[error("the rules of {atom} are others")]
+    #[error("the rules of {atom} differ")]
     WrongRules {
         /// The derived atom.
         atom: String,
     },
     /// The witness (the over-approximation of the reachable states) does not contain the initial
     /// state, or an action instance leads out of the witness.
-    #[error("the witness leaves out what can become of {what}")]
+    #[error("the witness does not cover all reachable values of {what}")]
     Witness {
         /// The atom or number that is outside the witness.
         what: String,
     },
     /// A mutex group (atoms of which at most one holds) that the witness lists is not proved.
-    #[error("nothing shows that at most one of {atoms} holds, as the witness has it")]
+    #[error("it is not proved that at most one of {atoms} holds, as the witness claims")]
     Exclusive {
         /// The atoms of the group.
         atoms: String,
@@ -116,10 +116,10 @@ pub enum Cause {
         limit: usize,
     },
     /// It is not proved that at most one atom of a variable holds after an instance, or the
-    /// comparison of the instance's effects needs too many case splits.
+    /// comparison of the instance's effects would have to examine too many partial states.
     #[error(
-        "cannot tell whether the ground task stands for the files: it takes at most one of {atoms} to hold, and neither \
-         {instance} nor the witness by itself shows that this stays so; no difference was found"
+        "cannot tell whether the ground task represents the files: at most one of {atoms} has to hold, and neither \
+         {instance} nor the witness alone proves that this is preserved; no difference was found"
     )]
     Exclusion {
         /// The action with its arguments.

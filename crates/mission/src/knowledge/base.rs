@@ -22,7 +22,7 @@ use crate::knowledge::waiting::Waiting;
 use crate::message::{Errors, Message};
 use crate::planta::Terms;
 
-/// Maximum number of equal names of an individual of which all pairs are listed.
+/// Upper limit on the number of equal names of an individual up to which all pairs of names are listed.
 const MANY_NAMES: usize = 32;
 
 /// Knowledge about a robot: assertions and the facts inferred from them.
@@ -48,7 +48,8 @@ pub struct Knowledge {
     terms: Option<Arc<Terms>>,
     /// Assertions and axioms of the documents and rule files.
     documented: Arc<ontology::Stated>,
-    /// Asserted facts, if the engine does not distinguish them from inferred facts.
+    /// Asserted facts. Set only for an engine that was created from all facts of a proof, and therefore does not
+    /// distinguish asserted from inferred facts.
     stated: Option<Arc<[Fact]>>,
 }
 
@@ -395,8 +396,8 @@ impl Knowledge {
         }
     }
 
-    /// Resets the knowledge to the documents and applies the differences. All other changes since
-    /// reading are discarded, such as names of former measured values.
+    /// Resets the knowledge to the documents and applies the differences. Everything else that was added since is
+    /// discarded, e.g. interned names of former measured values.
     ///
     /// # Errors
     /// Inference exceeds its limits; the knowledge is then unchanged.
@@ -414,7 +415,7 @@ impl Knowledge {
         Ok(())
     }
 
-    /// Number of names and values that were interned since the documents were read.
+    /// Number of names and values that were interned since the documents were read or revised.
     pub fn growth(&self) -> usize {
         let count = |runtime: &Runtime| runtime.engine().symbols().len();
         count(&self.runtime).saturating_sub(count(&self.origin))

@@ -6,10 +6,9 @@
 //! the knowledge base suggest that the two files do not belong together. The availability of a
 //! design is stated by the problem if the knowledge base has neither the design nor its functions.
 //!
-//! A required function can be solved only by a design that occurs in both the problem and the
-//! knowledge base, or by a design whose availability is stated by the problem. A required function
-//! without such a design is an error, because it makes every plan impossible for a reason that is
-//! not about the robot.
+//! A required function can be solved only by a design that occurs in both the problem and the knowledge base, or by a
+//! design whose availability is stated by the problem. If different names are the reason that a required function has
+//! no such design, this is an error: it makes every plan impossible for a reason that is not about the robot.
 
 use std::collections::BTreeSet;
 
@@ -35,10 +34,9 @@ pub(crate) struct Meeting {
     pub(crate) never_named: NeverNamed,
 }
 
-/// Set if the problem declares designs, all of which the knowledge base has, but not every design of the
-/// knowledge base that solves a function of the problem: the IRI of the first missing one, and the text of the
-/// warning. Designs that the knowledge base lacks cause another warning instead, and required functions
-/// without a design an error.
+/// Warning about designs that the problem omits although it declares other designs: the IRI of the first omitted
+/// design, and the text. Set only if the knowledge base has all designs that the problem declares, and every required
+/// function has a design. Otherwise, another message lists the omitted designs, too.
 pub(crate) type NeverNamed = Option<(String, String)>;
 
 pub(crate) fn meet(
@@ -212,8 +210,8 @@ impl Comparison<'_> {
         };
         let only_here: Vec<&str> = only_here.iter().map(|object| object.name.as_str()).collect();
         let text = format!(
-            "no design of the required function `{function}` is known to both sides; in the problem only: {}; in the knowledge \
-             base only: {}",
+            "the problem and the knowledge base have no common design of the required function `{function}`; in the \
+             problem only: {}; in the knowledge base only: {}",
             list(&only_here),
             list(&base_designs),
         );
@@ -225,12 +223,12 @@ impl Comparison<'_> {
             let candidates = pairs(&names, &[function.as_str()]);
             Some(match suggested(&candidates) {
                 Some(entries) => format!(
-                    "the knowledge base knows no function `{function}`; name it as the knowledge base does, or write in \
+                    "the knowledge base has no function `{function}`; name it as the knowledge base does, or write in \
                      `[bindings.names]`: {entries}"
                 ),
                 None => format!(
-                    "the knowledge base knows no function `{function}`; either it gets one, or the problem says which of its designs \
-                     are available"
+                    "the knowledge base has no function `{function}`; add it to the knowledge base, or state in the \
+                     problem which of its designs are available"
                 ),
             })
         };
@@ -271,12 +269,16 @@ impl Comparison<'_> {
             format!("in the problem only: {}; in the knowledge base only: {}", list(&here), list(&there));
         match (unknown.first(), unnamed.first()) {
             (Some(first), _) => {
-                let text = format!("the knowledge base does not know all {members} of the problem; {lists}");
+                let text = format!("the knowledge base lacks {members} of the problem; {lists}");
                 let help = suggestion(&there, &here, false);
                 let ours: Vec<&str> =
                     here.iter().copied().filter(|name| own.contains(&Name::new(name))).collect();
                 let decides = (!ours.is_empty()).then(|| {
-                    format!("the problem itself decides whether {} can be used, whose functions the knowledge base does not know", list(&ours))
+                    format!(
+                        "the problem determines whether {} can be used, since the knowledge base does not \
+                             have their functions",
+                        list(&ours)
+                    )
                 });
                 let help = [help, decides]
                     .into_iter()
@@ -285,7 +287,7 @@ impl Comparison<'_> {
                 OneSided::Objects(Finding { in_domain: first.in_domain, span: first.span, text, help })
             }
             (None, Some(first)) if role.class == DESIGN => {
-                let text = format!("the problem names {members}, but not all of the knowledge base; {lists}");
+                let text = format!("the problem lacks {members} of the knowledge base; {lists}");
                 OneSided::Individuals(first.iri.clone(), text)
             }
             _ => OneSided::Nothing,
@@ -328,11 +330,11 @@ fn suggestion<'n>(known: &[&'n str], here: &[&'n str], all: bool) -> Option<Stri
     let entries = suggested(&matches);
     match (entries, all) {
         (Some(entries), _) => {
-            Some(format!("did you mean the same? Then write in `[bindings.names]`: {entries}"))
+            Some(format!("if these names mean the same, write in `[bindings.names]`: {entries}"))
         }
-        (None, true) => Some(
-            "say in `[bindings.names]` which individual is which object: INDIVIDUAL = \"OBJECT\"".to_owned(),
-        ),
+        (None, true) => {
+            Some("map individuals to objects in `[bindings.names]`: INDIVIDUAL = \"OBJECT\"".to_owned())
+        }
         (None, false) => None,
     }
 }

@@ -21,9 +21,9 @@ pub(crate) type Resolved = (CalledNames, Vec<Message>);
 /// precedence over patterns.
 ///
 /// # Errors
-/// All malformed entries; entries without a matching individual, without an object, or with an object of
-/// another type; individuals that would have two object names; and objects that several individuals would
-/// share.
+/// All malformed entries; entries without a matching individual; entries without an object, or with an object of
+/// another type (for a pattern: only if this holds for all its individuals); individuals that would have two object
+/// names; and objects that several individuals would share.
 pub(crate) fn resolve(
     domain: &Domain,
     problem: &Problem,
@@ -100,7 +100,7 @@ impl<'a> Resolving<'a> {
             _ => {
                 let iris: Vec<&str> = matches.iter().map(|individual| individual.iri.as_str()).collect();
                 let text = format!(
-                    "`{}` may be each of {}; write the IRI that is meant",
+                    "`{}` is ambiguous, it can be each of {}; write the IRI",
                     entry.individual,
                     list(&iris)
                 );
@@ -131,7 +131,7 @@ impl<'a> Resolving<'a> {
                 let names: Vec<&str> =
                     self.individuals.iter().map(|individual| individual.name.as_str()).collect();
                 let text = format!(
-                    "the pattern `{}` meets no individual that has not a name of its own here; there are: {}",
+                    "the pattern `{}` matches no individual without an entry of its own; there are: {}",
                     entry.individual,
                     list(&names)
                 );
@@ -140,7 +140,7 @@ impl<'a> Resolving<'a> {
             Some(reason) if match_count == 0 => self.errors.push(entry.wrong("M224", &reason)),
             Some(reason) => {
                 let text = format!(
-                    "the pattern leaves {} as they are, without an object: {reason}",
+                    "the pattern does not map {}, which keep their names: {reason}",
                     list(&unmatched)
                 );
                 self.warnings.push(entry.questionable("M226", &text));
@@ -169,7 +169,7 @@ impl<'a> Resolving<'a> {
         let types: Vec<&str> = types.map(|r#type| r#type.name.as_str()).collect();
         let object_types: Vec<&str> =
             object.r#type.alternatives.iter().map(|alternative| alternative.name.as_str()).collect();
-        // PDDL types an object without a type as `object`.
+        // In PDDL, an object without a type has the type `object`.
         let object_types = if object_types.is_empty() { vec!["object"] } else { object_types };
         Err(format!(
             "`{name}` is of type {}, but `{}` is a {}; an object of type {} would be right",

@@ -1,10 +1,9 @@
 //! Roles of objects and individuals: the classes within which names of the problem and of the
 //! knowledge base are compared.
 //!
-//! A type of the domain that is bound to a class gives its objects the role of that class. If no
-//! type is bound, the roles follow from facts with predicates that are bound to TOMASys: if a fact
-//! states that a design solves a function, its first argument is a design and its second one a
-//! function.
+//! A type of the domain that is bound to a class gives its objects the role of that class. If no type is bound to a
+//! class, the role follows from facts whose predicates are bound. For example, if a fact states that a design solves a
+//! function, its first argument is a design and its second one a function.
 
 use std::collections::BTreeSet;
 

@@ -4,14 +4,16 @@
 //! A domain is plain if it declares no type of function designs. An action that the knowledge base has as
 //! well (`move` as `move` or `a_move`, or by a binding) gets a parameter for the design of each function that
 //! the action requires. It also gets conditions: the design solves the function, is available, and meets the
-//! quality bounds of the action (`t:requiresQuality`). A quality bound with a context applies only in this
-//! context. A numeric function without parameters that is named like an estimated attribute, but is neither
-//! measured nor has an initial value, is replaced by the sum over the chosen designs. So is a function that
-//! is bound to `chosen:ATTRIBUTE`. A function that is bound to `reconfigured:ATTRIBUTE` is replaced by the
-//! sum over the newly chosen designs, i.e. those that replace another design of their function; the first
-//! design of a function is not counted. As in an explicit domain, the planner chooses the designs for these
-//! parameters without grounding them into actions, unless reconfiguration costs make the designs part of the
-//! state.
+//! quality bounds of the action (`t:requiresQuality`). A quality bound with a context, which is a predicate of the
+//! domain, applies only while this predicate holds for the action's parameters.
+//!
+//! A numeric function without parameters that is named like an estimated attribute, but is neither measured nor has an
+//! initial value, is replaced by the sum over the chosen designs. So is a function that is bound to `chosen:ATTRIBUTE`.
+//! A function that is bound to `reconfigured:ATTRIBUTE` is replaced by the sum over the newly chosen designs, i.e.
+//! those that replace another design of their function; the first design of a function is not counted.
+//!
+//! As in an explicit domain, the planner chooses the designs for these parameters without grounding them into actions,
+//! unless reconfiguration costs make the designs part of the state.
 
 mod spoken;
 mod walk;
@@ -40,7 +42,7 @@ const AT_WORK: &str = "fd_at_work";
 /// Predicate `(p FUNCTION)`: a design has been chosen for the function.
 const CONFIGURED: &str = "f_configured";
 
-/// Additions of a knowledge base to the actions of a plain domain.
+/// Additions of a knowledge base to the actions of a plain domain (see the head of this file).
 #[derive(Debug, Clone)]
 pub struct CoAdaptation {
     /// Requirements of each action, by the name of its schema.
@@ -52,8 +54,8 @@ pub struct CoAdaptation {
     changed: BTreeMap<Name, String>,
 }
 
-/// Required functions and quality bounds of an action, and the number of its parameters in the
-/// plain domain.
+/// Required functions and quality bounds of an action, and the number of its parameters before those
+/// for designs are added.
 #[derive(Debug, Clone)]
 struct Needs {
     functions: Vec<Needed>,
@@ -61,7 +63,7 @@ struct Needs {
     parameters: usize,
 }
 
-/// A required function, with the attributes that at least one of its designs has an estimate of.
+/// A required function, with the attributes for which at least one of its designs has an estimate.
 #[derive(Debug, Clone)]
 struct Needed {
     name: String,
@@ -133,8 +135,8 @@ impl CoAdaptation {
             let action = domain.actions.iter().find(|action| action.identifier.name == *name);
             for function in action.into_iter().flat_map(|action| self.not_counted(action)) {
                 let text = format!(
-                    "`{name}` uses `({function})` where no change of designs is counted; `increase` and `decrease` count it, outside of \
-                     `when` and `forall`"
+                    "`{name}` uses `({function})` where reconfigurations cannot be counted; use it in `increase` or \
+                     `decrease`, outside of `when` and `forall`"
                 );
                 errors.push(Message::error("M228", text));
             }
@@ -148,7 +150,7 @@ impl CoAdaptation {
                 });
                 if !fits {
                     let text = format!(
-                        "<{}> counts for `{name}` in the context `{context}`, which is not a predicate of the domain \
+                        "<{}> applies to `{name}` in the context `{context}`, which is not a predicate of the domain \
                          whose parameters have names of the action's parameters",
                         quality.individual.iri
                     );
@@ -159,8 +161,8 @@ impl CoAdaptation {
         errors
     }
 
-    /// Returns the functions of newly chosen designs that an action uses where changes of designs
-    /// cannot be counted.
+    /// Returns the functions bound to `reconfigured:ATTRIBUTE` that an action uses where changes of designs cannot be
+    /// counted, e.g. in a condition.
     fn not_counted(&self, action: &Action) -> BTreeSet<Name> {
         let uncounted = RefCell::new(BTreeSet::new());
         let see = |part: &mut Expression| {
@@ -329,8 +331,8 @@ impl CoAdaptation {
         }
     }
 
-    /// Replaces a function of chosen designs in a leaf expression by the sum of its attribute over
-    /// `designs`. A function of newly chosen designs becomes 0.
+    /// If a leaf expression is a function bound to the chosen designs, replaces it by the sum of the function's
+    /// attribute over `designs`. A function bound to the newly chosen designs becomes 0.
     fn sum(&self, expression: &mut Expression, designs: &[(Identifier, &Needed)]) {
         let Expression::Fluent(fluent) = expression else { return };
         if let Some(attribute) = self.chosen.get(&fluent.predicate.name) {
@@ -343,9 +345,8 @@ impl CoAdaptation {
         }
     }
 
-    /// Appends to `out`, for each `increase` and `decrease` effect that uses functions of newly chosen
-    /// designs, a conditional effect for each design. It adds the design's share if the design replaces
-    /// another one.
+    /// Appends to `out`, for each `increase` and `decrease` effect whose amount contains a sum over the newly chosen
+    /// designs, a conditional effect for each design. It adds the design's share if the design replaces another one.
     fn changes(&self, effect: &Effect, designs: &[(Identifier, &Needed)], out: &mut Vec<Effect>) {
         match effect {
             Effect::And(parts) => parts.iter().for_each(|part| self.changes(part, designs, out)),

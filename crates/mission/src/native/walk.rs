@@ -9,8 +9,8 @@ pub(super) fn mentions(expression: &Expression, wanted: &dyn Fn(&Name) -> bool) 
     is_mentioned
 }
 
-/// Visits the expressions of an effect in which changes of designs cannot be counted: all except
-/// the amounts of unconditional `increase` and `decrease` effects.
+/// Visits the expressions of an effect in which changes of designs cannot be counted: all except the amounts of
+/// `increase` and `decrease` effects outside of `when` and `forall`.
 pub(super) fn walk_uncounted(effect: Effect, see: &dyn Fn(&mut Expression)) {
     match effect {
         Effect::And(parts) => parts.into_iter().for_each(|part| walk_uncounted(part, see)),

@@ -42,7 +42,7 @@ impl Terms {
             skipped.sort_unstable();
             skipped.dedup();
             let text = format!(
-                "these axioms have no form as derived predicates, and conclude nothing in the domain: {}",
+                "these axioms cannot be expressed as derived predicates and have no effect in the domain: {}",
                 skipped.join(", ")
             );
             terms.warnings.push(Message::warning("M212", text));

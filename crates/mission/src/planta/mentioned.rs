@@ -1,4 +1,4 @@
-//! Collects the predicates and types that a domain and a problem use.
+//! Collects the predicates that a domain uses but does not declare, and the types that a domain and a problem use.
 
 use std::collections::BTreeSet;
 

@@ -98,7 +98,7 @@ impl Planta {
         let errors = mentioned::undeclared(completed).into_iter().map(|name| {
             let suggestion = did_you_mean(name.as_str(), declared.iter().copied());
             let text = format!(
-                "the domain asks for `{name}`, and the knowledge base has no class or property of that name{suggestion}"
+                "the domain uses `{name}`, but the knowledge base has no class or property of that name{suggestion}"
             );
             Message::error("M215", text)
         });

@@ -51,7 +51,7 @@ impl<'a> Checker<'a> {
                     self.atom(atom, Kind::Predicate, &scope);
                     self.check_basic(atom);
                     if time.is_negative() {
-                        self.sink.error("P139", *span, "this time lies before the initial state");
+                        self.sink.error("P139", *span, "this time is before the initial state");
                     }
                 }
             }
@@ -70,7 +70,7 @@ impl<'a> Checker<'a> {
             self.sink.warning("P139", span, "this fact is stated and denied; it holds").related(
                 source,
                 place,
-                "the opposite stands here",
+                "the negation is here",
             );
         }
     }

@@ -116,7 +116,7 @@ impl Parser<'_> {
             )),
             ":task" | ":method" | ":htn" => Some((
                 "hierarchical tasks and methods (HDDL)",
-                "a plan here reaches a goal; state what the tasks are to bring about as `:goal`",
+                "a plan here reaches a goal; state the result of the tasks as `:goal`",
             )),
             ":axiom" => {
                 Some(("axioms of PDDL 1.2 (`:axiom`)", "write `(:derived (predicate ?x) (condition))`"))
@@ -163,7 +163,7 @@ impl Parser<'_> {
                 ":vars" => {
                     self.sink
                         .warning("P109", at_start(value), "`:vars` are read as further parameters")
-                        .help("plans name their objects, too, behind those of `:parameters`");
+                        .help("plans name their objects, too, after those of `:parameters`");
                     variables = self.parameters(value);
                 }
                 ":precondition" => precondition = self.precondition(value, &mut preferences),

@@ -1,5 +1,5 @@
-//! Parses durative actions. Time specifiers are moved outwards until each condition and each effect has
-//! exactly one.
+//! Parses durative actions. Conjunctions are split, and time specifiers are moved out of `forall` and `when`,
+//! until each condition and each effect has exactly one.
 
 use crate::ast::{Condition, ConditionTime, DurationConstraint, Effect, EffectTime, Expression};
 use crate::sexp::Item;

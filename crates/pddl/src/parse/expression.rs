@@ -37,7 +37,7 @@ impl Parser<'_> {
         let Some(symbol) = item.symbol() else { return self.value_of(item) };
         match symbol.strip_prefix('?') {
             Some("") => {
-                self.sink.error("P106", item.span(), "a variable has a name behind its question mark");
+                self.sink.error("P106", item.span(), "a variable has a name after its question mark");
                 None
             }
             Some(name) => Some(Term::Variable(self.identifier(name, item.span()))),

@@ -1,5 +1,4 @@
-//! Builds the abstract syntax tree from S-expressions. The parser reports every problem and continues after
-//! it.
+//! Builds the abstract syntax tree from S-expressions. The parser reports problems and continues after each of them.
 //!
 //! Parts that cannot be read are omitted, so a tree with errors is incomplete.
 
@@ -187,7 +186,7 @@ impl Parser<'_> {
         let diagnostic =
             self.sink.error("P106", at_start(item), format!("expected {description}, found {actual}"));
         if item.symbol().is_some_and(|symbol| symbol.starts_with("{{") || symbol.starts_with("{%")) {
-            diagnostic.help("this file is a template; give the file that is made from it");
+            diagnostic.help("this file is a template; give the file that is generated from it");
         }
         diagnostic
     }

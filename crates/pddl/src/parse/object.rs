@@ -193,7 +193,7 @@ impl Parser<'_> {
         Some((result?, values))
     }
 
-    /// Parses a condition and binds the values of its object-fluent terms by `exists`. A condition about a
+    /// Parses an atom or a comparison and binds the values of its object-fluent terms by `exists`. An atom about a
     /// missing value is therefore false.
     pub(super) fn with_values(
         &mut self,

@@ -168,7 +168,7 @@ impl Parser<'_> {
         match (operands.next(), operands.next(), operands.next()) {
             (Some(name), Some(body), None) => Some((Some(self.name_item(name, "a name")?), body)),
             (Some(body), None, None) if body.is_list() => {
-                self.sink.warning("P117", list_start(item), "a preference without a name counts for nothing");
+                self.sink.warning("P117", list_start(item), "a preference without a name has no effect");
                 Some((None, body))
             }
             _ => {

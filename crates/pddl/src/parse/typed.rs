@@ -27,11 +27,7 @@ impl Parser<'_> {
             if let Some(glued) = symbol.strip_prefix('-') {
                 let r#type = self.type_after_dash(item, glued, &mut items);
                 if untyped_from == list.len() {
-                    self.sink.warning(
-                        "P107",
-                        item.span(),
-                        "there is nothing before this `-` that it could type",
-                    );
+                    self.sink.warning("P107", item.span(), "there are no names before this `-`");
                 }
                 list[untyped_from..].iter_mut().for_each(|entry| entry.r#type = r#type.clone());
                 untyped_from = list.len();
@@ -53,11 +49,11 @@ impl Parser<'_> {
             let span = Span { start: dash.span().start + 1, ..dash.span() };
             self.sink
                 .warning("P107", dash.span(), format!("`-{glued}` is read as `- {glued}`"))
-                .help("put a space behind the dash: other planners read one name here");
+                .help("put a space after the dash: other planners read one name here");
             return self.named_type(glued, span);
         }
         let Some(item) = items.next() else {
-            self.sink.error("P107", dash.span(), "a type is missing behind this `-`");
+            self.sink.error("P107", dash.span(), "a type is missing after this `-`");
             return TypeExpression::default();
         };
         self.type_expression(item)

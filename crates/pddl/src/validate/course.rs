@@ -191,9 +191,8 @@ impl<'e, 'p> Follower<'e, 'p> {
         self.course.goal = bounds;
     }
 
-    /// Appends the bounds that a condition imposes on functions that actions can change. Only comparisons
-    /// that have such a function alone on one side are considered, and only if the condition is one or has
-    /// them as conjuncts.
+    /// Appends the bounds that a condition imposes on functions that actions can change. Considers only comparisons
+    /// that have such a function alone on one side, and that are the condition itself or one of its conjuncts.
     fn collect_bounds(
         &self,
         evaluator: &Evaluator<'_, 'p>,

@@ -184,7 +184,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         let source =
             if step.text.duration.is_some() { "the plan says" } else { "an equality of the domain says" };
         let (stated, bound) = (show_number(stated), show_number(bound));
-        let message = format!("{source} {stated}, but the domain wants ?duration {sign} {bound}");
+        let message = format!("{source} {stated}, but the domain requires ?duration {sign} {bound}");
         Err(step.violation(time, ViolationKind::Duration, message))
     }
 

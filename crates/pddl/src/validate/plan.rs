@@ -36,8 +36,8 @@ impl PlanText {
     ///
     /// # Errors
     ///
-    /// Returns an error for each other line that is neither empty nor a comment, or a single error if the
-    /// text exceeds 4 GB.
+    /// Returns an error for each other line that is neither empty nor a comment, but at most 201 errors. A text of
+    /// more than 4 GB gives a single error.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions in a text in memory, which are at most its length"
@@ -95,7 +95,7 @@ fn step(line: &str) -> Result<PlanStep, String> {
     let (inside, after) = remainder.split_once(')').ok_or("the `)` of this step is missing")?;
     let start = match before.trim() {
         "" => None,
-        time => Some(number(time.strip_suffix(':').ok_or("expected `:` behind the time")?.trim())?),
+        time => Some(number(time.strip_suffix(':').ok_or("expected `:` after the time")?.trim())?),
     };
     let duration = match after.trim() {
         "" => None,
@@ -105,7 +105,7 @@ fn step(line: &str) -> Result<PlanStep, String> {
                 .trim_end_matches([')', ' '])
                 .strip_prefix('[')
                 .and_then(|remainder| remainder.strip_suffix(']'));
-            let inner = inner.ok_or("expected a duration such as `[5.000]` behind the action")?;
+            let inner = inner.ok_or("expected a duration such as `[5.000]` after the action")?;
             Some(number(inner.trim().trim_start_matches("D:").split(';').next().unwrap_or_default().trim())?)
         }
     };

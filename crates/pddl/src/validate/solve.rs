@@ -96,8 +96,8 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         }
     }
 
-    /// Evaluates the conditions whose variables are all bound and opens quantifiers. Returns the remaining
-    /// conditions, or `None` if a condition does not hold or the budget is spent.
+    /// Evaluates the conditions whose variables are all bound and opens existential quantifiers. Returns the
+    /// remaining conditions, or `None` if a condition is false or the budget is spent.
     fn settle(&self, (mut todo, mut undefined): Goals<'p>, bindings: &mut Bindings<'p>) -> Option<Goals<'p>> {
         let mut unsolved = Vec::new();
         while let Some(condition) = todo.pop() {

@@ -66,10 +66,7 @@ impl<'e, 'p> Execution<'e, 'p> {
                         action: None,
                         time: time.clone(),
                         kind: ViolationKind::Constraint,
-                        message: format!(
-                            "the plan does not keep the constraint {}",
-                            constraint_text(constraint)
-                        ),
+                        message: format!("the plan violates the constraint {}", constraint_text(constraint)),
                         unmet: Vec::new(),
                     }));
                 }

@@ -1,8 +1,8 @@
 //! Graph of all cheapest plans: the states through which these plans pass, and the steps between the states.
 //!
-//! A cheapest plan reaches each of its states at the minimum cost of reaching this state. Each state is
-//! therefore expanded once, and every path from the initial state to a goal state is a cheapest plan. K\* and
-//! related algorithms represent top-k plans in this way \[1\].
+//! A cheapest plan reaches each of its states at the minimum cost of reaching this state. So paths that reach
+//! a state at a higher cost are omitted, and every path from the initial state to a goal state is a cheapest
+//! plan. K\* and related algorithms represent top-k plans in this way \[1\].
 //!
 //! If many states differ only in resources, expanding all of them is too much work. A label-setting search
 //! therefore comes first. Each of its labels represents all states that cost at least as much and have at
@@ -54,7 +54,8 @@ pub(super) struct Graph {
     pub(super) goals: Vec<bool>,
     /// For each label (node): whether a goal label can be reached from it.
     pub(super) alive: Vec<bool>,
-    /// `true` if every cheapest plan is a path of the graph.
+    /// `true` if the search was not cut short. If the graph is also exact, every cheapest plan is then one of
+    /// its paths.
     pub(super) is_complete: bool,
     /// `true` if every path to a goal label is a plan, because each label represents a single state.
     pub(super) is_exact: bool,

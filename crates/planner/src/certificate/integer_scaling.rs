@@ -19,7 +19,7 @@ pub(super) struct Scales {
     pub(super) numbers: Integer,
     pub(super) costs: Integer,
     pub(super) times: Integer,
-    /// Factor between the unit of cost bounds and scaled costs.
+    /// Factor by which a cost bound, counted in its unit, is multiplied to obtain a scaled cost.
     pub(super) bounds: Integer,
 }
 

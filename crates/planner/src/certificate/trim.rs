@@ -24,7 +24,7 @@ const NONE: u32 = u32::MAX;
 /// by line.
 ///
 /// # Errors
-/// The draft is not a valid proof, a limit is reached, or a file cannot be written.
+/// The draft cannot be read or is not a valid proof, a limit is reached, or a file cannot be written.
 #[expect(clippy::arithmetic_side_effects, reason = "places of clauses that are held in memory")]
 pub(super) fn trim<'c>(
     clauses: impl Iterator<Item = &'c [Literal]>,
@@ -190,7 +190,7 @@ impl Trimmer {
     }
 
     /// Returns hints: the unit clauses that falsify all literals of a clause except those of the variable
-    /// `except`, followed by the clause itself.
+    /// `except` (0 for no exception), followed by the clause itself.
     fn by_units(&self, position: u32, except: usize) -> Vec<u32> {
         let variables = self.clauses[position as usize].iter().map(|literal| literal.variable());
         let units = variables.filter(|variable| *variable != except).map(|variable| self.units[variable]);

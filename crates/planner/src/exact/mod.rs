@@ -1,8 +1,8 @@
 //! Planning with exact rationals, for tasks whose numbers do not fit fixed-size integers.
 //!
 //! If an action multiplies a number by one half, no scale makes all numbers integers. The common denominator
-//! of many measured numbers can exceed any machine integer. The search needs only addition and comparison.
-//! Its heuristics ignore numeric variables and use costs rounded down to integers, so they stay admissible.
+//! of many measured numbers can exceed any machine integer. So the search computes with rationals. Its
+//! heuristics ignore numeric variables and use scaled costs rounded down to integers, so they stay admissible.
 
 mod integer_scaling;
 
@@ -40,8 +40,8 @@ const COST_BITS: u64 = 90;
 pub struct ExactTask(pub Task<Rational>);
 
 /// Grounds a domain and a problem that have passed `pddl::check`, with rational numbers of any size. Plan
-/// such a task with [`optimize_exact`]. If [`task::ground`] also accepts the task, its planning is faster and
-/// supports more kinds of proofs.
+/// such a task with [`optimize_exact`]. If [`task::ground`] also accepts the task, planning with its result is
+/// faster and supports more kinds of proofs.
 ///
 /// # Errors
 /// Returns all unsupported constructs with their source locations, or an error if a limit is reached.

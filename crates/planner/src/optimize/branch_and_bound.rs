@@ -31,7 +31,7 @@ use crate::optimize::optimizer_run::Run;
 use crate::optimize::solve::solve;
 use crate::optimize::state_dependent_costs::StateDependentCosts;
 
-/// Maximum number of nodes. Numbers can grow without bound, at no cost.
+/// Maximum number of nodes. Without it, the search may not end, as numbers can grow without bound at no cost.
 const MAX_NODES: usize = 2_000_000;
 /// Maximum number of combinations of designs, over all operators.
 const MAX_COMBINATIONS: usize = 200_000;
@@ -42,9 +42,9 @@ const WORK: u64 = 1_000;
 /// Approximate memory use of a node, without its state.
 const OVERHEAD: usize = size_of::<Node>() + 80;
 
-/// Minimises a metric that depends on the state. Returns `None` if the method is not applicable: with the SAT solver
-/// only, if an operator may improve the metric, or if operators have too many combinations of designs. Also returns
-/// `None` if no plan within the horizon was found.
+/// Minimises a metric that depends on the state. Returns `None` if the method is not applicable, e.g. with the SAT
+/// solver only, if an operator may improve the metric, or if operators have too many combinations of designs. Also
+/// returns `None` if no plan within the horizon was found, or if a limit is reached before the search begins.
 pub(super) fn minimise(
     task: &Task,
     config: &Config,
@@ -202,7 +202,7 @@ struct Node {
     steps: usize,
     /// Parent node and step; `None` for the initial state.
     origin: Option<(u32, GroundStep)>,
-    /// Whether a cheaper path to the same state is known.
+    /// Whether another path dominates the path to this node.
     is_dominated: bool,
 }
 
@@ -328,7 +328,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Adds a node, unless a path to the same state is as cheap or the node cannot lead to a better plan.
+    /// Adds a node, unless another path dominates the path to the node, or the node cannot lead to a better plan within
+    /// the horizon. If the node is a goal, its path becomes the best plan.
     fn add(&mut self, state: State, (paid, total): (Int, Int), origin: Option<(u32, GroundStep)>) {
         let Some(estimate) = self.bounds.estimate(&state) else { return };
         let bound = total.saturating_add(estimate);

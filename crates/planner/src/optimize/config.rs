@@ -15,7 +15,8 @@ pub enum Strategy {
     /// Linear search: finds cheaper and cheaper plans until the formula is unsatisfiable.
     Tighten,
     /// Core-guided search: unsatisfiable cores raise the lower bound until a plan with this cost exists.
-    /// Without an upper bound on the number of steps of a cheapest plan, this strategy equals `Tighten`.
+    /// Without an upper bound on the number of steps of a cheapest plan, this strategy equals `Tighten`. The
+    /// same holds while the SAT solver has a budget, because other components of the planner take turns with it.
     Cores,
 }
 
@@ -30,7 +31,8 @@ pub enum Engine {
     Auto,
     /// The SAT solver only, together with the bounds that its formulas need.
     Sat,
-    /// Heuristic search only.
+    /// Heuristic search only. With a horizon, the SAT solver is used as well if the search does not find a
+    /// cheapest plan within the horizon.
     Search,
 }
 
@@ -47,9 +49,9 @@ pub struct Config {
     /// Number of states that A\* stores before the other components of the planner (satisficing search and
     /// SAT solver) start. Also scales the work of each component in the first round.
     pub head_start: usize,
-    /// Whether the SAT solver confirms proofs of other engines without a budget. If `false`, confirmation is
-    /// attempted with a small budget. A proof that is not confirmed remains valid. With [`Engine::Search`],
-    /// nothing is confirmed.
+    /// Whether the SAT solver confirms proofs of heuristic search without a budget. If `false`, confirmation is
+    /// attempted for small tasks only, with a small budget. A proof that is not confirmed remains valid. With
+    /// [`Engine::Search`], nothing is confirmed.
     pub confirm: bool,
     /// Step semantics of the SAT formulas. With a horizon, which counts actions, the semantics is always
     /// sequential. The default (`None`) is parallel for a first plan and sequential for the optimality proof.

@@ -97,7 +97,7 @@ impl HorizonSchedule {
 }
 
 /// Finds a first plan with increasing horizons and without a budget. Returns the solution without a plan if
-/// there is no plan or a limit is reached.
+/// there is no plan, a limit is reached, or the formulas become too large.
 pub(super) fn first_plan(run: &mut Run<'_>, bounds: &Bounds) -> Result<GroundPlan, Box<Solution>> {
     let mut first = HorizonSchedule::new(run);
     loop {

@@ -33,7 +33,8 @@ pub struct Point {
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Front {
-    /// Points in order, from the best by the first objective to the best by the second.
+    /// Points in order, from the best by the first objective to the best by the second. If no plan is found, a
+    /// single point without a plan.
     pub points: Vec<Point>,
     /// `Optimal` if the front is proved complete; `Unsolvable` if it is proved that there is no plan;
     /// `Feasible` if there may be further points. Without a plan, the status of the first query.
@@ -126,9 +127,9 @@ pub fn pareto(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement))
     }
 }
 
-/// Optimises the objectives lexicographically in the order of the indices `order`, until the optimum under an
-/// objective is not proved. Each budget is the index of an objective and the maximum cost under this
-/// objective.
+/// Optimises the objectives lexicographically in the order of the indices `order`. Stops at the first
+/// objective under which optimality is not proved. Each budget is the index of an objective and the maximum
+/// cost under this objective.
 fn in_order(
     task: &Task,
     order: &[usize],

@@ -1,8 +1,8 @@
 //! Portfolio of exact search, satisficing search and SAT, which take turns.
 //!
-//! The work of a round is twice that of the previous round. Each component gets a share of it, and smaller
-//! shares while it is unsuccessful. Work is counted in units instead of time, so results are
-//! deterministic. The plans and bounds of a component limit the others.
+//! The work of a round is twice that of the previous round. Each component gets a share of it; the shares of
+//! satisficing search and SAT shrink while they are unsuccessful. Work is counted in units instead of time, so
+//! results without a time limit are deterministic. The plans and bounds of a component limit the others.
 
 use std::time::Instant;
 

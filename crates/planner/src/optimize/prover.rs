@@ -21,7 +21,7 @@ const STAGES: Int = 8;
 #[derive(Default)]
 pub(super) struct Prover {
     stage: Option<Int>,
-    /// Greatest number of steps of a formula that was built.
+    /// Greatest number of steps of the formulas that were considered.
     pub(super) horizon: usize,
     /// Step bound of the formula that last raised the lower bound.
     pub(super) step_bound: usize,

@@ -13,7 +13,7 @@ pub(super) struct SatBudget {
 
 impl SatBudget {
     /// Returns the maximum number of conflicts for a formula with `clauses` clauses; the number is lower for
-    /// large formulas.
+    /// large formulas, unless it is unlimited.
     pub(super) fn conflicts(self, clauses: usize) -> u64 {
         let factor = (clauses / LARGE).saturating_add(1);
         if self.conflicts == u64::MAX {

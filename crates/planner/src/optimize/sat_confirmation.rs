@@ -17,15 +17,16 @@ use crate::optimize::sat_budget::{FORMULA_LIMIT, SatBudget};
 
 /// Budget for confirming a proof of another component. Both limits correspond to about five milliseconds.
 const CONFIRM_BUDGET: SatBudget = SatBudget { clauses: 50_000, conflicts: 60 };
-/// Maximum number of operator variables of a formula for confirmation.
+/// Number of operator variables of a formula above which confirmation is attempted only if it is configured.
 const CONFIRM_SIZE: usize = 5_000;
-/// Maximum product of the number of operators and the number of steps, above which no confirmation is
-/// attempted.
+/// Product of the number of operators and the number of steps above which confirmation is attempted only if it
+/// is configured.
 const CONFIRM_PRODUCT: usize = 1_500;
-/// Maximum number of operator variables of a formula for confirmation that does not use bounds.
+/// Number of operator variables above which confirmation by a formula without bounds is attempted only if it is
+/// configured.
 const CONFIRM_LIMIT: usize = 400;
-/// Cost limit from which formulas become large, so that no confirmation is attempted. Such costs arise from
-/// scaled products of decimals.
+/// Cost limit from which formulas become large, so that confirmation is attempted only if it is configured. Such
+/// costs arise from scaled products of decimals.
 const CONFIRM_COST: Int = 1 << 64;
 
 /// Returns the solution for a plan whose cost equals the lower bound. The SAT solver confirms optimality if

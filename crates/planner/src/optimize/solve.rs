@@ -33,8 +33,9 @@ pub(super) fn solve(mut run: Run<'_>) -> Solution {
     }
 }
 
-/// Runs heuristic search, which ignores the horizon. Solves formulas if the plan of the search is longer than
-/// the horizon, or if the search reaches a limit without a plan.
+/// Runs heuristic search, which ignores the horizon. A plan within the horizon that is not proved optimal is
+/// improved with formulas. If the plan is longer than the horizon, or a limit is reached without a plan, all
+/// plans come from formulas.
 fn solve_within(mut run: Run<'_>, bounds: &Bounds, lower: Int, horizon: usize) -> Solution {
     let started = Instant::now();
     let outcome = search(run.context(), bounds);

@@ -1,5 +1,5 @@
-//! Minimises a metric whose fluents change by amounts that depend on the state: A\* with the exact cost of each
-//! path \[1\].
+//! Exact costs of paths, and lower bounds on them, for a metric whose fluents change by amounts that depend on the
+//! state \[1\]. `branch_and_bound` minimises such a metric.
 //!
 //! The cost of a path is the sum of its operator costs plus the weighted values of the measured fluents in its
 //! last state. A lower bound on the increase of this cost by each operator, over the reachable intervals of all
@@ -20,7 +20,8 @@ use task::task::number::TaskNumber as _;
 use task::task::quantity::{Linear, Quantity};
 use task::task::{Condition, NumericId, Objective, Operator, State, Task};
 
-/// Number of rounds before bounds that still change are set to infinity.
+/// Number of rounds before bounds that still change are set to infinity, and number of later rounds that reduce
+/// the intervals again.
 const ROUNDS: usize = 3;
 
 /// Range of a number. `None` represents an infinite bound.
@@ -126,15 +127,15 @@ pub(super) struct Preference {
 }
 
 impl Preference {
-    /// Keeps only what a positive (or negative) influence of the number on something admits, of which less (or more)
-    /// is never worse.
+    /// Restricts the preference of a number that influences a quantity with the preference `other`. With a positive
+    /// influence, less of the number means less of the quantity; with a negative influence, more.
     fn restrict(&mut self, is_positive: bool, other: Self) {
         let (less, more) = if is_positive { (other.less, other.more) } else { (other.more, other.less) };
         *self = Self { less: self.less && less, more: self.more && more };
     }
 }
 
-/// Preferences of all numbers, as a greatest fixpoint over the numbers that read each other.
+/// Preferences of all numbers. Computed as a greatest fixpoint, because effects on numbers read other numbers.
 fn preferences(task: &Task, weights: &[(NumericId, Int)]) -> Vec<Preference> {
     let mut preferences = vec![Preference { less: true, more: true }; task.initial.numbers.len()];
     // More of a compared expression, and less of the cost, is never worse.
@@ -250,8 +251,8 @@ impl<'i> Guarded<'i> {
         restricted.map_or(self.intervals[variable.index()], |(_, interval)| *interval)
     }
 
-    /// Lower or upper bound on a weighted sum of numbers. `None` if no bound is known. Conditions on the same sum,
-    /// up to a factor, restrict it.
+    /// Lower bound (if `is_low`) or upper bound on a weighted sum of numbers. `None` if no bound is known. Conditions
+    /// of the operator on the same sum, up to a factor, restrict it.
     fn extreme(&self, coefficients: &[(NumericId, Int)], is_low: bool) -> Option<Int> {
         let mut sums = coefficients.iter();
         let by_intervals = sums.try_fold(0, |sum: Int, (variable, coefficient)| {

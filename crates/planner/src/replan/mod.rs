@@ -5,10 +5,10 @@
 //! a state of this task (see [`state_mapping`]) and a set of available objects, which restricts the operators
 //! (see [`restrict_designs`]). Data that depend only on this set (operators, pattern databases, non-dominated
 //! designs) are cached for recent sets, because failed components often recover. For each query, only the
-//! search and the tie-breaking remain. The answers equal those of grounding and optimising from scratch,
-//! except that the SAT solver does not confirm them.
+//! search and the tie-breaking remain. An optimal plan has the same metric as after grounding and optimising
+//! from scratch, but the SAT solver does not confirm it.
 //!
-//! If the previous plan is still valid, its cost is an upper bound for the search. At the time limit, the
+//! If the previous plan is still valid, its cost is an upper bound for the search. At the time limit, a valid
 //! previous plan is returned unless a better plan was found.
 //!
 //! No SAT solver with assumptions is used. On maps of 50 to 200 places, the search takes milliseconds and a

@@ -15,8 +15,8 @@ pub(super) struct GroundBase {
     /// Ground task with all objects available.
     pub(super) task: Task,
     pub(super) layout: Layout,
-    /// For each schema: the parameters that must be available, each with the index of the predicate that
-    /// states availability.
+    /// For each schema: the parameters whose objects must be available, each with the index of the predicate
+    /// that states availability.
     pub(super) requirements: Vec<Vec<(usize, usize)>>,
 }
 

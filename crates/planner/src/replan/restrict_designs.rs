@@ -1,8 +1,9 @@
 //! Restricts a task that was grounded with all designs to the available designs.
 //!
 //! Operators that require an unavailable object are removed. Tables and forbidden combinations of slots
-//! (parameters whose designs are not grounded) keep only the rows of available designs. The result equals the
-//! task that grounding would produce with these designs, except that it may contain unreachable operators.
+//! (parameters whose designs are not grounded) keep only the rows of available designs. The result has the same
+//! plans as the task that grounding would produce with these designs, but may contain unreachable operators and
+//! facts.
 
 use std::sync::Arc;
 

@@ -118,8 +118,9 @@ pub(super) fn solve(
     ReplanOutcome::Optimal { first, steps: decode(context, &plan).steps, metric }
 }
 
-/// Returns the current plan of the query if it is still valid, and otherwise no plan. Used if there is no
-/// time for a search.
+/// Returns `Misfit` if the task cannot represent one of the query's first steps. Otherwise returns the current
+/// plan of the query after the best first step with which it is still valid, or `Unknown` if it is valid
+/// with no first step. Used if there is no time for a search.
 pub(super) fn reuse_previous_plan(
     base: &GroundBase,
     task: &Task,
@@ -165,8 +166,8 @@ impl Candidate {
     }
 }
 
-/// Returns the possible beginnings of plans. Returns `None` if the task does not support a first step of the
-/// query.
+/// Returns the possible beginnings of plans. Returns `None` if the task cannot represent one of the query's
+/// first steps.
 fn starts(base: &GroundBase, situation: &ReplanState, query: &Query<'_>) -> Option<Vec<Start>> {
     let sign = |metric: &BigRational| if base.task.objective.maximize { -metric } else { metric.clone() };
     if query.first.is_empty() {

@@ -5,8 +5,8 @@
 //! facts must be reachable in the relaxation of the task and must respect its mutex groups. Then every fact
 //! that is reachable in the new problem is also reachable in the grounded problem. Facts and values that
 //! actions change but nothing reads may differ arbitrarily. Everything else must be equal: other facts and
-//! values (even if nothing reads them), objects, goal, constraints and metric. Timed initial literals are not
-//! supported.
+//! values (even if nothing reads them), objects, goal, constraints and metric. The last three are compared as
+//! syntax trees with their positions in the text. Timed initial literals are not supported.
 
 use num_rational::BigRational;
 use num_traits::ToPrimitive;

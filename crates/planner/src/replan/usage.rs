@@ -1,5 +1,5 @@
 //! Usage of the symbols of a domain and problem: which symbols conditions read, which symbols effects change,
-//! and which parameters must be available.
+//! and which parameters need available objects.
 //!
 //! The analysis is syntactic: if a symbol is read anywhere, all its atoms count as read. Only the goal is
 //! more precise: outside quantifiers, it reads just the atoms that it mentions.
@@ -99,8 +99,8 @@ pub(super) fn identifier(term: &Term) -> &Name {
     }
 }
 
-/// Returns, for each action, the indices of the parameters that must be available, each with the index of the
-/// predicate that states availability. Returns `None` if one of the predicates is used in another way,
+/// Returns, for each action, the parameters (by index) whose objects must be available, each with the index of
+/// the predicate that states availability. Returns `None` if one of the predicates is used in another way,
 /// because more availability might then exclude operators.
 #[expect(clippy::arithmetic_side_effects, reason = "occurrences in a text in memory")]
 pub(super) fn requirements(domain: &Domain, predicates: &[Name]) -> Option<Vec<Vec<(usize, usize)>>> {

@@ -53,7 +53,7 @@ pub const PLANNED: Features = Features {
     nonlinear: false,
 };
 
-/// Decoder that draws choices from bytes. If no bytes remain, it draws the first choice, so that every text
+/// Decoder that draws choices from bytes. If no bytes remain, it draws the first choice, so that every task
 /// is finite.
 pub struct Draw<'b> {
     bytes: &'b [u8],
@@ -408,7 +408,7 @@ impl<'b> Draw<'b> {
         }
     }
 
-    /// Generates some steps of a valid or invalid plan for a task.
+    /// Generates a random plan of at most five steps, which may be invalid.
     pub fn plan(&mut self, task: &Task) -> Vec<Step> {
         self.some(0, 5, |this| {
             let index = this.below(task.actions.len());

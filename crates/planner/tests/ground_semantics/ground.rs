@@ -9,7 +9,7 @@ use pddl::ast::{Domain, Problem};
 use crate::ground_semantics::interpret::{State, choices};
 use crate::ground_semantics::model::{Action, Expression, Number, OBJECTS, Sign, Task, fact_text};
 
-/// Maximum number of pairs of states that are compared.
+/// Maximum number of pairs of states that are compared, or of states that are searched.
 const LIMIT: usize = 60;
 
 /// States with numbers above this limit are not expanded, because exact integers are limited.
@@ -56,7 +56,7 @@ fn after(task: &Task, state: &State, index: usize, objects: Vec<usize>) -> Optio
     state.after(task, &(index, objects, duration))
 }
 
-/// Checks by search that no state of the lifted task satisfies the goal.
+/// Checks that none of the first [`LIMIT`] states of the lifted task satisfies the goal.
 fn goal_is_out_of_reach(task: &Task) {
     let mut open = vec![State::initial(task)];
     let mut next = 0;

@@ -256,8 +256,9 @@ impl State {
         }
     }
 
-    /// Returns the duration of an action in this state: the stated duration if the bounds admit it, or the
-    /// only possible one.
+    /// Returns the duration of an action in this state: 0 for an instantaneous action, otherwise the value of
+    /// the first equation, or without an equation the stated duration. Bounds at the end are ignored. Returns
+    /// `None` if the bounds do not admit the stated duration, or if the duration is negative or unknown.
     fn duration(
         &self,
         task: &Task,

@@ -1,8 +1,8 @@
 //! A small lifted task as plain data, and its conversion to PDDL.
 //!
 //! There are three objects and a few predicates and functions with fixed names. Only the actions, axioms,
-//! goal and initial state vary. A variable is a number: the count of quantified variables and parameters in
-//! scope where it is bound.
+//! initial state, timed literals, goal and metric vary. A variable is a number: the count of quantified
+//! variables and parameters in scope where it is bound, e.g. 0 for the first parameter.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -21,9 +21,9 @@ pub const PREDICATES: [(&str, usize); 8] =
     [("p", 0), ("q", 1), ("Q-r", 2), ("s", 1), ("t", 2), ("d", 1), ("w", 2), ("e", 1)];
 /// Indices of the predicates that actions change.
 pub const FLUENTS: [usize; 3] = [0, 1, 2];
-/// Indices of the static predicates, which only the initial state sets.
+/// Indices of the predicates that no action changes (timed literals may change them).
 pub const STATICS: [usize; 2] = [3, 4];
-/// Indices of the derived predicates that depend only positively on fluents and on each other.
+/// Indices of the derived predicates that depend on each other only positively.
 pub const DERIVED: [usize; 2] = [5, 6];
 /// Index of the derived predicate that may depend on all others, also negatively.
 pub const UPPER: usize = 7;
@@ -318,12 +318,12 @@ fn ground_text(name: &str, arguments: &[usize]) -> String {
     applied(name, &arguments.iter().map(|object| Term::Object(*object)).collect::<Vec<_>>())
 }
 
-/// Formats an atom as messages and ground tasks do, e.g. `(p o0)`.
+/// Formats an atom as messages and ground tasks do, e.g. `(q o0)`.
 pub fn fact_text((predicate, arguments): &Atom) -> String {
     ground_text(PREDICATES[*predicate].0, arguments)
 }
 
-/// Formats a function with objects, e.g. `(f o0)`.
+/// Formats a function with objects, e.g. `(g o0)`.
 pub fn function_text((function, arguments): &Atom) -> String {
     ground_text(FUNCTIONS[*function].0, arguments)
 }

@@ -74,8 +74,8 @@ fn true_certificates_are_accepted() {
     }
 }
 
-/// Collects all possible changes of a document: the JSON pointer and the new value (`None` to remove the
-/// element).
+/// Collects some changes of each part of a document: the JSON pointer and the new value (`None` to remove the
+/// element of an array).
 fn changes(value: &Value, path: &str, found: &mut Vec<(String, Option<Value>)>) {
     match value {
         Value::Array(elements) => {

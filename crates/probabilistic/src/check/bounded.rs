@@ -39,7 +39,7 @@ impl<N: Number> Query<'_, N> {
         if self.evaluated.is_some() || steps.least.is_some() {
             return Err(refusal(
                 "Q403",
-                "of bounds on rewards, those from above are handled, without a given policy",
+                "only upper bounds on rewards are supported, and only without a given policy",
             ));
         }
         let Some(bound) = &steps.most else { return self.solved(problem) };
@@ -119,8 +119,9 @@ fn whole_rewards<N: Number>(rewards: &[N]) -> Checked<Vec<usize>> {
         (exact && value.fract() == 0.0).then(|| value.to_usize()).flatten()
     };
     let integers: Option<Vec<usize>> = rewards.iter().map(whole).collect();
-    integers
-        .ok_or_else(|| refusal("Q403", "a bound on a reward is handled where all rewards are whole numbers"))
+    integers.ok_or_else(|| {
+        refusal("Q403", "bounds on a reward are supported only if all rewards are whole numbers")
+    })
 }
 
 /// The process for a single budget: each choice with a reward leads to a terminal state of its own.

@@ -40,7 +40,7 @@ impl<N: Number> Query<'_, N> {
             _ => Values::Numbers(self.numbers(inner)?),
         };
         if chosen.is_clear() {
-            return Err(refusal("Q509", "there is no state that the filter is about"));
+            return Err(refusal("Q509", "no state satisfies the condition of the filter"));
         }
         match values {
             Values::Truth(holds) => self.of_truth(filter, &holds, &chosen),

@@ -28,7 +28,7 @@ impl<N: Number> Query<'_, N> {
     fn no_given_policy(&self) -> Checked<()> {
         match self.evaluated {
             None => Ok(()),
-            Some(_) => Err(refusal("Q403", "a policy is not evaluated for what happens for ever")),
+            Some(_) => Err(refusal("Q403", "policies are not evaluated for long-run properties")),
         }
     }
 

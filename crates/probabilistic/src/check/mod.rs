@@ -1,5 +1,5 @@
-//! Checks properties of a model. Small models are solved in exact rationals, larger ones in doubles
-//! with guaranteed bounds.
+//! Checks properties of a model. By default, small models are solved in exact rationals, larger ones
+//! in doubles with guaranteed bounds.
 
 mod answer;
 mod ask;
@@ -57,8 +57,8 @@ pub struct Report {
     pub outcome: Outcome,
     /// The variables of the model: each with its name, and `true` for a Boolean variable.
     pub variables: Vec<(String, bool)>,
-    /// Number of explored states: the reachable states, except beyond states at which a single
-    /// property is decided.
+    /// Number of explored states. These are all reachable states or, if a single property is checked,
+    /// possibly fewer: exploration stops at states at which this property is decided.
     pub states: usize,
     /// Number of choices, summed over all states.
     pub choices: usize,
@@ -159,8 +159,8 @@ pub fn check_all<'p>(
 }
 
 /// Returns a state condition at which the property is decided, so that exploration can stop there.
-/// Returns `None` if a state does not decide the property, or if a policy is requested or given,
-/// because a policy continues after such a state.
+/// Returns `None` if a state does not decide the property. Also returns `None` if a policy is
+/// requested or given, or a secondary reward is set, because a policy continues after such a state.
 fn end_of(property: &Property, names: &Names, options: &Options<'_>) -> Option<Expr> {
     if options.policy || options.evaluate.is_some() || options.secondary.is_some() {
         return None;

@@ -15,7 +15,7 @@ impl<N: Number> Query<'_, N> {
     pub fn multi(&self, parts: &[Property]) -> Checked<Outcome> {
         let place = Place { line: 1, column: 1 };
         let [first, second] = parts else {
-            return Err(property_error("Q403", place, "`multi` is handled with two objectives").into());
+            return Err(property_error("Q403", place, "`multi` is supported with two objectives").into());
         };
         // If one objective has a bound, it is placed second.
         let (first, second, swapped) =

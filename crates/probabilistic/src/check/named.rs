@@ -106,7 +106,7 @@ impl Expansion<'_> {
             return None;
         }
         if self.within.iter().any(|open| open == name) {
-            let text = format!("the property `\"{name}\"` has itself as a part");
+            let text = format!("the property `\"{name}\"` contains itself");
             self.problem = Some(Diagnostic::new("Q204", place, text));
             return None;
         }

@@ -35,7 +35,7 @@ impl<N: Number> Query<'_, N> {
                 Err(refusal("Q403", "a policy is evaluated for one objective at a time"))
             }
             Property::Multi(_) if self.explored.starts > 1 => {
-                Err(refusal("Q403", "`multi` is handled for models that start in one state"))
+                Err(refusal("Q403", "`multi` is supported for models with one initial state"))
             }
             Property::Multi(parts) => Ok((self.multi(parts)?, None)),
             Property::Refused(problem) => Err(Error::Property(problem.clone().into()).into()),
@@ -77,7 +77,7 @@ impl<N: Number> Query<'_, N> {
                 Ok(averages)
             }
             Property::SteadyState(..) => {
-                Err(refusal("Q403", "`S` is handled for Markov chains, and not for decision processes"))
+                Err(refusal("Q403", "`S` is supported for Markov chains only, not for decision processes"))
             }
             _ => Err(refusal("Q403", "`multi` cannot be a part of another property")),
         }
@@ -157,7 +157,7 @@ impl<N: Number> Query<'_, N> {
             (None, Some(_)) => Ok(Direction::Min),
             (None, None) if self.program.kind == ModelKind::Dtmc => Ok(Direction::Max),
             (None, None) => {
-                let text = "a decision process has many policies: ask for `min` or `max`";
+                let text = "the value depends on the policy of a decision process: use `min` or `max`";
                 Err(refusal("Q502", text))
             }
         }

@@ -182,7 +182,7 @@ impl<N: Number> Query<'_, N> {
             RewardPath::Total => self.total(direction, self.rewards(name)?),
             RewardPath::LongRun if self.program.kind == ModelKind::Dtmc => self.long_run(self.rewards(name)?),
             RewardPath::LongRun => {
-                Err(refusal("Q403", "`S` is handled for Markov chains, and not for decision processes"))
+                Err(refusal("Q403", "`S` is supported for Markov chains only, not for decision processes"))
             }
         }
     }
@@ -203,8 +203,9 @@ impl<N: Number> Query<'_, N> {
         Problem::new(self.mdp(), direction, rewards, terminal)
     }
 
-    /// Computes the optimal values, or the values of the given policy if there is one. If the
-    /// policy is reported, ties between optimal choices are broken by the secondary reward.
+    /// Computes the optimal values, or the values of the given policy if there is one. If the optimal
+    /// policy is reported, ties between optimal choices are broken by the secondary reward or, without
+    /// one, by the number of steps.
     pub fn solved(&self, problem: Problem<'_, N>) -> Checked<Valued<N>> {
         let span = if problem.rewards.is_none() { Span::Probability } else { Span::Positive };
         let problem = Problem { allowed: self.evaluated.as_ref(), ..problem };

@@ -250,7 +250,7 @@ impl<N: Number> Query<'_, N> {
             _ if is_numeric(expression) => Err(property_error(
                 "Q403",
                 expression.place,
-                "of the values of properties, sums, differences, products and quotients are handled",
+                "values of properties support sums, differences, products and quotients only",
             )
             .into()),
             _ => self.plain_numbers(expression),

@@ -91,7 +91,8 @@ impl PolicyTable {
     /// without a row.
     ///
     /// # Errors
-    /// The table does not match the model: a missing variable, an unreached state, or a different choice.
+    /// The table does not match the model: a missing variable, an unreached state, a missing choice, or a
+    /// choice with another action.
     pub fn choices<N: Number>(
         &self,
         program: &Program<N>,

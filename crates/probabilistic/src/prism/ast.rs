@@ -403,7 +403,7 @@ pub struct Rewards {
 pub struct Model {
     /// The kind of process.
     pub kind: ModelKind,
-    /// The comment at the start of the file, possibly empty.
+    /// The comment to write at the start of the file, possibly empty. Empty in parsed models.
     pub remark: String,
     /// The constants.
     pub constants: Vec<Constant>,
@@ -483,8 +483,8 @@ impl Expr {
         })
     }
 
-    /// Returns the expression with subexpressions replaced by `with`, outermost first. Where `with` returns `None`,
-    /// its operands are rewritten. Does not descend into properties.
+    /// Returns the expression with subexpressions replaced by `with`, outermost first. If `with` returns `None` for a
+    /// subexpression, the operands of this subexpression are rewritten. Does not descend into properties.
     #[must_use]
     pub fn rewrite(&self, with: &mut dyn FnMut(&Self) -> Option<Self>) -> Self {
         if let Some(replacement) = with(self) {

@@ -49,7 +49,7 @@ type Result<T> = std::result::Result<T, Fault>;
 /// size of a power that is computed exactly.
 const MAX_OPERAND_BITS: u64 = 100_000;
 
-const OVERFLOW: Fault = Fault("an integer grows out of its range");
+const OVERFLOW: Fault = Fault("an integer exceeds its range");
 
 impl Code {
     /// Evaluates a Boolean expression; `values` are the values of the variables.

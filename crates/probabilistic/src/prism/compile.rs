@@ -213,7 +213,7 @@ impl Names {
         self.parts = self.parts.map(|parts| parts + 1);
         if self.depth > MAX_DEPTH || self.parts.iter().zip(MAX_PARTS).any(|(parts, most)| *parts > most) {
             self.depth -= 1;
-            let text = "with its formulas written out, this is nested too deeply or too large";
+            let text = "after the expansion of its formulas, this is nested too deeply or too large";
             return Err(Diagnostic::new("Q104", expression.place, text));
         }
         let compiled = self.kind(expression);
@@ -286,7 +286,7 @@ impl Names {
             return Err(Diagnostic::new(
                 "Q204",
                 place,
-                format!("`{name}` stands for something with itself in it"),
+                format!("the definition of `{name}` contains `{name}` itself"),
             ));
         }
         self.open.push(name.to_owned());
@@ -389,7 +389,7 @@ impl Names {
 }
 
 fn duplicate(description: &str, place: Place) -> Diagnostic {
-    Diagnostic::new("Q206", place, format!("the {description} is given a second time here"))
+    Diagnostic::new("Q206", place, format!("the {description} is repeated here"))
 }
 
 fn flatten<'a>(op: BinaryOp, expression: &'a Expr, parts: &mut Vec<&'a Expr>) {

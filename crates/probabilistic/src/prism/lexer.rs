@@ -120,7 +120,7 @@ fn token(text: &str) -> Result<(Kind, usize), String> {
             Some(end) if text[1 + end..].starts_with('"') => {
                 Ok((Kind::Quoted(text[1..=end].to_owned()), end + 2))
             }
-            _ => Err("this quotation mark has no partner on its line".to_owned()),
+            _ => Err("this quotation mark is not closed on its line".to_owned()),
         };
     }
     let sign = SIGNS.iter().find(|sign| text.starts_with(**sign));

@@ -85,7 +85,7 @@ fn part(
     let Kind::Name(word) = cursor.peek() else { return Err(cursor.expected("a declaration")) };
     let mut is_kind = |declared: ModelKind| match kind.replace(declared) {
         None => Ok(()),
-        Some(_) => Err(Diagnostic::new("Q107", place, "the model has said before what it is")),
+        Some(_) => Err(Diagnostic::new("Q107", place, "the model type is already given")),
     };
     match word.as_str() {
         "mdp" | "nondeterministic" => is_kind(ModelKind::Mdp)?,
@@ -102,13 +102,13 @@ fn part(
         "rewards" => return rewards(cursor, model),
         "ctmc" | "stochastic" | "pta" | "pomdp" | "popta" | "smg" | "csg" | "idtmc" | "imdp" | "ma" => {
             cursor.advance();
-            let text = format!("models of the kind `{word}` are not handled; `mdp` and `dtmc` are");
+            let text = format!("models of the kind `{word}` are not supported; use `mdp` or `dtmc`");
             return Err(Diagnostic::new("Q401", place, text));
         }
         "init" => return initial(cursor, model),
         "system" | "observables" | "invariant" | "player" => {
             cursor.advance();
-            let text = format!("`{word}` declarations are not handled");
+            let text = format!("`{word}` declarations are not supported");
             return Err(Diagnostic::new("Q401", place, text));
         }
         _ => return Err(cursor.expected("a declaration (`const`, `formula`, `module`, `rewards`, `label`)")),
@@ -124,7 +124,7 @@ fn initial(cursor: &mut Cursor<'_>, model: &mut Model) -> Read<()> {
     cursor.need_word("endinit")?;
     match model.initial.replace(states) {
         None => Ok(()),
-        Some(_) => Err(Diagnostic::new("Q107", place, "the model has said before where it starts")),
+        Some(_) => Err(Diagnostic::new("Q107", place, "the initial states are already given")),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Generates successors from cached behaviours, i.e. from the evaluated commands of the local states of modules.
 //!
-//! The choices and their order are the same as those of [`Program`]. If an evaluation fails in a state, the state is
-//! delegated to the program, which reports the error.
+//! The choices and their order are the same as those of [`Program`]. If an evaluation fails in a state, or modules have
+//! too many joint steps, the state is delegated to the program, which reports the error.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -126,7 +126,8 @@ impl<N: Number> Memory<N> {
         }
     }
 
-    /// Adds the choices of a state. Returns `None` if an evaluation fails; some choices may have been added.
+    /// Adds the choices of a state. Returns `None` if an evaluation fails, or modules have too many joint steps; some
+    /// choices may have been added.
     fn successors(
         &mut self,
         program: &Program<N>,
@@ -169,7 +170,7 @@ impl<N: Number> Memory<N> {
 
     /// Adds the only choice of a state of a Markov chain: a uniform distribution over the combinations of
     /// enabled commands. A state without enabled commands gets no choice. Returns `None` if an evaluation
-    /// fails.
+    /// fails, or modules have too many joint steps.
     fn step(&mut self, program: &Program<N>, state: &Packed, choices: &mut Choices<Packed, N>) -> Option<()> {
         let Self { team, state_sums, action_sums_cache, combiner, .. } = self;
         let (mut combinations, mut last_action) = (0_usize, UNNAMED);

@@ -74,7 +74,7 @@ impl<N: Number> Program<N> {
                 // With a single module, nothing is combined, so there is no limit.
                 if ends > MAX_COMBINED && module > 0 {
                     let text =
-                        format!("more than {MAX_COMBINED} ways in which modules move together in a state");
+                        format!("more than {MAX_COMBINED} combinations of synchronised commands in a state");
                     return Err(Diagnostic::new("Q306", commands[at].place, text).into());
                 }
             }

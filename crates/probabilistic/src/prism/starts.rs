@@ -46,7 +46,7 @@ pub fn starts(
         tried_values = tried_values.saturating_add(1);
         if tried_values > MAX_TRIED {
             let text = format!(
-                "more than {MAX_TRIED} combinations of values have to be tried to find where it starts"
+                "more than {MAX_TRIED} combinations of values have to be tried to find the initial states"
             );
             return Err(Diagnostic::new("Q307", place, text));
         }

@@ -102,7 +102,7 @@ fn parse_prefix(cursor: &mut Cursor<'_>) -> Read<Option<ExprKind>> {
             return Ok(Some(ExprKind::Temporal(Box::new(temporal))));
         }
         "A" | "E" => {
-            let text = format!("`{word}` of CTL is not handled; `P>=1 [ … ]` and `P>0 [ … ]` are");
+            let text = format!("`{word}` of CTL is not supported; use `P>=1 [ … ]` or `P>0 [ … ]`");
             return Err(Diagnostic::new("Q403", place, text));
         }
         _ => return Ok(None),
@@ -362,8 +362,8 @@ fn nested(letter: char, steps: Option<&Steps>, right: Expr, place: Place) -> Rea
 }
 
 fn ltl(place: Place) -> Diagnostic {
-    let text = "LTL (temporal operators in one another, or joined) is not handled, apart from `G F` and `F G`; ask for one \
-                operator at a time";
+    let text = "LTL (temporal operators in one another, or joined) is not supported, except for `G F` and `F G`; \
+                check one operator at a time";
     Diagnostic::new("Q403", place, text)
 }
 
@@ -407,7 +407,7 @@ fn reward_path(cursor: &mut Cursor<'_>) -> Read<RewardPath> {
         Ok(Path::Until(left, goal, None)) if left.kind == ExprKind::Bool(true) => Ok(RewardPath::Reach(goal)),
         _ => {
             let text =
-                "of rewards, `F`, `C`, `C<=k`, `I=k` and `S` are handled, and not what LTL says besides";
+                "of rewards, `F`, `C`, `C<=k`, `I=k` and `S` are handled, and no other operators of LTL";
             Err(Diagnostic::new("Q403", place, text))
         }
     }

@@ -31,7 +31,7 @@ pub struct Enclosed<N> {
 /// Upper limit on the work for one strongly connected component: the number of evaluated
 /// transitions and equations.
 const MAX_WORK: u64 = 30_000_000_000;
-/// Number of sweeps for a candidate upper bound; after them, the lower bound is refined.
+/// Maximum number of sweeps in which the equations have to confirm a candidate bound.
 const UPPER_SWEEPS: usize = 40;
 /// Distance of the initial bounds from approximate values, as a fraction of the required width.
 const INITIAL_SHARE: f64 = 0.45;

@@ -12,15 +12,16 @@ use crate::solve::quotient::Quotient;
 use crate::solve::users::{Users, owners};
 use crate::solve::work::Work;
 
-/// Upper limit on the number of rounds of policy iteration. If it is reached, the certificate
-/// bounds the error of the last policy.
+/// Upper limit on the number of rounds of policy iteration. If it is reached, the last policy may
+/// not be optimal; in doubles, the certificate bounds its error.
 const MAX_ROUNDS: usize = 1000;
 /// Least and greatest number of improvement sweeps before the chain is solved again, in large
-/// components.
+/// components in doubles. Otherwise there is one sweep.
 const SWEEPS: (u64, u64) = (2, 40);
 /// Number of entries that a sweep evaluates in the time in which elimination processes one entry.
 const SWEEP_SPEED: u64 = 4;
-/// Number of blocks (merged end components) from which on several sweeps per round save time.
+/// Number of blocks (merged end components) from which on several sweeps per round save time, in
+/// doubles.
 const SWEEP_MIN_BLOCKS: usize = 200;
 
 /// A policy with the value of each block (merged end component). No row clearly improves the

@@ -171,8 +171,9 @@ fn remove_dead_ends<N: Number>(local: &Local<N>, alive: &mut [bool]) {
     }
 }
 
-/// Returns a single end component if it covers all states, the frequent case of free
-/// reconfiguration. Otherwise, or for more than 64 states, returns `None`.
+/// Fast path for the frequent case that all states form a single end component, as in models in which
+/// every reconfiguration is possible and costs nothing. Returns `None` in other cases, and for more
+/// than 64 states.
 fn whole<N: Number>(local: &Local<N>, alive: &[bool]) -> Option<EndComponents> {
     let n = local.states.len();
     if n > 64 {

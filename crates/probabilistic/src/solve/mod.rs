@@ -11,7 +11,9 @@
 //!    TCS 735, 2018; for zero-reward end components: Bertsekas and Tsitsiklis, Math. OR 16(3),
 //!    1991).
 //! 3. Policy iteration solves the Markov chain of each policy directly.
-//! 4. A certificate bounds the error of the result (`certify`).
+//! 4. In doubles, a certificate bounds the error of the result (`certify`), or another method (`doubles`).
+//!
+//! Small components of a simple form are solved by shortest paths instead (`ways`).
 
 pub(crate) mod certify;
 pub(crate) mod chain;

@@ -18,8 +18,8 @@ pub enum Direction {
 /// An optimisation problem on a Markov decision process.
 ///
 /// Without rewards, the value of a state is the expected value of the first terminal state on a path; a path without
-/// terminal states counts as 0. With rewards, the value is the expected sum of rewards until a terminal state. The
-/// sum is infinite if a terminal state is reached with a probability below 1.
+/// terminal states counts as 0. With rewards, the value is the expected sum of rewards until a terminal state, plus
+/// the value of this terminal state. The sum is infinite if a terminal state is reached with a probability below 1.
 #[derive(Debug)]
 pub struct Problem<'a, N> {
     /// The Markov decision process.

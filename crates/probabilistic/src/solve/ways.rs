@@ -98,9 +98,9 @@ impl<N: Number> Run<'_, N> {
         true
     }
 
-    /// Collects the steps and exits of the component in `buffers`. Returns `false` if a choice can
-    /// both leave the component and lead to another state in it, or can lead to several other
-    /// states in it.
+    /// Collects in `buffers` the steps (choices that lead to another state of the component) and the
+    /// exits (choices that leave the component). Returns `false` if a choice can do both, or can lead
+    /// to several other states of the component.
     fn scan(&self, component: &[u32], buffers: &mut PathBuffers<N>) -> bool {
         buffers.steps.clear();
         buffers.exits.clear();
@@ -172,7 +172,9 @@ impl<N: Number> Run<'_, N> {
                 return;
             }
             if is_one {
-                // The remaining states cannot reach an exit that is sure to reach a terminal state.
+                // The probabilities of the states with a value in `best` are known to be 1. Only the other
+                // states are solved below: they cannot reach an exit from which a terminal state is
+                // reached with probability 1.
                 buffers.exits.retain(|(from, ..)| buffers.best[*from as usize].is_none());
                 buffers.steps.retain(|step| buffers.best[step.from as usize].is_none());
             }

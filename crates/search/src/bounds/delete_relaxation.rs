@@ -1,9 +1,9 @@
 //! Delete relaxation \[1\] of a task: rules that derive facts from facts, at the cost of an operator.
 //!
 //! An operator becomes one rule for its unconditional effects and one rule for each conditional effect. All
-//! these rules have the operator's minimum cost, which is paid only once. Axioms and literals of clauses
-//! become rules without cost. Numeric conditions are ignored, and derived variables may be false at any time.
-//! The relaxation therefore admits every plan of the task.
+//! these rules have the operator's minimum cost (0 if it is negative), which a relaxed plan pays only once.
+//! Axioms and literals of clauses become rules without cost. Numeric conditions are ignored, and derived
+//! variables may be false at any time. The relaxation therefore admits every plan of the task.
 //!
 //! \[1\] B. Bonet, H. Geffner: Planning as heuristic search, Artificial Intelligence 129, 2001.
 

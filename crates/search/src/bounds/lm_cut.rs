@@ -26,9 +26,9 @@ const WORK_PER_VISIT: u64 = 8;
 const UNREACHABLE: u64 = u64::MAX;
 const NONE: u32 = u32::MAX;
 
-/// LM-cut value of the initial state, or the part of it that was computed when a limit was reached:
-/// each landmark adds to a lower bound. Returns `None` if an operator costs too much or the goal is
-/// unreachable.
+/// Returns the LM-cut value of the initial state, or `None` if an operator costs too much or the goal is
+/// unreachable. If a limit is reached, returns the sum over the landmarks that were found, which is
+/// also a lower bound.
 pub fn landmark_cut_bound(task: &Task, limits: &Limits) -> Option<u64> {
     let mut cut = LandmarkCut::new(task)?;
     let stops = |work| work > MAX_WORK || limits.reached();

@@ -36,8 +36,8 @@ const STEP_LIMIT: usize = 4_000;
 const STATE_LIMIT: usize = 20_000;
 /// Maximum number of projections to pairs of variables.
 const PAIR_LIMIT: usize = 40;
-/// Maximum number of projections that are evaluated individually. More projections cost more time than the
-/// avoided expansions save.
+/// Maximum number of projections that are evaluated for each state if there is no cost partitioning. More
+/// projections cost more time than the avoided expansions save.
 const MAX_PROJECTIONS: usize = 12;
 
 /// Projections of a task, sorted by decreasing heuristic value of the initial state, and lower bounds

@@ -16,6 +16,7 @@ pub struct Transition {
 }
 
 /// A projection of a task to a few variables (the pattern), with the goal distance of each abstract state.
+/// Clauses and numeric conditions are ignored.
 pub struct Projection {
     pub pattern: Vec<VariableId>,
     sizes: Vec<usize>,
@@ -246,8 +247,8 @@ impl Projection {
         self.distances(|operator| used[operator].unwrap_or(0).max(0), goals.chain(free), limits)
     }
 
-    /// Returns `true` if the operator reads or changes a variable of the pattern and is applicable in some
-    /// abstract state.
+    /// Returns `true` if the operator requires a fact of the pattern or changes the pattern, and is applicable
+    /// in some abstract state.
     pub(crate) fn affects_pattern(&self, operator: usize) -> bool {
         !self.operators[operator].1.is_empty()
     }

@@ -294,9 +294,9 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
         Ok(())
     }
 
-    /// Returns propositions that are true when a landmark is achieved: the landmark, the common effects of
-    /// all its achievers, and the single facts required directly before. Returns an empty list for a
-    /// disjunctive landmark.
+    /// Returns propositions that are true when a landmark is achieved or directly before: the landmark, the
+    /// common effects of all its achievers, and the single facts that must be true directly before. Returns an
+    /// empty list for a disjunctive landmark.
     fn side(&self, landmark: u32) -> Vec<Proposition> {
         let [proposition] = self.all[landmark as usize].any_of[..] else { return Vec::new() };
         let mut achievers = self.adders[proposition as usize].iter();

@@ -5,8 +5,8 @@
 //! landmarks, and `landmark_status` tracks which landmarks a path has reached. `search` implements the search
 //! with an `alternating_open_list` over the states in a `store`.
 //!
-//! Heuristic values never serve as proofs. Callers execute each plan to verify it, and unsolvability is
-//! reported only if a search has exhausted the state space.
+//! The heuristic guides the search, but proves no plan optimal. Unsolvability is reported only if a search has
+//! exhausted the state space, except for proved dead ends.
 //!
 //! \[1\] S. Richter, M. Westphal: The LAMA planner: guiding cost-based anytime planning with
 //! landmarks, JAIR 39, 2010.

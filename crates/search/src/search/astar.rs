@@ -77,6 +77,7 @@ pub enum OpenListOrder {
 /// Reaction to a forecast that the search will run out of memory before it can finish.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum OutOfMemoryPolicy {
+    /// End the search without a proof.
     None,
     /// Ignore forecasts; the last forecast was favourable, or nothing was forecast.
     Some,
@@ -109,7 +110,7 @@ pub struct AStar<'a, N, E> {
     /// Work units already done, without those of the lazy heuristic.
     own_work: u64,
     sharing: usize,
-    /// Lower bound on the cost of every plan; `None` before the first expansion.
+    /// Lower bound on the cost of every plan; `None` before the first expansion. Meaningless in greedy search.
     bound: Option<N>,
     is_interrupted: bool,
     pub(super) patience: OutOfMemoryPolicy,
@@ -409,8 +410,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
     }
 
     /// Generates the successors of a node, whose state is in `self.state`, with the combinations of designs
-    /// that are not dominated. Operators that stubborn sets exclude are skipped. If interrupted, the node
-    /// counts as not expanded, and the search must end.
+    /// that are not dominated. Operators that stubborn sets exclude are skipped. If interrupted, some
+    /// successors are missing, and the search must end.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "steps are fewer than nodes, combinations are numbered"
@@ -444,8 +445,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         Ok(())
     }
 
-    /// Stores the successor in `self.next`, unless it is dominated, too expensive or a dead end. Its derived
-    /// variables are not evaluated yet. `through` is the f value of the parent.
+    /// Stores the successor in `self.next`, unless it is dominated, too expensive or a dead end, or its f value
+    /// overflows. Its derived variables are not evaluated yet. `through` is the f value of the parent.
     fn push(&mut self, cost: N, through: &N, origin: ParentLink) {
         self.statistics.generated = self.statistics.generated.saturating_add(1);
         if self.exceeds_upper_bound(&cost) {

@@ -34,7 +34,7 @@ pub type CostedCombinations<N> = Vec<(Vec<u32>, N)>;
 ///
 /// Slots that no table and no forbidden combination connects contribute independently. A combination that is
 /// dominated within a group of connected slots is dominated in every extension. For k independent functions
-/// with m designs each, this avoids m^k comparisons.
+/// with m designs each, this avoids the enumeration of m^k combinations.
 ///
 /// # Errors
 /// Fails if the deadline has passed or the interrupt flag is set.

@@ -45,7 +45,7 @@ struct Region {
 #[derive(Default)]
 pub(super) struct Front {
     regions: Vec<Region>,
-    /// Maximum number of labels in a leaf that can be split.
+    /// Maximum number of labels in a leaf, unless all its labels have equal numbers.
     most: usize,
 }
 

@@ -10,7 +10,7 @@
 //!
 //! The cost and length of the known plan bound two searches: the first minimises reconfigurations, and the
 //! second is a depth-first search in model order that stops at the first plan. If these searches exceed their
-//! limits, the known plan is returned; the result is still deterministic, but not canonical.
+//! limits, the known plan is returned, which need not be canonical.
 
 use std::cell::{Cell, RefCell};
 use std::cmp::Reverse;
@@ -238,9 +238,10 @@ pub fn select_canonical_plan(context: Context<'_>, bounds: &Bounds, plan: Ground
     choose_from((context, bounds, &prepared), plan, max_changes, &beginning).0
 }
 
-/// Selects the canonical plan for a given beginning, for example after steps that are already executed.
-/// `plan` is the known plan, which sets cost and number of steps. Also returns the changes of the canonical
-/// plan. If they exceed `max_changes` or the search reaches a limit, returns `plan` and `None`.
+/// Selects the canonical plan (see the head of this file) among the plans from the situation `beginning` that
+/// have the cost and the number of steps of the known plan `plan`. The situation may be the one after steps that
+/// are already executed. Also returns the [`Changes`] of the selected plan. If more than `max_changes` are
+/// necessary or the search reaches a limit, returns `plan` and `None`.
 pub fn choose_from(
     (context, bounds, prepared): (Context<'_>, &Bounds, &TieBreakContext),
     plan: GroundPlan,
@@ -373,8 +374,9 @@ impl Ties<'_> {
         Some(next)
     }
 
-    /// Returns the minimum changes of a plan that starts at the label `from`, and all labels (partial plans)
-    /// that were stored. Returns `None` if the minimum exceeds `max_changes` or a limit on labels,
+    /// Returns the fewest [`Changes`] of a plan that begins with the partial plan `from` and has at most the
+    /// cost and the number of steps of the known plan. Also returns all labels (partial plans) that were
+    /// stored. Returns `None` if there is no such plan with at most `max_changes`, or if a limit on labels,
     /// comparisons or time is reached.
     fn fewest_changes(&self, from: Label, max_changes: Changes) -> Option<(Changes, Labels)> {
         let mut open = BinaryHeap::from([Reverse((from.changes, Reverse(from.steps), 0))]);

@@ -1,10 +1,14 @@
 //! Scheduling of searches: a first plan, an optimal plan, and the closed states that prove its optimality.
 //!
-//! A\* with pattern databases runs first. If it finds no plan soon, a greedy best-first search looks for some
-//! plan. Then two A\* searches alternate: one uses only pattern databases, the other also LM-cut. The LM-cut
-//! search gets a quarter of the work of the other one at first, and then as much. A search that lags behind
-//! gets half. The result of the search that finishes first is returned. Work is counted in units instead of
-//! time, so the result is deterministic.
+//! `search` alternates several searches; `search_states` and `search_from` run a single A\* search. If it
+//! finds no plan soon and has no cost limit, a greedy search provides an upper bound.
+//!
+//! In `search`, A\* with pattern databases runs first. If it finds no plan soon, a greedy best-first search
+//! looks for some plan. Then two A\* searches alternate: one uses only pattern databases, the other also
+//! LM-cut. The LM-cut search first gets a quarter of the other's work, and later the same work. A search gets
+//! only half of its work if its lower bound lags behind that of the other, or if its memory may not suffice.
+//! The result of the search that finishes first is returned. Work is counted in units instead of time, so the
+//! result is deterministic.
 
 use std::sync::Arc;
 
@@ -25,8 +29,8 @@ use crate::search::search_task::SearchTask;
 use crate::search::statistics::SearchStatistics;
 use crate::search::stubborn_sets::{Stubborn, StubbornSetPruning};
 
-/// Maximum number of stored states of a search that must answer quickly or whose closed states are written to
-/// a certificate.
+/// Maximum number of stored states of a search that must answer quickly or whose closed states are written to a
+/// certificate. Also the number of states up to which the LM-cut search gets only a quarter of the work.
 pub const STATE_LIMIT: usize = 400_000;
 /// The greedy best-first search may store at least this number of states, unless `max_states` is lower.
 const LEAST: usize = 100;
@@ -89,7 +93,7 @@ pub fn search_states<N: TaskNumber>(
 
 /// Searches with A\* from the state `initial` for an optimal plan with a cost of at most `limit`; `Int::MAX`
 /// means no limit. Ends without a proof, with the best plan found, once A\* has stored more than `max_states`
-/// states. If A\* finds no plan soon and there is no limit, a greedy search provides one.
+/// states. If A\* finds no plan soon and there is no limit, a greedy search provides an upper bound.
 pub fn search_from(
     space: &SearchProblem<'_, Int, Bounds>,
     initial: &State,
@@ -204,8 +208,9 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
     }
 
     /// Resumes all searches until each has done the work of `max_states` states. The first call runs a single
-    /// search until it has stored `max_states` states. While `max_states` is small, the LM-cut search gets a
-    /// quarter of the work. A search that lags behind or is forecast to run out of memory gets half.
+    /// search until it has stored `max_states` states. While `max_states` is at most `STATE_LIMIT`, the LM-cut
+    /// search gets a quarter of the work. A search that lags behind or is forecast to run out of memory gets
+    /// half.
     ///
     /// Returns `None` if the searches are not finished. `SearchOutcome::Unknown(None)` also means that no
     /// plan is cheaper than the cost set by `set_upper_bound`.

@@ -54,8 +54,8 @@ impl<'t> Initial<'t> {
         self.truth(condition, &mut Vec::new()) == Some(true)
     }
 
-    /// Checks that all numeric functions in a condition have initial values. Otherwise a negated condition
-    /// could fail together with the condition. Returns an error at `place` if a value is missing.
+    /// Checks that all numeric functions in a condition have initial values, and returns an error at `place` if
+    /// a value is missing. With a missing value, both the condition and its negation could be false.
     pub(super) fn is_defined(&self, condition: &Condition, place: (File, Span)) -> Result<(), Error> {
         match self.undefined(condition, &mut Vec::new()) {
             None => Ok(()),
@@ -69,8 +69,8 @@ impl<'t> Initial<'t> {
         }
     }
 
-    /// Returns a numeric function in the condition that may have no value, or `None` if all values are
-    /// defined. Free variables range over all objects.
+    /// Returns a numeric function in the condition that may have no value, or `None` if all values are defined.
+    /// A function with a free variable needs a value for all arguments of its declared types.
     fn undefined<'c>(&self, condition: &'c Condition, binding: &mut Binding) -> Option<&'c Name> {
         match condition {
             Condition::Exists(variables, body) | Condition::ForAll(variables, body) => {

@@ -1,12 +1,13 @@
 //! Compiles preferences and trajectory constraints of PDDL 3 to PDDL 2. Works on the syntax tree before names
 //! are resolved.
 //!
-//! Each instance of a constraint is an automaton. Auxiliary atoms store its state, and additional effects of
-//! the actions update these atoms. A condition on the state *after* an action is regressed to the state
-//! before the action (`regress`) \[1\], so plans have no additional states. Hard constraints become conditions
-//! of actions and of the goal. Preferences are evaluated after the plan by hidden actions (`preferences`)
-//! \[2\]: each preference is satisfied or costs what the metric specifies \[3\]. If actions may overlap, the
-//! hidden actions are never executed; their conditions are evaluated in the last state.
+//! Each instance of a constraint is monitored by an automaton. Auxiliary atoms store its state, and additional
+//! effects of the actions update these atoms. A condition on the state *after* an action is regressed to the
+//! state before the action (`regress`) \[1\], so the automata need no actions of their own. Hard constraints
+//! become conditions of actions and of the goal. Preferences on the goal and on trajectories are evaluated
+//! after the plan by hidden actions (`preferences`) \[2\]: each preference is satisfied or costs what the
+//! metric specifies \[3\]. Violated preferences in preconditions are counted by additional effects. If actions
+//! may overlap, the hidden actions are never executed; their conditions are evaluated in the last state.
 //!
 //! \[1\] L. Bonassi et al.: On planning with qualitative state-trajectory constraints in PDDL3 by compiling
 //! them away, ICAPS 2021.
@@ -38,15 +39,16 @@ pub use semantics::PlanSemantics;
 use syntax_edits::unsupported;
 use trajectory_monitors::Monitors;
 
-/// A task whose preferences and trajectory constraints have been compiled away.
+/// A task whose preferences and trajectory constraints have been compiled away, except deadlines
+/// (`always-within`), which are checked on plans.
 pub struct CompiledTask<'t> {
     pub domain: Cow<'t, Domain>,
     pub problem: Cow<'t, Problem>,
     pub objectives: Cow<'t, [Metric]>,
     /// Deadlines (`always-within`), which are checked once the times of a plan are known.
     pub deadlines: Vec<Deadline>,
-    /// `true` if the compilation does not constrain the times of happenings beyond the original task.
-    /// Irrelevant for sequential plans.
+    /// `false` if the compilation may constrain the times of happenings beyond the original task. Irrelevant
+    /// for sequential plans.
     pub is_exact: bool,
 }
 
@@ -108,8 +110,8 @@ pub fn compile<'t>(
     let has_events = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
     if has_events && !used_preferences.is_empty() && matches!(course, PlanSemantics::Sequence) {
         errors.push(unsupported(
-            "a preference beside timed initial literals",
-            "a plan that waits for a literal after its last action would be judged too late",
+            "a preference together with timed initial literals",
+            "`--concurrent`, or preferences without timed initial literals",
             (File::Problem, problem.metric.as_ref().map_or(problem.name.span, |metric| metric.span)),
         ));
     }
@@ -126,7 +128,8 @@ pub fn compile<'t>(
         name_violations(&mut metric.expression);
     }
     if !used_preferences.is_empty() {
-        // The separation of happenings applies to the conditions of action preferences as to all conditions.
+        // Conditions of action preferences keep happenings apart like all other conditions, although the
+        // original task does not require this.
         let mut preferences = task.0.actions.iter().flat_map(|action| &action.preferences);
         is_exact &= !preferences.any(|preference| used_preferences.contains(&preference.name.name));
         preferences::install(&mut task.0, &mut task.1, (wanted, &used_preferences), course);

@@ -27,8 +27,8 @@ const GOING_ON: &str = "the plan goes on";
 
 pub(super) const VIOLATION: &str = " is violated";
 
-/// Auxiliary atom that is never true. Hidden actions that are never executed add it, because actions without
-/// effects would be pruned.
+/// Atom that the hidden actions add, because actions without effects would be pruned. It is never true, because
+/// these actions are never executed: only their preconditions are evaluated.
 const VIOLATED: &str = "a preference is violated";
 
 pub(super) fn count(preference: &Name) -> Atom {
@@ -64,8 +64,8 @@ pub(super) fn install(
     }
 }
 
-/// Adds hidden actions that are executed after a sequential plan and evaluate the preferences in a fixed
-/// order.
+/// Adds hidden actions that are executed after a sequential plan and evaluate the preferences in a fixed order.
+/// The new goal requires that all preferences are evaluated.
 fn follow(domain: &mut Domain, problem: &mut Problem, wanted: Vec<PreferenceInstance>) {
     declare(domain, GOING_ON);
     problem.init.push(InitialElement::Fact(flag(GOING_ON)));
@@ -78,7 +78,8 @@ fn follow(domain: &mut Domain, problem: &mut Problem, wanted: Vec<PreferenceInst
     for ((name, condition), number) in wanted.into_iter().zip(1_u64..) {
         let after = format!("{number} preferences are judged");
         declare(domain, &after);
-        // The goal must hold at the first evaluation. The later evaluations change no atom of the goal.
+        // The goal must hold at the first evaluation. It then also holds after the later evaluations, because
+        // they change no atom of the goal.
         let ready = all([holds(&before)].into_iter().chain(first.take()));
         let pass = [Effect::Delete(flag(&before)), Effect::Add(flag(&after))];
         let met = (format!("preference {number} is met"), condition.clone(), None);

@@ -8,8 +8,8 @@ use pddl::ast::{
 
 use super::simplify::{all, any, equal, exists, falsity, is_false, not};
 
-/// Limit on the number of cases of a regressed comparison. A case fixes which of the compared functions
-/// change.
+/// Limit on the number of cases of a regressed comparison. A case fixes which effects on the compared functions
+/// occur.
 const MAX_CASES: usize = 64;
 
 pub(super) struct Happening {
@@ -107,7 +107,8 @@ impl Happening {
     }
 
     /// Returns the condition on the state before the happening that is equivalent to `condition` after it.
-    /// Fails if a numeric effect is quantified, or a comparison has more than `MAX_CASES` cases.
+    /// Fails if a quantified effect may change a compared function, or a comparison has more than `MAX_CASES`
+    /// cases.
     pub(super) fn regress(&self, condition: &Condition) -> Result<Condition, NotRegressable> {
         let each =
             |parts: &[Condition]| parts.iter().map(|part| self.regress(part)).collect::<Result<Vec<_>, _>>();
@@ -158,7 +159,8 @@ impl Happening {
     }
 
     /// Returns all cases of a case distinction over the effects on the functions. Each case gives a new value
-    /// for every function. Fails if a numeric effect is quantified, or there are more than `MAX_CASES` cases.
+    /// for every function. Fails if a quantified effect may change one of the functions, or there are more than
+    /// `MAX_CASES` cases.
     fn ways(&self, functions: &[Atom]) -> Result<Vec<Way>, NotRegressable> {
         let mut ways = vec![(super::simplify::truth(), Vec::new())];
         for function in functions {

@@ -85,7 +85,7 @@ pub(super) fn ways(condition: Condition) -> Vec<Condition> {
 }
 
 /// Simplifies `condition` under the assumption that `known` holds: parts that are syntactically equal to
-/// `known` become true.
+/// `known` become true. Parts below quantifiers and implications are not changed.
 pub(super) fn assume(condition: &Condition, known: &Condition) -> Condition {
     if format!("{condition:?}") == format!("{known:?}") {
         return truth();

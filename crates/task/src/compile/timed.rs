@@ -1,9 +1,11 @@
-//! Compiles trajectory constraints that mention times (`within`, `hold-during`, `hold-after`,
-//! `always-within`). Timed initial literals mark these times, and actions may overlap.
+//! Compiles trajectory constraints that mention times (`within`, `hold-during`, `hold-after`, `always-within`).
+//! Actions must be allowed to overlap, because sequential plans have no times. For `always-within`, the
+//! deadlines are checked once the times of a plan are known (see `deadline`). For the others, timed initial
+//! literals mark the times of the constraint.
 //!
-//! The added effects of actions read these literals, so every happening is separated from each literal by
-//! epsilon. The literals are shifted by this separation, so that actions can still happen at the specified
-//! times.
+//! The added conditions and effects of actions read these literals, so the happenings of these actions are
+//! separated from each literal by epsilon. The literals are shifted by this separation, so that actions can
+//! still happen at the specified times.
 
 use num_rational::BigRational;
 use num_traits::{Signed, Zero};
@@ -25,7 +27,7 @@ impl Monitors<'_> {
             PlanSemantics::Overlapping(separation) => Ok(separation.clone()),
             PlanSemantics::Sequence => Err(unsupported(
                 "a constraint on the times of states (`within`, `always-within`, `hold-during`, `hold-after`)",
-                "`--concurrent`, or constraints on the order of states; `validate` judges those on times, too",
+                "`--concurrent`, or constraints on the order of states; `validate` supports constraints on times, too",
                 place,
             )),
         }
@@ -74,7 +76,8 @@ impl Monitors<'_> {
         if from.is_negative() && !is_asked(&zero) {
             return Ok(decided(true));
         }
-        // The initial state and later states may all have time 0.
+        // The initial state has time 0 and counts, even if a happening at time 0 leads to another state of this
+        // time.
         let at_first = from.is_positive() || !is_asked(&zero) || self.initial.holds(what);
         let broken = if hard { None } else { Some(self.remember("is broken", !at_first)) };
         let looked_at = self.remember("was looked at", false);
@@ -116,14 +119,15 @@ impl Monitors<'_> {
         }
         let deadline = Deadline::new(within.clone(), hard, self.deadlines.len());
         let begun = self.remember("has begun", self.initial.holds(first) && !self.initial.holds(second));
-        // Happenings that may start the deadline are separated from happenings that may end it, so that a
-        // start can be delayed until after an end.
+        // The added effects read both conditions. So happenings that may start the deadline are separated from
+        // happenings that may end it, and a start can be delayed until after an end.
         self.after_each(&[first, second], place, |touched, after| {
             let begins = all([touched, after[0].clone(), not(after[1].clone())]);
             Addition::notes(begins, Effect::Add(flag(&begun)))
         })?;
         let (noted, last) = if hard {
-            // This action is never executed. The search evaluates the effect to detect a pending deadline.
+            // The auxiliary action for the second condition is never executed. The search evaluates its effect
+            // to detect a pending deadline.
             (Effect::When(holds(&begun), Box::new(Effect::Add(flag(LOOKED_AT)))), truth())
         } else {
             let satisfied = self.remember("is kept", false);

@@ -20,7 +20,8 @@ use super::semantics::PlanSemantics;
 use super::simplify::{all, any, assume, flag, holds, is_false, is_true, not, ways};
 use super::syntax_edits::{PreferenceInstance, declare, happen, require, unsupported};
 
-/// Limit on the total number of ground instances of trajectory constraints, including those of preferences.
+/// Limit on the number of ground trajectory constraints, including those of preferences. A conjunction or
+/// quantifier counts in addition to its parts.
 const INSTANCES: usize = 20_000;
 
 pub(super) struct Monitors<'t> {
@@ -95,8 +96,9 @@ impl<'t> Monitors<'t> {
         Ok(())
     }
 
-    /// Adds the monitor of a ground trajectory constraint and returns its condition on the last state. Only a
-    /// `hard` constraint may add preconditions to actions.
+    /// Adds the monitor of a trajectory constraint whose variables have the objects in `binding`, and returns
+    /// its condition on the last state. Preconditions that prevent violations are added to actions only if
+    /// `hard` is `true`.
     fn trajectory(
         &mut self,
         trajectory: &Trajectory,
@@ -172,13 +174,14 @@ impl<'t> Monitors<'t> {
         name
     }
 
-    /// Adds the result of `make` to each start or end of an action that may change one of the conditions.
-    /// `make` is called with a condition under which the change may occur, and with the conditions regressed to
-    /// the state before it; it is called once for each disjunct of the former. If start and end may coincide
-    /// and both may change the conditions, the action also gets the condition that its duration is positive.
+    /// Calls `make` for each start or end of an action that may change one of the conditions, and adds the
+    /// result to the action. The arguments of `make` are a condition under which the change may occur, and
+    /// `conditions` regressed to the state before the change. If the first argument would be a disjunction,
+    /// `make` is called for each disjunct instead. If start and end may coincide and both may change the
+    /// conditions, the action also gets the condition that its duration is positive.
     ///
-    /// Fails if this or a regression is not possible, or if derived predicates or timed initial literals occur
-    /// in the conditions.
+    /// Fails if the duration cannot be restricted so, if a condition cannot be regressed, or if derived
+    /// predicates or timed initial literals occur in the conditions.
     pub(super) fn after_each(
         &mut self,
         conditions: &[&Condition],

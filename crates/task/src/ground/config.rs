@@ -1,10 +1,13 @@
-//! Configuration of grounding: the roles of the domain's symbols, and generality beyond the given problem.
+//! Configuration of grounding: the predicates that state which design solves which function, the objectives and
+//! the limits. Also requirements on the ground task beyond the given problem, for example that it stays valid
+//! for other initial values.
 
 use crate::limits::Limits;
 use crate::number::Int;
 use pddl::ast::{Metric, Name};
 
-/// Configuration of grounding: the roles of predicates, the objectives and the limits.
+/// Configuration of grounding: the predicates that state which design solves which function, the objectives and
+/// the limits.
 #[derive(Debug, Clone)]
 pub struct GroundConfig {
     /// Predicates `(p DESIGN FUNCTION)` that state which design solves which function.
@@ -12,7 +15,7 @@ pub struct GroundConfig {
     /// Objectives in lexicographic order, which replace the metric of the problem. If empty, the metric is
     /// used.
     pub objectives: Vec<Metric>,
-    /// Time and memory limits of grounding.
+    /// Limits of grounding: deadline and interrupt flag.
     pub limits: Limits,
 }
 
@@ -47,21 +50,20 @@ impl GroundConfig {
     }
 }
 
-/// Requirements on a ground task that must stay valid for changed initial values, not only for the given
-/// problem.
+/// Requirements on a ground task beyond the given problem, for example that it stays valid for changed initial
+/// values.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Generality {
-    /// If set, each initial number may be replaced by any multiple of 1/factor. Grounding then infers nothing
+    /// If set to n, each initial number may be replaced by any multiple of 1/n. Grounding then infers nothing
     /// from the initial numbers of the problem.
     pub numbers: Option<Int>,
-    /// If set, each multiple of 1/factor must be an integer after scaling, in addition to the numbers of the
-    /// problem.
+    /// If set to n, the scale makes all multiples of 1/n integers, in addition to the numbers of the problem.
     pub precision: Option<Int>,
     /// If set, the metric may contain fluents that effects change by state-dependent amounts. Optimality is
     /// then not provable.
     pub measures_ends: bool,
     /// If set, fluents that actions change so as to improve the metric are treated like fluents with
-    /// state-dependent changes.
+    /// state-dependent changes: their final values are added to the cost at the end of the plan.
     pub measures_rewards: bool,
     /// If set, the durations of all operators are 0 in the ground task, because the caller evaluates
     /// them. Their common denominator then does not matter.

@@ -1,10 +1,10 @@
 //! Simplifies derived atoms, i.e. atoms of derived predicates and auxiliary atoms that represent
 //! subconditions.
 //!
-//! Derived atoms stay rules over the state [1]: their truth values are the least fixpoint of the stratified
-//! rules, given the state variables. Constant derived atoms are folded. A derived atom with a single rule
-//! that is not recursive is replaced by the rule's body where the result is still a conjunction of literals,
-//! clauses and comparisons.
+//! In general, derived atoms keep their rules \[1\]: their truth values are the least fixpoint of the
+//! stratified rules, given the state variables. Constant derived atoms are replaced by their truth values. A
+//! derived atom with a single rule that is not recursive is replaced by the rule's body where the result is
+//! still a conjunction of literals, clauses and comparisons.
 //!
 //! \[1\] S. Thiébaux, J. Hoffmann, B. Nebel: In defense of PDDL axioms, Artificial Intelligence
 //! 168, 2005.
@@ -18,8 +18,9 @@ use crate::ground::vocabulary::task::GroundTask;
 use crate::limits::{Interrupted, Limits};
 use crate::number::dense;
 
-/// Replaces constant derived atoms by their truth values and, where possible, derived atoms with a single
-/// rule by the rule's body. Removes duplicate rules, and rules and operators whose conditions become false.
+/// Replaces constant derived atoms by their truth values and, where possible, derived atoms with a single rule
+/// by the rule's body. Removes duplicate rules, and rules, conditional effects and operators whose conditions
+/// become false. A goal that becomes false is replaced by `None`.
 pub fn simplify(task: &mut GroundTask<'_>) -> Result<(), Interrupted> {
     let limits = task.world.limits;
     let mut axioms = std::mem::take(&mut task.axioms);
@@ -129,8 +130,9 @@ fn substitute(condition: &mut GroundCondition, known: &FxHashMap<AtomId, bool>) 
     condition.tidy()
 }
 
-/// Maps each non-recursive derived atom with exactly one rule to the rule's body. Atoms in the body that also
-/// have a single rule are already inlined. Atoms whose body contradicts itself are omitted.
+/// Maps each non-recursive derived atom with exactly one rule to the rule's body. Such atoms in the body are
+/// already inlined where [`inline`] can replace them (a negative literal is replaced only by a literal). Atoms
+/// whose body contradicts itself are omitted.
 #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
 fn single_bodies(
     axioms: &[GroundAxiom],

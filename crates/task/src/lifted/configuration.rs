@@ -1,10 +1,11 @@
 //! Separable design parameters: parameters of action schemas that are function designs and need not be
-//! grounded.
+//! grounded. Also contains general queries on conditions and expressions, e.g. for their terms.
 //!
 //! In the explicit form (Metaplan paper, Listings 1 and 2), a schema has parameters `?fd` with a condition
 //! `(fd_solve_f ?fd ?f)`. Such a parameter is *separable* and becomes a slot if no fluent has it as an
-//! argument, and it occurs neither in conditions of effects nor in conditions that mix static atoms and
-//! fluents. The number of designs then does not multiply the number of ground operators.
+//! argument, and it occurs neither in conditions of effects, nor in conditions that mix static atoms and
+//! fluents, nor in factors of fluents. The number of designs then does not multiply the number of ground
+//! operators.
 
 use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
@@ -155,8 +156,8 @@ fn insert(set: &mut SlotSet, term: Term, slots: &[SlotParameter]) {
     }
 }
 
-/// Returns `true` if a condition on the middle or end of a durative action contains a derived predicate whose
-/// truth the action's start effects or timed events may change.
+/// Returns `true` if a condition of a durative action on its middle or end, or of an end effect, contains a
+/// derived predicate whose truth the action's start effects or timed events may change.
 pub fn depends_on_own_start(lifted: &Lifted, schema: &Schema) -> bool {
     let (mut open, mut seen, mut numbers) = (Vec::new(), FxHashSet::default(), false);
     let conditions =

@@ -64,8 +64,8 @@ pub struct Lifted {
     pub metrics: Vec<Metric>,
 }
 
-/// A predicate. It is a fluent if an action or timed event changes it or if it is derived from fluents;
-/// otherwise it is static.
+/// A predicate. It is a fluent if an action or timed event changes it, or if it is derived from fluents or
+/// cannot be evaluated in advance; otherwise it is static.
 #[derive(Debug, Clone)]
 pub struct Predicate {
     pub name: Name,
@@ -82,7 +82,8 @@ pub struct Predicate {
 pub struct Function {
     pub name: Name,
     pub fluent: bool,
-    /// `true` if the function may be undefined for some arguments. Guard conditions then precede its uses.
+    /// `true` if the function may be undefined for some arguments and thus needs no initial value. Its uses are
+    /// guarded by conditions, or come after an assignment.
     pub partial: bool,
 }
 
@@ -99,9 +100,9 @@ pub struct Schema {
     /// Condition on the state after the start effects: `over all` and `at end` conditions of a durative
     /// action.
     pub middle_condition: Formula,
-    /// The `over all` condition. Used only in tasks with timed events.
+    /// The `over all` condition, which is a part of `middle_condition`.
     pub over_all: Formula,
-    /// The `at end` condition.
+    /// The `at end` condition, which is a part of `middle_condition`.
     pub at_end: Formula,
     pub end_effects: Vec<Effect>,
     /// Duration in the domain's time unit; `None` for an instantaneous action.

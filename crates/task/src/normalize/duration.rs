@@ -1,8 +1,9 @@
 //! Duration constraints of durative actions, in particular variable durations.
 //!
-//! In sequential execution without timed events, an action takes its shortest admissible duration, or its
-//! longest if the metric rewards time. This requires that no effect depends on the duration. If actions may
-//! overlap, the planner chooses a duration when the action starts.
+//! In sequential execution without timed events, a variable duration takes its lower bound, or its upper bound
+//! if the metric rewards time. There must be exactly one such bound, and no effect may depend on the duration.
+//! Other variable durations are errors. If actions may overlap, the planner chooses a duration when the action
+//! starts.
 
 use crate::error::{File, Place};
 use crate::lifted::{Expression, Formula, Function, FunctionId, Metric, Rational, Term};
@@ -15,8 +16,8 @@ use pddl::ast::{self, Comparison, Direction, Name, Span};
 /// no spaces, so there are no conflicts.
 pub const CHOSEN: &str = "chosen duration of ";
 
-/// Returns `true` if all metrics reward longer plans, and `false` if none does. Returns `None` if this cannot
-/// be determined or the metrics disagree.
+/// Returns `true` if the metrics that depend on `total-time` reward longer plans, and `false` if they reward
+/// shorter plans or none depends on it. Returns `None` if this cannot be determined or the metrics disagree.
 pub(super) fn rewards_time(metrics: &[Metric]) -> Option<bool> {
     let zero = Rational::from_integer(0);
     let mut rewards = Vec::new();
@@ -64,10 +65,10 @@ pub fn time_factor(expression: &Expression) -> Option<Rational> {
     }
 }
 
-/// Returns the duration of an action, and conditions that ensure its bounds. If durations may be chosen
-/// freely, a variable duration becomes an auxiliary numeric function. Otherwise it is replaced by its longest
-/// value if `longest` is `Some(true)` (the metric rewards time) and by its shortest if `Some(false)`. If no
-/// single bound determines the value, an error is recorded in `names`.
+/// Returns the duration of an action, and conditions that ensure its bounds. If durations may be chosen freely,
+/// a variable duration becomes an auxiliary numeric function. Otherwise it is replaced by its longest value if
+/// `longest` is `Some(true)` (the metric rewards time) and by its shortest if `Some(false)`. If `longest` is
+/// `None` or no single bound determines the value, an error is recorded in `names`.
 pub(super) fn duration(
     names: &mut Names,
     (constraints, span): (&[ast::DurationConstraint], Span),

@@ -1,5 +1,5 @@
-//! Determines the fluents: predicates and functions that actions or timed events change, and derived
-//! predicates.
+//! Determines the fluents: predicates and functions that actions or timed events change, and derived predicates
+//! that depend on fluents or cannot be evaluated in advance.
 
 use crate::lifted::configuration::{is_static, recursive_through_forall};
 use crate::lifted::{Axiom, Change, Formula, Lifted};
@@ -21,8 +21,9 @@ pub(super) fn mark_fluents(lifted: &mut Lifted) {
         lifted.predicates[predicate.index()].fluent = true;
     }
     // The Datalog engine requires stratified negation. Derived predicates that depend on themselves through a
-    // universal quantifier are therefore treated as fluents. The same applies to comparisons below a
-    // universal quantifier: if a value is undefined, neither the comparison nor its negation is true.
+    // universal quantifier are therefore treated as fluents. The same applies to derived predicates with
+    // comparisons below a universal quantifier: if a value is undefined, neither the comparison nor its
+    // negation is true.
     let compares = lifted.axioms.iter().filter(|axiom| compares_for_all(&axiom.condition, false));
     let compares: Vec<_> = compares.map(|axiom| axiom.predicate).collect();
     for predicate in recursive_through_forall(lifted).into_iter().chain(compares) {

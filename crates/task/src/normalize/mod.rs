@@ -22,7 +22,8 @@ use pddl::ast::{self, ConditionTime, EffectTime};
 /// replace the metric of the problem; if empty, the metric is used.
 ///
 /// # Errors
-/// Returns all unsupported constructs and undeclared names with their source locations.
+/// Returns the unsupported constructs and undeclared names that normalisation finds, with their source
+/// locations.
 pub fn normalize(
     domain: &ast::Domain,
     problem: &ast::Problem,

@@ -1,11 +1,12 @@
 //! Numeric functions without an initial value, which are undefined until an action assigns a value. An action
-//! that reads an undefined function is inapplicable.
+//! is inapplicable if an effect that occurs reads an undefined function.
 //!
-//! Each such function gets a guard predicate, which is true where the function has a value. A comparison
-//! becomes the conjunction of itself and the guards of its functions. A formula in negation normal form is
-//! then true exactly if it is true in Kleene's three-valued logic. An effect adds a condition to its action:
-//! the condition of the effect must be defined, and if it is true, all functions that the effect reads must
-//! have values (`validate`, "One happening").
+//! If a task has such functions, numeric fluents get a guard predicate, which is true where the function has a
+//! value (for exceptions, see `guard`). A comparison becomes the conjunction of itself and the guards of its
+//! functions. For example, `(> (level) 3)` becomes "`(level)` has a value, and `(> (level) 3)`". A formula in
+//! negation normal form is then true exactly if it is true in Kleene's three-valued logic. An effect adds a
+//! condition to its action: the condition of the effect must be defined, and if it is true, all functions that
+//! the effect reads must have values (`validate`, "One happening").
 
 use rustc_hash::FxHashMap;
 

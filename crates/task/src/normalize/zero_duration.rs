@@ -11,7 +11,7 @@ use crate::error::{Error, Errors};
 use crate::lifted::{Expression, Formula, FunctionId, Joint, Lifted, Rational, Schema};
 use pddl::ast::Comparison;
 
-/// Minimum and maximum of an expression, or `None` if they are unknown.
+/// Lower and upper bound on the value of an expression, or `None` if they are unknown.
 type Range = Option<(Rational, Rational)>;
 
 /// Splits every schema whose duration may be 0 into two schemas. The schemas for duration 0 are appended. A
@@ -50,7 +50,8 @@ pub fn split(lifted: &mut Lifted) -> Result<(), Errors> {
                 };
                 let (is_zero, is_positive) = (compare(Comparison::Equal), compare(Comparison::Greater));
                 let mut copy = instant(schema);
-                // The start reads the duration.
+                // The condition on the duration belongs to the start, which thus reads the functions of the
+                // duration.
                 if let Some(joint) = &mut copy.joint {
                     joint.start = Formula::And(vec![is_zero.clone(), schema.start_condition.clone()]);
                 }

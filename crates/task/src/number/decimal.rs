@@ -1,5 +1,5 @@
-//! Decimals of up to 76 decimal places, stored in 256 bits. Sums and products of measured numbers are
-//! decimals, and unlike fractions they need no greatest common divisors.
+//! Decimals of up to 76 decimal places, with a mantissa of at most 254 bits. Sums and products of measured
+//! numbers are decimals, and unlike fractions they need no greatest common divisors.
 //!
 //! The representation is unique: the mantissa is not a multiple of 10, unless the number of decimal places is
 //! 0.

@@ -1,8 +1,8 @@
 //! Exact numbers: rationals of any size for reading and grounding, and integers for the ground task.
 //!
-//! No operation rounds, wraps or saturates. A rational that does not fit two machine integers is stored with
-//! big integers. Integers of a task that may overflow are computed by checked operations, and the callers
-//! handle the overflow.
+//! No operation rounds, wraps or saturates. A rational that does not fit two 128-bit integers is stored as a
+//! decimal with 256 bits if possible, otherwise with big integers. Integers of a task that may overflow are
+//! computed by checked operations, and the callers handle the overflow.
 
 mod decimal;
 
@@ -98,7 +98,7 @@ impl Rational {
         }
     }
 
-    /// Returns the positive denominator, or `None` on overflow.
+    /// Returns the positive denominator of the reduced fraction, or `None` if it exceeds 128 bits.
     pub fn denominator(&self) -> Option<Int> {
         match &self.0 {
             Repr::Small(small) => Some(*small.denom()),

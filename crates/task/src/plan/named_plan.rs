@@ -66,7 +66,7 @@ impl From<BigRational> for Exact {
     }
 }
 
-/// Parses a decimal or a fraction: `2.5`, `-7/3`.
+/// Parses an integer, a decimal or a fraction: `3`, `2.5`, `-7/3`.
 impl FromStr for Exact {
     type Err = NotANumber;
 
@@ -148,7 +148,8 @@ pub struct Step {
 pub struct Plan {
     /// Actions in order of execution.
     pub steps: Vec<Step>,
-    /// Value of the plan under the metric of the problem file.
+    /// Value of the plan under the metric of the problem file, or under the first objective if others replace
+    /// the metric.
     pub cost: Exact,
 }
 
@@ -200,7 +201,8 @@ pub fn measured<'s, N: TaskNumber>(
     let (mut state, mut added) = (task.initial.clone(), Vec::new());
     let mut before = rest(task, &state);
     for (operator, choice) in steps {
-        // A step may be inapplicable if it is examined outside its plan; the state then does not change.
+        // On overflow, the state does not change. A step may also be inapplicable if it is examined outside its
+        // plan; its effects are then applied nevertheless.
         if let Some(next) = task.successor(&task.operators[operator.index()], &state, choice) {
             state = next;
         }
@@ -248,8 +250,8 @@ impl Step {
         }
     }
 
-    /// Adds the functions whose design differs from their design in `current` to `reconfigured`, and updates
-    /// `current`.
+    /// Adds the functions whose design changes in this step to `reconfigured`. `current` holds the last design
+    /// of each function before this step, and is updated.
     fn note_reconfigured(&mut self, current: &mut Vec<(String, String)>) {
         for (function, design) in &self.configuration {
             match current.iter_mut().find(|(name, _)| name == function) {

@@ -1,8 +1,8 @@
 //! Rescheduling: starts the actions of a plan with timed events as early as possible.
 //!
 //! Waiting is free, so an optimal plan may delay an action until an event that only a later action needs. For
-//! each action, the operators of its earlier timeline windows are therefore tried; required waits are
-//! inserted before the next action. A change is kept if the result is still a plan and costs no more.
+//! each action, the operators for its other timeline windows are therefore tried, with the necessary waits. A
+//! change is kept if the result is still a plan, costs no more and has earlier starts.
 
 use num_traits::Zero;
 
@@ -31,7 +31,7 @@ pub fn earliest<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) ->
             let best = tried.map(|tried| (starts(task, &tried.steps), tried)).min_by(|a, b| a.0.cmp(&b.0));
             if let Some((_, tried)) = best.filter(|(times, _)| *times < current_starts) {
                 plan = tried;
-                // The change may have removed earlier waits.
+                // The change may have removed waits before earlier actions, so all actions are tried again.
                 position = 0;
                 continue;
             }
@@ -54,8 +54,8 @@ fn same_action<N: TaskNumber>(task: &Task<N>, id: OperatorId) -> impl Iterator<I
     operators.filter(move |(other, other_id)| *other_id != id && is_same_action(other)).map(|(_, id)| id)
 }
 
-/// Replaces the operator at `position` and inserts the necessary waits. Returns `None` if the result is not a
-/// plan or costs more than `plan`.
+/// Replaces the operator at `position` by `other`, drops all waits and inserts the necessary waits again.
+/// Returns `None` if the result is not a plan or costs more than `plan`.
 fn with<N: TaskNumber>(
     task: &Task<N>,
     plan: &GroundPlan<N>,

@@ -33,14 +33,14 @@ words! {
 /// Justification of an optimality or unsolvability claim.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Proof {
-    /// The formula for cheaper plans of up to `step_bound` steps is unsatisfiable, and no longer plan is
-    /// cheaper.
+    /// The formula for plans of up to `step_bound` steps (cheaper than the known plan, if there is one) is
+    /// unsatisfiable, and longer plans need not be considered.
     Sat {
-        /// Number of steps above which no plan can be cheaper.
+        /// Number of steps above which no plan can be cheaper, or no shortest plan exists.
         step_bound: usize,
     },
-    /// The cost of the plan equals a lower bound on the cost of all plans: the goal distance in a projection,
-    /// or the sum of individual minimum costs.
+    /// The cost of the plan equals a lower bound on the cost of all plans, for example the goal distance in a
+    /// projection.
     Bound,
     /// A\* with an admissible heuristic has terminated. Its pruning preserves at least one optimal plan, if
     /// there is a plan.
@@ -136,7 +136,7 @@ pub struct Statistics {
     pub evaluated: u64,
     /// Number of restarts of the satisficing search.
     pub restarts: usize,
-    /// Better plans in chronological order, and lower bounds that increased by at least one percent.
+    /// Better plans and considerably higher lower bounds in chronological order.
     pub history: Vec<Moment>,
     /// Time spent on lower bounds and searches.
     pub search: Duration,
@@ -162,8 +162,8 @@ pub struct Solution {
     pub horizon: usize,
     /// Justification of the status.
     pub proof: Option<Proof>,
-    /// Set if the metric may have no best value. The plan then has the fewest steps, and the best metric
-    /// among the plans with this number of steps.
+    /// Set if the metric may have no best value. The plan then has the fewest steps, and the best metric that
+    /// was found among plans with this number of steps.
     pub unbounded: Option<MetricUnbounded>,
     /// Statistics of the run.
     pub statistics: Statistics,

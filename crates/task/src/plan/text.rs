@@ -1,7 +1,7 @@
 //! Text form of plans, with times as decimals that preserve the order of actions.
 //!
-//! A fraction such as 1/3 has no finite decimal expansion. Starts and ends are rounded to the same grid, and
-//! the printed duration is the difference between rounded end and rounded start. Gaps of a thousandth are
+//! A fraction such as 1/3 has no finite decimal expansion. Such starts and ends are rounded to the same grid,
+//! and the printed duration is the difference between rounded end and rounded start. Gaps of a thousandth are
 //! thus preserved, and no action starts before its predecessor ends.
 
 use std::fmt;

@@ -98,7 +98,7 @@ impl Task {
         self.unreachable.as_deref()
     }
 
-    /// Returns `true` if the state satisfies the goal.
+    /// Returns `true` if the state satisfies the goal; `false` if grounding found that the goal is unreachable.
     pub fn reaches_goal(&self, situation: &TaskState) -> bool {
         self.unreachable.is_none() && self.is_goal(&situation.state)
     }

@@ -23,22 +23,22 @@ fn verdict(solution: &Solution) -> String {
     let horizon = solution.horizon;
     let program = solution.statistics.unchecked.as_ref();
     let proved =
-        program.map_or("proved".to_owned(), |program| format!("by the word of `{program}`, unchecked"));
+        program.map_or("proved".to_owned(), |program| format!("according to `{program}`, not checked"));
     match (solution.status, &solution.proof, solution.unbounded) {
         (Status::Optimal, Some(Proof::Sat { step_bound }), _) => format!(
-            "optimal, {proved}: no cheaper plan has up to {} (unsatisfiable), and none with more can be cheaper",
+            "optimal, {proved}: no plan of up to {} is cheaper (unsatisfiable), and no longer plan can be cheaper",
             steps(*step_bound)
         ),
         (Status::Optimal, Some(Proof::Bound), _) => {
             "optimal, proved: the cost equals a lower bound on the cost of all plans".to_owned()
         }
         (Status::Optimal, _, _) => {
-            "optimal, proved: the search left out only states that are dominated or too dear".to_owned()
+            "optimal, proved: the search left out only states that are dominated or too expensive".to_owned()
         }
         (Status::Feasible, proof, Some(unbounded)) => {
             let why = match unbounded {
                 MetricUnbounded::Proved => {
-                    "the metric has no best value: an action that improves it can be repeated for ever"
+                    "the metric has no best value: an action that improves it can be repeated without limit"
                 }
                 MetricUnbounded::Suspected => "the metric may have no best value: actions improve it",
             };
@@ -55,14 +55,15 @@ fn verdict(solution: &Solution) -> String {
             format!("no plan exists, proved: {reason}")
         }
         (Status::Unsolvable, Some(Proof::Sat { step_bound }), _) => format!(
-            "no plan exists, {proved}: none has up to {} (unsatisfiable), and a shortest one has no more",
+            "no plan exists, {proved}: there is none of up to {} (unsatisfiable), and a shortest plan has no \
+             more steps",
             steps(*step_bound)
         ),
         (Status::Unsolvable, _, _) => {
             "no plan exists, proved: every reachable state was visited or is dominated".to_owned()
         }
         (Status::UnsolvableWithinHorizon, _, _) => {
-            format!("no plan with up to {}, {proved}; longer ones were not considered", steps(horizon))
+            format!("no plan with up to {}, {proved}; longer plans were not considered", steps(horizon))
         }
         (Status::Unknown, _, _) => match &solution.lower_bound {
             Some(bound) => format!(

@@ -1,9 +1,9 @@
 //! The ground task: finite-domain and numeric variables, and operators with slots for designs.
 //!
-//! The formalism is SAS+ by Bäckström and Nebel \[1\] with two extensions. Numeric variables have exact
-//! integer values. Operators have *slots*; a step of a plan chooses a function design for each slot.
-//! Conditions, costs and consumption that depend on designs are tables over slots. For k functions with m
-//! designs each, k·m choices thus replace m^k operators.
+//! The formalism is SAS+ by Bäckström and Nebel \[1\] with two extensions. Numeric variables have exact values:
+//! integers, or rationals where integers would overflow. Operators have *slots*; a step of a plan chooses a
+//! function design for each slot. Conditions, costs and consumption that depend on designs are tables over
+//! slots. For k functions with m designs each, k·m choices thus replace m^k operators.
 //!
 //! \[1\] C. Bäckström, B. Nebel: Complexity results for SAS+ planning, Computational Intelligence
 //! 11(4), 1995.
@@ -112,8 +112,8 @@ pub struct Axiom<N = Int> {
 }
 
 /// A layer of stratified rules: the rules of one derived variable, or of several mutually dependent derived
-/// variables. Derived variables that the rules read negatively, or that are not heads of this layer, belong
-/// to earlier layers.
+/// variables. All other derived variables that the rules read, and all that they read negatively, belong to
+/// earlier layers.
 #[derive(Debug, Clone)]
 pub struct Layer<N = Int> {
     pub rules: Vec<Axiom<N>>,
@@ -155,7 +155,8 @@ pub struct Operator<N = Int> {
     /// End of the wait if the operator is a wait, in the task's time unit since the start of the plan; `None`
     /// for an action.
     pub wait: Option<N>,
-    /// Earliest start and end, in the task's time unit since the start of the plan.
+    /// Lower bounds on start and end that follow from timed initial literals, in the task's time unit since the
+    /// start of the plan.
     pub timing: Timing<N>,
 }
 
@@ -382,7 +383,8 @@ impl<N: TaskNumber> Operator<N> {
 }
 
 impl Task {
-    /// Returns `true` if the costs of a task without metric are durations, and `false` if they count actions.
+    /// Returns `false` if each action costs 1 and each wait 0, so that the cost is the number of actions.
+    /// Otherwise returns `true`, e.g. if the costs are durations.
     pub fn is_timed(&self) -> bool {
         self.is_measured_by_time(&self.objective.scale)
     }

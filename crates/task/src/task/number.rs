@@ -38,11 +38,12 @@ pub trait TaskNumber: Number + std::fmt::Debug + std::hash::Hash + Default {
     /// Returns the product, or `None` on overflow.
     fn times(&self, other: &Self) -> Option<Self>;
 
-    /// Returns `true` if the magnitude is within the limit for fluents and sums of costs.
+    /// Returns `true` if the magnitude (for rationals: the number of bits) is within the limit for fluents and
+    /// sums of costs.
     fn is_moderate(&self) -> bool;
 
-    /// Returns a lower bound on n such that n·`part` ≥ this number, where `part` > 0. Returns 0 if no bound
-    /// is known.
+    /// Returns a lower bound on the numbers n with n·`part` ≥ this number, where `part` > 0. Returns 0 if no
+    /// bound is known.
     fn times_at_least(&self, part: &Self) -> u32;
 
     /// Returns `true` if no value of the quantity can overflow. For integers, the sum of the constant's

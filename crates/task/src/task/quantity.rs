@@ -17,7 +17,8 @@ pub type SlotSet = SmallVec<[u32; 2]>;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Table<N> {
     pub slots: SlotSet,
-    /// Values in row-major order: the last slot varies fastest. Operators of a schema share the values.
+    /// Values in row-major order: the last slot varies fastest. Several operators of a schema may share the
+    /// values.
     pub values: Arc<[N]>,
 }
 
@@ -92,8 +93,8 @@ impl<N: Number> Quantity<N> {
         }
     }
 
-    /// Adds a table. It is merged with an existing table over the same slots. A table whose values are all
-    /// equal is added to the constant instead.
+    /// Adds a table. If there is already a table over the same slots, the values are added to those of this
+    /// table. A table whose values are all equal is added to the constant instead.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"

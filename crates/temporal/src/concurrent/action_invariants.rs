@@ -9,8 +9,8 @@ use crate::concurrent::happening::{Happening, Instance, Role};
 use crate::concurrent::simple_temporal_network::Key;
 use crate::concurrent::time_number::TimeNumber;
 
-/// Work limit of an analysis, in visits of operators. Actions that are not analysed before the
-/// limit get no bounds.
+/// Work limit of an analysis, in visits of operators. Nothing is concluded about actions that are
+/// not analysed before the limit.
 pub(super) const MAX_PAIR_CHECKS: usize = 20_000_000;
 
 pub(super) struct Index<'a, T: TimeNumber = Int> {
@@ -21,8 +21,8 @@ pub(super) struct Index<'a, T: TimeNumber = Int> {
     pub(super) marking: FxHashMap<Key, Vec<OperatorId>>,
     setting: Vec<Vec<OperatorId>>,
     changing: FxHashMap<NumericId, Vec<OperatorId>>,
-    /// Atoms and numbers that joint conditions over all read, numbered as in [`Happening::writes`],
-    /// ascending.
+    /// Atoms and numbers that are read by over-all conditions of the kind of [`Instance::joint`],
+    /// numbered as in [`Happening::writes`], ascending.
     pub(super) joint: Vec<u32>,
 }
 
@@ -155,7 +155,7 @@ impl<'a, T: TimeNumber> Index<'a, T> {
         if operator.condition.facts.iter().any(contradicts) {
             return true;
         }
-        // A simultaneous happening cannot restore a fact that the condition over all requires: it
+        // A simultaneous happening cannot restore a fact that the over-all condition requires: it
         // would interfere with the happening that deletes the fact.
         let breaks = |fact: &Fact| {
             let mut required = invariant.over_all.iter();
@@ -175,7 +175,7 @@ impl<'a, T: TimeNumber> Index<'a, T> {
         operator.conditional.is_empty() && required.any(contradicts)
     }
 
-    /// Like [`Self::excludes`], and also `true` for the end of an action whose condition over all
+    /// Like [`Self::excludes`], and also `true` for the end of an action whose over-all condition
     /// contradicts the invariant: right before an end inside the run, both would have to hold. This
     /// argument does not cover an end at the time of the start of `own`, so that end must also be
     /// impossible. Either the end and the start must keep a distance, or the start requires the fact of

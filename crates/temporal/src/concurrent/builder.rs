@@ -63,7 +63,7 @@ pub(super) struct Builder<'a> {
     joined: Vec<(OperatorId, [Footprint; 2])>,
     instances: FxHashMap<InstanceKey, Halves>,
     order: Vec<InstanceKey>,
-    /// Schemas of the domain whose condition over all can change.
+    /// Schemas of the domain whose over-all condition can change.
     held: FxHashSet<usize>,
 }
 
@@ -81,7 +81,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Groups the starts, ends and conditions over all of instances, and collects the write sets of
+    /// Groups the starts, ends and over-all conditions of instances, and collects the write sets of
     /// all operators.
     pub(super) fn collect(&mut self, context: Context<'_>) -> Result<(), Errors> {
         let Context { task, limits } = context;
@@ -183,7 +183,7 @@ impl<'a> Builder<'a> {
         });
         for pair in limits.watch(pairs) {
             let (key, start, over_all, end) = pair?;
-            // Without this operator, the condition over all is unreachable.
+            // Without this operator, the over-all condition is unreachable.
             if self.held.contains(&key.0) && over_all.is_none() {
                 continue;
             }
@@ -248,7 +248,7 @@ impl<'a> Builder<'a> {
     /// Durations that do not depend on the state, and divisors of those that do.
     ///
     /// # Errors
-    /// Fails if a divisor is not positive.
+    /// A divisor is not positive, a duration cannot be computed, or a limit is reached.
     pub(super) fn static_durations(
         &mut self,
         Context { task, limits }: Context<'_>,
@@ -321,7 +321,8 @@ impl<'a> Builder<'a> {
         self.footprints.supposes
     }
 
-    /// Returns the temporal properties of each operator, and the number of access keys.
+    /// Returns the temporal properties of each operator, and the number of access keys. Also sets
+    /// [`Instance::joint`].
     pub(super) fn happenings<T: TimeNumber>(
         mut self,
         context: Context<'_>,
@@ -356,7 +357,7 @@ impl<'a> Builder<'a> {
         Ok((happenings, keys.len()))
     }
 
-    /// Reads of an operator when it happens, and reads of its condition over all. Returns `None` if
+    /// Reads of an operator when it happens, and reads of its over-all condition. Returns `None` if
     /// the operator never happens or is a timed initial literal.
     fn reads(&self, task: &Task, id: OperatorId, role: Role) -> Option<(Reads, Reads)> {
         let operator = &task.operators[id.index()];
@@ -391,7 +392,7 @@ fn timer(task: &Task, id: OperatorId) -> Option<NumericId> {
     })
 }
 
-/// Adds the interference constraints of conditions over all (with the reads `over_all`) and of
+/// Adds the interference constraints of over-all conditions (with the reads `over_all`) and of
 /// designs to a happening. Also sets [`Instance::joint`].
 fn join<T: TimeNumber>(
     happening: &mut Happening<T>,

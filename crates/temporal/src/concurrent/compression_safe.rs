@@ -18,7 +18,7 @@ use crate::concurrent::happening::{Happening, Instance};
 use crate::concurrent::time_number::TimeNumber;
 
 /// Returns for each instance whether its end can directly follow its start without loss of
-/// completeness.
+/// completeness. `false` also if the work limit is used up.
 pub(super) fn compression_safe_actions<T: TimeNumber>(
     task: &Task,
     happenings: &[Happening<T>],

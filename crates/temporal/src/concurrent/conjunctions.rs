@@ -1,10 +1,10 @@
 //! Explicit conjunctions in the delete relaxation, for facts that no action adds again.
 //!
 //! A relaxed plan deletes nothing, so an action that deletes a fact needed later looks useful even
-//! if nothing adds the fact again. For each such fact, the relaxed task gets conjunctions of this
-//! fact and each proposition that is needed at the same time. Only rules that keep the fact achieve
-//! these conjunctions. They are conjunctions of two facts as in the task Π^C \[1\], for a few
-//! selected facts.
+//! if nothing adds the fact again. Up to work limits, the relaxed task gets, for each such fact,
+//! conjunctions of this fact and each proposition that is needed at the same time. Only rules that
+//! keep the fact achieve these conjunctions. They are conjunctions of two facts as in the task Π^C
+//! \[1\], for a few selected facts.
 //!
 //! \[1\] E. Keyder, J. Hoffmann, P. Haslum: Improving delete relaxation heuristics through
 //! explicitly represented conjunctions, JAIR 50, 2014.
@@ -27,7 +27,7 @@ pub(super) type Conjunction = [Proposition; 3];
 pub(super) struct Scope<'a> {
     pub(super) rules: &'a mut Vec<Rule>,
     pub(super) goal: &'a mut Vec<Proposition>,
-    /// Range of the propositions of each variable; empty for variables that are excluded.
+    /// Range of the propositions of each variable; empty if the variable gets no conjunctions.
     pub(super) variables: &'a [std::ops::Range<Proposition>],
     pub(super) propositions: &'a mut u32,
 }
@@ -115,7 +115,7 @@ impl Index {
 
     /// Propositions that are needed together with `fact`, directly or for achieving another needed
     /// proposition, and that a rule in `deleting` may help to achieve. Ascending; empty if the work
-    /// limit `looks` is used up.
+    /// limit `looks` is used up while the needed propositions are collected.
     fn together(
         &self,
         fact: Proposition,

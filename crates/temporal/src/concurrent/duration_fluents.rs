@@ -2,9 +2,10 @@
 //! holds the duration, from the start to the end of an action.
 //!
 //! `?duration` has the value of the duration expression in the state in which the action starts
-//! \[1\]. The start assigns this value to the fluent. The end, its effects and the temporal network
-//! read the fluent. A duration that the planner chooses has an auxiliary operator that never
-//! happens; it makes relaxed reachability assume any value from 0.
+//! \[1\]. The start assigns this value to the fluent; the readers of the fluent (the end, its effects
+//! and the temporal network) divide it by a static expression, if necessary. If the planner chooses
+//! the duration, the start assigns nothing. An auxiliary operator, which is never executed, increases
+//! the fluent, so that every value from 0 is reachable in the relaxed task.
 //!
 //! \[1\] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 5.2.
 

@@ -1,13 +1,13 @@
-//! Removal of the auxiliary variables that link a condition over all to the end of its action
-//! during grounding.
+//! Removal of the auxiliary variables that link an over-all condition to the end of its action. They
+//! are needed only during grounding.
 
 use task::task::{Condition, Fact, Task, VariableId};
 
 use crate::concurrent::happening::Instance;
 use crate::concurrent::time_number::TimeNumber;
 
-/// Removes the variables that condition-over-all operators set. During grounding, these variables
-/// let an end require its condition over all; afterwards they have no use.
+/// Removes the variables that the operators of over-all conditions set. During grounding, an end
+/// requires its over-all condition by such a variable; afterwards the variables have no use.
 #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
 pub(super) fn drop_links<T: TimeNumber>(task: &mut Task, instances: &[Instance<T>]) {
     let mut is_link = vec![false; task.variables.len()];

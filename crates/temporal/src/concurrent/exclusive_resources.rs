@@ -54,7 +54,8 @@ struct Resource {
     instances: Vec<u32>,
 }
 
-/// Lower bound on the makespan of every plan, in internal time units; 0 if there is no exclusive resource.
+/// Lower bound on the makespan of every plan, in internal time units. 0 if no better bound is found, e.g.
+/// without an exclusive resource.
 pub(super) fn makespan_bound<T: TimeNumber>(concurrent: &TemporalTask<T>, limits: &Limits) -> T {
     let mut by_schemas: BTreeMap<Vec<u32>, Vec<Resource>> = BTreeMap::new();
     let mut by_size: BTreeMap<(Vec<u32>, usize), Vec<Resource>> = BTreeMap::new();
@@ -78,7 +79,7 @@ pub(super) fn makespan_bound<T: TimeNumber>(concurrent: &TemporalTask<T>, limits
         let sizes: FxHashSet<usize> = group.iter().map(|resource| resource.instances.len()).collect();
         sizes.len() > 1
     }));
-    // Groups with many instances per resource have the highest bounds.
+    // Groups with many instances per resource usually have the highest bounds.
     groups.sort_by_key(|group| {
         let instances: usize = group.iter().map(|resource| resource.instances.len()).sum();
         std::cmp::Reverse(instances.checked_div(group.len()))
@@ -129,8 +130,9 @@ fn bound<T: TimeNumber>(
     quotient.map_or(T::ZERO, |quotient| (quotient - separation).max(T::ZERO))
 }
 
-/// Copy of the split task without costs, in which ends also require the conditions over all: these
-/// hold at some time before the end, because the duration is positive.
+/// Copy of the split task without costs, in which ends also require the facts and clauses (not the
+/// comparisons) of the over-all conditions: these hold at some time before the end, because the
+/// duration is positive.
 fn without_costs<T: TimeNumber>(concurrent: &TemporalTask<T>) -> Task {
     let mut task = concurrent.task.clone();
     for operator in &mut task.operators {
@@ -222,7 +224,7 @@ fn resource<T: TimeNumber>(
         };
         match required(bad) {
             Some(value) => busy.remove(&value),
-            // Any value may be left.
+            // The operator may leave any value, so no value is busy.
             None => return None,
         };
         if busy.is_empty() {

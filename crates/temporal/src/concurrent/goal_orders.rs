@@ -7,12 +7,13 @@
 //! processing time \[1\]. Local search then swaps and moves goals \[2\]; decoding a sequence of
 //! intermediate goals by a simple planner is the scheme of \[3\].
 //!
-//! The greedy search expands each state once, whatever its clocks are, so its way of sharing out
-//! actions among interchangeable objects remains. This search proves nothing: it only yields plans,
-//! each of which was executed happening by happening.
+//! The greedy search (`greedy`) usually expands each state only once, whatever its clocks are. So it
+//! rarely changes how actions are distributed among interchangeable objects. The search over goal
+//! orders proves nothing: it only yields plans, each of which was executed happening by happening.
 //!
-//! A short plan is the executable part of the relaxed plan, as in \[4\], repeatedly. If this leads
-//! to a known state, best-first search by the size of the relaxed plan continues \[5\].
+//! A short plan results from executing the executable actions of a relaxed plan, as in \[4\],
+//! repeatedly. If this leads to a known state, or no action is executable, best-first search by the
+//! size of the relaxed plan continues \[5\].
 //!
 //! \[1\] R. Graham: Bounds on multiprocessing timing anomalies, SIAM Journal on Applied Mathematics
 //! 17, 1969.
@@ -43,18 +44,19 @@ use crate::concurrent::temporal_task::TemporalTask;
 use crate::concurrent::time_number::TimeNumber;
 use crate::concurrent::timed_relaxed_plan::{TimedRelaxation, TimedRelaxedPlan};
 
-/// Upper limit on the number of relaxed plans per goal.
+/// Upper limit, per goal, on the number of relaxed plans whose actions are executed.
 const MAX_ROUNDS: usize = 60;
 /// Upper limit on the number of states that one best-first search evaluates, and on the number of
 /// these searches per goal. Orders that need more are dropped, so that tasks whose goals conflict
 /// leave the time to the other searches.
 const MAX_ESCAPE: usize = 100;
 const MAX_ESCAPES: usize = 3;
-/// Number of orders without any plan after which the search ends.
+/// Number of orders after which the search ends if it has found no plan.
 const MAX_FAILURES: usize = 12;
-/// Work without a better plan after which the search ends.
+/// Work (see `GoalOrders::work`) without a better plan after which the search ends.
 const MAX_STALE: u64 = 200_000;
-/// Number of neighbours per goal without a better plan after which the order is perturbed.
+/// Number of neighbouring orders, per goal, without a better plan after which the best order is
+/// perturbed.
 const NEIGHBOURS: usize = 12;
 /// Number of random moves of a perturbation.
 const KICK: usize = 3;
@@ -86,7 +88,7 @@ struct Decoded<T: TimeNumber = Int> {
 
 enum Decoding<T: TimeNumber = Int> {
     Plan(Box<Decoded<T>>, Sequence<T>),
-    /// A goal was not achieved, or the plan is worse than required.
+    /// No plan was found, or the plan is worse than required.
     Failed,
     Interrupted,
 }
@@ -166,8 +168,8 @@ impl<'a, T: TimeNumber> GoalOrders<'a, T> {
         })
     }
 
-    /// Returns `true` if the search has ended: it found no plan at all, no better plan for long, or the task
-    /// has a single goal whose plan is found.
+    /// Returns `true` if the search has ended: many orders gave no plan at all, no better plan was found for
+    /// long, or the task has a single goal whose plan is found.
     pub(super) fn is_over(&self) -> bool {
         self.best.is_none() && self.failures >= MAX_FAILURES
             || self.best.is_some() && self.goals.len() < 2 && self.initial.is_empty()
@@ -226,7 +228,7 @@ impl<'a, T: TimeNumber> GoalOrders<'a, T> {
         None
     }
 
-    /// Order in which a plan finally achieves the goals; goals that it never changes come last.
+    /// Order in which a plan finally achieves the goals; goals that it never makes true come last.
     fn order_of(&self, sequence: &Sequence<T>) -> Vec<usize> {
         let task = &self.concurrent.task;
         let mut state = task.initial.clone();
@@ -434,8 +436,8 @@ fn achieve<T: TimeNumber>(
     Ok(None)
 }
 
-/// Executes the actions of a relaxed plan that can be executed, in its order. Returns `None` if no
-/// action can be executed.
+/// Executes the actions of a relaxed plan that can be executed, in several passes over the plan.
+/// Returns `None` if no action can be executed.
 fn execute<T: TimeNumber>(
     context: (&TemporalTask<T>, &Expansion<'_, T>),
     situation: &TemporalState<T>,

@@ -40,7 +40,7 @@ use crate::concurrent::time_number::TimeNumber;
 /// hash.
 const OVERHEAD: usize = size_of::<Node>() + 80;
 
-/// Noise raises a heuristic value by up to `(NOISE_LEVELS - 1) / NOISE_DIVISOR` of it.
+/// Noise raises a heuristic value by up to `(NOISE_LEVELS - 1) / NOISE_DIVISOR` of the value.
 const NOISE_LEVELS: usize = 8;
 const NOISE_DIVISOR: u64 = 20;
 
@@ -57,7 +57,7 @@ pub(super) enum Mode {
     /// Starts and ends are separate successors.
     Overlapping,
     /// Like `Overlapping`, with two additions. A state reached again with a smaller lower bound on
-    /// the makespan is expanded again. Successors in which a condition over all is violated until a
+    /// the makespan is expanded again. Successors in which an over-all condition is violated until a
     /// simultaneous happening repairs it are kept.
     Sooner,
 }
@@ -65,7 +65,7 @@ pub(super) enum Mode {
 impl Mode {
     /// Returns the successor by a happening, after applying timed initial literals that must precede it.
     /// Appends all applied happenings to `links`. Returns `None` if the happening is not applicable or,
-    /// except in mode `Sooner`, leaves a condition over all violated.
+    /// except in mode `Sooner`, leaves an over-all condition violated.
     pub(super) fn apply_happening<T: TimeNumber>(
         self,
         concurrent: &TemporalTask<T>,
@@ -79,7 +79,7 @@ impl Mode {
             let before = waited.as_ref().unwrap_or(situation);
             let together = before.clocks.unsettled();
             match expansion.after(before, operator, false) {
-                // Another simultaneous happening rarely repairs a violated condition over all.
+                // Another simultaneous happening rarely repairs a violated over-all condition.
                 Ok((situation, _)) if situation.clocks.unsettled() && self != Self::Sooner => return None,
                 Ok((situation, compressed)) => {
                     links.push((operator, together));
@@ -106,8 +106,8 @@ struct Node {
     links: Links,
 }
 
-/// Queue key: whether the state has no novel fact, heuristic value, and lower bound on the
-/// makespan. Smaller keys come first.
+/// Queue key: whether the state has no novel fact (always `false` in the first two queues), heuristic
+/// value, and lower bound on the makespan. Smaller keys come first.
 type Value<T> = (bool, u64, T);
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -129,7 +129,8 @@ pub(super) struct Greedy<'a, T: TimeNumber = Int> {
     nodes: Vec<Node>,
     /// Id and unpacked state of the node that was expanded last.
     latest: Option<(u32, TemporalState<T>)>,
-    /// Least lower bound on the makespan of each visited state, by a hash of the state.
+    /// Lower bound on the makespan of each visited state, by a hash of the state: that of the first
+    /// visit or, in mode `Sooner`, the least one.
     seen: FxHashMap<u64, T>,
     /// Approximate memory use of the nodes in bytes.
     bytes: usize,
@@ -193,7 +194,7 @@ impl<'a, T: TimeNumber> Greedy<'a, T> {
         Self { noise: (seed > 0).then_some(Random(seed)), ..self }
     }
 
-    /// Searches for a plan that is better than the incumbent, within `work` evaluations.
+    /// Searches for a plan that is better than the incumbent. Generates at most `work` successors.
     #[expect(clippy::arithmetic_side_effects, reason = "counted down from what was given")]
     pub(super) fn run(
         &mut self,

@@ -16,7 +16,7 @@ pub(super) enum Role {
     Whole,
     /// Timed initial literals: index into the events of the task.
     Timed(u32),
-    /// Operator that never happens: a condition over all, or the start or end of an action that
+    /// Operator that never happens: an over-all condition, or the start or end of an action that
     /// cannot be executed.
     #[default]
     Never,
@@ -41,7 +41,7 @@ pub(super) struct Happening<T: TimeNumber = Int> {
 pub(super) struct Instance<T: TimeNumber = Int> {
     pub(super) start: OperatorId,
     pub(super) end: OperatorId,
-    /// Operator whose condition is the action's condition over all. `None` if there is no such
+    /// Operator whose condition is the action's over-all condition. `None` if there is no such
     /// condition.
     pub(super) over_all: Option<OperatorId>,
     /// Duration in internal time units. Only a lower bound if the duration depends on the state or
@@ -53,7 +53,7 @@ pub(super) struct Instance<T: TimeNumber = Int> {
     /// Whether the planner chooses the duration.
     pub(super) is_chosen: bool,
     pub(super) designs: Designs,
-    /// Atoms and numbers that the condition over all reads, numbered as in `Happening::writes`.
+    /// Atoms and numbers that the over-all condition reads, numbered as in `Happening::writes`.
     /// Empty unless several simultaneous happenings can maintain the condition jointly.
     pub(super) joint: Vec<u32>,
     /// Upper bound on the number of simultaneous runs that can be useful; `u32::MAX` if no bound is

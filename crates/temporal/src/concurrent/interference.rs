@@ -18,7 +18,7 @@ enum Access {
     Read(AtomId),
     Added(AtomId),
     Deleted(AtomId),
-    /// The atom is read by a condition over all.
+    /// The atom is read by an over-all condition.
     Held(AtomId),
     ReadNumber(NumericId),
     Changed(NumericId, Way),
@@ -92,7 +92,7 @@ impl<T: TimeNumber> Keys<T> {
         self.resolve(&collector)
     }
 
-    /// Constraints of a condition over all with the given reads. The start waits for the accesses
+    /// Constraints of an over-all condition with the given reads. The start waits for the accesses
     /// in `after`; start and end make the accesses in `marks`.
     pub(super) fn over_all(&mut self, reads: &(Vec<AtomId>, Vec<NumericId>)) -> InterferenceConstraints<T> {
         let mut collector = InterferenceCollector::default();

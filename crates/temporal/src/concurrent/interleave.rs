@@ -1,7 +1,8 @@
-//! Interleaves exact and greedy search with growing, equal budgets.
+//! Interleaves the exact search with incomplete ones (greedy search, goal orders, sequential plans).
+//! The budgets double in each round.
 //!
-//! Small tasks are proved before the greedy search begins. After that, its plans are incumbents of
-//! both searches.
+//! Small tasks are solved by the exact search alone, before the others begin. After that, the best
+//! plan of any search is the incumbent.
 
 use search::bounds::Bounds;
 use task::limits::Limits;
@@ -22,10 +23,10 @@ use crate::concurrent::temporal_relaxation::TemporalRelaxation;
 use crate::concurrent::temporal_task::TemporalTask;
 use crate::concurrent::time_number::TimeNumber;
 
-/// Expansions of the exact search per evaluation of the greedy search.
+/// Expansions of the exact search per unit of work of the greedy search, once a plan is known.
 const EXACT_BUDGET: usize = 4;
-/// Number of rounds in which the search for sequential plans runs although a plan is known. Its
-/// best plan is an upper bound.
+/// Number of rounds in which the search for sequential plans runs although a plan is known. The best
+/// sequential plan gives an upper bound on the metric.
 const WHOLE: usize = 2;
 
 /// Interleaves the searches until optimality is proved, no search can continue, a limit is reached, or
@@ -66,7 +67,7 @@ pub(super) fn interleave_searches<T: TimeNumber>(
     greedy.extend(differs.then(|| begin(Mode::Sequential)));
     let (mut share, turn) = (1_usize, limits.thresholds().turn.max(1));
     let mut orders = GoalOrders::new(concurrent, &expansion, &relaxed, 0, limits);
-    // A first plan comes before the sequential task is ground.
+    // A first plan is sought before the sequential task is grounded.
     improve(&mut orders, &mut exact, turn, limits, record);
     let whole = SequentialTask::new(concurrent, limits);
     let mut seeker = whole.as_ref().map(|task| SequentialPlanner::new(task, limits));
@@ -78,8 +79,8 @@ pub(super) fn interleave_searches<T: TimeNumber>(
             break;
         }
         if is_stuck {
-            // No search has memory left. Until the deadline, the searches that need little begin
-            // again, in other orders and with the incumbent as upper bound.
+            // The exact search has used up its memory, and the other searches have ended. Until the
+            // deadline, the others begin again, in other orders and with the incumbent as upper bound.
             let restarts = &mut record.statistics.restarts;
             *restarts = restarts.saturating_add(1);
             seed = *restarts as u64;
@@ -105,15 +106,15 @@ pub(super) fn interleave_searches<T: TimeNumber>(
             let work = turn.saturating_mul(share);
             if pursue(&mut greedy[position], &mut exact, work, limits, record) == Outcome::Exhausted {
                 let mode = greedy.remove(position).mode;
-                // Pruned successors may have reached a state earlier, so a complete restart may
-                // find better plans.
+                // Successors that were pruned as duplicates may reach a state at an earlier time, so
+                // a complete restart may find better plans.
                 greedy.extend((mode == Mode::Overlapping).then(|| begin(Mode::Sooner).with_noise(seed)));
                 let restarts = &mut record.statistics.restarts;
                 *restarts = restarts.saturating_add(1);
             }
         }
         improve(&mut orders, &mut exact, turn.saturating_mul(share), limits, record);
-        // Plans better than a sequential one have more overlap.
+        // Once a plan is known, sequential mode is dropped: better plans usually overlap more.
         greedy.retain(|search| search.mode != Mode::Sequential || exact.incumbent.is_none());
         let _span = info_span!("search").entered();
         // Without a plan, the greedy search gets a larger share: a plan is more useful than a
@@ -125,7 +126,8 @@ pub(super) fn interleave_searches<T: TimeNumber>(
     (claimed(search_end, (concurrent, &exact), root), exact.incumbent)
 }
 
-/// Resumes a greedy search, from each improved plan to the next.
+/// Resumes a greedy search, again after each better plan, until it generates `work` successors without
+/// finding one or has ended. Each better plan is reported and becomes the incumbent.
 fn pursue<T: TimeNumber>(
     greedy: &mut Greedy<'_, T>,
     exact: &mut Search<'_, T>,
@@ -146,8 +148,8 @@ fn pursue<T: TimeNumber>(
     }
 }
 
-/// Resumes the search over goal orders, from each improved plan to the next. Removes it when it has
-/// ended.
+/// Resumes the search over goal orders for `work` work units. Each better plan is reported and becomes
+/// the incumbent. Sets `orders` to `None` once the search has ended.
 fn improve<T: TimeNumber>(
     orders: &mut Option<GoalOrders<'_, T>>,
     exact: &mut Search<'_, T>,

@@ -163,7 +163,7 @@ fn edges<T: TimeNumber>(
                 let over_all = instance.over_all.map(|id| &task.operators[id.index()]);
                 let required_value = over_all.and_then(|over_all| value_in(&over_all.condition.facts));
                 edges.push(match (value_in(&start.effects), from) {
-                    // The start's value persists until the end: either the condition over all
+                    // The start's value persists until the end: either the over-all condition
                     // requires it, or no other happening sets it, including other runs of the
                     // instance.
                     (Some(set), Some(from))

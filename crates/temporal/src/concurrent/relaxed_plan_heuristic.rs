@@ -42,7 +42,8 @@ pub(super) struct RelaxedPlanHeuristic<'a> {
     unmet: Vec<u32>,
     sums: Vec<u32>,
     marked: Vec<bool>,
-    /// Per numeric condition: amount that is missing. `None` if unknown.
+    /// Per numeric condition: amount that is missing. `None` if the expression can have any value, so
+    /// that the condition counts as satisfied.
     missing: Vec<Option<Int>>,
     open: Queue,
     targets: Vec<Proposition>,

@@ -14,8 +14,8 @@ pub(super) struct RelevanceContext<'k, T: TimeNumber = Int> {
     /// known.
     pub(super) most: &'k [u32],
     pub(super) separation: T,
-    /// Per variable: whether a fact with a value other than 0 may be needed, i.e. the falsity of a
-    /// single atom.
+    /// Per variable: whether a fact with a value other than 0 may be needed. For a variable of a single
+    /// atom, this fact is the falsity of the atom.
     pub(super) needed: &'k [bool],
     /// Polarity of each number, i.e. whether larger or smaller values can help. Numbers beyond the
     /// end of the list have unknown polarity.
@@ -78,7 +78,7 @@ pub(super) fn asked<T: TimeNumber>(task: &Task, instances: &[Instance<T>]) -> Ve
 }
 
 /// Per variable: whether the falsity of its atoms may be needed. `false` only for a variable of a
-/// single atom that occurs positively in conditions and the goal, and neither in axioms nor in
+/// single atom that occurs only positively in conditions and the goal, and neither in axioms nor in
 /// conditions of conditional effects.
 pub(super) fn needed(task: &Task) -> Vec<bool> {
     let mut falsity_needed: Vec<bool> =

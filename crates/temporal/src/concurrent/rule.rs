@@ -17,7 +17,7 @@ pub(super) struct Rule {
     /// Facts to which the happening certainly sets their variables, so that other values are
     /// deleted. Empty for clauses and derived facts.
     pub(super) sets: Vec<Proposition>,
-    /// Numeric conditions that the rule increases.
+    /// Numeric conditions whose expressions the rule increases.
     pub(super) raises: Vec<NumericEffect>,
     pub(super) weight: u32,
     /// Happening that the rule represents. `None` for clauses and derived facts.

@@ -79,7 +79,7 @@ fn bounds<T: TimeNumber>(
     let mut marked: FxHashMap<Key, Vec<usize>> = FxHashMap::default();
     // Runs of an instance end in the order of their starts.
     let mut open_starts: FxHashMap<u32, VecDeque<usize>> = FxHashMap::default();
-    // Running actions with a joint condition over all, each with the last happening that wrote an
+    // Running actions with a joint over-all condition, each with the last happening that wrote an
     // atom or number in this condition.
     let mut joint: Vec<(u32, usize)> = Vec::new();
     let mut floor = T::ZERO;

@@ -62,7 +62,8 @@ type Priority<T> = (T, T, T, u32, u32);
 pub(super) struct Search<'a, T: TimeNumber = Int> {
     concurrent: &'a TemporalTask<T>,
     estimate: &'a Estimate<T>,
-    /// Lower bounds on costs and resources. `None` if neither costs nor numbers occur.
+    /// Lower bounds on costs and resources. `None` if neither costs nor numbers occur, or if the bounds
+    /// could not be computed.
     bounds: Option<&'a Bounds>,
     expansion: &'a Expansion<'a, T>,
     store: Store<'a, T>,
@@ -120,8 +121,9 @@ impl<'a, T: TimeNumber> Search<'a, T> {
         (total.max(floor), makespan.max(self.floor))
     }
 
-    /// Searches until the open list is exhausted, `max_nodes` nodes were expanded, or a limit is
-    /// reached. The search can be resumed. Better plans and lower bounds are reported to `record`.
+    /// Searches until the open list is exhausted, the work reaches `max_nodes` (expanded nodes and their
+    /// successors), or a limit is reached. The search can be resumed. Better plans and lower bounds are
+    /// reported to `record`.
     pub(super) fn run(
         &mut self,
         limits: &Limits,
@@ -219,7 +221,8 @@ impl<'a, T: TimeNumber> Search<'a, T> {
         self.incumbent.as_ref().is_none_or(|incumbent| value < incumbent.value)
     }
 
-    /// Expands a node with the given lower bound on the metric. Returns the work in nodes.
+    /// Expands a node with the given lower bound on the metric. Returns the work: the number of
+    /// successors, plus 1, plus one unit per [`COMPARED`] comparisons of nodes.
     ///
     /// # Errors
     /// [`Interrupted`] if a limit was reached before the last successor. A node can have tens of

@@ -9,15 +9,15 @@ use task::plan::solution::{Improvement, Moment, PlannerPart, Statistics};
 use crate::concurrent::temporal_task::TemporalTask;
 use crate::concurrent::time_number::TimeNumber;
 
-/// Inverse of the smallest reported rise of the lower bound, relative to the last reported bound. A
-/// bound that reaches the cost of the incumbent is always reported.
+/// A lower bound is recorded if it exceeds the last recorded bound by more than 1/`REPORT_STEP` of that
+/// bound. A bound that reaches the cost of the incumbent is always recorded.
 const REPORT_STEP: Int = 100;
 
 pub(super) struct Record<'r, T: TimeNumber = Int> {
     concurrent: &'r TemporalTask<T>,
     report: &'r mut dyn FnMut(Improvement),
     started: Instant,
-    /// Last reported integer metric of the best plan, and last reported integer lower bound.
+    /// Last recorded integer metric of the best plan, and last recorded integer lower bound.
     noted: Option<(Option<Rational>, Rational)>,
     cost: Option<Rational>,
     /// Initial lower bound if the search is incomplete; later lower bounds are capped at this
@@ -56,8 +56,8 @@ impl<'r, T: TimeNumber> Record<'r, T> {
         }
     }
 
-    /// Records a lower bound. Returns the bound after capping it at the ceiling and at the cost of
-    /// the incumbent.
+    /// Adds a lower bound to the history, if it has risen enough or the incumbent has changed. Returns
+    /// the bound after capping it at the ceiling and at the cost of the incumbent.
     pub(super) fn report_lower_bound(&mut self, lower: Rational) -> Rational {
         let caps = self.ceiling.iter().chain(&self.cost);
         let lower = caps.fold(lower, |lower, cap| if *cap < lower { cap.clone() } else { lower });

@@ -174,7 +174,7 @@ impl<T: TimeNumber> Index<'_, T> {
         let [starts, ends] = [start, end].map(|operator| -> Vec<Fact> {
             operator.effects.iter().filter(|fact| fact.variable != under_way).copied().collect()
         });
-        // The run that ends first deletes a fact that the condition over all of the other run
+        // The run that ends first deletes a fact that the over-all condition of the other run
         // requires. So the runs start and end together, and one run has the effect of both.
         if ends.iter().any(|fact| clashes(*fact, &alone.over_all)) {
             return Some(1);
@@ -321,7 +321,7 @@ impl<T: TimeNumber> Index<'_, T> {
     }
 
     /// Returns `true` if no happening during a run, other than those of `own`, reads or sets the
-    /// variable.
+    /// variable, and no axiom reads it.
     fn is_hidden(
         &self,
         own: &Instance<T>,

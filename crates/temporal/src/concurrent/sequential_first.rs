@@ -33,7 +33,7 @@ use crate::concurrent::temporal_task::TemporalTask;
 use crate::concurrent::time_number::TimeNumber;
 
 /// Upper limit on the operators of the temporal task; for larger tasks, no sequential task is
-/// ground.
+/// grounded.
 const OPERATORS: usize = 100_000;
 
 /// Work units of the satisficing search per evaluation of the greedy temporal search.
@@ -106,7 +106,8 @@ impl SequentialTask {
                 }
                 continue;
             }
-            // The temporal task derives violated preferences from the final state instead.
+            // Hidden actions record violated preferences. The temporal task derives the violations
+            // from the final state instead.
             if is_hidden(&self.task.schema_names[operator.schema as usize]) {
                 continue;
             }
@@ -150,7 +151,7 @@ pub(super) struct SequentialPlanner<'w> {
 }
 
 enum Exact<'w> {
-    /// Absent before the start, because computing the heuristics may take longer than finding a plan.
+    /// The search begins later, because computing the heuristics may take longer than finding a plan.
     Later,
     Begun(Box<InterleavedSearch<'w, Int, Bounds>>),
     Over,

@@ -34,9 +34,9 @@ pub(super) struct RunningAction<T: TimeNumber = Int> {
     pub(super) float: TimePoint,
     pub(super) offset: T,
     pub(super) duration: T,
-    /// Time of the last happening that wrote an atom or number in the condition over all of the
-    /// action, initially its start. `None` unless several happenings can maintain this condition
-    /// jointly.
+    /// Time of the last happening that wrote an atom or number in the over-all condition of the
+    /// action, initially its start. `None` unless several simultaneous happenings can maintain this
+    /// condition jointly.
     last: Option<TimeExpression<T>>,
 }
 
@@ -59,8 +59,8 @@ pub(super) struct SimpleTemporalNetwork<T: TimeNumber = Int> {
     /// Running actions, sorted by instance. Runs of one instance are in the order of their starts,
     /// which is also the order of their ends.
     opens: Vec<RunningAction<T>>,
-    /// Time point and offset at which all further happenings take place until every condition over
-    /// all holds again. `None` if all these conditions hold.
+    /// Time point and offset at which all further happenings take place until every over-all
+    /// condition holds again. `None` if all these conditions hold.
     group: Option<(TimePoint, T)>,
     /// Time of the last happening; negative before the first one.
     latest: TimeExpression<T>,
@@ -83,13 +83,14 @@ pub(super) struct Happening<'h, T: TimeNumber = Int> {
     /// Access kinds that the happening must follow, each with the required distance.
     pub(super) after: &'h [(Key, T)],
     pub(super) marks: &'h [Key],
-    /// Whether several happenings can jointly maintain the condition over all of the instance.
+    /// Whether several simultaneous happenings can maintain the instance's over-all condition jointly,
+    /// because it has a disjunction, a comparison or a derived fact.
     pub(super) joint: bool,
-    /// Returns `true` if the happening writes an atom or number in a condition over all that
-    /// several happenings can maintain jointly. The argument is the instance with this condition.
+    /// Returns `true` if the happening writes an atom or number in an over-all condition that several
+    /// simultaneous happenings can maintain jointly. The argument is the instance with this condition.
     pub(super) touches: &'h dyn Fn(u32) -> bool,
     pub(super) changes: &'h [u32],
-    /// Whether every condition over all of a running action holds after the happening.
+    /// Whether the over-all conditions of all running actions hold after the happening.
     pub(super) settled: bool,
 }
 
@@ -100,7 +101,7 @@ pub(super) struct Event<'h, T: TimeNumber = Int> {
     pub(super) after: &'h [(Key, T)],
     pub(super) marks: &'h [Key],
     pub(super) changes: &'h [u32],
-    /// Whether every condition over all of a running action holds after the literals.
+    /// Whether the over-all conditions of all running actions hold after the literals.
     pub(super) settled: bool,
 }
 
@@ -109,7 +110,7 @@ impl<T: TimeNumber> SimpleTemporalNetwork<T> {
         &self.opens
     }
 
-    /// Returns `true` if some condition over all is violated, so that another happening must follow
+    /// Returns `true` if some over-all condition is violated, so that another happening must follow
     /// at the same time.
     pub(super) fn unsettled(&self) -> bool {
         self.group.is_some()
@@ -236,8 +237,9 @@ impl<T: TimeNumber> SimpleTemporalNetwork<T> {
         Some(next)
     }
 
-    /// Constrains the end of the running action at `position` to keep the distances in `after` from
-    /// earlier accesses. Returns `None` if the network becomes inconsistent.
+    /// Constrains the end of the running action at `position` in `opens` to be far enough behind
+    /// earlier accesses. `after` lists the access kinds that the end must follow, each with the
+    /// required distance. Returns `None` if the network becomes inconsistent.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "sums of fewer than 2^32 times fit, see `TimeNumber::TIME_BITS`"

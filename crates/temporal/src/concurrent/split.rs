@@ -1,9 +1,9 @@
 //! Splits durative actions into starts and ends: a lifted task in which each schema is a single happening.
 //!
 //! A durative action becomes two instantaneous operators, the *snap actions* of Fox and Long \[1\].
-//! An atom that holds while the action runs links both. The condition over all becomes a third
+//! An atom that holds while the action runs links both. The over-all condition becomes a third
 //! schema that never happens; the search checks its condition while the action runs. An action of
-//! duration 0 is one happening without a condition over all. Timed initial literals become a
+//! duration 0 is one happening without an over-all condition. Timed initial literals become a
 //! sequence of schemas without parameters.
 //!
 //! \[1\] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 8.
@@ -24,7 +24,7 @@ use pddl::ast::{Comparison, Name, Span};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Half {
     Start,
-    /// The condition over all; no happening.
+    /// The over-all condition; no happening.
     OverAll,
     End,
     /// The whole action: instantaneous or of duration 0.
@@ -64,8 +64,8 @@ pub(super) struct Split {
     pub(super) durations: Vec<FunctionId>,
     /// Per schema of the domain: whether the planner chooses its duration.
     pub(super) chosen: Vec<bool>,
-    /// Per schema of the domain: static divisor of its duration. The duration is the number that
-    /// holds it, divided by this value.
+    /// Per schema of the domain: static divisor of its duration. The duration is the value of the
+    /// duration fluent, divided by this expression. `None` for no division.
     pub(super) divisors: Vec<Option<Expression>>,
     /// Whether the split task keeps every optimal plan. `false` if a duration was fixed although the planner
     /// could choose it, or if durations are chosen and a condition contains a strict comparison.
@@ -217,7 +217,7 @@ fn timed(lifted: &Lifted, index: u32, event: &Event) -> Schema {
             effect(if holds { Change::Add(predicate, terms) } else { Change::Delete(predicate, terms) })
         })
         .collect();
-    // A plan without actions ends at time 0.
+    // A plan without actions ends at time 0, so literals at this time do not extend it.
     if event.time.is_positive() {
         effects.push(effect(Change::Add(lifted.time.waited, Vec::new())));
     }

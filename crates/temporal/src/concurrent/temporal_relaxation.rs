@@ -1,8 +1,8 @@
 //! Delete relaxation of the split task: rules from conditions to effects.
 //!
-//! Each start, end and instantaneous action becomes a rule, as in the relaxed planning graphs of
-//! CRIKEY \[1\]. A start adds the fact that its action runs, and the end requires this fact, so
-//! required concurrency is visible. An end also requires the condition over all. A numeric
+//! Each start, end, instantaneous action and timed initial literal becomes a rule, as in the relaxed
+//! planning graphs of CRIKEY \[1\]. A start adds the fact that its action runs, and the end requires
+//! this fact, so required concurrency is visible. An end also requires the over-all condition. A numeric
 //! condition needs enough applications of rules to reach its amount \[2\]; a condition on a
 //! duration that the planner chooses always holds.
 //!
@@ -55,7 +55,7 @@ pub(super) struct TemporalRelaxation {
     pub(super) goal: Vec<Proposition>,
     /// Index of the rule for the end of each instance.
     pub(super) ends: Vec<u32>,
-    /// Propositions of the initial values of derived variables.
+    /// Propositions of the default values of derived variables, which hold from the beginning.
     pub(super) defaults: Vec<Proposition>,
     pub(super) conjunctions: Vec<Conjunction>,
 }

@@ -31,8 +31,8 @@ use crate::concurrent::unit::{StaticDurations, Unit};
 pub struct ConcurrentTask(pub(super) Width);
 
 impl ConcurrentTask {
-    /// Returns the numeric fluents of the metric that are not minimised, in PDDL: actions change them by amounts
-    /// that depend on the state.
+    /// Returns the numeric fluents of the metric that the search does not minimise, in PDDL, e.g. because
+    /// actions change them by amounts that depend on the state.
     pub fn not_minimised(&self) -> Vec<String> {
         let (task, is_whole) = match &self.0 {
             Width::Narrow(narrow) => (&narrow.task, narrow.is_whole),
@@ -45,7 +45,7 @@ impl ConcurrentTask {
 
 #[cfg(test)]
 impl ConcurrentTask {
-    /// The task with times of 128 bits.
+    /// The task with times of 128 bits. Panics if the times are wide.
     pub(super) fn narrow(self) -> TemporalTask {
         let Width::Narrow(task) = self.0 else { panic!("the times are wide") };
         *task
@@ -104,8 +104,8 @@ pub(super) struct Scale<'s> {
     pub(super) time_weight: &'s Rational,
 }
 
-/// Builds the temporal task from a ground split task, with the narrowest number type that
-/// represents all constant times.
+/// Builds the temporal task from a ground split task, with the narrow number type for times if it
+/// suffices for all constant times, and with the wide one otherwise.
 pub(super) fn compile(
     mut task: Task,
     split: &Split,
@@ -292,7 +292,8 @@ impl<T: TimeNumber> TemporalTask<T> {
     }
 
     /// Clears the running fact and the duration of an instance in `state`, after the last of its
-    /// simultaneous runs has ended.
+    /// simultaneous runs has ended. Does nothing if the instance has no simultaneous runs, because the
+    /// end itself then clears both.
     pub(super) fn end_last_run(&self, instance: u32, state: &mut State) {
         if let Some(fact) = self.instances[instance as usize].under_way {
             // The variable of the running fact has two values, so this is the other one. No derived
@@ -322,8 +323,9 @@ impl<T: TimeNumber> TemporalTask<T> {
         }
     }
 
-    /// Returns `true` if a happening writes an atom or number that the condition over all of an
-    /// instance reads. Always `false` unless happenings can maintain this condition jointly.
+    /// Returns `true` if the happening `operator` writes an atom or number that the over-all condition of
+    /// `instance` reads. Always `false` unless several simultaneous happenings can maintain this condition
+    /// jointly (see [`Instance::joint`]).
     pub(super) fn touches(&self, operator: OperatorId, instance: u32) -> bool {
         let joint = &self.instances[instance as usize].joint;
         let writes = &self.happenings[operator.index()].writes;

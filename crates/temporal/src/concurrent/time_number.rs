@@ -338,7 +338,7 @@ impl TimeNumber for Wide {
         words.extend(self.0.into_iter().flat_map(|word| [(word & 0xffff_ffff) as u32, (word >> 32) as u32]));
     }
 
-    /// The number of bytes, then the least significant bytes without those that only extend the
+    /// Writes the number of bytes, then the least significant bytes without those that only extend the
     /// sign.
     fn write(self, bytes: &mut Vec<u8>) {
         let buffer = self.to_bytes();

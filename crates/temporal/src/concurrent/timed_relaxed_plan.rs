@@ -30,7 +30,7 @@ use crate::concurrent::time_number::TimeNumber;
 /// A time of the relaxation. Times only guide the search, so larger ones saturate.
 type Time = i64;
 
-/// Durations are rounded to this number of bits, so that sums of thousands of them fit.
+/// Durations are rounded down to this number of bits, so that sums of thousands of them fit.
 const TIME_BITS: u64 = 48;
 /// Time of propositions and actions that are not reached.
 const NEVER: Time = Time::MAX;
@@ -85,7 +85,8 @@ pub(super) struct TimedRelaxation<'a, T: TimeNumber = Int> {
     fired: u32,
     /// Per instance: relaxed time of its start, and its duration then.
     starts: Vec<(Time, Time)>,
-    /// Per numeric condition: amount that is missing. `None` if unknown.
+    /// Per numeric condition: amount that is missing. `None` if unknown; the condition then counts as
+    /// satisfied.
     missing: Vec<Option<Int>>,
     queue: BinaryHeap<Reverse<(Time, u32, Proposition)>>,
 }
@@ -313,7 +314,8 @@ impl<'a, T: TimeNumber> TimedRelaxation<'a, T> {
                 self.limit(*need, by, before);
             }
         }
-        // An end counts for its start. Variants of an operator with more effects are one action.
+        // An end counts for its start. The rules for the conditional effects of an operator are one
+        // action.
         let mut timed: FxHashMap<OperatorId, (Time, u32, u32)> = FxHashMap::default();
         for (rule, times) in used {
             self.is_used[rule as usize] = false;

@@ -28,11 +28,11 @@ pub(super) struct StaticDurations {
 pub(super) struct Unit(pub(super) BigInt);
 
 impl Unit {
-    /// Computes the greatest unit in which all durations, the separation and the times of timed
-    /// initial literals are integers.
+    /// Computes a unit in which all durations, the separation and the times of timed initial literals
+    /// are integers.
     ///
     /// # Errors
-    /// `Error::Overflow` if the unit exceeds the widest integers.
+    /// `Error::Overflow` if the number of units per PDDL time unit has more than `T::TIME_BITS` bits.
     pub(super) fn new<T: TimeNumber>(
         task: &Task,
         split: &Split,
@@ -65,7 +65,7 @@ impl Unit {
         Ok(Self(common))
     }
 
-    /// Returns `true` if all constant times are representable.
+    /// Returns `true` if the unit and all constant times are representable by `T`.
     pub(super) fn fits<T: TimeNumber>(
         &self,
         split: &Split,

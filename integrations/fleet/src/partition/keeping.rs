@@ -47,8 +47,8 @@ impl<S: Store> Partition<S> {
         true
     }
 
-    /// Starts to store in the snapshot of a suspended robot that the progress does not wait for it. Does
-    /// nothing if the snapshot says so or is being written. Returns `true` if a write was started.
+    /// Starts to mark the snapshot of a suspended robot, so that the progress of the partition does not wait for the
+    /// robot. Does nothing if the snapshot has this mark or is being written. Returns `true` if a write was started.
     fn set_apart(&mut self, name: &str) -> bool {
         // Without a snapshot, all that is known about the robot follows the progress.
         let (event, decision) = (self.progress.events, self.progress.decisions);

@@ -1,13 +1,13 @@
 //! A partition, i.e. a fixed group of robots, run by the worker that leases it.
 //!
-//! Events are read in order. Each robot handles one event at a time, and robots run concurrently. A robot
-//! that cannot keep up, or is suspended, does not delay the others: its events stay in the log, and are read
-//! again separately. A
-//! decision is appended only if the robot's last decision has the expected sequence number. So only
-//! one of two workers can decide an event. Robots are saved periodically; the stored progress of
-//! the partition gives the positions from which events and decisions must be read again. A crash is
-//! possible between any two of these operations. A new owner reads the snapshots, replays later
-//! events with the recorded plans, and continues with the first undecided event.
+//! Events are read in order. Each robot handles one event at a time, and robots run concurrently. A robot that cannot
+//! keep up, or is suspended, does not delay the others: its events stay in the log, and are read again separately. A
+//! decision is appended only if the robot's last decision has the expected sequence number. So only one of two workers
+//! can decide an event.
+//!
+//! Robots are saved periodically; the stored progress of the partition gives the positions from which events and
+//! decisions must be read again. A crash is possible between any two of these operations. A new owner reads the
+//! snapshots, replays later events with the recorded plans, and continues with the first undecided event.
 
 mod asking;
 mod keeping;
@@ -49,8 +49,8 @@ pub struct Settings {
     pub save_within: Duration,
     /// Time between two checks whether robots have to be saved.
     pub look: Duration,
-    /// Number of undecided events of a partition in memory from which robots with many of them get no more.
-    /// Their later events are read again when these are decided.
+    /// Limit on the undecided events of a partition in memory. From half of this number on, robots with many undecided
+    /// events get no more; their later events are read again when these are decided.
     pub ahead: usize,
     /// Maximum time that a partition waits for running loops when it is given back. Their events are decided by
     /// the next owner.

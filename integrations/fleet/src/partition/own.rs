@@ -40,7 +40,7 @@ pub(super) struct Partition<S> {
     pub(super) recent: VecDeque<(u64, String)>,
 }
 
-/// Number of undecided events that each robot can have in memory, however many other robots have.
+/// Number of undecided events that each robot can have in memory, regardless of other robots.
 const FEW: usize = 16;
 
 /// Maximum number of events of a robot that are read again at once.
@@ -198,8 +198,8 @@ impl<S: Store> Partition<S> {
         Some(event)
     }
 
-    /// Starts to handle the next queued event of a robot, if the robot is idle. Starts to read more events
-    /// of the robot if the queue lacks some.
+    /// Starts to handle the next queued event of a robot, if the robot is idle. Drops events of a suspended robot, and
+    /// refuses events that a former owner has skipped. Starts to read more events of the robot if the queue lacks some.
     fn begin(&mut self, name: &str) {
         let last_decision = self.seen.1;
         loop {
@@ -418,12 +418,12 @@ impl<S: Store> Partition<S> {
     /// would have followed it. The events of the robot are read again by the next owner of the partition.
     pub(super) fn fault(&mut self, robot: &str, event: u64, decision: u64, why: &str) {
         metrics::counter!("metaplan_fleet_faulted_total").increment(1);
-        tracing::error!(partition = self.number, robot, "does not go on: {why}");
+        tracing::error!(partition = self.number, robot, "robot suspended: {why}");
         let subject = Address { partition: self.number, robot: robot.to_owned() }.to_string();
         let slot = self.slot(robot);
         slot.suspended = Some(slot.unsaved.front().copied().unwrap_or((event, decision)));
         slot.unsaved.clear();
-        let text = format!("the robot does not go on: {why}");
+        let text = format!("the robot is suspended: {why}");
         self.refuse(Some((subject, text)), "faulted");
     }
 }

@@ -47,8 +47,8 @@ pub(super) struct Slot {
 }
 
 impl Slot {
-    /// Returns the greatest sequence numbers of events and decisions that the progress of the partition can
-    /// have because of this robot. `None` if the robot does not limit it.
+    /// Returns the greatest sequence numbers of events and decisions up to which the progress of the partition may
+    /// advance without losing data of this robot. `None` if the robot does not limit the progress.
     pub(super) fn limits(&self) -> Option<(u64, u64)> {
         if self.is_apart {
             return None;

@@ -60,7 +60,7 @@ impl<S: Store> Task<S> {
             Err(Faulted(why)) => Outcome::Faulted(why),
             Ok(Err(refused)) => Outcome::Refused(refused),
             Ok(Ok(_)) if self.was_refused => Outcome::Faulted(format!(
-                "event {} was refused by a former owner, and would not be now",
+                "event {} was refused by a former owner, but would be accepted now",
                 event.sequence
             )),
             Ok(Ok(mut decided)) => {
@@ -169,7 +169,7 @@ impl<S: Store> Task<S> {
                 },
                 Err(Fault::TooLong(length)) => {
                     return Outcome::Faulted(format!(
-                        "a decision of {length} bytes is longer than the server takes"
+                        "a decision of {length} bytes is longer than the server accepts"
                     ));
                 }
                 Err(Fault::Unreachable(_)) => {}

@@ -62,8 +62,8 @@ impl Threads {
         tokio::task::spawn_blocking(work).await
     }
 
-    /// Runs a search. `estimate` is the expected duration, if the robot has searched before. Returns also the
-    /// [new estimate](updated).
+    /// Runs a search. `estimate` is the expected duration, if the robot has searched before. Also returns the [new
+    /// estimate](updated).
     ///
     /// # Errors
     /// The search has panicked.

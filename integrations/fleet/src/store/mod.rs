@@ -125,10 +125,10 @@ pub struct Entry {
 pub enum Fault {
     /// The last message of the subject or the current value of the key is not the expected
     /// predecessor.
-    #[error("another message or value is there than was expected")]
+    #[error("the stored message or value is not the expected one")]
     Conflict,
     /// The message with this number of bytes is longer than the server accepts.
-    #[error("the message has {0} bytes; that is more than the server takes")]
+    #[error("the message has {0} bytes; that is more than the server accepts")]
     TooLong(usize),
     /// The result is unknown: the operation may still succeed. It has to be retried.
     #[error("{0}")]

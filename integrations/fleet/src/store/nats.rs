@@ -1,12 +1,13 @@
 //! NATS JetStream as a log.
 //!
-//! The streams are called `FLEET-events` and `FLEET-decisions`, and there is a bucket for each
-//! [`Bucket`]. The subjects of the fleet `fleet`, the default, have no prefix (`ev.PARTITION.ROBOT`),
-//! those of another fleet begin with its name (`FLEET.ev.PARTITION.ROBOT`), so that several fleets
-//! can share the servers. The subjects of an existing fleet are those with which it was created. All have the number of replicas with which they were created. The last message of a
-//! subject and the message with a sequence number are read from the leader of the stream. Values of
-//! a bucket may be read from a replica that lags behind; conditional writes then fail. Consumers may
-//! lag behind, too, so a caller passes the sequence number up to which a consumer has to read.
+//! The streams are called `FLEET-events` and `FLEET-decisions`, and there is a bucket for each [`Bucket`]. The subjects
+//! of the default fleet `fleet` have no prefix (`ev.PARTITION.ROBOT`). Those of another fleet begin with its name
+//! (`FLEET.ev.PARTITION.ROBOT`), so that several fleets can share the servers. An existing fleet keeps the subjects and
+//! the number of replicas with which it was created.
+//!
+//! The last message of a subject and the message with a sequence number are read from the leader of the stream. Values
+//! of a bucket may be read from a replica that lags behind; conditional writes then fail. Consumers may lag behind,
+//! too, so a caller passes the sequence number up to which a consumer has to read.
 
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -98,7 +99,7 @@ impl From<Fault> for OpenError {
     }
 }
 
-/// Returns whether servers that have not finished starting can cause an error of this kind.
+/// Returns `true` if servers that have not finished starting can cause an error of this kind.
 fn is_transient(kind: ConnectErrorKind) -> bool {
     match kind {
         ConnectErrorKind::Dns
@@ -139,14 +140,14 @@ impl Nats {
     /// JetStream leader, so failures are retried for the duration `patience`, each with a warning.
     ///
     /// # Errors
-    /// The name of the fleet is invalid, a file of `access` cannot be read, the servers refuse access,
-    /// or a stream of this name does not belong to a fleet. After `patience`: no server can be reached, or it has no JetStream.
+    /// The name of the fleet is invalid, a file of `access` cannot be read, the servers refuse access, or a stream of
+    /// this name does not belong to a fleet. After `patience`: no server can be reached, or it has no JetStream.
     pub async fn open(access: &Access, layout: &Layout, patience: Duration) -> Result<Self, Diagnostic> {
         let wrong =
             |error: &dyn std::fmt::Display| Diagnostic::error("N311", format!("{}: {error}", access.url));
         if !is_name(&layout.fleet) {
             let text = format!(
-                "`{}` is no name of a fleet: use up to 64 letters, digits, `-` and `_`",
+                "`{}` is not a name of a fleet: use up to 64 letters, digits, `-` and `_`",
                 layout.fleet
             );
             return Err(wrong(&text));
@@ -270,8 +271,8 @@ impl Nats {
         &self.buckets[bucket as usize]
     }
 
-    /// Reads the messages of a stream that match `filter`, beginning as `from` requires. Calls `take` with each message and its
-    /// sequence number.
+    /// Reads the messages of a stream that match `filter`, beginning as `from` requires. Calls `take` with each message
+    /// and its sequence number.
     async fn read(
         &self,
         name: &str,
@@ -304,7 +305,7 @@ impl Nats {
                     (info.stream_sequence, info.consumer_sequence, info.pending)
                 };
                 if number != expected {
-                    return Err(failed("messages were lost on their way"));
+                    return Err(failed("messages were lost"));
                 }
                 expected += 1;
                 got += 1;
@@ -314,7 +315,7 @@ impl Nats {
             }
             total += got;
             if got == 0 {
-                return Err(failed("the server has no more messages, and should have"));
+                return Err(failed("the server lacks messages that it should have"));
             }
         }
         // The server would also remove an unused consumer by itself, but later.

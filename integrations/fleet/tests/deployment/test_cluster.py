@@ -266,4 +266,4 @@ def test_fleets_share_a_server(server, tmp_path):
         # Each fleet counts its own events.
         assert json.loads(decided.partition(" ")[2])["event"] == 1
     out = call("status", "--nats", url, "--fleet", "no.name")
-    assert out.returncode == 2 and "is no name of a fleet" in out.stderr, out.stderr
+    assert out.returncode == 2 and "is not a name of a fleet" in out.stderr, out.stderr

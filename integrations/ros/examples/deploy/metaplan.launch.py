@@ -13,7 +13,7 @@ from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-# Name, default, what it is.
+# Name, default and description of each argument.
 ARGUMENTS = (
     ("program", "metaplan-ros", "the program: a path, or a name on PATH"),
     ("role", "manager", "manager, reasoner, planner or controller"),
@@ -44,7 +44,7 @@ def start(context):
             parameters=[value["params_file"]] if value["params_file"] else [],
             remappings=[("/diagnostics", value["diagnostics"])],
             output="screen",
-            # With a journal it goes on where it was.
+            # With a journal, the program resumes where it ended.
             respawn=True,
             respawn_delay=2.0,
         )

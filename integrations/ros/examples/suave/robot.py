@@ -38,7 +38,7 @@ def main() -> None:
         print("waits for metaplan-ros")
         if not robot.wait(120.0):
             sys.exit("nobody serves /task/request")
-        # It waits for the functions first.
+        # Metaplan waits for the functions before it handles tasks.
         robot.node.spin(6.0)
         robot.monitors.visibility(3.5, now())
         tell(robot, "the water is clear: 3.5 m")

@@ -24,7 +24,8 @@ use crate::node::{Clock, Lifecycle, Node, Severity};
 use crate::perform::Perform;
 use crate::performer::performers;
 
-/// Period of the clock input and of the manager's own status on `/diagnostics`.
+/// Period of the clock input, of the requests for modes of new servers, and of the manager's own status on
+/// `/diagnostics`.
 const PERIOD: Duration = Duration::from_secs(1);
 
 /// Limit on the number of inputs that are kept while the manager is inactive.
@@ -32,8 +33,8 @@ const MAX_DELAYED_INPUTS: usize = 100_000;
 
 const SEARCH_TIME: Duration = Duration::from_millis(200);
 
-/// Time after which a task that is requested while functions are missing is refused. SUAVE's
-/// mission node waits for five seconds.
+/// Time after which a task that is requested while functions are missing is refused. SUAVE's mission node waits five
+/// seconds for the reply.
 const TASK_WAIT: Duration = Duration::from_secs(4);
 
 const GRAPH_LOG_PERIOD: Duration = Duration::from_secs(5);
@@ -68,7 +69,7 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
     }
     let timeout = node.declare_seconds(
         "call_timeout",
-        "How long a function may take to change its mode before it is asked once more, in seconds.",
+        "Time after which an unfinished change of mode is requested again, in seconds.",
         5.0,
     )?;
     let attribute = |name: &str| {
@@ -116,7 +117,7 @@ fn journal(node: &Node, options: &Options, control: &mut Loop) -> Result<Option<
         node.log(Severity::Warn, warning.text().trim_end());
     }
     if recovery.replayed.is_some() {
-        let text = format!("goes on from the journal after {} lines", control.beliefs().lines());
+        let text = format!("continues from the journal after {} lines", control.beliefs().lines());
         node.log(Severity::Info, &text);
     }
     Ok(Some(journal))
@@ -139,8 +140,9 @@ struct Driver {
 }
 
 impl Driver {
-    /// Waits until the functions are present or `stop` is set, and logs the missing ones periodically.
-    /// Requests to start or end a task wait for at most [`TASK_WAIT`]; a start is then refused.
+    /// Waits until the functions are present or `stop` is set, and logs the missing ones periodically. Then checks the
+    /// designs and passes the current modes of the functions to the state machine. Requests to start or end a task wait
+    /// for at most [`TASK_WAIT`]; a start is then refused.
     fn wait_for_functions(
         &mut self,
         sender: &Sender<Input>,
@@ -193,7 +195,7 @@ impl Driver {
         let silent = modes.iter().filter(|(_, mode)| mode.is_none()).count();
         let text = match silent {
             0 => "every function answers".to_owned(),
-            _ => format!("{silent} of {} functions do not say which mode they have", modes.len()),
+            _ => format!("{silent} of {} functions do not report their modes", modes.len()),
         };
         self.node.log(Severity::Info, &text);
         self.handle(Input::Ready(modes))?;
@@ -252,8 +254,8 @@ impl Driver {
         Ok(())
     }
 
-    /// While the node is inactive, refuses tasks and keeps other inputs. They are handled when the node is
-    /// active, or when [`MAX_DELAYED_INPUTS`] are kept.
+    /// While the node is inactive, refuses requests to start or end a task, and keeps other inputs. The kept inputs are
+    /// handled when the node is active, or when there are [`MAX_DELAYED_INPUTS`].
     fn wait_for_activation(&mut self, inputs: &Receiver<Input>) -> Result<(), Message> {
         let mut delayed = Vec::new();
         while !self.active.load(Ordering::Relaxed) && delayed.len() < MAX_DELAYED_INPUTS {

@@ -155,7 +155,7 @@ impl Robot {
         let mut missing: Vec<String> =
             futures::future::join_all(missing).await.into_iter().flatten().collect();
         if !self.node.is_written("/diagnostics") {
-            missing.push("nobody writes on /diagnostics".to_owned());
+            missing.push("/diagnostics has no publisher".to_owned());
         }
         missing
     }
@@ -175,7 +175,7 @@ impl Robot {
                         Seen::Mode(mode) => Ok(mode),
                         Seen::Nothing => Ok(String::new()),
                         Seen::Unsettled | Seen::Ambiguous => {
-                            Err(format!("the nodes of {name} do not show which design it has"))
+                            Err(format!("the nodes of {name} do not show the current design"))
                         }
                     },
                 };
@@ -253,8 +253,8 @@ impl Robot {
         }
     }
 
-    /// Requests the modes of functions with new servers, because a restarted server has lost its
-    /// mode. The loss of a node that steps use also changes the mode.
+    /// Requests the modes of functions with new servers, because a restarted server has lost its mode. If steps set the
+    /// designs of a function, a lost server of its nodes counts, too.
     pub(super) fn request_new_modes(&mut self) {
         let mut names = Vec::new();
         for (name, function) in &mut self.functions {
@@ -439,7 +439,8 @@ fn subscribe_function(
     subscribe_transitions(node, &topic, move || drop(sender.send(Input::Touched(name.clone()))))
 }
 
-/// Subscribes to parameter changes of the functions' nodes, and to the lifecycle of the nodes that steps use.
+/// Subscribes to parameter changes of the functions' nodes and of the nodes that steps use, and to the lifecycle of the
+/// latter.
 fn subscribe_nodes(
     node: &Arc<Node>,
     settings: &Settings,

@@ -27,7 +27,7 @@ pub struct Settings {
     /// Tasks by the names with which they are requested.
     #[serde(default)]
     pub tasks: BTreeMap<String, TaskSettings>,
-    /// Names of functions and designs in `system_modes`, if they differ.
+    /// Names of functions and designs in `system_modes`, if they differ, or steps that put designs into effect.
     #[serde(default)]
     pub functions: Functions,
     /// Diagnostics of drivers that report a component or measure an attribute.
@@ -76,7 +76,7 @@ impl Source {
 pub struct TaskSettings {
     /// PDDL condition that ends the task.
     pub goal: String,
-    /// Facts that hold when the task begins, as for `--set`.
+    /// Facts and values that are set when the task begins, as with `--set`.
     #[serde(default)]
     pub facts: BTreeMap<String, toml::Value>,
 }

@@ -324,7 +324,6 @@ impl<A: Action> Goals<A> {
     }
 }
 
-/// Registers the expected types and hashes of all topics of an action in the graph.
 /// Names and type hashes of the interfaces of an action.
 struct ActionNames<'n> {
     package: &'n str,
@@ -360,6 +359,7 @@ impl<'n> From<&'n ActionType> for ActionNames<'n> {
     }
 }
 
+/// Registers the expected types and hashes of all topics of an action in the graph.
 fn expect_action(graph: &Graph, full: &str, names: ActionNames<'_>) {
     use crate::interfaces::action_msgs::srv::CancelGoal;
     let ActionNames { package, name, send_goal, get_result, feedback } = names;
@@ -426,7 +426,7 @@ impl Node {
             loop {
                 for error in served.poll(&graph, &mut gates, &mut take) {
                     let Some(node) = weak.upgrade() else { return };
-                    node.log(Severity::Warn, &format!("what {full} has heard is wrong: {error}"));
+                    node.log(Severity::Warn, &format!("a message to {full} is malformed: {error}"));
                 }
                 if weak.strong_count() == 0 {
                     return;

@@ -30,7 +30,8 @@ impl Arrivals {
 }
 
 impl Node {
-    /// Waits until a topic has a number of subscribers that are matched, at most for `within`. Returns the number.
+    /// Waits until at least `count` subscribers of a topic are matched with a publisher of this program, at most for
+    /// `within`. Returns their number.
     pub(crate) async fn await_subscribers(&self, name: &str, count: usize, within: Duration) -> usize {
         let topic = format!("rt{}", self.resolve(name));
         let enough = |graph: &Graph| (graph.matched_readers(&topic) >= count).then_some(());
@@ -77,7 +78,7 @@ impl Node {
             let Some((package, message)) = message_type(&kind) else {
                 node.log(
                     Severity::Warn,
-                    &format!("{full} has the type {kind}, which is no message of ROS 2"),
+                    &format!("{full} has the type {kind}, which is not a message type of ROS 2"),
                 );
                 return;
             };
@@ -116,9 +117,9 @@ impl Node {
         inner.create_subscription(&topic, Some(profile))
     }
 
-    /// Subscribes to a topic once it has a publisher; see [`Node::subscribe_raw`]. If the publisher is latched, samples are received
-    /// reliably, beginning with the last one. Otherwise, only new samples are received, with best effort. A
-    /// failed subscription is logged.
+    /// Subscribes to a topic once it has a publisher; see [`Node::subscribe_raw`]. If the publisher is latched, samples
+    /// are received reliably, beginning with the last one. Otherwise, only new samples are received, with best effort.
+    /// A failed subscription is logged.
     ///
     /// # Errors
     /// The name is not a valid topic name.

@@ -64,7 +64,7 @@ impl RosArguments {
     }
 
     fn take(&mut self, word: &str, words: &mut impl Iterator<Item = String>) -> Result<(), Errors> {
-        let mut next = || words.next().ok_or_else(|| vec![invalid(format!("`{word}` wants a value"))]);
+        let mut next = || words.next().ok_or_else(|| vec![invalid(format!("`{word}` requires a value"))]);
         match word {
             "-r" | "--remap" => self.rules.push(rule(&next()?)?),
             "-p" | "--param" => self.parameters.push(parameter(&next()?)?),
@@ -76,7 +76,7 @@ impl RosArguments {
             _ if word.starts_with("--enable-") || word.starts_with("--disable-") => {}
             _ => {
                 let text = format!(
-                    "`{word}` is not known behind `--ros-args`; -r, -p, --params-file and --log-level are"
+                    "`{word}` is not known after `--ros-args`; -r, -p, --params-file and --log-level are"
                 );
                 return Err(invalid(text).into());
             }

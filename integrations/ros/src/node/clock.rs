@@ -130,7 +130,7 @@ impl Node {
                 state.is_simulated && state.simulated.is_none()
             };
             if is_missing {
-                let text = "use_sim_time is true and nobody publishes on /clock: time stands still";
+                let text = "use_sim_time is true, but /clock has no publisher: time does not advance";
                 node.log(Severity::Warn, text);
             }
         });

@@ -31,7 +31,7 @@ pub(crate) struct Graph {
 
 #[derive(Debug, Default)]
 struct GraphState {
-    /// Participants by GUID prefix, and the time of the first discovery.
+    /// Vendors of the participants, by GUID prefix.
     participants: BTreeMap<[u8; 12], Vendor>,
     first: Option<Instant>,
     endpoints: BTreeMap<[u8; 16], Endpoint>,
@@ -459,8 +459,8 @@ fn is_reader(guid: [u8; 16]) -> bool {
     matches!(guid[15], 0x04 | 0x07)
 }
 
-/// Parses the type hash that endpoints of ROS 2 Jazzy and later publish: `typehash=RIHS01_…;` in
-/// their user data (REP 2011).
+/// Parses the type hash that endpoints of ROS 2 Iron and later publish: `typehash=RIHS01_…;` in their user data (REP
+/// 2011).
 fn type_hash(user_data: &[u8]) -> Option<String> {
     let text = String::from_utf8_lossy(without_length(user_data));
     let hash = text.split(';').find_map(|part| part.trim_matches('\0').strip_prefix("typehash="))?;

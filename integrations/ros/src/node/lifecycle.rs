@@ -22,7 +22,7 @@ pub enum Phase {
     Unconfigured,
     /// The node has read its mission and is idle.
     Inactive,
-    /// The node works.
+    /// The node has read its mission and performs its role.
     Active,
     /// The node is shutting down.
     Finalized,
@@ -296,8 +296,8 @@ impl Lifecycle {
 
     fn change_state(&self, requested: &Transition) -> bool {
         let from = self.phase();
-        // As in rcl_lifecycle, a label is used if there is no id, and every id of a shutdown has
-        // the label of the current state.
+        // As in rcl_lifecycle, a label is used if there is no id. The label `shutdown` has a different id in each
+        // state.
         let is_requested = |phase_change: &&PhaseChange| {
             phase_change.from == from
                 && if requested.id == 0 {

@@ -1,10 +1,10 @@
 //! A node of a ROS 2 graph over DDS: topics, services, actions, parameters, log and lifecycle, without a ROS
 //! installation.
 //!
-//! Names are expanded and remapped as in ROS 2. Received messages are passed to closures on a thread of the
-//! executor, which must return quickly. Samples of the wrong type and endpoints with another type are
-//! reported and ignored. Our own services wait until a participant reveals its mapping of services, at most
-//! for one second after the first discovery (see `rmw`).
+//! Names are expanded and remapped as in ROS 2. Received messages are passed to closures, which must return quickly, on
+//! a thread of the executor. Samples of the wrong type and endpoints with another type are reported and ignored. Our
+//! own services wait until a participant reveals its mapping of services, at most for one second after the first
+//! discovery (see `rmw`).
 
 mod action;
 mod any_topic;
@@ -148,9 +148,9 @@ impl Node {
         Ok(node)
     }
 
-    /// Ends the background tasks and announces the departure to participants of Fast DDS. The library
-    /// announces it to the others when the node is dropped. Without this call the tasks may hold the
-    /// participant until the program ends, and the others wait for the lease.
+    /// Ends the background tasks and announces the departure to participants of Fast DDS. The library announces it to
+    /// the others when the node is dropped. Without this call, the tasks may hold the participant until the program
+    /// ends, and the others notice the departure only when the lease expires.
     pub fn close(&self) {
         let tasks = std::mem::take(&mut *self.tasks.lock().unwrap_or_else(PoisonError::into_inner));
         let canceled = futures::future::join_all(tasks.into_iter().map(Task::cancel));
@@ -216,7 +216,7 @@ fn client_name(full: &str) -> Result<ros2_client::Name, Message> {
 }
 
 fn creation_error(entity: &str, error: &dyn std::fmt::Display) -> Message {
-    Message::error("N122", format!("{entity} could not be made: {error}"))
+    Message::error("N122", format!("{entity} could not be created: {error}"))
 }
 
 /// Returns `true` if `ROS_DISTRO` is `lyrical` or `rolling`, in which some message types differ.

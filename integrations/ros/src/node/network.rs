@@ -61,8 +61,9 @@ impl Network {
             }
         };
         if let Some(peers) = value("ROS_STATIC_PEERS") {
-            let text =
-                format!("ROS_STATIC_PEERS ({peers}) is not supported: only what multicast finds is there");
+            let text = format!(
+                "ROS_STATIC_PEERS ({peers}) is not supported: participants are discovered by multicast only"
+            );
             warnings.push(Message::warning("N111", text));
         }
         Ok((Self { domain, loopback }, warnings))

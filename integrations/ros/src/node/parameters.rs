@@ -124,8 +124,8 @@ impl Node {
         Ok(warnings)
     }
 
-    /// Declares a single parameter, a time in seconds that can be set while the node runs. Returns
-    /// its value in milliseconds. Other parameters of the command line are logged as warnings.
+    /// Declares a single parameter, a time in seconds that can be set while the node runs. Returns its value in
+    /// milliseconds. Undeclared parameters of the command line are logged as warnings.
     ///
     /// # Errors
     /// See [`Node::declare`].

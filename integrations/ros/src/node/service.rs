@@ -50,7 +50,7 @@ impl<S: Service> Responder<S> {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CallError {
     /// The service has no server.
-    #[error("nobody serves {service} after {waited} s")]
+    #[error("{service} has no server after {waited} s")]
     Absent {
         /// Full name of the service.
         service: String,
@@ -67,7 +67,8 @@ pub enum CallError {
     },
     /// The server exists, but the reply did not arrive in time.
     #[error(
-        "no answer from {service} after {waited} s; it was called with the mapping of {mapping}, `--rmw {other}` has the other one"
+        "no answer from {service} after {waited} s; it was called with the mapping of {mapping}; `--rmw \
+         {other}` selects the other one"
     )]
     Silent {
         /// Full name of the service.
@@ -79,7 +80,8 @@ pub enum CallError {
         /// Value of the option `--rmw` that selects the other mapping.
         other: &'static str,
     },
-    /// The reply is not a message of the service's type, or the request could not be written.
+    /// The reply is not a message of the service's type, the request could not be written, or the client could not be
+    /// created.
     #[error("{service}: {because}")]
     Broken {
         /// Full name of the service.
@@ -148,7 +150,7 @@ impl<S: Service> Caller<S> {
             futures::FutureExt::fuse(Timer::after(remaining)),
         );
         futures::select! {
-            answer = answer => answer.map_err(|error| broken(format!("the answer is none: {error}"))),
+            answer = answer => answer.map_err(|error| broken(format!("the answer is malformed: {error}"))),
             _ = timer => Err(CallError::Silent {
                 service: self.full.clone(),
                 waited: seconds(within),
@@ -278,7 +280,7 @@ impl Node {
                         Some(Ok((id, request))) => gate.push(id, request),
                         Some(Err(error)) => {
                             let Some(node) = weak.upgrade() else { return };
-                            node.log(Severity::Warn, &format!("a request to {full} is none: {error}"));
+                            node.log(Severity::Warn, &format!("a request to {full} is malformed: {error}"));
                             drop(node);
                             Timer::after(Duration::from_millis(1)).await;
                         }

@@ -182,7 +182,7 @@ impl Node {
                     Ok((message, info)) => take(message, published(&info).unwrap_or_else(SystemTime::now)),
                     Err(error) => {
                         if invalid_count % INVALID_PER_LOG_MESSAGE == 0 {
-                            let text = format!("what was heard on {full} is not a {type_name}: {error}");
+                            let text = format!("a message on {full} is not a {type_name}: {error}");
                             node.log(Severity::Warn, &text);
                         }
                         invalid_count += 1;

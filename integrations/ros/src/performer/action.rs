@@ -103,11 +103,11 @@ pub(super) async fn pursue_on<A: Action>(
                 }
                 Ok(Accepted::Ended(GoalEnd::Canceled, _)) => return End::Canceled,
                 Ok(Accepted::Ended(GoalEnd::Aborted, result)) => {
-                    let because = shortfall(&result).unwrap_or_else(|| "its server gave up".to_owned());
+                    let because = shortfall(&result).unwrap_or_else(|| "its server has aborted the goal".to_owned());
                     return End::Failed(because);
                 }
                 Ok(Accepted::Lost(because)) => return End::Failed(because),
-                Err(_) => return End::Failed("nothing more is heard of it".to_owned()),
+                Err(_) => return End::Failed("its server no longer responds".to_owned()),
             },
             () = canceled => pursued.cancel(),
         }

@@ -98,7 +98,7 @@ impl TryFrom<CallEntry> for AnyCall {
     }
 }
 
-/// Values for which a text of the settings stands.
+/// Values that replace the placeholders in texts of the settings, e.g. `{2}` and `{pose 2}`.
 trait Values {
     /// Value of an argument, counted from 1.
     fn argument(&self, number: usize) -> Result<String, String>;
@@ -130,7 +130,7 @@ fn pose_value(stamped: PoseStamped, is_stamped: bool) -> Result<Value, String> {
     value.map_err(|error| error.to_string())
 }
 
-/// Values that have the types of all later ones, to check the fields when the settings are read.
+/// Sample values with the types of the later values, to check the fields when the settings are read.
 struct Sample;
 
 impl Values for Sample {

@@ -10,9 +10,9 @@ use crate::perform::{Call, End, Perform, Running};
 use crate::performer::action::SERVER_TIMEOUT;
 use crate::performer::settings::argument;
 
-/// Performer that executes an action by a call of `change_mode`. The fields `function` and `design`
-/// are the positions of these values among the arguments of the action, counted from 1. `None`
-/// selects the last argument but one and the last argument.
+/// Performer that executes an action by a call of `change_mode`. The fields `function` and `design` are the positions
+/// of these values among the arguments of the action, counted from 1. Without a position, the last argument but one is
+/// the function, and the last argument is the design.
 #[derive(Debug)]
 pub(super) struct ChangeMode {
     node: Arc<Node>,

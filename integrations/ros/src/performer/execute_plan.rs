@@ -45,7 +45,8 @@ impl ExecutePlans {
         Self { caller }
     }
 
-    /// Starts the execution of a plan. The progress is the completed share of the plan's actions.
+    /// Starts the execution of a plan. An executor of an older version requests the plan itself, so `plan` is then
+    /// ignored. The progress is the completed share of the plan's actions.
     pub fn start(&self, plan: Plan) -> Running {
         let (running, performance) = Running::pair();
         match &self.caller {

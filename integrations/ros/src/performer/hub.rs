@@ -167,7 +167,7 @@ async fn negotiate(
             Next::Time
         };
         match smol::future::or(received, smol::future::or(canceled, time)).await {
-            Next::Message(None) => return End::Failed("actions_hub is heard no more".to_owned()),
+            Next::Message(None) => return End::Failed("actions_hub is no longer received".to_owned()),
             Next::Message(Some(message)) => match negotiation.react(&message) {
                 Reaction::Nothing => {}
                 Reaction::Reply(reply) => hub.send(reply),

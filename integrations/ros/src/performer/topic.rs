@@ -40,7 +40,7 @@ impl Perform for Awaited {
                 let received = async {
                     match receiver.recv().await {
                         Ok(()) => End::Succeeded,
-                        Err(_) => End::Failed("the topic is heard no more".to_owned()),
+                        Err(_) => End::Failed("the topic is no longer received".to_owned()),
                     }
                 };
                 let canceled = async {

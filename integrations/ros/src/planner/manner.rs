@@ -24,31 +24,31 @@ fn declared() -> Vec<Declared> {
     vec![
         parameter(
             "plan_solver_timeout",
-            "how long whoever asks for a plan waits for it, in seconds",
+            "time for which a client of the planner waits for a plan, in seconds",
             ParameterValue::Double(DEFAULT_TIMEOUT),
             timeout,
         ),
         parameter(
             "plan_solver_plugins",
-            "accepted, as PlanSys2's parameter files have it; there are no plugins here",
+            "accepted for PlanSys2's parameter files and ignored: there are no plugins",
             ParameterValue::StringArray(Vec::new()),
             any_value,
         ),
         parameter(
             "metric",
-            "what is minimised where the problem has no metric, as PlanSys2's problems have none: `(cost)`, `total-time`",
+            "the metric to minimise if the problem has none, as problems of PlanSys2: `(cost)`, `total-time`",
             ParameterValue::String(String::new()),
             any_value,
         ),
         parameter(
             "overlap",
-            "whether durative actions may overlap: `yes`, `no`, or `auto`: unless a knowledge base joins in",
+            "whether durative actions may overlap: `yes`, `no`, or `auto` (`yes` without a knowledge base, else `no`)",
             ParameterValue::String("auto".to_owned()),
             overlap,
         ),
         parameter(
             "alternatives",
-            "up to so many further plans that are as good, in the answer of get_plan_array",
+            "maximum number of further equally good plans in the answer of get_plan_array",
             ParameterValue::Integer(DEFAULT_ALTERNATIVES as i64),
             alternatives,
         ),

@@ -132,7 +132,7 @@ impl Planner {
         let planner = Arc::clone(self);
         if let Err(error) = on_a_thread(name, move || work(&planner)) {
             // The client receives no reply and times out.
-            self.node.log(Severity::Error, &format!("{name}: there is no further thread: {error}"));
+            self.node.log(Severity::Error, &format!("{name}: no thread can be started: {error}"));
         }
     }
 

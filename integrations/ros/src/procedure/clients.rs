@@ -172,7 +172,8 @@ impl Clients {
         self.nodes.get(name).ok_or_else(|| Failure::Refused(format!("{name} has no client")))
     }
 
-    /// Connects to the services of an operation. Returns the missing ones.
+    /// Connects to the services of an operation, or waits for the subscribers of its message. Returns descriptions of
+    /// the missing ones.
     pub(super) async fn missing(&self, operation: &Operation, within: Duration) -> Vec<String> {
         let mut missing = Vec::new();
         let mut note =
@@ -214,8 +215,9 @@ impl Clients {
         }
     }
 
-    /// Returns the GUIDs of the servers that report the state or the parameters of a node. Of a condition about
-    /// messages, the result is empty unless the condition holds: its change shows that the mode has changed.
+    /// Returns the GUIDs of the servers that report the state or the parameters of a node. For a condition about the
+    /// last message on a topic, returns an invented id while the condition holds, so that a change of the result shows
+    /// a change of the mode.
     pub(super) fn servers(&self, condition: &Condition) -> BTreeSet<[u8; 16]> {
         let (Condition::State { node, .. } | Condition::Parameters { node, .. }) = condition else {
             let is_met = !matches!(condition, Condition::Topic(_)) && self.is_met(condition);
@@ -358,7 +360,7 @@ impl Clients {
     }
 
     /// Publishes a message once the topic has enough subscribers, unless it is the last message already. Passes the
-    /// message before to `before`.
+    /// previous message to `before`.
     pub(super) async fn publish(
         &self,
         message: &TopicMessage,
@@ -410,9 +412,8 @@ impl Clients {
         }
     }
 
-    /// Returns `true` if a node has the required state or parameters, or the last message on a topic the required
-    /// values, and always for the arrival of a message. Fails if the
-    /// node is silent or in a transition.
+    /// Returns `true` if a node has the required state or parameters, or if the last message on a topic has the
+    /// required values. The arrival of a message is not checked. Fails if the node is silent or in a transition.
     pub(super) async fn holds(&self, condition: &Condition) -> Result<bool, Failure> {
         match condition {
             Condition::State { node, state } => {

@@ -17,7 +17,8 @@ use crate::types::TopicMessage;
 pub(crate) enum Outcome {
     /// All steps have succeeded and all conditions hold.
     Done,
-    /// A step has failed or a condition does not hold, although the robot answers. Earlier steps are undone.
+    /// A step has failed, a condition does not hold although the robot answers, or a newer request replaces the
+    /// procedure. Earlier steps are undone.
     Failed(String),
     /// A node does not answer. Earlier steps are undone as far as possible.
     Silent(String),
@@ -88,7 +89,8 @@ impl Procedures {
         self.functions.contains_key(function)
     }
 
-    /// Returns `true` if a function has procedures, and none of them sets or verifies a state or a parameter.
+    /// Returns `true` if a function has procedures, and none of their steps and conditions can be observed later, as
+    /// states, parameters and published messages can.
     pub(crate) fn is_unobservable(&self, function: &str) -> bool {
         self.functions.get(function).is_some_and(|procedures| procedures.conditions().next().is_none())
     }
@@ -103,8 +105,8 @@ impl Procedures {
         conditions.filter_map(node).collect()
     }
 
-    /// Returns the servers of the nodes that show the mode of a function. A restarted or lost node changes
-    /// them.
+    /// Returns the servers of the nodes that show the mode of a function, and an id for each condition about messages
+    /// that holds. The result changes if a node is restarted or lost, or if another message is published.
     pub(crate) fn servers(&self, function: &str) -> BTreeSet<[u8; 16]> {
         let conditions = self.functions.get(function).into_iter().flat_map(FunctionProcedures::conditions);
         conditions.flat_map(|condition| self.clients.servers(&condition)).collect()
@@ -131,9 +133,9 @@ impl Procedures {
         missing.into_iter().min_by_key(Vec::len).unwrap_or_default()
     }
 
-    /// Returns the mode whose conditions hold: of several, the one with the most conditions, or else the one
-    /// that was put into effect or seen last. While a mode without observable conditions is in effect, it is
-    /// returned. The result is [`Seen::Unknown`] while a procedure runs.
+    /// Returns the mode whose conditions hold: of several, the one with the most conditions, or else the one that was
+    /// put into effect or seen last. While a mode without observable conditions is in effect, it is returned. The
+    /// result is [`Seen::Unsettled`] while a procedure runs or a node does not answer.
     pub(crate) async fn observe(&self, function: &str) -> Seen {
         let Some(procedures) = self.functions.get(function) else { return Seen::Ambiguous };
         // The modes in the middle of a procedure mean nothing.
@@ -187,7 +189,7 @@ impl Procedures {
         self.clients.holds(condition).await.ok()
     }
 
-    /// Returns `true` if the nodes whose silence has ended a procedure answer again.
+    /// Returns `true` if the nodes whose silence has ended a procedure answer again. Their silence is then forgotten.
     pub(crate) async fn answers(&self, function: &str) -> bool {
         let Some(procedures) = self.functions.get(function) else { return false };
         let silent = procedures.silent.lock().unwrap_or_else(PoisonError::into_inner).clone();

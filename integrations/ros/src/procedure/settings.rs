@@ -28,11 +28,12 @@ pub(crate) struct Procedure {
     pub(crate) timeout: Option<Duration>,
 }
 
-/// A step, with the operation that undoes it if its results cannot be undone by themselves.
+/// A step, with the operation that undoes it if the program cannot derive this operation.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Step {
     pub(crate) operation: Operation,
-    /// Operation that is executed if a later step fails. State transitions and parameters need none.
+    /// Operation that is executed if a later step or a condition fails. State transitions and parameters need none, and
+    /// a message needs one only if there was no earlier message.
     pub(crate) undo: Option<Operation>,
 }
 

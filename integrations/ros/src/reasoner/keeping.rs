@@ -394,7 +394,8 @@ impl Keeping {
     }
 }
 
-/// Returns a number as JSON text, with its digits if it is a JSON number, and otherwise (`+1`, `.5`) as the nearest double.
+/// Returns a number as JSON text: with its digits if it is a JSON number, and otherwise (`+1`, `.5`) as the nearest
+/// double.
 fn json_number(text: &str) -> String {
     match serde_json::from_str::<serde_json::Number>(text) {
         Ok(_) => text.to_owned(),

@@ -58,7 +58,7 @@ impl MemoryFile {
         let path = directory.join("reasoner.json");
         let failed = |text: String| Message::at("N141", &path.display().to_string(), None, text);
         std::fs::create_dir_all(directory)
-            .map_err(|error| failed(format!("the directory cannot be made: {error}")))?;
+            .map_err(|error| failed(format!("the directory cannot be created: {error}")))?;
         let last = match std::fs::read_to_string(&path) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Memory::default(),
             Err(error) => return Err(failed(format!("the file cannot be read: {error}"))),

@@ -68,7 +68,7 @@ impl Network {
         let to_errors = |message: Message| vec![message];
         let period = node.declare_seconds(
             "reasoning_period",
-            "How often is told how objectives are, in seconds; what changes is told at once.",
+            "Period of reports on objectives, in seconds; changes are reported immediately.",
             1.5,
         )?;
         let (sender, inputs) = mpsc::channel();
@@ -155,7 +155,7 @@ impl Network {
     fn go_on(&mut self) {
         let Some(memory) = self.memory.as_ref().map(MemoryFile::read) else { return };
         if !memory.goals.is_empty() {
-            let text = format!("goes on from the journal with {} objectives", memory.goals.len());
+            let text = format!("continues from the journal with {} objectives", memory.goals.len());
             self.node.log(Severity::Info, &text);
         }
         let goals: Vec<GoalId> =

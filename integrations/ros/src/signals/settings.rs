@@ -261,7 +261,7 @@ fn target(entry: &Entry, source: &Source) -> Result<Target, String> {
             if let Source::Field { kind, field, .. } = source
                 && field.is_text(&kind.structure)?
             {
-                return Err("the field is a text, which is no value of an attribute".to_owned());
+                return Err("the field is a text, which cannot be the value of an attribute".to_owned());
             }
             Ok(Target::Attribute {
                 attribute: attribute.clone(),

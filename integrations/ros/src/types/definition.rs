@@ -202,7 +202,7 @@ fn add_line(line: &str, part: &mut Part, package: &str) -> Result<(), String> {
     let kind = field_type(kind, package)?;
     if let Some(value) = value.strip_prefix('=') {
         let FieldType { base: Base::Primitive(kind), count: Count::One, .. } = kind else {
-            return Err(format!("the constant `{name}` is no single value"));
+            return Err(format!("the constant `{name}` is not a single value"));
         };
         part.constants.push(Constant { name: name.to_owned(), kind, value: value.trim().to_owned() });
     } else {

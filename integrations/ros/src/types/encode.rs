@@ -14,9 +14,9 @@ use super::field::{FieldPath, unknown_field};
 use super::structure::{Layout, Structure};
 
 impl Structure {
-    /// Encodes a message. Fields that the table does not give have their default values. Of a number, the name
-    /// of a constant may be given, of a `Duration` or `Time` its seconds, and of NaN or an infinite number its text
-    /// `nan`, `inf` or `-inf`.
+    /// Encodes a message. Fields that the table does not give have their default values. For a number, the table may
+    /// contain the name of a constant; for a `Duration` or `Time`, a number of seconds; and for NaN or an infinite
+    /// number, the text `nan`, `inf` or `-inf`.
     ///
     /// # Errors
     /// A field does not exist or cannot have its value.
@@ -26,8 +26,8 @@ impl Structure {
         Ok(writer.0)
     }
 
-    /// Returns a value of a field as [`Structure::find`] returns it: the value of a constant for its name, a
-    /// rounded number for a `float32`.
+    /// Converts a value of a field to the form in which [`Structure::find`] returns it: the name of a constant to its
+    /// value, and a number to the nearest `float32` if this is the type of the field.
     ///
     /// # Errors
     /// The field does not exist or cannot have the value.

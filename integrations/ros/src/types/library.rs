@@ -17,7 +17,7 @@ use super::structure::{Layout, Structure, StructureField};
 /// Names and definitions of the interfaces of this package.
 static DEFINITIONS: &[(&str, &str)] = include!(concat!(env!("OUT_DIR"), "/definitions.rs"));
 
-/// Upper limit on the number of single values that a message has at least.
+/// Upper limit on the number of single values that the shortest message of a type has, without elements of sequences.
 const MAX_VALUES: u64 = 1_000_000;
 
 /// A definition in the settings.
@@ -143,7 +143,8 @@ impl Library {
         ))
     }
 
-    /// Resolves an interface of a folder. Returns its structures, and the descriptions for hashes.
+    /// Resolves an interface, which must be in the folder `folder` (`msg`, `srv` or `action`). Returns it with its
+    /// structures, and the descriptions from which hashes are computed.
     fn resolve(
         &self,
         name: &str,
@@ -151,9 +152,7 @@ impl Library {
     ) -> Result<(Interface, Vec<Arc<Structure>>, Descriptions), String> {
         let mut resolver = Resolver { library: self, structures: BTreeMap::new(), open: BTreeSet::new() };
         if name.split('/').nth(1) != Some(folder) {
-            return Err(format!(
-                "`{name}` is not the name of a type here, which is such as `package/{folder}/Name`"
-            ));
+            return Err(format!("`{name}` is not the name of a type; write `package/{folder}/Name`"));
         }
         let interface = self.interface(name)?;
         let structures: Vec<_> = interface

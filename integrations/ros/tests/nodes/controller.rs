@@ -119,7 +119,7 @@ fn it_gives_up_and_it_can_be_stopped() {
     let controls = control(domain, &stop);
     until("the end", || controls.is_finished());
     let end = controls.join().expect("no panic");
-    assert!(end.as_ref().is_err_and(|text| text.starts_with("5 plans on end have failed")), "{end:?}");
+    assert!(end.as_ref().is_err_and(|text| text.starts_with("5 consecutive plans have failed")), "{end:?}");
     assert_eq!(goals.lock().expect("no panic").len(), 5);
     // Without an executor, cancellation has no effect.
     let other = crate::common::domain();

@@ -81,7 +81,7 @@ fn services_answer_or_it_is_said_why_not() {
     let nobody = client.caller::<Task>("/task/cancel");
     let error =
         block_on(nobody.call(TaskRequest::default(), Duration::from_millis(200))).expect_err("nobody");
-    assert_eq!(error.to_string(), "nobody serves /task/cancel after 0.2 s");
+    assert_eq!(error.to_string(), "/task/cancel has no server after 0.2 s");
     drop(server);
     until("the server is gone", || !caller.is_served());
 }

@@ -63,7 +63,7 @@ def killed_reasoner(setting: Setting) -> str:
         robot.node.spin(0.3)
         program.start()
         check(
-            program.wait_output("goes on from the journal with 2 objectives", 10.0),
+            program.wait_output("continues from the journal with 2 objectives", 10.0),
             "it does not go on from the journal",
         )
         robot.node.spin(3.0)

@@ -4,7 +4,6 @@ import contextlib
 import json
 import os
 import pathlib
-import random
 import statistics
 import subprocess
 import sys
@@ -14,7 +13,8 @@ import time
 from collections.abc import Callable, Iterator
 
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-os.environ["ROS_DOMAIN_ID"] = str(random.randrange(1, 100))
+# Runs side by side need different domains, because the shared memory of Fast DDS ignores network namespaces.
+os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 99)
 
 import rclpy  # noqa: E402  (reads the environment)
 from rclpy.context import Context  # noqa: E402

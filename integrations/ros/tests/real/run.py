@@ -567,9 +567,13 @@ SCENARIOS = {
 
 
 def main() -> None:
-    """Runs the scenarios that the command line names, or all."""
+    """Runs the scenarios that the command line names, or all. `--shard 2/3` runs the second third of all."""
     rclpy.init()
     scenarios = SCENARIOS
+    if sys.argv[2:3] == ["--shard"]:
+        number, shards = map(int, sys.argv.pop().split("/"))
+        sys.argv.pop()
+        scenarios = dict(list(SCENARIOS.items())[number - 1 :: shards])
     if sys.argv[2:3] == ["--cold-starts"]:
         count = int(sys.argv.pop())
         sys.argv.pop()

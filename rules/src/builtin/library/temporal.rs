@@ -132,7 +132,8 @@ struct DurationComparison {
     negated: bool,
 }
 
-/// A test of one of Allen's interval relations, between an instant and an instant or period.
+/// A test of one of Allen's interval relations (or `intersects`), possibly negated, between an instant and an instant
+/// or period.
 struct AllenRelation {
     iri: &'static str,
     relation: fn(Period, Period) -> bool,

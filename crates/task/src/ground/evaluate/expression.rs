@@ -50,7 +50,7 @@ pub fn ground(
                 return Err(Failure::Error(Error::NonLinear { place: *place }));
             }
             let divisor = divisor.quantity.constant;
-            // Division by zero leaves the value undefined, and the action inapplicable.
+            // Division by zero leaves the value undefined.
             if divisor == Rational::from_integer(0) {
                 return Err(Failure::Undefined);
             }

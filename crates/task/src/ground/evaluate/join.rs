@@ -1,8 +1,9 @@
 //! Enumerates the bindings of quantified variables by a join over atoms that must hold.
 //!
-//! Quantifiers range over the product of the types of their variables, but most bindings fail a static atom.
-//! The atoms of the quantified formula are therefore joined: the possible rows of each atom are looked up by
-//! its bound arguments. Only the remaining variables are enumerated by type.
+//! Quantifiers range over the product of the types of their variables, but typically most bindings fail a
+//! static atom. The atoms of the quantified formula are therefore joined: the rows (argument tuples that can
+//! hold) of each atom are looked up by its bound arguments. Only the remaining variables are enumerated by
+//! type.
 
 use crate::ground::vocabulary::atom::Binding;
 use crate::ground::vocabulary::world::World;
@@ -39,8 +40,9 @@ pub fn guards_of_forall(body: &Formula) -> Vec<Guard<'_>> {
 }
 
 /// Calls `visit` with every binding of the variables in `bound` for which all guards (necessary atoms) can
-/// hold, until `visit` returns `false`. Returns `true` if `visit` always returned `true`. Afterwards the
-/// variables are unbound, unless the enumeration was interrupted.
+/// hold, until `visit` returns `false`. Other bindings may be visited, too, because some guards are not
+/// evaluated. Returns `true` if `visit` always returned `true`. Afterwards the variables are unbound, unless
+/// the enumeration was interrupted.
 ///
 /// # Errors
 /// The deadline has passed or the run is interrupted.
@@ -120,7 +122,7 @@ impl Join<'_> {
         binding: &Binding,
     ) -> Option<Level> {
         let guard = match last {
-            // Candidates are enumerated only after the rows of all guards (necessary atoms).
+            // Candidates are enumerated only after the rows of all usable guards (necessary atoms).
             Some(Level { options: Options::Candidates(..), .. }) => None,
             _ => self.next_guard(binding),
         };

@@ -1,9 +1,9 @@
 //! Computes the fluents and atoms that the start or end of an action reads. The rule of no moving targets in
 //! PDDL 2.1 \[1\] forbids that a simultaneous happening changes them.
 //!
-//! Every atom and fluent in a condition or effect counts as read, even if its value does not matter in a
-//! state. This includes all instances of an atom below a quantifier, and everything that the axioms of a
-//! derived predicate read.
+//! Every atom and fluent in a condition, in the condition of an effect or in an assigned value counts as read,
+//! even if its value does not matter in a state. This includes all instances of an atom below a quantifier, and
+//! everything that the axioms of a derived predicate read.
 //!
 //! \[1\] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 8.4.
 
@@ -131,7 +131,8 @@ impl Reads {
         while let Some(predicate) = open.pop() {
             for axiom in lifted.axioms.iter().filter(|axiom| axiom.predicate == predicate) {
                 let mut below = Self::default();
-                // Arguments in the body of an axiom are not related to the arguments of its head.
+                // How the arguments in the body of an axiom depend on those of its head is not analysed: any
+                // arguments count as read.
                 below.literals(&axiom.condition);
                 for (predicate, _) in below.atoms {
                     if seen.insert(predicate) {

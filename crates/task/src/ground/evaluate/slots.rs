@@ -28,7 +28,8 @@ impl Slots<'_> {
 /// and count as 0.
 ///
 /// # Errors
-/// The expression is not linear, the deadline has passed, or the run is interrupted.
+/// The expression is not linear, a part that mentions no slot is undefined, the deadline has passed, or the run
+/// is interrupted.
 pub fn open(
     world: &mut World<'_>,
     expression: &Expression,

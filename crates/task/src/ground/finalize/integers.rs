@@ -1,5 +1,5 @@
-//! Scales exact rationals to integers, with a common factor for each kind of number (for example costs).
-//! Shared tables are converted only once.
+//! Converts exact rationals to the number type of the task. For integers, numbers are multiplied by a common
+//! factor for each kind of number (for example costs). Shared tables are converted only once.
 
 use std::collections::hash_map::Entry;
 use std::sync::Arc;

@@ -1,4 +1,5 @@
-//! Last grounding stage: converts atoms to finite-domain variables, and rationals to integers.
+//! Last grounding stage: converts atoms to finite-domain variables, and rationals to the number type of the
+//! task (usually integers).
 
 mod conditions;
 mod integers;
@@ -73,7 +74,7 @@ pub fn finish<N: TaskNumber>(
         None => Condition::default(),
     };
     let exclusive =
-        || contradictory(&goal).then(|| "the goal asks for atoms that exclude each other".to_owned());
+        || contradictory(&goal).then(|| "the goal requires atoms that exclude each other".to_owned());
     let unreachable = unreachable.or_else(exclusive);
     let axioms = axioms(&task.axioms, &atoms, &mut numbers)?;
     let mut task = Task {

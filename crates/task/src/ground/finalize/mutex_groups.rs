@@ -1,12 +1,13 @@
 //! Mutex groups: sets of atoms at most one of which is true in each reachable state. They become
 //! finite-domain variables.
 //!
-//! Invariant synthesis after Helmert [1]. A candidate is a set of predicates with key arguments; at most one
-//! further argument of each predicate is counted, i.e. ignored (more for atoms of running actions). An
-//! instance of the candidate fixes the objects of the key. The candidate is an invariant if no operator
-//! increases the number of true atoms of any instance. If an operator violates a candidate, the candidate is
-//! extended by a predicate that the operator deletes. The check uses ground operators, so statically
-//! impossible instances do not violate candidates.
+//! Invariant synthesis after Helmert \[1\]. A candidate is a set of predicates with key arguments. Each
+//! predicate has at most one further argument (more for atoms of running actions), which may have any value. An
+//! instance of the candidate fixes the objects of the key. For example, the candidate `(at ?robot ?place)` with
+//! the key `?robot` has an instance for each robot: the atoms that place this robot. The candidate is an
+//! invariant if no operator increases the number of true atoms of any instance. If an operator violates a
+//! candidate, the candidate is extended by a predicate that the operator deletes. The check uses ground
+//! operators, so statically impossible instances do not violate candidates.
 //!
 //! \[1\] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial
 //! Intelligence 173, 2009, section 5.
@@ -24,8 +25,8 @@ use crate::ground::vocabulary::task::GroundTask;
 use crate::lifted::{ObjectId, PredicateId};
 use crate::limits::{Interrupted, Limits};
 
-/// A predicate of an invariant candidate, with the argument positions that form the key, in key order. A
-/// remaining argument is counted, i.e. may have any value.
+/// A predicate of an invariant candidate, with the argument positions that form the key, in key order. The
+/// other arguments may have any value.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
 struct Part {
     predicate: PredicateId,
@@ -155,8 +156,8 @@ fn invariants(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Result<Vec
     Ok(accepted)
 }
 
-/// An unconditional or conditional effect: the two conditions that must hold, and the added and deleted
-/// atoms.
+/// An unconditional or conditional effect: the conditions of the operator and of the effect, and the added and
+/// deleted atoms.
 struct Change<'o> {
     conditions: [&'o [GroundLiteral]; 2],
     adds: &'o [AtomId],
@@ -169,8 +170,9 @@ impl Change<'_> {
     }
 }
 
-/// Returns the operator and the key of an instance whose number of true atoms it may increase. Returns `None`
-/// if the operator preserves the candidate.
+/// Returns the operator with the key of an instance that it violates, or `None` if the operator preserves the
+/// candidate. The operator violates an instance if it may increase the number of true atoms, or deletes an atom
+/// without requiring it.
 #[expect(clippy::arithmetic_side_effects, reason = "atoms of one operator are counted")]
 fn broken_by<'o>(
     task: &GroundTask<'_>,
@@ -206,7 +208,7 @@ fn broken_by<'o>(
         for atom in change.deletes {
             if let Some(key) = key_of(task, candidate, *atom) {
                 // A deletion sets the variable to "none of these". This is wrong if another atom of the group
-                // is true.
+                // is true, so the deleted atom must be required.
                 if !change.requires(*atom) {
                     return Some((operator, key));
                 }
@@ -247,7 +249,7 @@ fn refinements(
             let free = (0..arguments.len()).find(|p| arguments[*p] == *object && !positions.contains(p));
             positions.extend(free);
         }
-        // Atoms that represent running actions may have any number of counted arguments. Such an atom
+        // Atoms that represent running actions may have any number of arguments outside the key. Such an atom
         // replaces the value of the variable at the start of the action.
         let is_running = task.world.lifted.predicates.get(predicate.index()).is_some_and(|p| p.running);
         if positions.len() == key.len() && (arguments.len() <= key.len() + 1 || is_running) {

@@ -25,7 +25,7 @@ use crate::task::ForbiddenCombinations;
 /// numeric end effects of an action instance.
 const CASE_LIMIT: usize = 64;
 
-/// A case of an action instance: one combination of truth values of the effect conditions. All parts are
+/// A case of an action instance: one combination of truth values of the effect conditions. All conditions are
 /// expressed over the state before the instance.
 pub(super) struct Case {
     parts: Vec<Residual>,
@@ -57,7 +57,7 @@ impl Start {
     }
 }
 
-/// Conditions between the start and end of an instance, and timed events in between.
+/// Conditions of an instance over all and at its end, and the timed events between its start and end.
 pub(super) struct Middle<'m> {
     pub(super) over_all: &'m [Residual],
     pub(super) at_end: &'m [Residual],
@@ -219,8 +219,9 @@ impl Case {
         if admit_some(&forbidden, &sizes, limits)? { Ok(forbidden.into()) } else { Err(Failure::Undefined) }
     }
 
-    /// Returns the operator of this case (combination of truth values of the effect conditions). The
-    /// `template` provides all its fields except conditions, effects and forbidden combinations.
+    /// Returns the operator of this case (combination of truth values of the effect conditions). Conditions and
+    /// effects come from the case, and all other fields from `template`. The forbidden combinations of the case
+    /// are added to those of `template`.
     #[expect(clippy::arithmetic_side_effects, reason = "something was pushed before")]
     pub(super) fn operator(
         self,

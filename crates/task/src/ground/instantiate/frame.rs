@@ -24,8 +24,9 @@ use crate::number::dense;
 use crate::task::ForbiddenCombinations;
 use crate::task::quantity::{Linear, Quantity};
 
-/// Data that all instances of an action schema share if they agree in the objects for the key parameters,
-/// i.e. the parameters that occur together with slots or in the duration.
+/// Data that all instances of an action schema share if they have the same objects for the key parameters. These
+/// are the parameters in the duration, in the functions of the slots (design parameters that selection
+/// assigns), and in conditions and numeric effects that mention slots.
 pub(super) struct SharedInstanceData<'a> {
     pub(super) designs: Slots<'a>,
     pub(super) slots: Arc<GroundSlots>,

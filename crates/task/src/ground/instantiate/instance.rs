@@ -37,9 +37,9 @@ impl<'a> Instantiation<'a> {
         Self { world, definitions: Definitions::default(), timeline }
     }
 
-    /// Returns the operators of an instance, one for each timeline window and each case of its conditional
-    /// effects that is possible; possibly none. Returns `Failure::Undefined` if the instance is never
-    /// applicable.
+    /// Returns the operators of an instance: one for each possible combination of a timeline window (position
+    /// between timed events) and a case (truth values of the effect conditions). The list may be empty. Returns
+    /// `Failure::Undefined` if the instance is never applicable.
     pub(super) fn operators(
         &mut self,
         outline: &SplitSchema<'_>,

@@ -49,8 +49,9 @@ impl Build<'_, '_> {
         Ok(parts)
     }
 
-    /// Returns the residuals of comparisons that mention slots and depend on the state. Combinations of
-    /// designs that violate a static conjunct are forbidden.
+    /// Returns the residuals of comparisons that mention slots and depend on the state. Combinations of designs
+    /// that violate a static comparison, or another conjunct over several slots, are forbidden. Other conjuncts
+    /// over a single slot are skipped, because `suitable_designs` has evaluated them.
     pub(super) fn open_conditions(&mut self, open: &[(&Formula, SlotSet)]) -> Result<Vec<Residual>, Failure> {
         let mut parts = Vec::new();
         for (conjunct, mentioned) in open {

@@ -1,5 +1,5 @@
-//! Instantiates action schemas: each schema and binding becomes one or more ground operators whose slots are
-//! still open.
+//! Instantiates action schemas: each schema and binding becomes ground operators (none, one or several) whose
+//! slots are still open.
 //!
 //! A durative action becomes a single step (sequential execution of PDDL 2.1, section 8). Conditions on its
 //! middle and end that its start effects make true are dropped; conditions that its start effects make false

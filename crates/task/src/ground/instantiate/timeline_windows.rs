@@ -35,10 +35,10 @@ enum Start {
     Later,
     /// A moment (a very short time) after the event that begins the phase.
     AfterEvent,
-    /// Computed from the required end of the action.
+    /// Earlier than the required time of the end by the duration.
     ByEnd,
-    /// Computed from the required end of the action, and later than the event that begins the phase of the
-    /// start.
+    /// Earlier than the required time of the end by the duration, and later than the event that begins the
+    /// phase of the start.
     LaterByEnd,
 }
 
@@ -77,7 +77,8 @@ impl<'t> TimelineWindow<'t> {
                     timeline.events[later].0.clone() - &timeline.events[earlier].0
                 };
                 // The action starts before the phase of its start ends. It ends in the phase `to`, or exactly
-                // at the event that begins this phase.
+                // at the event that begins this phase. If its longest duration does not reach this event, it
+                // does not reach later phases either.
                 if to > from && most <= apart(to - 1, from) {
                     break;
                 }

@@ -1,9 +1,8 @@
 //! Interval analysis of numeric variables: removes operators and rules whose comparisons can never hold.
 //!
-//! Uses the relaxation of Hoffmann's Metric-FF \[1\] with a lower and an upper bound for each variable. If
-//! the comparisons of an operator are satisfiable within the current intervals, its numeric effects extend
-//! the intervals. For termination, a bound that still changes after a few rounds is set to infinity
-//! (widening).
+//! Uses the relaxation of Hoffmann's Metric-FF \[1\] with a lower and an upper bound for each variable. If each
+//! comparison of an operator is satisfiable within the current intervals, its numeric effects extend the
+//! intervals. For termination, a bound that still changes after a few rounds is set to infinity (widening).
 //!
 //! \[1\] J. Hoffmann: The Metric-FF planning system, JAIR 20, 2003.
 
@@ -25,7 +24,7 @@ struct Interval {
     high: Option<Rational>,
 }
 
-/// Removes operators and rules whose comparisons are unsatisfiable within the reachable intervals. Returns
+/// Removes operators and rules with a comparison that is false everywhere in the reachable intervals. Returns
 /// `true` if any were removed.
 pub fn prune_by_numbers(task: &mut GroundTask<'_>) -> Result<bool, Interrupted> {
     let conditions = task.operators.iter().map(|operator| &operator.condition);
@@ -40,7 +39,7 @@ pub fn prune_by_numbers(task: &mut GroundTask<'_>) -> Result<bool, Interrupted> 
     Ok(operators != task.operators.len() || axioms != task.axioms.len())
 }
 
-/// Returns `true` if the comparisons of the goal are satisfiable within the reachable intervals.
+/// Returns `true` if each comparison of the goal is satisfiable by itself within the reachable intervals.
 pub fn goal_can_hold(task: &GroundTask<'_>) -> Result<bool, Interrupted> {
     let Some(goal) = task.goal.as_ref().filter(|goal| !goal.comparisons.is_empty()) else {
         return Ok(true);

@@ -1,8 +1,8 @@
 //! Pruning: removes irrelevant and unreachable operators, rules and effects.
 //!
 //! Forward pruning uses relaxed reachability over the ground operators and interval analysis of numbers.
-//! Backward pruning removes effects on atoms that no condition reads, and then operators that neither change
-//! the state nor reduce the cost.
+//! Backward pruning removes effects on atoms and numbers that nothing reads, and then operators that neither
+//! change the state nor reduce the cost.
 
 mod forward;
 mod intervals;
@@ -43,7 +43,7 @@ pub fn prune(task: &mut GroundTask<'_>, generality: &Generality) -> Result<Optio
         return Ok(Some(never_true(&task.world.atom_name(atom))));
     }
     if generality.numbers.is_none() && !goal_can_hold(task)? {
-        let reason = "the numbers that the goal asks for are out of reach, even if nothing is ever deleted";
+        let reason = "the numbers that the goal requires cannot be reached, even if nothing is ever deleted";
         return Ok(Some(reason.into()));
     }
     drop_unread_numerics(task);
@@ -65,5 +65,5 @@ fn why_goal_is_false(task: &GroundTask<'_>) -> String {
             }
         }
     }
-    "the goal contradicts what never changes".into()
+    "the goal contradicts static facts".into()
 }

@@ -1,5 +1,5 @@
-//! Relevance analysis: removes effects on atoms and numbers that nothing reads, and then operators without
-//! effects.
+//! Relevance analysis: removes effects on atoms and numbers that nothing reads, and then operators that neither
+//! change the state nor reduce the cost.
 
 use rustc_hash::FxHashSet;
 

@@ -2,9 +2,9 @@
 //! relaxation.
 //!
 //! The lifted task becomes a Datalog program \[1\]. A schema with slots has an auxiliary relation for each
-//! slot. This relation contains the values of the other parameters for which *some* design is suitable.
-//! Designs are no columns of the relation of applicable instances, so its size is independent of the number
-//! of designs.
+//! slot. This relation contains the values of the other parameters in the conditions on the slot for which
+//! *some* design is suitable. The relation of applicable instances has no columns for designs, so its size is
+//! independent of their number.
 //!
 //! The rules of static derived predicates are part of the program, with stratified negation and without
 //! relaxation. Derived fluents are relaxed like all other fluents.

@@ -1,7 +1,9 @@
-//! Translates conditions to Datalog rule bodies: exactly if they are static, otherwise relaxed.
+//! Translates conditions to Datalog rule bodies: exactly for the axioms of static derived predicates, otherwise
+//! relaxed.
 //!
-//! A relaxed rule body is true whenever the condition can be true; negated fluents and numeric comparisons
-//! are ignored. Disjunctions and universal quantifiers become auxiliary relations over their free variables.
+//! A relaxed rule body is true whenever the condition can be true. It ignores negated fluents, numeric
+//! comparisons, and universal quantifiers whose conditions contain fluents or comparisons. Disjunctions and
+//! universal quantifiers become auxiliary relations over their free variables.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -31,7 +31,7 @@ impl<K: PartialEq> Equivalent<(K, Arguments)> for Key<'_, K> {
     }
 }
 
-/// A tuple of objects, for look-ups and as a temporary.
+/// A short-lived tuple of objects, for example for a look-up.
 pub type Row = SmallVec<[ObjectId; 8]>;
 
 /// Object assigned to each parameter and quantified variable; `None` for an unassigned variable or a slot.

@@ -27,8 +27,8 @@ pub struct GroundObjective {
     /// Value of the metric in the initial state without the fluents in `rest`, negated for maximisation.
     pub(crate) offset: Rational,
     pub(crate) maximize: bool,
-    /// Fluents with state-dependent changes, with their factors (negated for maximisation). Their final
-    /// values are added to the cost of a plan.
+    /// Fluents of the metric that operator costs do not include, e.g. because of state-dependent changes, with
+    /// their factors (negated for maximisation). Their final values are added to the cost of a plan.
     pub(crate) rest: Vec<(NumericId, Rational)>,
 }
 

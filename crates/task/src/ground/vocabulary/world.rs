@@ -1,4 +1,4 @@
-//! Static facts and values of a task, and the tables of fluent atoms and numeric variables that grounding
+//! Initial facts and values of a task, and the tables of fluent atoms and numeric variables that grounding
 //! creates.
 
 use std::num::Wrapping;
@@ -33,7 +33,8 @@ pub struct World<'a> {
     values: IndexMap<(FunctionId, Arguments), Rational, FxBuildHasher>,
     pub atoms: AtomIndex<PredicateId>,
     pub numerics: AtomIndex<FunctionId>,
-    /// Indices of relations. The key holds the predicate and the set of indexed columns (bit i for column i).
+    /// Tuples of a predicate, indexed by their values in some columns. The key holds the predicate and the set
+    /// of these columns (bit i for column i).
     joins: FxHashMap<(PredicateId, u64), Rows>,
     visited: Wrapping<u32>,
 }
@@ -178,7 +179,8 @@ impl<'a> World<'a> {
         Ok(NumericId(dense(self.numerics.insert_full((function, arguments.into()), ()).0)))
     }
 
-    /// Returns the id of the clock variable, which is 0 initially.
+    /// Returns the id of an auxiliary numeric variable for time (the clock or the moment), which is 0
+    /// initially.
     pub(crate) fn clock(&mut self, function: FunctionId) -> NumericId {
         NumericId(dense(self.numerics.insert_full((function, Box::default()), ()).0))
     }

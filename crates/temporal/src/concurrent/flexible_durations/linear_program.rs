@@ -208,7 +208,7 @@ mod tests {
                     prop_assert_eq!(Some(program.least().clone()), least(&constraints, &second_objective));
                     prop_assert_eq!(program.value(&second_objective), program.least().clone());
                 } else {
-                    // Within a large box it has a minimum, which lies on the border of the box.
+                    // Within a large box, the objective has a minimum, on the border of the box.
                     constraints.extend([affine(1_000_000, [-1, 0]), affine(1_000_000, [0, -1])]);
                     prop_assert!(least(&constraints, &second_objective).is_some_and(|value| value < Rational::from_integer(-1000)));
                 }

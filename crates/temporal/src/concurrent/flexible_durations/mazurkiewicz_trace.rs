@@ -1,9 +1,9 @@
 //! Mazurkiewicz traces \[1\]: sequences that differ only in the order of happenings that do not interfere.
 //!
 //! The sequences of a trace reach the same state and have the same linear program up to the names
-//! of columns. Only the lexicographically first sequence of each trace is searched. An end is
-//! identified by its operator and the index of the run that it ends; runs of one instance keep
-//! their order.
+//! of columns, so the search expands only one of them. The lexicographically first sequence of a
+//! trace identifies the trace. An end is given by its operator and the index of the run that it
+//! ends; runs of one instance keep their order.
 //!
 //! \[1\] A. Mazurkiewicz: Concurrent program schemes and their interpretations, DAIMI PB 78, Aarhus
 //! University, 1977.
@@ -66,8 +66,8 @@ fn depend(concurrent: &TemporalTask, one: OperatorId, other: OperatorId) -> bool
         });
         used.next().is_some()
     };
-    // An instance with a joint condition over all depends on every happening that writes what the
-    // condition reads.
+    // An instance with a joint over-all condition (see `Instance::joint`) depends on every happening
+    // that writes what the condition reads.
     let touches = |id, instance: Option<u32>| instance.is_some_and(|index| concurrent.touches(id, index));
     let mut joint = 0..u32::try_from(concurrent.instances.len()).unwrap_or(u32::MAX);
     is_timed

@@ -85,8 +85,7 @@ pub(super) fn is_exact(concurrent: &TemporalTask) -> bool {
             .all(|instance| instance.joint.is_empty() && is_decided(instance) && takes_time(instance))
 }
 
-/// Searches for a plan with the least metric, until a limit is reached. Among the plans with the same
-/// sequence of happenings, it has the least makespan and then the shortest durations.
+/// Searches for a plan with the least metric, until all sequences are searched or a limit is reached.
 pub(super) fn optimize(concurrent: &TemporalTask, limits: &Limits, mut record: Record<'_>) -> Solution {
     let span = info_span!("optimize", operators = concurrent.task.operators.len());
     let (is_over, lower, best) = span.in_scope(|| take_turns_choosing(concurrent, limits, &mut record));
@@ -112,8 +111,9 @@ pub(super) fn optimize(concurrent: &TemporalTask, limits: &Limits, mut record: R
     }
 }
 
-/// Interleaves the searches. Returns whether the exhaustive search has visited all sequences, the
-/// lower bound on the metric, and the best plan.
+/// Interleaves the exhaustive search, the greedy search and the searches for fixed durations. Returns
+/// whether the exhaustive search has visited all sequences, the lower bound on the metric, and the
+/// best plan.
 fn take_turns_choosing(
     concurrent: &TemporalTask,
     limits: &Limits,

@@ -1,11 +1,11 @@
 //! Partial plans with open times and durations: a prefix of happenings and a linear program.
 //!
-//! The encoding follows POPF \[1\] and COLIN \[2\]. Each start has a column for its time, and
-//! another one for its duration if the planner chooses the duration. The values of numeric fluents
-//! are affine expressions over earlier durations, so each numeric condition is a linear constraint.
-//! Interfering happenings are a separation apart, in the order of the sequence. The end of a
-//! running action is constrained as soon as its predecessors have happened. The first column is the
-//! makespan.
+//! The encoding follows POPF \[1\] and COLIN \[2\]. Each start and each action without duration has
+//! a column for its time. A start has another column for its duration if the planner chooses the
+//! duration. The values of numeric fluents are affine expressions over earlier durations, so each
+//! numeric condition is a linear constraint. Interfering happenings are a separation apart, in the
+//! order of the sequence. Each new happening also constrains the ends of running actions that must
+//! follow it. The first column is the makespan.
 //!
 //! \[1\] A. Coles, A. Coles, M. Fox, D. Long: Forward-chaining partial-order planning, ICAPS 2010.
 //! \[2\] A. Coles, A. Coles, M. Fox, D. Long: COLIN: planning with continuous linear numeric
@@ -44,8 +44,8 @@ pub(super) struct RunningAction {
     /// Value of the number that holds the duration of this run, if the instance has such a number.
     /// Other runs of the instance may have other values.
     number: Option<Affine>,
-    /// Time of the last happening that wrote an atom or number in the joint condition over all of
-    /// the instance. `None` if the instance has no joint condition.
+    /// Time of the last happening that wrote an atom or number in the joint over-all condition of
+    /// the instance (see [`Instance::joint`]). `None` if the instance has no joint condition.
     last: Option<Affine>,
 }
 
@@ -105,7 +105,8 @@ impl Course {
 
     pub(super) fn bytes(&self) -> usize {
         let numbers = self.numbers.iter().map(Affine::bytes);
-        // The table of traces stores about the same amount for each happening again.
+        // `Affine::bytes` includes the expression itself. `size_of::<Passed>()` is added for the
+        // table of traces, which stores about this amount for each happening.
         let times = self.passed.iter().map(|passed| {
             let bytes = passed.time.bytes().saturating_add(passed.duration.bytes());
             bytes.saturating_add(passed.measured.bytes()).saturating_add(size_of::<Passed>())
@@ -152,7 +153,8 @@ impl Course {
     }
 
     /// Returns the partial plan after a happening. `run` identifies the run if the happening is an
-    /// end. Returns `None` if no times and durations satisfy the constraints.
+    /// end. Returns `None` if the happening is not applicable, or if no times and durations satisfy
+    /// the constraints.
     pub(super) fn after(
         &self,
         concurrent: &TemporalTask,
@@ -188,7 +190,8 @@ impl Course {
         Some(next)
     }
 
-    /// Returns `true` if a happening is applicable, ignoring numeric conditions and times.
+    /// Returns `true` if a happening is applicable, ignoring numeric conditions, over-all conditions
+    /// and times.
     fn admits(&self, concurrent: &TemporalTask, (operator, run): (OperatorId, u32), role: Role) -> bool {
         let designs = &concurrent.happenings[operator.index()].designs;
         let clashes = || {
@@ -210,8 +213,9 @@ impl Course {
             && concurrent.task.operators[operator.index()].condition.holds_propositionally(&self.values)
     }
 
-    /// Updates the numbers after a happening, and adds its numeric conditions to `constraints`.
-    /// Returns `None` if a condition is certainly violated.
+    /// Updates the numbers after a happening, and adds its numeric conditions to `constraints`. For
+    /// the start of an action with a chosen duration, also stores the bounds of the duration. Returns
+    /// `None` if a condition is certainly violated.
     fn count(
         &mut self,
         concurrent: &TemporalTask,
@@ -260,8 +264,9 @@ impl Course {
         })
     }
 
-    /// Stores the bounds of the duration in `column` that follow from `constraints` and the lower
-    /// bound `least`. Returns `None` if the bounds contradict each other.
+    /// Adds the constraint that the duration in `column` is at least `least`, and stores the bounds of
+    /// the duration that follow from all `constraints`. Returns `None` if the bounds contradict each
+    /// other.
     fn note_range(&mut self, column: Column, least: Rational, constraints: &mut Vec<Affine>) -> Option<()> {
         constraints.push(Affine::column(column).shifted(&-least.clone()));
         let (mut low, mut high) = (least, None);
@@ -295,9 +300,9 @@ impl Course {
         Some(sum)
     }
 
-    /// Appends a happening, and adds its temporal constraints: after earlier happenings that
-    /// interfere with it, and before the ends of running actions that interfere with it. Returns
-    /// `None` if a constraint is certainly violated.
+    /// Appends a happening, and adds its temporal constraints: mainly, it is after earlier happenings
+    /// and before the ends of running actions that interfere with it. Returns `None` if a constraint
+    /// is certainly violated.
     fn pass(
         &mut self,
         concurrent: &TemporalTask,
@@ -368,8 +373,9 @@ impl Course {
         }
     }
 
-    /// Adds constraints that `time` keeps the distances in `after` from all earlier accesses.
-    /// Returns `None` if a constraint is certainly violated.
+    /// Adds the constraints that `time` is far enough behind earlier happenings. `after` lists the
+    /// accesses that `time` must follow, each with the required distance. Returns `None` if a
+    /// constraint is certainly violated.
     fn come_after(
         &self,
         concurrent: &TemporalTask,
@@ -386,7 +392,7 @@ impl Course {
         Some(())
     }
 
-    /// Adds constraints that every condition over all of a running action holds after the last
+    /// Adds constraints that the over-all conditions of all running actions hold after the last
     /// happening, `operator`. Returns `None` if a propositional condition does not hold or a
     /// constraint is certainly violated.
     fn keep_up(

@@ -32,7 +32,7 @@ use crate::concurrent::temporal_task::TemporalTask;
 const BOOST: i64 = 1_000;
 
 /// Queue entry: heuristic value, lower bound on the metric, depth (deepest first), insertion order,
-/// parent node, and the happening with the index of the run that it ends.
+/// parent node, and the happening with the index of the action's run that it ends (0 for a start).
 type QueueEntry = Reverse<(u64, Rational, Reverse<u32>, u32, u32, (OperatorId, u32))>;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -111,8 +111,8 @@ impl<'a> Search<'a> {
         self.bytes.saturating_add(queued) > limits.room() / 4
     }
 
-    /// Searches for a plan that is better than the incumbent, within `work` evaluations of
-    /// sequences.
+    /// Searches for a plan that is better than the incumbent `best`, which it replaces. Takes at most
+    /// `work` entries from the queues.
     pub(super) fn run(&mut self, best: &mut Option<Answer>, limits: &Limits, work: u64) -> Outcome {
         if self.nodes.is_empty()
             && let Some(outcome) = self.take_up(Course::new(self.concurrent), best)

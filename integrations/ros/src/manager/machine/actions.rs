@@ -48,6 +48,6 @@ impl Machine {
             let line = json!({"event": "action_progress", "action": number, "fraction": (fraction * 100.0).round() / 100.0});
             self.lines.push_back(line.to_string());
         }
-        format!("action {number} goes on")
+        format!("action {number} continues")
     }
 }

@@ -8,11 +8,11 @@ use serde_json::json;
 use crate::manager::machine::Machine;
 use crate::manager::machine::io::{Change, Outcome, Output, State};
 
-/// Number of attempts of a call without a reply.
+/// Maximum number of attempts of a call without a reply. A change that consists of steps gets one attempt.
 const MAX_ATTEMPTS: u32 = 2;
 
 /// Half of the delay before the first probe of a function without a reply. The delay is doubled with each
-/// further missed reply.
+/// further change without a reply, up to [`MAX_PROBE_DELAY`].
 const INITIAL_PROBE_DELAY: Duration = Duration::from_secs(1);
 
 const MAX_PROBE_DELAY: Duration = Duration::from_secs(60);
@@ -201,7 +201,8 @@ impl Machine {
         because
     }
 
-    /// Handles a requested mode that is reported after the timeout of its call.
+    /// Handles a mode that was requested, but is reported only after the timeout of its call: its design is realisable
+    /// again.
     pub(super) fn changed_late(&mut self, function: &str, mode: &str) {
         let designs = self.control.beliefs().mission().designs_of(function);
         let Some(design) = self.settings.functions.design(function, mode, &designs) else { return };
@@ -243,8 +244,9 @@ impl Machine {
         format!("{function} answers again")
     }
 
-    /// Retries designs whose delay is over, and requests the modes of contradicted grants whose period is
-    /// over. Passes a due tick to the loop in the state EXECUTE.
+    /// Reports designs as realisable again once their retry delay is over. Forgets granted modes once their
+    /// period is over; if another mode was reported in the meantime, asks for the current mode of the function.
+    /// In the state EXECUTE, also passes a due tick to the loop.
     pub(super) fn tick(&mut self) -> String {
         let now = self.now;
         let mut back = Vec::new();

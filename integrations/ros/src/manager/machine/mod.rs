@@ -136,7 +136,7 @@ impl Machine {
         designs.iter().map(|design| self.settings.functions.mode(function, design).to_owned()).collect()
     }
 
-    /// Handles an input at a time since the start. Returns the outputs.
+    /// Handles an input at the time `now` of the adaptation loop. Returns the outputs.
     ///
     /// # Errors
     /// The journal cannot be written. No outputs may then be executed.
@@ -161,7 +161,7 @@ impl Machine {
                 if !self.pending.contains_key(&function) {
                     self.outputs.push(Output::Look(function.clone()));
                 }
-                format!("{function} has changed something")
+                format!("{function} reports a change")
             }
             Input::Performed(number, ended) => self.performed(number, &ended),
             Input::Progress(number, fraction) => self.progress(number, fraction),
@@ -247,7 +247,7 @@ impl Machine {
     }
 
     fn queue_line(&mut self, line: String) -> String {
-        let because = "what is known has changed".to_owned();
+        let because = "the knowledge has changed".to_owned();
         self.lines.push_back(line);
         because
     }

@@ -125,7 +125,8 @@ impl<A: Action + 'static> ActionCaller<A> {
             sent = sent => sent.map_err(|error| unreachable(error.to_string()))?,
             _ = timer => {
                 let text = format!(
-                    "no answer to a goal after {:.1} s; it was sent with the mapping of {mapping}, `--rmw {}` has the other one",
+                    "no answer to a goal after {:.1} s; it was sent with the mapping of {mapping}; `--rmw {}` \
+                     selects the other one",
                     within.as_secs_f64(),
                     mapping.other()
                 );
@@ -155,7 +156,7 @@ impl<A: Action + 'static> ActionCaller<A> {
         let topics = goal_topics(&self.full);
         let discovered = self.node.graph.wait(within, |graph| graph.server(&topics)).await;
         let server =
-            discovered.ok_or_else(|| format!("nobody serves it after {:.1} s", within.as_secs_f64()))??;
+            discovered.ok_or_else(|| format!("it has no server after {:.1} s", within.as_secs_f64()))??;
         if connection.as_ref().is_none_or(|connected| connected.server != server) {
             let client = self.client(server.mapping).map_err(|message| message.message.clone())?;
             // Answers that the server sends before it has discovered this client are lost.
@@ -204,7 +205,7 @@ impl<A: Action + 'static> Connection<A> {
             absent = if graph.server(&topics).is_some() { 0 } else { absent + 1 };
             if absent > MAX_FAILED_LOOKUPS {
                 for followed in std::mem::take(&mut *self.goals()).into_values() {
-                    let because = format!("nobody serves {full} any more");
+                    let because = format!("the server of {full} is gone");
                     let _ = followed.events.try_send(Accepted::Lost(because));
                 }
             }

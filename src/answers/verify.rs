@@ -1,0 +1,60 @@
+//! Answer of `metaplan verify`, as JSON and as text.
+
+use std::fmt::Write as _;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+use verify::{Verification, VerificationAnswer};
+
+use crate::certificate::Theorem;
+use crate::visible::visible;
+
+/// Name of the theorem in `proved/Optimal.v`.
+const OPTIMAL: &str = "optimal";
+
+/// The claim of a certificate, and the results of checking its parts.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct VerifyAnswer<'a> {
+    #[serde(flatten)]
+    verification: VerificationAnswer<'a>,
+    /// With `--proved`: what follows from a theorem.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    theorem: Option<TheoremPart<'a>>,
+}
+
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+struct TheoremPart<'a> {
+    /// Whether the claim follows from the theorem.
+    proved: bool,
+    /// Name of the theorem in `proved/Optimal.v`; null if it does not apply.
+    name: Option<&'static str>,
+    /// Parts that the theorem covers.
+    parts: &'a [&'static str],
+    /// The proved statement, or the reason why there is none.
+    message: &'a str,
+}
+
+impl<'a> VerifyAnswer<'a> {
+    /// Creates the answer for the result of a verification, and of the proved checker if it was run.
+    pub fn new(report: &'a Verification, theorem: Option<&'a Theorem>) -> Self {
+        let theorem = theorem.map(|theorem| match theorem {
+            Theorem::Holds { statement, parts } => {
+                TheoremPart { proved: true, name: Some(OPTIMAL), parts, message: statement }
+            }
+            Theorem::None(reason) => TheoremPart { proved: false, name: None, parts: &[], message: reason },
+        });
+        Self { verification: VerificationAnswer::new(report), theorem }
+    }
+}
+
+/// Formats a line about the theorem.
+pub fn theorem_line(theorem: &Theorem) -> String {
+    let mut line = String::new();
+    let _ = match theorem {
+        Theorem::Holds { parts, .. } => {
+            writeln!(line, "proved: theorem `{OPTIMAL}` covers the parts {}", parts.join(", "))
+        }
+        Theorem::None(reason) => writeln!(line, "NOT proved by a theorem: {reason}"),
+    };
+    visible(&line).into_owned()
+}

@@ -1,0 +1,246 @@
+//! Runs the proved checker (`proved/`, extracted from Coq) on a certificate, and compares its answer with
+//! that of `metaplan-verify`.
+//!
+//! Two programs are called. `metaplan-proved-prepare` is not trusted: it writes evidence. `metaplan-proved-check`
+//! decides by the function that the theorem `optimal` is about.
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use ::verify::{Claim, Verification, VerifiedPart};
+
+use crate::message::Message;
+
+const PREPARE: &str = "metaplan-proved-prepare";
+const CHECK: &str = "metaplan-proved-check";
+/// Exit statuses of the programs; `proved/ocaml/check.ml` defines them.
+const PROVED: i32 = 0;
+const REJECTED: i32 = 3;
+const NOT_PROVED: i32 = 30;
+
+const POLL_INTERVAL: Duration = Duration::from_millis(5);
+/// Upper limit on the memory of each program, in kilobytes of 2^10 bytes.
+const MEMORY_LIMIT: u64 = 4 << 20;
+/// Parts of a verification that the theorem makes statements about.
+const COVERED_PARTS: [&str; 3] = ["task", "plan", "argument"];
+
+/// The programs of the proved checker.
+#[derive(Debug, Clone)]
+pub struct ProvedChecker {
+    prepare: PathBuf,
+    check: PathBuf,
+}
+
+/// What the proved checker states about a certificate.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Theorem {
+    /// The claim follows from the theorem `optimal`.
+    Holds {
+        /// The proved statement, as the program prints it.
+        statement: String,
+        /// Parts of the verification that the theorem covers.
+        parts: Vec<&'static str>,
+    },
+    /// There is no statement, for this reason: for example, the proved checker does not cover a construct.
+    None(String),
+}
+
+impl ProvedChecker {
+    /// Finds the programs in `folder` if it is given. Otherwise finds them beside the running program or in a
+    /// directory of `PATH`.
+    ///
+    /// # Errors
+    /// M145: no directory has both programs.
+    pub fn find(folder: Option<&Path>) -> Result<Self, Message> {
+        let candidates = if let Some(folder) = folder {
+            vec![folder.to_owned()]
+        } else {
+            let running = std::env::current_exe().ok();
+            let beside = running.as_deref().and_then(Path::parent).map(Path::to_owned);
+            let path = std::env::var_os("PATH").unwrap_or_default();
+            beside.into_iter().chain(std::env::split_paths(&path)).collect()
+        };
+        let program = |folder: &Path, name| folder.join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
+        candidates
+            .iter()
+            .map(|folder| Self { prepare: program(folder, PREPARE), check: program(folder, CHECK) })
+            .find(|checker| checker.prepare.is_file() && checker.check.is_file())
+            .ok_or_else(|| {
+                let place = match folder {
+                    Some(folder) => folder.display().to_string(),
+                    None => "the directory of this program or PATH".to_owned(),
+                };
+                let text = format!(
+                    "the programs `{PREPARE}` and `{CHECK}` are not in {place}: `sh proved/build.sh` in the source code builds them (it needs Coq and OCaml); then add `proved/ocaml` to PATH, or use `--proved=FOLDER`"
+                );
+                Message::error("M145", text)
+            })
+    }
+
+    /// Runs the proved checker on the certificate in `directory`, which `report` is about. If the two checkers
+    /// disagree, adds a failed part `theorem` to the report. Ends the programs as soon as `stop` returns `true`.
+    ///
+    /// # Errors
+    /// M145: a program cannot be started, or a temporary file cannot be written.
+    pub fn compare(
+        &self,
+        directory: &Path,
+        report: &mut Verification,
+        stop: &dyn Fn() -> bool,
+    ) -> Result<Theorem, Message> {
+        let Some(claim) = &report.claim else {
+            return Ok(Theorem::None("the files of the certificate cannot be read".to_owned()));
+        };
+        let answer = self.answer(directory, stop)?;
+        let accepted = COVERED_PARTS.iter().all(|part| {
+            let has_part = *part != "plan" || *claim != Claim::Unsolvable;
+            let is_verified = |verified: &VerifiedPart| verified.part == *part && verified.result.is_ok();
+            !has_part || report.parts.iter().any(is_verified)
+        });
+        let disagreement = match answer {
+            Answer::None(reason) => return Ok(Theorem::None(reason)),
+            Answer::Rejected if !accepted => return Ok(Theorem::None("not proved".to_owned())),
+            Answer::Rejected => "the proved checker does not accept this certificate".to_owned(),
+            Answer::Accepted(statement) if !states(&statement, claim) => {
+                format!("the proved checker proves something else: {statement}")
+            }
+            Answer::Accepted(statement) if accepted => {
+                let parts = report.parts.iter().map(|part| part.part);
+                let parts = parts.filter(|part| COVERED_PARTS.contains(part)).collect();
+                return Ok(Theorem::Holds { statement, parts });
+            }
+            Answer::Accepted(statement) => {
+                format!("the proved checker accepts this certificate ({statement})")
+            }
+        };
+        let reason = format!("the checkers disagree: {disagreement}");
+        report.parts.push(VerifiedPart { part: "theorem", result: Err(reason.clone()) });
+        Ok(Theorem::None(reason))
+    }
+
+    fn answer(&self, directory: &Path, stop: &dyn Fn() -> bool) -> Result<Answer, Message> {
+        let folder = tempfile::tempdir().map_err(|error| failed("a temporary directory", &error))?;
+        let evidence = folder.path().join("evidence");
+        let mut prepare = Command::new(&self.prepare);
+        prepare.arg(directory);
+        let errors = folder.path().join("errors");
+        match run(prepare, &evidence, &errors, stop)? {
+            Ended::Status(PROVED) => {}
+            Ended::Status(_) => return Ok(Answer::None(reason(&errors)?)),
+            Ended::Other(reason) => return Ok(Answer::None(format!("`{PREPARE}` {reason}"))),
+        }
+        let mut check = Command::new(&self.check);
+        check.arg(directory).arg(&evidence);
+        let output = folder.path().join("output");
+        Ok(match run(check, &output, &errors, stop)? {
+            Ended::Status(PROVED) => Answer::Accepted(read(&output)?),
+            Ended::Status(NOT_PROVED) => Answer::Rejected,
+            Ended::Status(REJECTED) => Answer::None(reason(&output)?),
+            Ended::Status(status) => Answer::None(format!("`{CHECK}` ended with status {status}")),
+            Ended::Other(reason) => Answer::None(format!("`{CHECK}` {reason}")),
+        })
+    }
+}
+
+/// The answer of the proved checker.
+enum Answer {
+    Accepted(String),
+    Rejected,
+    /// There is no decision, for this reason.
+    None(String),
+}
+
+/// The end of a program: its exit status, or the reason for ending without one.
+enum Ended {
+    Status(i32),
+    Other(String),
+}
+
+/// Returns `true` if a statement of the proved checker is the claim of the certificate. The program has the
+/// claim from evidence, which is not trusted.
+fn states(statement: &str, claim: &Claim) -> bool {
+    match claim {
+        Claim::Unsolvable => statement == "proved: there is no plan",
+        Claim::Optimal { metric } => statement
+            .strip_prefix("proved: the plan of ")
+            .and_then(|text| text.strip_suffix(&format!(" steps is optimal, metric {metric}")))
+            .is_some_and(|count| count.parse::<usize>().is_ok()),
+    }
+}
+
+fn failed(what: &str, error: &dyn std::fmt::Display) -> Message {
+    Message::error("M145", format!("the proved checker cannot be run: {what}: {error}"))
+}
+
+fn read(file: &Path) -> Result<String, Message> {
+    let bytes = fs::read(file).map_err(|error| failed(&file.display().to_string(), &error))?;
+    Ok(String::from_utf8_lossy(&bytes).trim_end().to_owned())
+}
+
+/// Reads the reason for a rejection that a program has printed.
+fn reason(file: &Path) -> Result<String, Message> {
+    let text = read(file)?;
+    let line = text.lines().last().unwrap_or_default();
+    let line = line.strip_prefix("rejected: ").unwrap_or(line);
+    Ok(if line.is_empty() { "the program has printed no reason".to_owned() } else { line.to_owned() })
+}
+
+/// Runs a program with its output in files. Kills it when `stop` returns `true`, or at the memory limit.
+fn run(
+    mut command: Command,
+    output: &Path,
+    errors: &Path,
+    stop: &dyn Fn() -> bool,
+) -> Result<Ended, Message> {
+    let program = command.get_program().to_string_lossy().into_owned();
+    let wrong = |error: &dyn std::fmt::Display| failed(&program, error);
+    let create =
+        |path: &Path| File::create(path).map_err(|error| failed(&path.display().to_string(), &error));
+    command.stdin(Stdio::null()).stdout(create(output)?).stderr(create(errors)?);
+    let mut child = command.spawn().map_err(|error| wrong(&error))?;
+    loop {
+        if let Some(status) = child.try_wait().map_err(|error| wrong(&error))? {
+            return Ok(match status.code() {
+                Some(code) => Ended::Status(code),
+                None => Ended::Other("ended without an exit status; its stack may be too small".to_owned()),
+            });
+        }
+        let is_large = memory(&child).is_some_and(|size| size > MEMORY_LIMIT);
+        if is_large || stop() {
+            child.kill().and_then(|()| child.wait()).map_err(|error| wrong(&error))?;
+            let reason = if is_large { "needs more than 4096 MB" } else { "did not end within the limits" };
+            return Ok(Ended::Other(reason.to_owned()));
+        }
+        std::thread::sleep(POLL_INTERVAL);
+    }
+}
+
+/// Returns the main memory of a process in kilobytes of 2^10 bytes, where the platform reports it as a file.
+fn memory(child: &Child) -> Option<u64> {
+    let text = fs::read_to_string(format!("/proc/{}/status", child.id())).ok()?;
+    let line = text.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
+    line.trim().strip_suffix(" kB")?.trim().parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn statement_is_compared_with_the_claim() {
+        let metric = |metric: &str| Claim::Optimal { metric: metric.to_owned() };
+        let optimal = "proved: the plan of 4 steps is optimal, metric 408";
+        assert!(states(optimal, &metric("408")));
+        assert!(!states(optimal, &metric("8")));
+        assert!(!states(optimal, &Claim::Unsolvable));
+        assert!(!states(
+            "proved: the plan of 4 steps is optimal, metric 4 steps is optimal, metric 8",
+            &metric("8")
+        ));
+        assert!(states("proved: there is no plan", &Claim::Unsolvable));
+        assert!(!states("proved: there is no plan", &metric("8")));
+    }
+}
