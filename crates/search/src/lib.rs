@@ -20,5 +20,6 @@
 )]
 
 pub mod bounds;
+pub mod random;
 pub mod satisfice;
 pub mod search;

@@ -30,6 +30,14 @@ const CLAUSES_PER_STATE: usize = 50;
 const STATES_PER_CONFLICT: u64 = 4;
 /// Maximum number of times that the budget of an unsuccessful component is halved.
 const MAX_BACKOFF: u32 = 3;
+/// Maximum number of times that the budget of a successful component is doubled.
+const MAX_BOOST: u32 = 3;
+/// Minimum number of times that the budget of the improvement of the best plan is doubled while a proof is not
+/// within reach.
+const MIN_BOOST: i32 = 2;
+/// Maximum number of times that the budget of the improvement of the best plan is doubled while a proof is within
+/// reach.
+const NEAR_BOOST: i32 = 1;
 /// Numerator and denominator of a ratio. If the cost of a plan divided by the lower bound exceeds this ratio,
 /// a better plan is probably easier to find than a proof.
 const NEAR_OPTIMAL_RATIO: (Int, Int) = (3, 2);
@@ -49,6 +57,9 @@ struct Portfolio<'r, 'a> {
     share: u32,
     /// Number of times that the budget of the satisficing search is halved, at most [`MAX_BACKOFF`].
     satisficer_share: u32,
+    /// Number of times that the budget of the improvement of the best plan is doubled, at most [`MAX_BOOST`], minus
+    /// the number of times that it is halved.
+    improvement_share: i32,
 }
 
 /// Result of a turn: how the run ends, or `None` if the next component continues.
@@ -89,6 +100,7 @@ pub(super) fn solve(run: Run<'_>, bounds: &Bounds, lower: Int) -> Solution {
         reason: Proof::Bound,
         share: MAX_BACKOFF,
         satisficer_share: 0,
+        improvement_share: MAX_BOOST.cast_signed(),
     };
     let ending = portfolio.rounds();
     portfolio.note_search(started);
@@ -110,8 +122,12 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
             // The work doubles in each round, up to a factor of 2^20.
             let work = unit.saturating_mul(1_usize.checked_shl(round.min(20)).unwrap_or(1));
             stored = stored.saturating_add(work);
-            let turns: [fn(&mut Self, usize, usize) -> Turn; 3] =
-                [Self::satisfice, |portfolio, _, stored| portfolio.search_exactly(stored), Self::sat_turn];
+            let turns: [fn(&mut Self, usize, usize) -> Turn; 4] = [
+                Self::satisfice,
+                Self::improve_best_plan,
+                |portfolio, _, stored| portfolio.search_exactly(stored),
+                Self::sat_turn,
+            ];
             for turn in turns {
                 if self.run.config.limits.reached() {
                     return Ending::Over;
@@ -120,8 +136,9 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
                     return ending;
                 }
             }
-            let is_over = self.exact.is_none() && self.satisficer.is_none();
-            if is_over && if self.best.is_some() { self.prover.is_none() } else { self.first.is_none() } {
+            if self.searches_ended()
+                && if self.best.is_some() { self.prover.is_none() } else { self.first.is_none() }
+            {
                 return Ending::Over;
             }
         }
@@ -161,19 +178,19 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
     }
 
     fn satisfice(&mut self, work: usize, _: usize) -> Turn {
-        let satisficer = self.satisficer.as_mut()?;
+        let is_near = self.is_near();
+        let satisficer = self.satisficer.as_mut().filter(|satisficer| !satisficer.has_ended())?;
         let span = info_span!("satisfice", expanded = Empty, generated = Empty).entered();
         let nodes = work.saturating_mul(RELAXATION_WORK_PER_STATE) as u64;
         let limit = self.best.as_ref().map(|plan| plan.cost);
-        // A first plan is more important than a better plan. If the satisficing search is unsuccessful, its
-        // next budget is smaller, provided that a proof is within reach.
+        // A first plan is more important than a better plan, and a better plan is more important than a proof,
+        // unless a proof is within reach. If the satisficing search is unsuccessful, its share becomes smaller,
+        // because A\* may be faster.
         let has_hope = self.exact.as_ref().is_some_and(InterleavedSearch::may_finish);
-        let is_near = |cost: Int| {
-            cost.saturating_mul(NEAR_OPTIMAL_RATIO.1) <= self.lower.saturating_mul(NEAR_OPTIMAL_RATIO.0)
-        };
         let (twice, halved) = match limit {
-            None => (1, 0),
-            Some(cost) => (0, if has_hope && is_near(cost) { self.satisficer_share } else { 0 }),
+            None => (MAX_BOOST.saturating_sub(self.satisficer_share).max(1), 0),
+            Some(_) if !is_near => (1, 0),
+            Some(_) => (0, if has_hope { self.satisficer_share } else { 0 }),
         };
         self.satisficer_share = self.satisficer_share.saturating_add(1).min(MAX_BACKOFF);
         let before = satisficer.figures;
@@ -189,15 +206,59 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
             Ok(StepResult::Paused) => None,
             Ok(StepResult::Ended) => {
                 self.run.statistics.restarts = satisficer.restarts();
-                self.satisficer = None;
                 None
             }
             Err(_) => Some(Ending::Over),
         }
     }
 
+    /// Returns `true` if only formulas can still find a plan or prove anything.
+    fn searches_ended(&self) -> bool {
+        let can_improve = |satisficer: &Satisficer<'a, Int>| {
+            self.best.is_some() && satisficer.can_improve() || !satisficer.has_ended()
+        };
+        self.exact.is_none() && !self.satisficer.as_ref().is_some_and(can_improve)
+    }
+
+    /// Returns `true` if a proof is probably easier to find than a better plan.
+    fn is_near(&self) -> bool {
+        self.best.as_ref().is_some_and(|plan| {
+            plan.cost.saturating_mul(NEAR_OPTIMAL_RATIO.1) <= self.lower.saturating_mul(NEAR_OPTIMAL_RATIO.0)
+        })
+    }
+
+    /// Replaces parts of the best plan by cheaper ones. The budget is doubled or halved after each turn, by
+    /// whether the turn has succeeded.
+    fn improve_best_plan(&mut self, work: usize, _: usize) -> Turn {
+        let has_hope = self.exact.as_ref().is_some_and(InterleavedSearch::may_finish);
+        let (least, most) = if has_hope && self.is_near() {
+            (MAX_BACKOFF.cast_signed().saturating_neg(), NEAR_BOOST)
+        } else {
+            (MIN_BOOST, MAX_BOOST.cast_signed())
+        };
+        let (satisficer, best) = (self.satisficer.as_mut()?, self.best.as_ref()?);
+        let span = info_span!("improve", expanded = Empty, generated = Empty).entered();
+        let share = self.improvement_share.clamp(least, most);
+        let nodes = work.saturating_mul(RELAXATION_WORK_PER_STATE) as u64;
+        let mut nodes = (nodes << share.max(0) >> share.min(0).unsigned_abs()).max(1);
+        let before = satisficer.figures;
+        let mut plan = best.clone();
+        let mut is_better = false;
+        while let Ok(Some(better)) = satisficer.improve(&plan, &mut nodes) {
+            (plan, is_better) = (better, true);
+        }
+        satisficer.figures.add_to(before, &mut self.run.statistics);
+        record(&span, &self.run.statistics);
+        if !is_better {
+            self.improvement_share = share.saturating_sub(1).max(least);
+            return None;
+        }
+        self.improvement_share = most;
+        self.improve(plan, PlannerPart::Satisficing)
+    }
+
     fn sat_turn(&mut self, work: usize, _: usize) -> Turn {
-        let alone = self.exact.is_none() && self.satisficer.is_none();
+        let alone = self.searches_ended();
         let before = (self.lower, self.best.as_ref().map(|plan| plan.cost));
         let share = self.share;
         let allowance = SatBudget {

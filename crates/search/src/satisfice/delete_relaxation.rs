@@ -5,8 +5,9 @@
 //! conditional effect, a rule of a derived variable, or one disjunct of a disjunction. Conditions that
 //! require a derived variable to be false are assumed to hold. For each numeric comparison separately, the
 //! most favourable designs are assumed. The number of repetitions of an operator until a comparison holds is
-//! estimated as by Scala et al. \[1\]. An operator whose numeric effect is not the addition of a constant is
-//! assumed to achieve a comparison with one application.
+//! estimated as by Scala et al. \[1\]. If an operator adds an expression that depends on the state, its value in the
+//! evaluated state counts. An operator that assigns an expression is assumed to achieve a comparison with one
+//! application.
 //!
 //! \[1\] E. Scala, P. Haslum, S. Thiébaux: Heuristics for numeric planning via subgoaling, IJCAI 2016.
 
@@ -39,12 +40,21 @@ impl<N: TaskNumber> NumericCondition<N> {
     }
 }
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct Achiever {
     /// Index of the linear expression in `Relaxation::directions`.
     pub(super) direction: u32,
-    /// Increase of the expression per application; infinite if a single application is assumed to suffice.
-    pub(super) gain: f64,
+    pub(super) gain: Gain,
+}
+
+/// Increase of an expression per application of an operator.
+#[derive(Debug, Clone)]
+pub(super) enum Gain {
+    Constant(f64),
+    /// A linear expression over the state before the operator: constant and terms.
+    Linear(f64, Vec<(NumericId, f64)>),
+    /// A single application is assumed to suffice.
+    Unlimited,
 }
 
 pub(super) struct Relaxation<N> {
@@ -352,32 +362,33 @@ impl<'a, N: TaskNumber> Builder<'a, N> {
 }
 
 /// Returns the maximum increase of an expression by one application of the operator. Returns `None` if the
-/// increase is not positive, and infinity if it is not constant or overflows. The sign is decided with exact
-/// arithmetic, because a comparison that no operator increases counts as unreachable.
-fn gain<N: TaskNumber>(operator: &Operator<N>, sum: &[(NumericId, N)]) -> Option<f64> {
+/// increase is never positive. The sign of a constant is decided with exact arithmetic, because a comparison that no
+/// operator increases counts as unreachable.
+fn gain<N: TaskNumber>(operator: &Operator<N>, sum: &[(NumericId, N)]) -> Option<Gain> {
     let mut gain = N::zero();
+    let mut terms: Vec<(NumericId, f64)> = Vec::new();
     for (variable, factor) in sum {
         let Some(effect) = operator.numeric_effects.iter().find(|effect| effect.variable == *variable) else {
             continue;
         };
         let quantity = &effect.value.quantity;
-        let amount = match &effect.value.coefficients[..] {
-            [(changed_variable, factor_one)] if changed_variable == variable && factor_one.is_one() => {
-                if *factor < N::zero() {
-                    quantity.minimum()
-                } else {
-                    maximum(quantity)
-                }
-            }
-            _ => return Some(f64::INFINITY),
-        };
+        let coefficients = &effect.value.coefficients;
+        if !coefficients.iter().any(|(changed, factor)| changed == variable && factor.is_one()) {
+            return Some(Gain::Unlimited);
+        }
+        let others = coefficients.iter().filter(|(changed, _)| changed != variable);
+        terms.extend(others.map(|(other, times)| (*other, times.approximate() * factor.approximate())));
+        let amount = if *factor < N::zero() { quantity.minimum() } else { maximum(quantity) };
         let Some(next) = factor.times(&amount).and_then(|more| gain.plus(&more)) else {
-            return Some(f64::INFINITY);
+            return Some(Gain::Unlimited);
         };
         gain = next;
     }
+    if !terms.is_empty() {
+        return Some(Gain::Linear(gain.approximate(), terms));
+    }
     // A positive increase may round to 0 in floating-point arithmetic.
-    (gain > N::zero()).then(|| gain.approximate().max(f64::MIN_POSITIVE))
+    (gain > N::zero()).then(|| Gain::Constant(gain.approximate().max(f64::MIN_POSITIVE)))
 }
 
 #[expect(clippy::arithmetic_side_effects, reason = "numbers of a task are far from the least integer")]

@@ -12,7 +12,7 @@ use task::task::State;
 use task::task::number::TaskNumber;
 
 use crate::satisfice::bucket_queue::Queue;
-use crate::satisfice::delete_relaxation::{NO_OPERATOR, Proposition, Relaxation};
+use crate::satisfice::delete_relaxation::{Gain, NO_OPERATOR, Proposition, Relaxation};
 
 const UNREACHED: u32 = u32::MAX;
 const MAX_COST: u32 = 1 << 30;
@@ -36,8 +36,11 @@ pub(super) struct FfHeuristic {
     initially_left: Vec<u32>,
     queue: Queue,
     values: Vec<f64>,
+    numbers: Vec<f64>,
     pub(super) applicable: Vec<u32>,
     pub(super) preferred: Vec<u32>,
+    /// Preferred operators that the relaxed plan repeats, with the number of applications.
+    pub(super) repeated: Vec<(u32, u32)>,
     marked: Vec<bool>,
     marks: Vec<Proposition>,
     planned: Vec<u32>,
@@ -56,8 +59,10 @@ impl FfHeuristic {
             initially_left: lengths.map(task::number::dense).collect(),
             queue: Queue::default(),
             values: vec![0.0; relaxation.directions.len()],
+            numbers: Vec::new(),
             applicable: Vec::new(),
             preferred: Vec::new(),
+            repeated: Vec::new(),
             marked: vec![false; relaxation.propositions],
             marks: Vec::new(),
             planned: Vec::new(),
@@ -65,7 +70,8 @@ impl FfHeuristic {
         }
     }
 
-    /// Returns the cost of a relaxed plan under the operator costs `prices`, each at least 1. The cost is
+    /// Returns the cost of a relaxed plan that achieves all `targets` under the operator costs `prices`, each at
+    /// least 1. The cost is
     /// capped at `MAX_COST`. Returns `None` if there is no relaxed plan. Afterwards `applicable` contains the
     /// operators that may be applicable in the state, and `preferred` contains those of them that belong to
     /// the relaxed plan.
@@ -74,13 +80,22 @@ impl FfHeuristic {
         relaxation: &Relaxation<N>,
         prices: &[u32],
         state: &State<N>,
+        targets: &[Proposition],
     ) -> Option<u32> {
         self.preferred.clear();
-        self.reach(relaxation, prices, state);
-        (self.costs[relaxation.goal as usize] < UNREACHED).then(|| self.relaxed_plan(relaxation, prices))
+        self.repeated.clear();
+        self.reach(relaxation, prices, state, targets);
+        let is_reached = targets.iter().all(|target| self.costs[*target as usize] < UNREACHED);
+        is_reached.then(|| self.relaxed_plan(relaxation, prices, targets))
     }
 
-    fn reach<N: TaskNumber>(&mut self, relaxation: &Relaxation<N>, prices: &[u32], state: &State<N>) {
+    fn reach<N: TaskNumber>(
+        &mut self,
+        relaxation: &Relaxation<N>,
+        prices: &[u32],
+        state: &State<N>,
+        targets: &[Proposition],
+    ) {
         self.costs.fill(UNREACHED);
         self.sums.fill(0);
         self.left.copy_from_slice(&self.initially_left);
@@ -90,6 +105,8 @@ impl FfHeuristic {
         for proposition in relaxation.facts(&state.values).chain(relaxation.always.iter().copied()) {
             self.put(proposition, 0, no_supporter);
         }
+        self.numbers.clear();
+        self.numbers.extend(state.numbers.iter().map(TaskNumber::approximate));
         for (direction, index) in relaxation.directions.iter().zip(0..) {
             let value: Option<N> = direction.value(&state.numbers);
             for (threshold, strict, proposition) in &direction.thresholds {
@@ -109,14 +126,22 @@ impl FfHeuristic {
                 self.reached(relaxation, prices, node);
             }
         }
+        let mut missing = targets;
         while let Some((cost, proposition)) = self.queue.pop() {
             if self.costs[proposition as usize] != cost {
                 continue;
             }
             // Propositions of cost 0 are always processed completely, because they determine which operators
             // are applicable.
-            if cost > 0 && self.costs[relaxation.goal as usize] <= cost {
-                break;
+            if cost > 0 {
+                while let [target, rest @ ..] = missing
+                    && self.costs[*target as usize] <= cost
+                {
+                    missing = rest;
+                }
+                if missing.is_empty() {
+                    break;
+                }
             }
             for node in relaxation.waiting.of(proposition) {
                 let unreached = &mut self.left[*node as usize];
@@ -156,22 +181,44 @@ impl FfHeuristic {
         for support in &relaxation.supports[node as usize] {
             let direction = &relaxation.directions[support.direction as usize];
             let value = self.values[support.direction as usize];
+            let gain = self.gain(&support.gain);
             for (threshold, _, proposition) in &direction.thresholds {
                 if self.costs[*proposition as usize] == 0 {
                     continue;
                 }
-                let times = times(threshold.approximate() - value, support.gain);
+                let times = times(threshold.approximate() - value, gain);
                 let cost = sum.saturating_add(price.saturating_mul(times)).min(MAX_COST);
                 self.put(*proposition, cost, Supporter { node, times });
             }
         }
     }
 
-    fn relaxed_plan<N: TaskNumber>(&mut self, relaxation: &Relaxation<N>, prices: &[u32]) -> u32 {
+    /// Returns the increase of an expression by one application in the evaluated state.
+    fn gain(&self, gain: &Gain) -> f64 {
+        match gain {
+            Gain::Constant(gain) => *gain,
+            Gain::Linear(constant, terms) => {
+                let terms = terms.iter().map(|(variable, factor)| factor * self.numbers[variable.index()]);
+                constant + terms.sum::<f64>()
+            }
+            Gain::Unlimited => f64::INFINITY,
+        }
+    }
+
+    fn relaxed_plan<N: TaskNumber>(
+        &mut self,
+        relaxation: &Relaxation<N>,
+        prices: &[u32],
+        targets: &[Proposition],
+    ) -> u32 {
         let mut total: u32 = 0;
-        self.marks.push(relaxation.goal);
+        for target in targets {
+            if !self.marked[*target as usize] {
+                self.marked[*target as usize] = true;
+                self.marks.push(*target);
+            }
+        }
         let mut next = 0;
-        self.marked[relaxation.goal as usize] = true;
         while let Some(proposition) = self.marks.get(next).copied() {
             next = next.saturating_add(1);
             let Supporter { node, times } = self.supporters[proposition as usize];
@@ -193,6 +240,9 @@ impl FfHeuristic {
                         self.preferred.push(operator);
                     }
                 }
+                if times > 1 && self.sums[node as usize] == 0 {
+                    self.repeated.push((operator, times));
+                }
             }
             for condition in relaxation.conditions.of(node) {
                 if !self.marked[*condition as usize] {
@@ -212,10 +262,14 @@ impl FfHeuristic {
 }
 
 /// Returns the estimated number of applications whose gains add up to at least the missing amount: at least 1
-/// and at most `MAX_REPETITIONS`.
+/// and at most `MAX_REPETITIONS`. If the gain is not positive in the evaluated state, it may be positive later, so
+/// the maximum is returned.
 fn times(missing: f64, gain: f64) -> u32 {
     if gain.is_infinite() {
         return 1;
+    }
+    if gain <= 0.0 {
+        return MAX_REPETITIONS.to_u32().unwrap_or(u32::MAX);
     }
     (missing / gain).ceil().clamp(1.0, MAX_REPETITIONS).to_u32().unwrap_or(1)
 }

@@ -118,9 +118,7 @@ impl LandmarkStatus {
     /// Marks the propositions of all unreached landmarks whose predecessors are reached as wanted, and no
     /// others.
     pub(super) fn request_landmark(&mut self, reached: &[u64]) {
-        for mark in self.marks.drain(..) {
-            self.wanted[mark as usize] = false;
-        }
+        self.request_none();
         for (landmark, index) in self.landmarks.all.iter().zip(0_u32..) {
             if !bit(reached, index) && landmark.after.iter().all(|sooner| bit(reached, *sooner)) {
                 for proposition in &landmark.any_of {
@@ -128,6 +126,13 @@ impl LandmarkStatus {
                     self.marks.push(*proposition);
                 }
             }
+        }
+    }
+
+    /// Marks no propositions as wanted.
+    pub(super) fn request_none(&mut self) {
+        for mark in self.marks.drain(..) {
+            self.wanted[mark as usize] = false;
         }
     }
 

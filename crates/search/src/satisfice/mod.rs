@@ -17,20 +17,23 @@ mod delete_relaxation;
 mod ff_heuristic;
 mod landmark_status;
 mod landmarks;
+mod plan_improvement;
 mod search;
 mod search_context;
+mod segment_goal;
+mod step_order;
 mod store;
 
 use task::context::Context;
 use task::limits::{Interrupted, Limits};
 use task::plan::ground::GroundPlan;
-use task::task::OperatorId;
 use task::task::number::TaskNumber;
 
 use crate::search::{MutexPairs, SearchStatistics};
 
-use search::{HeuristicWeight, Outcome, Search};
-use search_context::{SearchContext, USELESS_OPERATOR_COST};
+use plan_improvement::PlanImprovement;
+use search::{HeuristicWeight, Outcome, Search, SearchGoal};
+use search_context::{MEMORY_SHARE, SearchContext};
 
 /// Configurations of the searches that run one after another: whether operator costs are used, and the weight
 /// of the heuristic.
@@ -42,10 +45,6 @@ const SEARCH_SEQUENCE: [(bool, HeuristicWeight); 6] = [
     (true, HeuristicWeight::Times(2)),
     (true, HeuristicWeight::Times(1)),
 ];
-
-/// The next search begins if the search needs more 64-bit words than the memory limit in bytes, divided by this
-/// number. So a search may use half of the available memory.
-const MEMORY_SHARE: usize = 16;
 
 /// Result of one turn of the satisficing search.
 pub enum StepResult<N> {
@@ -65,7 +64,10 @@ pub struct Satisficer<'a, N> {
     limits: &'a Limits,
     phase: usize,
     search: Option<Search<N>>,
+    /// Cost of the plan that the searches found last.
+    cost: Option<N>,
     knows_pairs: bool,
+    improvement: Option<PlanImprovement<N>>,
     pub figures: SearchStatistics,
 }
 
@@ -81,7 +83,9 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
             limits: context.limits,
             phase: 0,
             search: None,
+            cost: None,
             knows_pairs: false,
+            improvement: None,
             figures: SearchStatistics::default(),
         }))
     }
@@ -89,6 +93,16 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
     /// Returns the number of searches of the sequence that have ended or were skipped.
     pub fn restarts(&self) -> usize {
         self.phase
+    }
+
+    /// Returns `true` if all searches of the sequence have ended.
+    pub fn has_ended(&self) -> bool {
+        self.phase >= SEARCH_SEQUENCE.len()
+    }
+
+    /// Returns `true` if `improve` was called and may find a better plan than the one that it received last.
+    pub fn can_improve(&self) -> bool {
+        self.improvement.as_ref().is_some_and(|improvement| !improvement.has_ended())
     }
 
     /// Searches for a plan with a cost below `limit` (for any plan if `None`), with about `work` work units.
@@ -103,7 +117,7 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
         };
         if !self.knows_pairs && self.figures.evaluated >= self.limits.thresholds().pairs {
             self.knows_pairs = true;
-            self.known.pairs = MutexPairs::new(self.known.task, self.limits)?;
+            self.known.set_pairs(MutexPairs::new(self.known.task, self.limits)?);
             // The h² mutexes change the preferred operators and the operator costs, so the current search
             // restarts.
             self.search = None;
@@ -111,30 +125,27 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
         let search = match &mut self.search {
             Some(search) => search,
             vacant => {
-                let mut costs = if priced {
-                    self.known.operator_costs()
-                } else {
-                    vec![1; self.known.task.operators.len()]
-                };
-                if let Some(pairs) = &self.known.pairs {
-                    let ids = OperatorId::all(costs.len());
-                    costs
-                        .iter_mut()
-                        .zip(ids)
-                        .filter(|(_, id)| pairs.is_operator_useless(*id))
-                        .for_each(|(cost, _)| *cost = USELESS_OPERATOR_COST);
-                }
-                vacant.insert(Search::new(&mut self.known, weight, costs))
+                let prices = self.known.prices(priced);
+                vacant.insert(Search::new(&mut self.known, weight, prices, SearchGoal::Task))
             }
         };
-        let outcome = search.run(&mut self.known, limit, work, self.limits, &mut self.figures);
+        let is_last = self.phase.saturating_add(1) == SEARCH_SEQUENCE.len();
+        // A search that finds a worse plan than other components ends early, and the next search, which is less
+        // greedy, may find a better one. It would take long to search for a plan below the limit.
+        let own_limit = if is_last { limit } else { self.cost.as_ref() };
+        let outcome = search.run(&mut self.known, own_limit, work, self.limits, &mut self.figures);
         let is_large = search.size() > self.limits.room() / MEMORY_SHARE;
         match outcome? {
             Outcome::Plan(plan) => {
-                self.next();
-                Ok(StepResult::Plan(plan))
+                // The last search continues with the cost of the plan as its limit.
+                if !is_last {
+                    self.next();
+                }
+                self.cost = Some(plan.cost.clone());
+                let is_better = limit.is_none_or(|limit| plan.cost < *limit);
+                Ok(if is_better { StepResult::Plan(plan) } else { StepResult::Paused })
             }
-            Outcome::Exhausted if limit.is_none() && !search.incomplete => Ok(StepResult::Unsolvable),
+            Outcome::Exhausted if own_limit.is_none() && !search.incomplete => Ok(StepResult::Unsolvable),
             Outcome::Exhausted => {
                 self.next();
                 Ok(StepResult::Paused)
@@ -146,6 +157,23 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
                 Ok(StepResult::Paused)
             }
         }
+    }
+
+    /// Searches for a plan that is cheaper than `plan`, with about `work` work units, by replacing parts of the
+    /// plan. Subtracts the work done from `work`.
+    ///
+    /// # Errors
+    /// Fails if the deadline has passed or the interrupt flag is set.
+    pub fn improve(
+        &mut self,
+        plan: &GroundPlan<N>,
+        work: &mut u64,
+    ) -> Result<Option<GroundPlan<N>>, Interrupted> {
+        if self.improvement.as_ref().is_none_or(|improvement| plan.cost < *improvement.cost()) {
+            self.improvement = PlanImprovement::new(&self.known, plan);
+        }
+        let Some(improvement) = &mut self.improvement else { return Ok(None) };
+        improvement.run(&mut self.known, work, self.limits, &mut self.figures)
     }
 
     fn next(&mut self) {

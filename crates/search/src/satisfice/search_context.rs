@@ -1,5 +1,7 @@
 //! Data that all satisficing searches of a task share.
 
+use std::sync::Arc;
+
 use num_traits::ToPrimitive as _;
 use task::context::Context;
 use task::limits::Interrupted;
@@ -12,8 +14,12 @@ use crate::satisfice::ff_heuristic::FfHeuristic;
 use crate::satisfice::landmark_status::LandmarkStatus;
 use crate::satisfice::landmarks::Landmarks;
 use crate::search::design_combinations::pareto_optimal_combinations;
-use crate::search::{MutexPairs, is_monotone};
+use crate::search::{MutexPairs, SearchStatistics, is_monotone};
 
+/// A search may use 1/`MEMORY_SHARE` of the available memory. If it needs more, the next search begins.
+pub(super) const MEMORY_SHARE: usize = 16;
+/// Work units charged for generating a successor and looking it up in the store.
+pub(super) const GENERATION_COST: u64 = 200;
 /// Cost of an operator that is never useful according to the h² mutexes.
 pub(super) const USELESS_OPERATOR_COST: u32 = 1 << 20;
 
@@ -30,6 +36,8 @@ pub(super) struct SearchContext<'a, N> {
     pub(super) status: LandmarkStatus,
     /// The h² mutexes; `None` if they are not computed yet, or their computation exceeded its limits.
     pub(super) pairs: Option<MutexPairs>,
+    /// Operator costs of the searches: all 1, and scaled ([`SearchContext::operator_costs`]).
+    prices: [Option<Arc<[u32]>>; 2],
     steps: Vec<Step<N>>,
     /// Index of the first step of each operator, followed by the total number of steps.
     first: Vec<u32>,
@@ -53,12 +61,40 @@ impl<'a, N: TaskNumber> SearchContext<'a, N> {
         let relaxation = Relaxation::new(task, limits)?;
         let explorer = FfHeuristic::new(&relaxation, task.operators.len());
         let status = LandmarkStatus::new(Landmarks::new(task, &relaxation, limits)?, &relaxation);
-        Ok(Some(Self { task, relaxation, explorer, status, pairs: None, steps, first }))
+        Ok(Some(Self { task, relaxation, explorer, status, pairs: None, prices: [None, None], steps, first }))
+    }
+
+    /// Sets the h² mutexes. They change the operator costs.
+    pub(super) fn set_pairs(&mut self, pairs: Option<MutexPairs>) {
+        self.pairs = pairs;
+        self.prices = [None, None];
+    }
+
+    /// Returns the operator costs of a search: the scaled costs if `priced`, otherwise 1 each. Useless
+    /// operators have the cost [`USELESS_OPERATOR_COST`].
+    pub(super) fn prices(&mut self, priced: bool) -> Arc<[u32]> {
+        if let Some(prices) = &self.prices[usize::from(priced)] {
+            return Arc::clone(prices);
+        }
+        let mut prices = if priced { self.operator_costs() } else { vec![1; self.task.operators.len()] };
+        if let Some(pairs) = &self.pairs {
+            let useless = prices.iter_mut().zip(OperatorId::all(self.task.operators.len()));
+            let useless = useless.filter(|(_, id)| pairs.is_operator_useless(*id));
+            useless.for_each(|(price, _)| *price = USELESS_OPERATOR_COST);
+        }
+        Arc::clone(self.prices[usize::from(priced)].insert(prices.into()))
     }
 
     /// Returns the number of work units charged for the evaluation of a state.
     pub(super) fn size(&self) -> u64 {
         self.relaxation.propositions.saturating_add(self.relaxation.operators.len()) as u64
+    }
+
+    /// Returns the number of work units between two states of the counters of a search.
+    pub(super) fn work(&self, before: SearchStatistics, after: SearchStatistics) -> u64 {
+        let evaluated = after.evaluated.saturating_sub(before.evaluated);
+        let generated = after.generated.saturating_sub(before.generated);
+        evaluated.saturating_mul(self.size()).saturating_add(generated.saturating_mul(GENERATION_COST))
     }
 
     pub(super) fn step(&self, step: u32) -> (OperatorId, &[u32], &N) {

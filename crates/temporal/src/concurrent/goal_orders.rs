@@ -28,13 +28,14 @@ use std::collections::BinaryHeap;
 use std::hash::{Hash, Hasher};
 
 use rustc_hash::{FxHashSet, FxHasher};
+use search::random::Random;
 use search::search::SearchStatistics;
 use task::limits::{LimitPoll, Limits};
 use task::number::{Int, dense};
 use task::task::{Fact, OperatorId};
 
 use crate::concurrent::greedy::{Links, Mode};
-use crate::concurrent::random::Random;
+
 use crate::concurrent::rule::Proposition;
 use crate::concurrent::search::Sequence;
 use crate::concurrent::successors::{Expansion, TemporalState};

@@ -19,6 +19,7 @@ use std::hash::{Hash, Hasher};
 
 use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
 use search::bounds::Bounds;
+use search::random::Random;
 use search::satisfice::alternating_open_list::AlternatingOpenList;
 use search::search::SearchStatistics;
 use smallvec::SmallVec;
@@ -27,7 +28,7 @@ use task::number::{Int, dense, words};
 use task::task::OperatorId;
 
 use crate::concurrent::makespan_heuristic::Estimate;
-use crate::concurrent::random::Random;
+
 use crate::concurrent::relaxed_plan_heuristic::{HeuristicValue, RelaxedPlanHeuristic};
 use crate::concurrent::search::Sequence;
 use crate::concurrent::store::{PackedNode, Packing};

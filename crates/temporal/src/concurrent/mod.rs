@@ -25,7 +25,6 @@ mod makespan_heuristic;
 mod measure;
 mod monotone_metric;
 mod plan_metric;
-mod random;
 mod relaxed_plan_heuristic;
 mod relevant_effects;
 mod rule;

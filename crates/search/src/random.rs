@@ -1,11 +1,11 @@
 //! Deterministic pseudo-random numbers, for perturbations and restarts.
 
 /// Deterministic pseudo-random numbers (`SplitMix64`).
-pub(super) struct Random(pub(super) u64);
+pub struct Random(pub u64);
 
 impl Random {
-    /// Number from 0 to `limit - 1`; `limit` is at least 1.
-    pub(super) fn below(&mut self, limit: usize) -> usize {
+    /// Returns a number from 0 to `limit - 1`; `limit` is at least 1.
+    pub fn below(&mut self, limit: usize) -> usize {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
