@@ -74,7 +74,11 @@ fn names_in_imported_files_have_a_position() {
 #[test]
 fn unbound_names_of_plain_domains_are_reported() {
     let kb = "ontology/kb/ugv.ttl";
-    check("ugv_plain", (kb, ":a_move a", ":a_mvoe a"), &["M205", "a_mvoe", "if it corresponds to `move`", "ugv.ttl:"]);
+    check(
+        "ugv_plain",
+        (kb, ":a_move a", ":a_mvoe a"),
+        &["M205", "a_mvoe", "if it corresponds to `move`", "ugv.ttl:"],
+    );
     let domain = "encodings/ugv/plain.pddl";
     let text = std::fs::read_to_string(root().join(domain)).expect("a domain");
     let old = ["(battery_usage)", "(battery_usage )"]

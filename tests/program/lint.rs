@@ -54,7 +54,11 @@ fn templates_and_shipped_missions_are_clean() {
 
 #[test]
 fn unused_names_are_warnings() {
-    check(&[("robot.ttl", ":a_pick a t:Action", ":a_pickup a t:Action")], 1, &["M205", "if it corresponds to `pick`"]);
+    check(
+        &[("robot.ttl", ":a_pick a t:Action", ":a_pickup a t:Action")],
+        1,
+        &["M205", "if it corresponds to `pick`"],
+    );
     check(
         &[("robot.ttl", "t:requiresC :c_lidar ;", "t:requiresC :c_lidra ;")],
         1,
