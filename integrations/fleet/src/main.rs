@@ -128,7 +128,7 @@ struct Server {
     /// Authenticate as this user, with the password in the environment variable `NATS_PASSWORD`.
     #[arg(long, value_name = "NAME")]
     user: Option<String>,
-    /// Trust the certificate authorities in this file besides those of the system.
+    /// Trust the certificate authorities in this file in addition to those of the system.
     #[arg(long, value_name = "FILE")]
     tls_ca: Option<PathBuf>,
     /// Authenticate with a client certificate and its key.

@@ -30,7 +30,7 @@ struct Arguments {
     /// Set the role of this node.
     #[arg(long = "as", value_enum, default_value_t = Role::Manager)]
     role: Role,
-    /// Read the mapping between mission and robot from this file. [default: `ros.toml` beside the manifest, if it exists]
+    /// Read the mapping between mission and robot from this file. [default: `ros.toml` in the directory of the manifest, if it exists]
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
     /// Write events and decisions to a journal in this directory before acting on them, and resume from it after a crash.

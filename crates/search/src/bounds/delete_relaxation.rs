@@ -92,8 +92,8 @@ impl DeleteRelaxation {
         let mut builder = Builder::new(task);
         builder.rule(builder.free, &task.goal, &[], vec![GOAL]);
         for (operator, payer) in task.operators.iter().zip(0..) {
-            let given: Vec<u32> = operator.effects.iter().map(|fact| builder.fact(*fact)).collect();
-            builder.rule(payer, &operator.condition, &[], given);
+            let effects: Vec<u32> = operator.effects.iter().map(|fact| builder.fact(*fact)).collect();
+            builder.rule(payer, &operator.condition, &[], effects);
             for effect in &operator.conditional {
                 let given = effect.effects.iter().map(|fact| builder.fact(*fact)).collect();
                 builder.rule(payer, &operator.condition, &effect.condition, given);

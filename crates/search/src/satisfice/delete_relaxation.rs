@@ -376,8 +376,10 @@ fn gain<N: TaskNumber>(operator: &Operator<N>, sum: &[(NumericId, N)]) -> Option
         if !coefficients.iter().any(|(changed, factor)| changed == variable && factor.is_one()) {
             return Some(Gain::Unlimited);
         }
-        let others = coefficients.iter().filter(|(changed, _)| changed != variable);
-        terms.extend(others.map(|(other, times)| (*other, times.approximate() * factor.approximate())));
+        let other_coefficients = coefficients.iter().filter(|(changed, _)| changed != variable);
+        terms.extend(
+            other_coefficients.map(|(other, times)| (*other, times.approximate() * factor.approximate())),
+        );
         let amount = if *factor < N::zero() { quantity.minimum() } else { maximum(quantity) };
         let Some(next) = factor.times(&amount).and_then(|more| gain.plus(&more)) else {
             return Some(Gain::Unlimited);

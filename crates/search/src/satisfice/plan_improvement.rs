@@ -162,8 +162,8 @@ impl<N: TaskNumber> PlanImprovement<N> {
         }
     }
 
-    /// Starts the search of the next segment that has not been searched as long before. Ends the pass if there
-    /// is none.
+    /// Starts the search of the next segment that was not yet searched with the current limit. Ends the pass
+    /// after the last segment.
     fn begin_segment(&mut self, context: &mut SearchContext<'_, N>) {
         let count = self.plan.steps.len();
         // The segments that reach the end of the plan are the same.

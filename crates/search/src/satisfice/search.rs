@@ -38,9 +38,9 @@ pub(super) enum HeuristicWeight {
 
 /// Start and goal of a search.
 pub(super) enum SearchGoal<N> {
-    /// From the initial state to the goal of the task. Landmarks guide the search.
+    /// Search from the initial state to the goal of the task. Landmarks guide it.
     Task,
-    /// From a state of a plan to the goal of a segment.
+    /// Search from a state of a plan to the goal of a segment.
     Segment(State<N>, SegmentGoal),
 }
 
