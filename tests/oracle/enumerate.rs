@@ -18,7 +18,7 @@ use num_rational::BigRational;
 use pddl::ast::Problem;
 use pddl::validate::ViolationKind;
 
-use crate::judge::{Case, Mode, Tally, Truth, judge, plan_lines, project_verdict, read, setting};
+use crate::judge::{Case, Mode, SHORT, Tally, Truth, judge, plan_lines, project_verdict, read, setting};
 use crate::temporal::best::{Schedule, written};
 use crate::temporal::happening::{Obstacle, World};
 use crate::temporal::model::{Body, Q, big, q};
@@ -202,6 +202,7 @@ fn check(name: &str, seed: u64, unit: Option<Q>, tally: &mut Tally) {
         execute: crate::temporal::executor(world, unit),
         certify: false,
         limit: Duration::from_secs(2),
+        second_limit: SHORT,
     };
     for disagreement in &disagreements {
         tally.fail(&case, "executor and validator disagree", disagreement);

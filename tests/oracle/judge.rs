@@ -64,7 +64,12 @@ pub struct Case {
     /// Whether a certificate is written and verified, in sequential mode only.
     pub certify: bool,
     pub limit: Duration,
+    /// Time limit of the second run, in which the search uses all its parts from the start.
+    pub second_limit: Duration,
 }
+
+/// Second time limit of random tasks: a task that the first run does not decide is rarely decided by the second run.
+pub const SHORT: Duration = Duration::from_millis(300);
 
 #[derive(Debug)]
 pub struct Failure {
@@ -330,10 +335,7 @@ fn judge_caught(case: &Case, tally: &mut Tally) {
         }
     };
     check_witness(case, &mission, &problem, tally);
-    // A task that the first run does not decide is rarely decided by the second run, so the second limit is
-    // short.
-    let short = case.limit.min(Duration::from_millis(300));
-    for (thresholds, limit) in [(Thresholds::default(), case.limit), (Thresholds::NONE, short)] {
+    for (thresholds, limit) in [(Thresholds::default(), case.limit), (Thresholds::NONE, case.second_limit)] {
         let started = Instant::now();
         let limits = Limits::none().with_time(limit);
         let answer = plan(&mission, &problem, case, (&limits, thresholds));

@@ -25,7 +25,7 @@ use std::time::Duration;
 
 use fastrand::Rng;
 
-use crate::judge::{Case, Executor, Mode, Step, Tally, Truth, is_over, judge, setting};
+use crate::judge::{Case, Executor, Mode, SHORT, Step, Tally, Truth, is_over, judge, setting};
 
 use explore::{Budget, Measures};
 use ground::Ground;
@@ -100,6 +100,7 @@ impl Puzzle {
             execute: executor(Rc::clone(&self.ground)),
             certify,
             limit: Duration::from_millis(500),
+            second_limit: SHORT,
         }
     }
 }

@@ -19,7 +19,7 @@ use std::time::Duration;
 use num_rational::BigRational;
 use num_traits::ToPrimitive as _;
 
-use crate::judge::{Case, Executor, Mode, Step, Tally, judge, run};
+use crate::judge::{Case, Executor, Mode, SHORT, Step, Tally, judge, run};
 use happening::{Obstacle, World};
 use make::Maker;
 use model::{Measure, Q, Task, big};
@@ -115,6 +115,7 @@ fn case_up_to(cap: usize, name: String, task: Task, unit: Option<Q>) -> Case {
         execute: executor(world, unit),
         certify: unit.is_none(),
         limit: Duration::from_secs(2),
+        second_limit: SHORT,
     }
 }
 
