@@ -318,8 +318,8 @@ mod tests {
             ("p/msg/M", "wstring a", "not supported"),
             ("p/msg/M", "a//b c", "not a type"),
             ("p/msg/M", "int32 a\nint32 a", "two fields `a`"),
-            ("p/msg/M", "int32[] A=1", "no single value"),
-            ("p/msg/M", "Header A=1", "no single value"),
+            ("p/msg/M", "int32[] A=1", "not a single value"),
+            ("p/msg/M", "Header A=1", "not a single value"),
             ("p/msg/M", "\"", "neither"),
         ] {
             let error = Interface::parse(name, text).expect_err(text);
