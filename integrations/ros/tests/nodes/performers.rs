@@ -155,7 +155,7 @@ fn nav2_moves_the_robot() {
     assert_eq!(end, End::Canceled);
     // Another distribution, another argument, and a failure.
     let (_, end) = hear(&cast.start(call("(drive r1 hall)")));
-    assert!(matches!(&end, End::Failed(because) if because.contains("gave up")), "{end:?}");
+    assert!(matches!(&end, End::Failed(because) if because.contains("aborted the goal")), "{end:?}");
     assert_eq!(others.lock().expect("no panic").len(), 1);
     // Objects without a pose have no goal.
     let (_, end) = hear(&cast.start(call("(move r1 hall hal)")));
