@@ -27,12 +27,11 @@ impl SegmentGoal {
         let has_facts_only = |condition: &task::task::Condition<N>| {
             condition.clauses.is_empty() && condition.linears().next().is_none()
         };
-        let is_complete = task.axioms.is_empty()
-            && conditions().all(has_facts_only)
-            && operators()
-                .all(|operator| operator.conditional.is_empty() && operator.numeric_effects.is_empty());
         let is_regressive =
             task.axioms.is_empty() && operators().all(|operator| operator.conditional.is_empty());
+        let is_complete = is_regressive
+            && conditions().all(has_facts_only)
+            && operators().all(|operator| operator.numeric_effects.is_empty());
         let facts = if is_regressive {
             regress(task, suffix)
         } else {
