@@ -30,7 +30,7 @@ struct TheoremPart<'a> {
     name: Option<&'static str>,
     /// Parts that the theorem covers.
     parts: &'a [&'static str],
-    /// The proved statement, or the reason why there is none.
+    /// The proved statement, or the reason why nothing is proved.
     message: &'a str,
 }
 

@@ -33,7 +33,7 @@ pub struct ProvedChecker {
     check: PathBuf,
 }
 
-/// What the proved checker states about a certificate.
+/// Answer of the proved checker to a certificate, after the comparison with `metaplan-verify`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Theorem {

@@ -16,7 +16,8 @@ use crate::satisfice::landmarks::Landmarks;
 use crate::search::design_combinations::pareto_optimal_combinations;
 use crate::search::{MutexPairs, SearchStatistics, is_monotone};
 
-/// A search may use 1/`MEMORY_SHARE` of the available memory. If it needs more, the next search begins.
+/// The next search begins if the search needs more 64-bit words than the memory limit in bytes, divided by this
+/// number. So a search may use half of the available memory.
 pub(super) const MEMORY_SHARE: usize = 16;
 /// Work units charged for generating a successor and looking it up in the store.
 pub(super) const GENERATION_COST: u64 = 200;
