@@ -121,18 +121,18 @@ fn case_up_to(cap: usize, name: String, task: Task, unit: Option<Q>) -> Case {
 
 #[test]
 fn actions_one_after_another() {
-    run(1000, |seed| vec![case("temporal", seed, None)]).finish();
+    run(500, |seed| vec![case("temporal", seed, None)]).finish();
 }
 
 #[test]
 fn actions_with_designs() {
     let case = |seed| vec![case_of(format!("designs-{seed}"), Maker::with_designs(seed), None)];
-    run(500, case).finish();
+    run(250, case).finish();
 }
 
 #[test]
 fn overlapping_actions() {
-    run(300, |seed| vec![case("overlap", seed, Some(concurrent_unit(seed)))]).finish();
+    run(200, |seed| vec![case("overlap", seed, Some(concurrent_unit(seed)))]).finish();
 }
 
 #[test]
@@ -142,7 +142,7 @@ fn batteries_that_are_charged() {
         let (task, cap) = battery::make(seed, unit);
         vec![case_up_to(cap, format!("battery-{seed}"), task, Some(unit))]
     };
-    run(200, case).finish();
+    run(100, case).finish();
 }
 
 /// Returns the kinds and the texts of the failures of a task.

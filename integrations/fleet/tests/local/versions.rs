@@ -12,7 +12,7 @@ use metaplan_fleet::partition::{Order, Settings, Shared, serve};
 use metaplan_fleet::robot::Robot;
 use metaplan_fleet::robots::status;
 use metaplan_fleet::store::local::Local;
-use metaplan_fleet::store::{Bucket, Store, Stream};
+use metaplan_fleet::store::{Bucket, Store, Stored, Stream};
 use metaplan_fleet::wire::Decided;
 use metaplan_fleet::worker;
 use tempfile::TempDir;
@@ -210,13 +210,32 @@ async fn verify(store: &Local, missions: &Missions) {
                 assert!(replayed.as_ref().is_ok_and(Result::is_ok), "{replayed:?}");
             }
             None if next.is_some_and(|next| next.skips) => {}
-            None => assert!(
-                matches!(robot.decide(&event, missions, None), Ok(Err(_))),
-                "event {}",
-                event.sequence
-            ),
+            None => {
+                let outcome = robot.decide(&event, missions, None);
+                assert!(
+                    matches!(outcome, Ok(Err(_))),
+                    "event {} {outcome:?}\n{}",
+                    event.sequence,
+                    listing(store, &made).await
+                );
+            }
         }
     }
+}
+
+/// Returns a line for each event of the robot, with its decision.
+async fn listing(store: &Local, made: &BTreeMap<u64, Decided>) -> String {
+    let events = store.history(Stream::Events, 0, 0).await.expect("it can be read");
+    let line = |event: &Stored| {
+        let decision = made.get(&event.sequence).map(|decided| {
+            let Decided { worker, epoch, retired, skips, migrated, digest, target, .. } = decided;
+            format!(
+                "{worker}/{epoch} retired {retired} skips {skips} migrated {migrated} {digest:?} {target:?}"
+            )
+        });
+        format!("{} {} {decision:?}\n", event.sequence, String::from_utf8_lossy(&event.payload))
+    };
+    events.iter().map(line).collect()
 }
 
 /// Owners with different versions are stopped at any time.

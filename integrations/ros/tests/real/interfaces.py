@@ -1,9 +1,9 @@
 """Builds ROS 2 interface packages with the generators of rosidl: from `definitions`, or else from `integrations/ros/interfaces`.
 
-    python interfaces.py PREFIX PACKAGE...
+    python interfaces.py PREFIX PACKAGE[/FILE]...
 
-PREFIX is the virtual environment with the wheels of `requirements.txt`; the packages are installed into it. A package is built
-again only if its definitions have changed.
+PREFIX is the virtual environment with the wheels of `requirements.txt`; the packages are installed into it. Without FILE (such as
+`srv/Task.srv`), all definitions of the package are built. A package is built again only if its definitions have changed.
 """
 
 import hashlib
@@ -21,7 +21,7 @@ ROOTS = (HERE / "definitions", HERE.parents[1] / "interfaces")
 CMAKE = """cmake_minimum_required(VERSION 3.16)
 project({name})
 find_package(ament_cmake REQUIRED)
-find_package(rosidl_default_generators REQUIRED)
+{generators}
 {dependencies}
 rosidl_generate_interfaces(${{PROJECT_NAME}} {files} {clause})
 ament_package()
@@ -39,12 +39,23 @@ PACKAGE = """<?xml version="1.0"?>
 </package>
 """
 
+# What rclpy on Fast DDS needs. `rosidl_default_generators` would also generate and compile messages for C++, and introspection.
+GENERATORS = (
+    "rosidl_cmake",
+    "rosidl_generator_type_description",
+    "rosidl_generator_c",
+    "rosidl_generator_cpp",
+    "rosidl_typesupport_fastrtps_cpp",
+    "rosidl_typesupport_fastrtps_c",
+    "rosidl_typesupport_c",
+    "rosidl_generator_py",
+)
+
 # Packages that the definitions refer to, beside their own.
 DEPENDENCIES = {
     "controller_manager_msgs": ["builtin_interfaces"],
     "nav2_msgs": ["action_msgs", "builtin_interfaces", "geometry_msgs", "nav_msgs"],
-    "nav_msgs": ["builtin_interfaces", "geometry_msgs", "std_msgs"],
-    "suave_msgs": ["action_msgs", "geometry_msgs"],
+    "suave_msgs": [],
     "system_modes_msgs": [],
 }
 
@@ -72,9 +83,9 @@ def python_headers(prefix: pathlib.Path) -> None:
             file.write_text(local)
 
 
-def build(prefix: pathlib.Path, name: str) -> None:
-    """Builds and installs one package."""
-    files = definitions(name)
+def build(prefix: pathlib.Path, name: str, file: str) -> None:
+    """Builds and installs one package, or only one definition of it."""
+    files = [root(name) / file] if file else definitions(name)
     digest = hashlib.sha256(b"".join(file.name.encode() + file.read_bytes() for file in files)).hexdigest()
     stamp = prefix / "share" / name / "definitions.sha256"
     if stamp.exists() and stamp.read_text() == digest:
@@ -86,9 +97,11 @@ def build(prefix: pathlib.Path, name: str) -> None:
             (source / file.parent.name).mkdir(exist_ok=True)
             shutil.copy(file, source / file.parent.name / file.name)
         relative = " ".join(str(file.relative_to(root(name))) for file in files)
-        found = "\n".join(f"find_package({dependency} REQUIRED)" for dependency in dependencies)
+        generators, found = (
+            "\n".join(f"find_package({package} REQUIRED)" for package in packages) for packages in (GENERATORS, dependencies)
+        )
         clause = f"DEPENDENCIES {' '.join(dependencies)}" if dependencies else ""
-        text = CMAKE.format(name=name, files=relative, dependencies=found, clause=clause)
+        text = CMAKE.format(name=name, files=relative, generators=generators, dependencies=found, clause=clause)
         (source / "CMakeLists.txt").write_text(text)
         depends = "".join(f"<depend>{dependency}</depend>" for dependency in dependencies)
         (source / "package.xml").write_text(PACKAGE.format(name=name, depends=depends))
@@ -106,6 +119,8 @@ def build(prefix: pathlib.Path, name: str) -> None:
 
         out = str(source / "build")
         options = [f"-DCMAKE_PREFIX_PATH={prefix}", f"-DCMAKE_INSTALL_PREFIX={prefix}", "-DBUILD_TESTING=OFF"]
+        # Optimised code would take longer to compile than it saves.
+        options += ["-DCMAKE_C_FLAGS=-O0", "-DCMAKE_CXX_FLAGS=-O0"]
         cmake("-S", str(source), "-B", out, *options)
         cmake("--build", out, "-j2")
         cmake("--install", out)
@@ -116,8 +131,9 @@ def main() -> None:
     """Builds the packages that the command line names."""
     prefix = pathlib.Path(sys.argv[1]).resolve()
     python_headers(prefix)
-    for name in sys.argv[2:]:
-        build(prefix, name)
+    for argument in sys.argv[2:]:
+        name, _, file = argument.partition("/")
+        build(prefix, name, file)
 
 
 if __name__ == "__main__":
