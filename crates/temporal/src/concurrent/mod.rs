@@ -10,6 +10,7 @@ mod action_invariants;
 mod builder;
 mod compression_safe;
 mod conjunctions;
+mod critical_path;
 mod deadline;
 mod duration_fluents;
 mod envelope_facts;

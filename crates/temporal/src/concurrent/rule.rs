@@ -14,6 +14,9 @@ pub(super) struct Rule {
     /// Conditions of the rule, ascending.
     pub(super) needs: Vec<Proposition>,
     pub(super) adds: Vec<Proposition>,
+    /// Conditions that must hold from the start of the action on, ascending. Only the ends of actions have some,
+    /// and only in [`TemporalRelaxation::admissible`](super::temporal_relaxation::TemporalRelaxation::admissible).
+    pub(super) over_all: Vec<Proposition>,
     /// Facts to which the happening certainly sets their variables, so that other values are
     /// deleted. Empty for clauses and derived facts.
     pub(super) sets: Vec<Proposition>,

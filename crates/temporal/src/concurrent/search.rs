@@ -19,6 +19,7 @@ use task::number::Int;
 use task::plan::solution::PlannerPart;
 use task::task::OperatorId;
 
+use crate::concurrent::critical_path::CriticalPath;
 use crate::concurrent::makespan_heuristic::Estimate;
 use crate::concurrent::search_log::Record;
 use crate::concurrent::store::{Origin, Store};
@@ -62,6 +63,8 @@ type Priority<T> = (T, T, T, u32, u32);
 pub(super) struct Search<'a, T: TimeNumber = Int> {
     concurrent: &'a TemporalTask<T>,
     estimate: &'a Estimate<T>,
+    /// `None` unless its bound for the initial state exceeds that of `estimate`.
+    critical_path: Option<CriticalPath<'a, T>>,
     /// Lower bounds on costs and resources. `None` if neither costs nor numbers occur, or if the bounds
     /// could not be computed.
     bounds: Option<&'a Bounds>,
@@ -91,6 +94,7 @@ impl<'a, T: TimeNumber> Search<'a, T> {
         let mut search = Self {
             concurrent,
             estimate,
+            critical_path: None,
             bounds,
             expansion,
             store: Store::new(concurrent, monotone),
@@ -100,8 +104,13 @@ impl<'a, T: TimeNumber> Search<'a, T> {
             floor: T::ZERO,
             figures: SearchStatistics::default(),
         };
+        let root = expansion.root();
+        let estimated = estimate.left(&root.state, &root.clocks).map(|remaining| remaining.makespan);
+        let mut critical_path = CriticalPath::new(concurrent);
+        let is_better = critical_path.makespan(&root).is_none_or(|makespan| Some(makespan) > estimated);
+        search.critical_path = is_better.then_some(critical_path);
         // Costs and times are not negative, so 0 is a lower bound.
-        search.push(&expansion.root(), None, T::ZERO);
+        search.push(&root, None, T::ZERO);
         search
     }
 
@@ -283,9 +292,29 @@ impl<'a, T: TimeNumber> Search<'a, T> {
             return;
         }
         let depth = origin.map_or(0, |origin| origin.depth);
-        if let Some(id) = self.store.add(situation, origin) {
+        // The critical path is evaluated last, as it takes the longest.
+        if let Some(id) = self.store.add(situation, origin)
+            && let Some(value) = self.with_critical_path(value, situation, costs)
+        {
             self.open.push(Reverse((value.0, value.1, remaining.sum, depth, id)));
         }
+    }
+
+    /// Raises the lower bounds on metric and makespan by that of the critical path. Returns `None` if no plan
+    /// through the node is better than the incumbent.
+    fn with_critical_path(
+        &mut self,
+        value: (T, T),
+        situation: &TemporalState<T>,
+        costs: Int,
+    ) -> Option<(T, T)> {
+        let Some(critical_path) = &mut self.critical_path else { return Some(value) };
+        let makespan = critical_path.makespan(situation)?.max(value.1);
+        let cost = situation.cost.checked_add(costs);
+        let total = cost.and_then(|cost| self.concurrent.measure.total(makespan, cost));
+        // A metric that overflows is not a bound.
+        let value = total.filter(|total| total.is_moderate()).map_or(value, |total| (total, makespan));
+        self.is_better(value).then_some(value)
     }
 
     /// Plan that leads to a goal node. Returns `None` if its metric overflows or it violates a hard deadline.

@@ -179,6 +179,11 @@ impl<T: TimeNumber> SimpleTemporalNetwork<T> {
         self.change(variable).map(|time| time.base)
     }
 
+    /// Earliest possible time of the latest access of each kind.
+    pub(super) fn accesses(&self) -> impl Iterator<Item = (Key, T)> {
+        self.entries.iter().map(|(key, time)| (*key, time.base))
+    }
+
     fn change(&self, variable: u32) -> Option<&TimeExpression<T>> {
         let position = self.changed.binary_search_by_key(&variable, |(candidate, _)| *candidate).ok()?;
         Some(&self.changed[position].1)

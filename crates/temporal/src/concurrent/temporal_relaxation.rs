@@ -37,6 +37,8 @@ pub(super) struct TemporalRelaxation {
     pub(super) propositions: usize,
     /// Propositions that each rule requires (its conditions), ascending.
     pub(super) needs: Lists,
+    /// Propositions that must hold from the start of the action to this rule, which is its end; see [`Rule`].
+    pub(super) over_all: Lists,
     /// Number of conditions of each rule.
     pub(super) unmet: Vec<u32>,
     /// Indices of the rules without conditions.
@@ -62,6 +64,7 @@ pub(super) struct TemporalRelaxation {
 
 struct RelaxationBuilder<'a> {
     task: &'a Task,
+    is_admissible: bool,
     /// Numbers that hold durations chosen by the planner.
     chosen: FxHashSet<NumericId>,
     first: Vec<Proposition>,
@@ -73,11 +76,23 @@ struct RelaxationBuilder<'a> {
 }
 
 impl TemporalRelaxation {
+    /// Relaxation that guides a search. It has conjunctions of facts, and simultaneous happenings cannot reach an over-all
+    /// condition jointly.
     pub(super) fn new<T: TimeNumber>(concurrent: &TemporalTask<T>) -> Self {
+        Self::build(concurrent, false)
+    }
+
+    /// Relaxation in which every plan is executable: without conjunctions, and over-all conditions are conditions of the
+    /// ends only.
+    pub(super) fn admissible<T: TimeNumber>(concurrent: &TemporalTask<T>) -> Self {
+        Self::build(concurrent, true)
+    }
+
+    fn build<T: TimeNumber>(concurrent: &TemporalTask<T>, is_admissible: bool) -> Self {
         let task = &concurrent.task;
         let chosen = concurrent.instances.iter().filter(|instance| instance.is_chosen);
         let chosen = chosen.filter_map(|instance| instance.timer.map(|(number, _)| number)).collect();
-        let mut builder = RelaxationBuilder::new(task, chosen);
+        let mut builder = RelaxationBuilder::new(task, chosen, is_admissible);
         let mut ends = vec![0; concurrent.instances.len()];
         let ids = OperatorId::all(task.operators.len());
         for ((operator, happening), id) in task.operators.iter().zip(&concurrent.happenings).zip(ids) {
@@ -93,13 +108,14 @@ impl TemporalRelaxation {
         }
         let mut goal = builder.needs(&task.goal);
         builder.raise(task);
-        let conjunctions = builder.conjoin(concurrent, &mut goal);
+        let conjunctions = if is_admissible { Vec::new() } else { builder.conjoin(concurrent, &mut goal) };
         let derived = task.variables.iter().enumerate().skip(task.basic);
         let defaults = derived.map(|(index, variable)| builder.last(index, variable.values.len())).collect();
         let RelaxationBuilder { first, propositions, rules, numeric, .. } = builder;
-        let (mut needs, mut adds) = (Lists::default(), Lists::default());
+        let (mut needs, mut over_all, mut adds) = (Lists::default(), Lists::default(), Lists::default());
         for rule in &rules {
             needs.push(&rule.needs);
+            over_all.push(&rule.over_all);
             adds.push(&rule.adds);
         }
         let propositions = propositions as usize;
@@ -108,6 +124,7 @@ impl TemporalRelaxation {
             propositions,
             needing: needs.inverse(propositions),
             needs,
+            over_all,
             unmet: rules.iter().map(|rule| dense(rule.needs.len())).collect(),
             free: (0..).zip(&rules).filter(|(_, rule)| rule.needs.is_empty()).map(|(id, _)| id).collect(),
             adds,
@@ -125,7 +142,7 @@ impl TemporalRelaxation {
 
 impl<'a> RelaxationBuilder<'a> {
     #[expect(clippy::arithmetic_side_effects, reason = "values of variables are held in memory")]
-    fn new(task: &'a Task, chosen: FxHashSet<NumericId>) -> Self {
+    fn new(task: &'a Task, chosen: FxHashSet<NumericId>, is_admissible: bool) -> Self {
         let mut first = Vec::with_capacity(task.variables.len());
         let mut propositions = 0;
         for variable in &task.variables {
@@ -134,7 +151,7 @@ impl<'a> RelaxationBuilder<'a> {
         }
         let (rules, numeric) = (Vec::new(), Vec::new());
         let (clauses, comparisons) = (FxHashMap::default(), FxHashMap::default());
-        Self { task, chosen, first, propositions, rules, clauses, comparisons, numeric }
+        Self { task, is_admissible, chosen, first, propositions, rules, clauses, comparisons, numeric }
     }
 
     #[expect(clippy::arithmetic_side_effects, reason = "values of variables are held in memory")]
@@ -206,11 +223,12 @@ impl<'a> RelaxationBuilder<'a> {
         operator: &Operator,
         role: Role,
     ) {
-        let mut needs = self.needs(&operator.condition);
+        let (mut needs, mut over_all_needs) = (self.needs(&operator.condition), Vec::new());
         let weight = match role {
             Role::Never => return,
             Role::Timed(_) => 0,
             Role::Whole => 1,
+            Role::Start(_) if self.is_admissible => 1,
             Role::Start(instance) => {
                 // Facts of the `over all` condition must already hold before the start, unless the
                 // start sets their variable. Otherwise only a simultaneous happening could add
@@ -227,7 +245,11 @@ impl<'a> RelaxationBuilder<'a> {
             }
             Role::End(instance) => {
                 let instance_data = &concurrent.instances[instance as usize];
-                if let Some(over_all) = instance_data.over_all {
+                let over_all = instance_data.over_all;
+                if self.is_admissible {
+                    let condition = over_all.map(|id| &self.task.operators[id.index()].condition);
+                    over_all_needs = condition.map(|condition| self.needs(condition)).unwrap_or_default();
+                } else if let Some(over_all) = over_all {
                     needs.extend(self.needs(&self.task.operators[over_all.index()].condition));
                     needs.sort_unstable();
                     needs.dedup();
@@ -236,7 +258,15 @@ impl<'a> RelaxationBuilder<'a> {
             }
         };
         let adds: Vec<_> = operator.effects.iter().map(|fact| self.fact(*fact)).collect();
-        let rule = Rule { needs, sets: adds.clone(), adds, raises: Vec::new(), weight, origin: Some(id) };
+        let rule = Rule {
+            needs,
+            over_all: over_all_needs,
+            sets: adds.clone(),
+            adds,
+            raises: Vec::new(),
+            weight,
+            origin: Some(id),
+        };
         let mut conditional = Vec::new();
         for effect in &operator.conditional {
             let effect_needs: Vec<_> =
