@@ -53,10 +53,10 @@ pub struct Availability {
 pub struct Cause {
     /// The alteration that removes this cause; other causes may remain.
     pub alteration: Alteration,
-    /// The rules and facts by which this cause alone rules the design out, i.e. after the other alterations of a
-    /// minimal set.
+    /// The rules and facts by which this cause alone rules the design out, i.e. those after the other alterations of
+    /// a minimal set.
     pub because: Vec<String>,
-    /// The knowledge base after the other alterations of that set, for further analysis.
+    /// The knowledge base after the other alterations of the minimal set, for further analysis.
     pub knowledge: Knowledge,
 }
 
@@ -87,8 +87,8 @@ pub fn causes(knowledge: &Knowledge, design: &FunctionDesign) -> Causes {
     Causes { causes: causes_of(knowledge, design, &ways), are_all_needed: ways.len() == 1 }
 }
 
-/// Returns a cause for each different alteration in `ways`, unless reasoning fails. Its reasons are the
-/// conclusions that remain after all other alterations of its set.
+/// Returns a cause for each different alteration in `ways`, unless reasoning fails. The reasons of a cause are the
+/// conclusions that still rule the design out after all other alterations of its set.
 fn causes_of(knowledge: &Knowledge, design: &FunctionDesign, ways: &[Vec<Alteration>]) -> Vec<Cause> {
     let mut causes: Vec<Cause> = Vec::new();
     for (way, alteration) in ways.iter().flat_map(|way| way.iter().map(move |alteration| (way, alteration))) {
@@ -353,7 +353,8 @@ fn targets<'a>(bounds: impl Iterator<Item = &'a Requirement>, from: &BigRational
     least.into_iter().chain(most).collect()
 }
 
-/// Returns targets (bounds for the value) at a bound and just beyond it, as seen from the current value `from`.
+/// Returns targets (bounds for the value) at a bound and just beyond it, as seen from the current value `from`. If
+/// the value equals the bound: just below and just above it.
 fn around(bound: &BigRational, from: &BigRational) -> Vec<Target> {
     let bound = bound.clone();
     match from.cmp(&bound) {

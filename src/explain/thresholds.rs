@@ -27,10 +27,10 @@ pub struct SmallestChanges {
     pub complete: bool,
 }
 
-/// Searches for the smallest changes of single values that lead to another plan. Each measured attribute is set to the
-/// values, below and above the current one, at which a requirement of a design begins or ceases to hold. Each positive
-/// numeric value of the problem is changed downwards and upwards by at most 100 %. At a limit, returns the partial
-/// results. `hear` is called with the name of each value before it is varied.
+/// Searches for the smallest changes of single values that lead to another plan. Each measured attribute is set to
+/// the values, below and above the current one, at which a requirement of a design begins or ceases to hold. Each
+/// positive numeric value of the problem is changed downwards and upwards by at most 100 %. At a limit, returns the
+/// partial results. `hear` is called with `the best plan` and then with the name of each value, before the search.
 ///
 /// # Errors
 /// The mission cannot be planned for.
