@@ -23,7 +23,8 @@ use crate::cli::values::seconds;
 
 const INTERVAL: Duration = Duration::from_millis(10);
 
-/// Additional time, after 1.1 times the time limit, until a command without an answer is ended.
+/// Time that is added to 1.1 times the time limit. After that, a command that has not begun to write an answer is
+/// ended.
 const GRACE: Duration = Duration::from_millis(150);
 
 /// The option `--time-limit` of commands that have nothing to show before their end, and of those that show what they have.
@@ -116,8 +117,8 @@ fn nothing_to_show() -> Message {
     Message::error("M130", "a limit was reached before there was a result")
 }
 
-/// The time and memory limits plus a tenth. A program that reaches them after it has read its input is ended, unless
-/// it has begun to write an answer.
+/// The time limit plus a tenth and [`GRACE`], and the memory limit plus a tenth. A program that reaches one of them
+/// after it has read its input is ended, unless it has begun to write an answer.
 struct Deadline {
     started: Instant,
     time: Option<Duration>,

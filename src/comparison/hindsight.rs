@@ -1,7 +1,7 @@
-//! Evaluates the loss of a component during a mission in two ways. If the robot executes the plan and nothing else
-//! fails: the total time for each move after which the component can be lost. If each move loses the component with a
-//! given probability: lower bounds by a clairvoyant policy, which knows in advance when the loss happens (hindsight
-//! optimisation).
+//! Evaluates the loss of a component during a mission, in two ways. First, the robot executes the plan and nothing
+//! else fails: total times of the mission are computed for a loss after 0, 1, 2, … moves. Second, each move loses the
+//! component with a given probability: lower bounds are computed by a clairvoyant policy, which knows in advance when
+//! the loss happens (hindsight optimisation).
 
 use num_traits::ToPrimitive;
 use probabilistic::explore::{Bounds, explore};
@@ -14,8 +14,8 @@ use crate::comparison::planned::{NoResult, PlanTable};
 use crate::comparison::process::{Action, Process, Risk, Valuation};
 use crate::comparison::referee::Referee;
 
-/// Total times of a mission with four reactions to a loss: a component is lost after a given number of moves, and no
-/// move fails.
+/// Total times of a mission in which a component is lost after a given number of moves and no move fails, for four
+/// reactions to the loss.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct LossAt {

@@ -17,7 +17,7 @@ use crate::message::Errors;
 /// A plan from a state of the process, and the effort of computing the plan.
 #[derive(Debug, Clone, Default)]
 pub struct Planned {
-    /// Actions of the plan. `None` if there is no plan, or none that the process can express.
+    /// Actions of the plan. `None` if there is no plan, or if the process has no such actions.
     pub actions: Option<Vec<Action>>,
     /// Number of variables of the largest formula.
     pub variables: u64,

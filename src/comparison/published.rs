@@ -121,7 +121,8 @@ fn to_goal(mission: &Coadaptation, length: &dyn Fn(usize) -> u64) -> Vec<Option<
 }
 
 /// Returns the time, the energy and the probability of no collision that the published model predicts for a route
-/// with one configuration. Returns `None` if the route cannot be traversed with this configuration.
+/// with one configuration, including the initial change to this configuration. Returns `None` if the route cannot be
+/// traversed with it.
 fn believed(mission: &Coadaptation, route: &[usize], configuration: usize) -> Option<[f64; 3]> {
     let way: Option<Vec<&Traversal>> =
         route.iter().map(|arc| mission.arcs[*arc].by[configuration].as_ref()).collect();

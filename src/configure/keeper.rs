@@ -161,8 +161,8 @@ impl Keeper {
         Self { unrecorded, ..self }
     }
 
-    /// Returns the next time, since the start, at which a filter accepts a held report without a further line; `None`
-    /// if no filter does. The caller should handle a tick event at this time.
+    /// Returns the earliest time, since the start, at which a filter changes a belief or reports a silent sensor
+    /// without a further line. Returns `None` if no filter does. The caller should handle a tick event at this time.
     pub fn due(&self) -> Option<Duration> {
         self.filters.due(&self.states)
     }
@@ -323,7 +323,8 @@ impl Keeper {
         self.configurator.revert(&objective, from.as_deref())
     }
 
-    /// Asserts the reports that filters held back and that are now due.
+    /// Asserts the beliefs that filters change because of the passing of time: reports that were held back and are
+    /// now due, and assumed values of silent sensors.
     fn elapse(&mut self, answers: &mut Vec<KeeperAnswer>) {
         let mut filter_answers = Vec::new();
         let due: Vec<Accepted> = self.filters.elapse(&mut self.states, self.now, &mut filter_answers);

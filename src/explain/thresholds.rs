@@ -90,8 +90,8 @@ struct VariedMission<'a> {
 }
 
 impl VariedMission<'_> {
-    /// Computes the best plan after a value of the mission is set. Returns `None` if a limit is reached before the plan
-    /// is proved optimal, or its absence is proved.
+    /// Computes the best plan after a value of the mission is set. Returns `None` if a limit is reached before it is
+    /// proved that the plan is optimal, or that there is no plan.
     fn with(&self, name: &str, value: &BigRational) -> Result<Option<BestPlan>, Errors> {
         if self.limits.reached() {
             return Ok(None);
