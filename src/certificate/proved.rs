@@ -45,8 +45,8 @@ pub enum Theorem {
         /// Parts of the verification that the theorem covers.
         parts: Vec<&'static str>,
     },
-    /// The proved checker gives no statement about the certificate, for this reason: for example, it does not cover a
-    /// construct.
+    /// It is not shown that the claim follows from the theorem, for the given reason: for example, the proved checker
+    /// does not cover a construct.
     None(String),
 }
 

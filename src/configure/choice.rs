@@ -259,7 +259,7 @@ struct Whole<'a> {
     designs: &'a [Option<usize>],
     /// Designs of the objectives that are not in need. These objectives keep their designs.
     kept: &'a [&'a Offer],
-    /// Remaining budgets after the demands of the kept designs.
+    /// Remaining budgets after the demands of the kept designs; at least 0.
     left: &'a [BigRational],
 }
 
