@@ -24,7 +24,8 @@ pub struct Syntax {
     pub built_ins: Vec<BuiltIn>,
 }
 
-/// Parses rules. `source` names the text in rule identities and errors. Prefix declarations of the text supplement or override `prefixes`.
+/// Parses rules. `source` names the text in rule identities and errors. Prefix declarations of the text
+/// supplement or override `prefixes`.
 ///
 /// ```
 /// use metaplan_rules::{Prefixes, Symbols, parse_rules};
