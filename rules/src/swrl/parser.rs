@@ -48,7 +48,8 @@ pub fn parse_rules(
 
 /// Parses rules like [`parse_rules`], with syntax options.
 ///
-/// # Errors Returns the errors of [`parse_rules`], and R105 for an extension of SWRL if [`Syntax::swrl_only`] is set.
+/// # Errors
+/// Returns the errors of [`parse_rules`], and R105 for an extension of SWRL if [`Syntax::swrl_only`] is set.
 pub fn parse_rules_as(
     text: &str,
     source: &str,
@@ -63,7 +64,8 @@ pub fn parse_rules_as(
 /// that no rule of any text derives has to be a class or a property. An atom of such a relation that can be neither
 /// (because it has three arguments, or a literal as its first one) is an unknown built-in.
 ///
-/// # Errors Returns the errors of [`parse_rules_as`] for each text. If there are none, returns R104 for unknown
+/// # Errors
+/// Returns the errors of [`parse_rules_as`] for each text. If there are none, returns R104 for unknown
 /// built-ins of any namespace.
 pub fn parse_rules_together(
     texts: &[(&str, &str)],
