@@ -58,9 +58,9 @@ pub fn lower_with(ontology: &Ontology, equality: Equality, symbols: &mut Symbols
     lower_together(ontology, Vec::new(), equality, symbols)
 }
 
-/// Lowers an ontology like [`lower_with`], together with additional rules, whose names are in `symbols`.
-/// In the additional rules, `owl:Thing`, `owl:Nothing`, `sameAs` and `differentFrom` have the semantics
-/// of OWL. These rules come last in the program.
+/// Lowers an ontology like [`lower_with`], together with additional rules, whose names are in `symbols`. In the
+/// additional rules, `owl:Thing`, `owl:Nothing`, `sameAs` and `differentFrom` have the semantics of OWL (the last two
+/// only under [`Equality::Owl`]). These rules come last in the program.
 pub fn lower_together(
     ontology: &Ontology,
     additional: Vec<Rule>,

@@ -205,8 +205,8 @@ impl Declared {
             || iri.starts_with(rdf::NS)
     }
 
-    /// Returns `true` if the node is an ontology, class or property and not an individual. Other blank
-    /// nodes count as classes.
+    /// Returns `true` if the node is an ontology, class or property and not an individual. A blank node that is no
+    /// ontology counts as a class.
     fn is_entity(&self, graph: &Graph, node: &NamedOrBlankNode) -> bool {
         // Statements about an ontology header are usually annotations.
         if graph.of(node).any(|(_, triple)| is_type(triple, owl::ONTOLOGY)) {

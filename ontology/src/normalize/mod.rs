@@ -56,7 +56,8 @@ pub(crate) struct Merged {
     pub graph: Graph,
     /// Triples that are not in the graph, because no pass before `plain` has to process them.
     pub bulk: Vec<Compact>,
-    /// For each document, the index of its first triple in the graph, and its ontology.
+    /// For each document: the index of its first triple in the graph, and its ontology IRI, or its name if it
+    /// declares none.
     pub parts: Vec<(usize, Iri)>,
 }
 

@@ -72,7 +72,7 @@ pub struct Missed {
     pub estimation: BigRational,
     /// The bound that the objective requires.
     pub bound: BigRational,
-    /// Status of the objective that the rules would conclude.
+    /// Error status that the objective would have if the estimation were measured, such as `IN_ERROR_NFR`.
     pub status: String,
 }
 

@@ -37,13 +37,13 @@ use crate::vocabulary::{DIFFERENT_FROM, SAME_AS};
 use classes::Classes;
 
 impl Program {
-    /// Returns the program under OWL's semantics of names: `owl:sameAs` is equality, and `differentFrom` in
-    /// rule bodies matches stated and derived facts of `owl:differentFrom`. Without equality,
-    /// `differentFrom` compares names.
+    /// Returns the program under OWL's semantics of names: `owl:sameAs` is equality, and `differentFrom` in rule
+    /// bodies (outside of aggregates) matches stated and derived facts of `owl:differentFrom`. Without equality,
+    /// `differentFrom` compares names. Two rules are added: `owl:differentFrom` is symmetric and irreflexive.
     ///
-    /// `sameAs` in a body compares individuals if one of its terms is a variable that another atom binds. Otherwise (two
-    /// constants, or variables that no other atom binds) the atom matches pairs of names of individuals with several
-    /// names. An individual with one name then equals itself only if this pair is stated.
+    /// `sameAs` in a body compares individuals, unless its terms are two different constants, or two variables that
+    /// no other atom binds. Then the atom matches pairs of names of individuals with several names. An individual
+    /// with one name then equals itself only if this pair is stated.
     #[must_use]
     pub fn with_equality(&self, symbols: &mut Symbols) -> Self {
         let (same_as, different) = (symbols.name(SAME_AS), symbols.name(DIFFERENT_FROM));
@@ -80,7 +80,8 @@ impl Program {
 pub(crate) struct Equality {
     same_as: Symbol,
     classes: Classes,
-    /// Maps each row to the stated facts that it represents, unless these are just the row itself.
+    /// Maps each row (fact about representatives) to the stated facts that it represents, unless these are just the
+    /// row itself.
     originals: FxHashMap<Fact, BTreeSet<Fact>>,
     /// Maps each name to the stated `owl:sameAs` pairs that contain it.
     pairs: FxHashMap<Symbol, BTreeSet<Fact>>,
