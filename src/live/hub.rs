@@ -12,8 +12,8 @@ use serde_json::{Value, json};
 use crate::live::keep::{design_key, keys};
 use crate::mapek::DesignChange;
 
-/// Maximum number of lines that the loop has queued and the thread of [`listen`] has not read. Further lines are
-/// dropped and counted.
+/// Maximum number of lines in the queue from the loop to the thread of [`listen`]. Further lines are dropped and
+/// counted.
 const MAX_QUEUED_LINES: usize = 4096;
 const MAX_QUEUED_BYTES: usize = 16 << 20;
 
@@ -56,8 +56,8 @@ pub(super) enum News {
 }
 
 impl Hub {
-    /// Returns, in order, the lines that define the current state of a key and are older than the retained
-    /// lines. Also returns the number of the first retained line.
+    /// Returns the lines that define the current state of a key and are not retained any more, in the order of their
+    /// numbers. Also returns the number of the first retained line.
     pub(super) fn state(&self) -> (Vec<Arc<str>>, u64) {
         let state = self.lock();
         let mut visited = BTreeSet::new();

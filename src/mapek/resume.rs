@@ -1,5 +1,5 @@
 //! Compiles the action under way into the PDDL domain, so that each plan of the remaining mission begins with the
-//! remainder of this action, under any designs.
+//! remainder of this action. The designs of the remainder are open.
 //!
 //! The paper (see [`crate::mapek`]) plans from the state in which the action has ended. Here, planning starts in the
 //! current state, with the remainder of the action as the first step. So the designs of all remaining steps are chosen

@@ -147,8 +147,8 @@ impl Controller {
         self.plan = self.control.plan_anew().unwrap_or_default().into();
     }
 
-    /// Requests the next action of the plan if no action is running. If the plan is empty, the goal is not reached and
-    /// the available designs have changed, plans again first, except with [`Strategy::None`].
+    /// Requests the next action of the plan if no action is running. Plans again first if the plan is empty, the goal
+    /// is not reached, and the available designs have changed since the last planning; never with [`Strategy::None`].
     fn go_on(&mut self, answers: &mut Vec<Answer>) {
         if self.gave_up || self.control.beliefs().running().is_some() {
             return;
@@ -164,7 +164,7 @@ impl Controller {
             // A plan may exist if the availability of designs changes.
             self.replan();
             if let Some(step) = self.plan.pop_front() {
-                // The recursive call requests the step, and ends because the plan is not empty.
+                // The plan is not empty, so the recursive call requests the step and does not plan again.
                 self.plan.push_front(step);
                 self.go_on(answers);
             }

@@ -276,7 +276,7 @@ impl<'m> Numbers<'m> {
                     };
                     causes.push(format!("{name} is {}", number::decimal(value)));
                 }
-                // A single message per cause suffices.
+                // One message for each action and list of causes suffices.
                 let is_told = |reported: &NegativeDuration| {
                     reported.action == action.identifier.name.as_str() && reported.causes == causes
                 };
