@@ -256,7 +256,7 @@ impl Adaptation<'_> {
     fn configure_again(&mut self, answers: &mut Vec<Answer>) {
         let Some(mut running) = self.beliefs.running.take() else { return };
         let is_active = !running.suspended && !running.cancelling;
-        // Without a design to be sent the objectives are up to date.
+        // If no design must be sent, the objectives in the knowledge base are up to date.
         if is_active
             && running.step.configuration.iter().any(|pair| must_be_sent(self.beliefs, &running, pair))
         {

@@ -72,7 +72,7 @@ pub enum Answer {
         effect: Option<u64>,
         /// Number of the action.
         action: u64,
-        /// Seconds since the request, or since the last report.
+        /// Seconds since the effect was last requested, or since the action was requested or last reported.
         seconds: u64,
         /// Reaction of the loop.
         outcome: OverdueOutcome,

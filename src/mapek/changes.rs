@@ -7,8 +7,8 @@ use crate::mapek::answer::Answer;
 #[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub(super) struct Changes {
     pub(super) base: Base,
-    /// Whether inputs of planning have changed otherwise than by the progress or success of an action: facts or values
-    /// of the problem, or facts of the knowledge base.
+    /// Whether inputs of planning have changed: facts or values of the problem, or facts of the knowledge base. Effects
+    /// of the progress and success of actions do not count.
     pub(super) facts: bool,
     /// Whether a report has changed facts of the problem, and not only values.
     pub(super) predicates: bool,

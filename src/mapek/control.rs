@@ -228,7 +228,8 @@ impl Loop {
             if let Some(sequence) = observation.sequence {
                 self.beliefs.numbers.insert(sequence);
             }
-            // The observed design becomes a function grounding before the analysis.
+            // Before the analysis, the knowledge base must contain the observed design as the one in use (function
+            // grounding).
             if let Some(running) = self.beliefs.running.as_ref().filter(|_| changes.observed) {
                 let step = running.step.clone();
                 objectives(&mut self.beliefs, Some(&step), &mut answers);

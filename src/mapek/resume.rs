@@ -45,7 +45,7 @@ pub(crate) fn resume(domain: &Domain, running: &PlannedStep, done: &BigRational)
                 require(&mut copy, Condition::Equal(variable, constant, Span::default()));
             }
         }
-        // The gate opens only once, so that the remainder occurs exactly once.
+        // The copy requires that the gate fact does not hold, and adds this fact. So the remainder occurs exactly once.
         require(&mut copy, Condition::Not(Box::new(Condition::Atom(gate()))));
         open(&mut copy);
         // The copy comes first: among schemas with the same name, the first applicable one is used.
