@@ -276,8 +276,8 @@ impl Beliefs {
         self.reached
     }
 
-    /// Returns `true` if a design is believed to be available. For a design that the knowledge base lacks, the problem
-    /// has to state this. Without a knowledge base, all designs are available.
+    /// Returns `true` if a design is believed to be available. If the problem decides on the availability of the
+    /// design, the problem has to state it. Without a knowledge base, all designs are available.
     pub(super) fn is_available(&self, design: &str) -> bool {
         self.mission.knowledge().is_none() || self.available.contains(design) || self.mission.provides(design)
     }

@@ -8,8 +8,8 @@ use serde_json::{Value, json};
 /// Upper limit on the number of superseded reconfigurations recorded per function.
 const MAX_SUPERSEDED: usize = 16;
 
-/// History of acknowledged and superseded reconfigurations, by function. A reconfiguration is superseded if the robot
-/// has not acknowledged it before a later request replaces it, or before its deadline.
+/// History of acknowledged and superseded reconfigurations, by function. A reconfiguration is superseded if a later
+/// request replaces it, or if it counts as failed, before the robot has acknowledged it.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct Receipts {
     /// Whether any effect was acknowledged explicitly, by its number.

@@ -9,9 +9,10 @@
 //! - `/metaplan/inferences`, `/metaplan/plans`, `/metaplan/effects` and `/metaplan/loop`, schema `metaplan.Answer`: the
 //!   written answers, each on the topic of its kind.
 //!
-//! Times start from the system's clock at the creation of the file, and never decrease. A chunk is written to the file
-//! as a whole, at most [`INTERVAL`] after its first message. So if the program is killed, the file consists of complete
-//! chunks and perhaps an incomplete one. All readers of MCAP can read the complete chunks.
+//! With [`Form::Text`], the schema of all `/metaplan` topics is `std_msgs/msg/String` instead. Times start from the
+//! system's clock at the creation of the file, and never decrease. A chunk is written to the file as a whole, at most
+//! [`INTERVAL`] after its first message. So if the program is killed, the file consists of complete chunks and perhaps
+//! an incomplete one. Readers that do not need an index can read the complete chunks.
 //!
 //! - \[1\] Foxglove: MCAP file format specification, <https://mcap.dev/spec>.
 
