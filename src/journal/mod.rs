@@ -1,5 +1,5 @@
 //! Write-ahead journal: each observation of a loop, and each decision on it, is written before the answers of the
-//! decision leave the program. [`Sync`] says when the written data is flushed to the disk.
+//! decision leave the program. [`Sync`] defines when the written data is flushed to the disk.
 //!
 //! A directory contains segments `journal-N` and snapshots `snapshot-N`. Each segment except segment 0 begins at the
 //! snapshot with its number. The last two segments and snapshots are kept. Records are numbered and chained by hashes,

@@ -72,7 +72,7 @@ pub enum Answer {
         effect: Option<u64>,
         /// Number of the action.
         action: u64,
-        /// Seconds since the effect was last requested, or since the action was requested or last reported.
+        /// Seconds since the last request of the effect, or since the request or last report of the action.
         seconds: u64,
         /// Reaction of the loop.
         outcome: OverdueOutcome,

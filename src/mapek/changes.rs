@@ -10,7 +10,7 @@ pub(super) struct Changes {
     /// Whether inputs of planning have changed: facts or values of the problem, or facts of the knowledge base. Effects
     /// of the progress and success of actions do not count.
     pub(super) facts: bool,
-    /// Whether a report has changed facts of the problem, and not only values.
+    /// Whether a report has changed facts of the problem or a design of the action under way, and not only values.
     pub(super) predicates: bool,
     /// Whether the goal has changed, which invalidates all remembered plans.
     pub(super) goal: bool,

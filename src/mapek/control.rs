@@ -33,8 +33,8 @@ use crate::mission::Mission;
 /// Limit on reasoning steps per update of the knowledge base; see [`rules::Limits`]. The robot waits during reasoning.
 const MAX_REASONING_STEPS: u64 = 100_000_000;
 
-/// Maximum number of names and values that reports may add to the knowledge base before it is rebuilt. The rebuilt
-/// knowledge base lacks the names and values that are not used any more.
+/// Maximum number of names and values that may be added to the knowledge base after the start, or after it was last
+/// rebuilt. Above it, the knowledge base is rebuilt without the names and values that are not used any more.
 const MAX_GROWTH: usize = 1024;
 
 /// Upper limit on the time stated in a line, measured from the clock or from the time of the previous line, whichever
