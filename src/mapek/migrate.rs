@@ -101,7 +101,7 @@ fn merged(
         };
         let name = record[0].to_string();
         match (former.get(&name), robot.remove(&name)) {
-            // The robot has another value than the former version, or the fact is false for it.
+            // The robot has another value than the former version. In the next arm, the fact is false for the robot.
             (before, Some(now)) if before != Some(&now) => init.extend(element_from_record(&now)),
             (Some(_), None) => {}
             _ => init.push(element.clone()),

@@ -74,8 +74,8 @@ impl Folded {
     }
 }
 
-/// Adds to `vocabulary` the predicates whose axioms mention only predicates of the vocabulary and
-/// bind all their variables. Other axioms, for example about maps, may have very large extensions.
+/// Adds to `vocabulary` the predicates whose axioms mention only predicates of the vocabulary and bind all their
+/// variables. Other predicates, for example about maps, may have very large extensions.
 fn with_small(axioms: &[(&Name, Option<Vec<Clause>>)], mut vocabulary: HashSet<Name>) -> HashSet<Name> {
     let is_small = |clauses: &[Clause], vocabulary: &HashSet<Name>| {
         let is_known = |part: &Literal| match part {

@@ -67,12 +67,11 @@ pub struct Planner<'m, 'r> {
 }
 
 impl<'m, 'r> Planner<'m, 'r> {
-    /// Creates a planner for the mission's problem, filled with facts and values from the knowledge
-    /// base. By default, the planner has no limits and reports no improvements.
+    /// Creates a planner for the mission's problem, filled with facts and values from the knowledge base. By default,
+    /// the planner has no time limit and reports no improvements.
     ///
     /// # Errors
-    /// Facts or values from the knowledge base do not fit the domain; M110 if the knowledge is
-    /// inconsistent.
+    /// Facts or values from the knowledge base do not fit the domain; M110 if the knowledge is inconsistent.
     pub fn new(mission: &'m Mission) -> Result<Self, Errors> {
         consistent(mission.knowledge())?;
         let (problem, warnings) = mission.filled()?;
@@ -134,8 +133,8 @@ impl<'m, 'r> Planner<'m, 'r> {
         self
     }
 
-    /// Requests up to `most` further plans of the optimal cost, or none if `most` is `None`. Requires
-    /// sequential plans, a single objective, and numbers that are not too large for integers.
+    /// Requests up to `most` further plans of the optimal cost, or none if `most` is `None`. Requires sequential plans,
+    /// the problem's own metric, and numbers that are not too large for integers.
     #[must_use]
     pub fn alternatives(mut self, most: impl Into<Option<usize>>) -> Self {
         self.alternatives = most.into();

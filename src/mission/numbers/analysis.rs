@@ -276,7 +276,7 @@ impl<'m> Numbers<'m> {
                     };
                     causes.push(format!("{name} is {}", number::decimal(value)));
                 }
-                // A single message per cause suffices.
+                // An action is reported only once for the same causes.
                 let is_told = |reported: &NegativeDuration| {
                     reported.action == action.identifier.name.as_str() && reported.causes == causes
                 };
