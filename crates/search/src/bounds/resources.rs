@@ -1,9 +1,9 @@
 //! Lower bounds on the consumption of a resource until it is replenished or the goal is reached.
 //!
-//! A numeric variable is a resource if every operator that can only lower the variable requires that the new
-//! value is at least 0. The minimum consumption in a projection, on the way to the goal or to a replenishing
-//! operator, is a lower bound on the amount that a state must have. This is the resource-to-go of constrained
-//! shortest paths \[1\].
+//! A numeric variable is a resource if every operator that changes the variable by a constant and cannot
+//! raise it requires that the new value is at least 0. The minimum consumption in a projection, on the way to
+//! the goal or to a replenishing operator, is a lower bound on the amount that a state must have. This is the
+//! resource-to-go of constrained shortest paths \[1\].
 //!
 //! \[1\] I. Dumitrescu, N. Boland: Improved preprocessing, labeling and scaling algorithms for the
 //! weight-constrained shortest path problem, Networks 42(3), 2003.

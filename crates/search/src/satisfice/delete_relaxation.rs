@@ -361,9 +361,9 @@ impl<'a, N: TaskNumber> Builder<'a, N> {
     }
 }
 
-/// Returns the maximum increase of an expression by one application of the operator. Returns `None` if the
-/// increase is never positive. The sign of a constant is decided with exact arithmetic, because a comparison that no
-/// operator increases counts as unreachable.
+/// Returns the increase of an expression by one application of the operator with the most favourable designs.
+/// Returns `None` if the increase is a constant that is not positive. Its sign is decided with exact
+/// arithmetic, because a comparison that no operator increases counts as unreachable.
 fn gain<N: TaskNumber>(operator: &Operator<N>, sum: &[(NumericId, N)]) -> Option<Gain> {
     let mut gain = N::zero();
     let mut terms: Vec<(NumericId, f64)> = Vec::new();

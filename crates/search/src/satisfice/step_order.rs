@@ -26,7 +26,8 @@ pub(super) struct StepOrder {
 type VariableKey = (bool, u32);
 
 impl StepOrder {
-    /// Computes which steps of a plan interfere. With derived variables, and in long plans, all steps do.
+    /// Computes which steps of a plan interfere. With derived variables, and in long plans, all steps count
+    /// as interfering.
     pub(super) fn new<N: TaskNumber>(task: &Task<N>, steps: &[GroundStep]) -> Self {
         let count = steps.len();
         if !task.axioms.is_empty() || count > MAX_STEPS {

@@ -7,9 +7,9 @@ use task::plan::solution::Statistics;
 pub struct SearchStatistics {
     /// Number of expanded states.
     pub expanded: u64,
-    /// Number of generated successors.
+    /// Number of generated successors, including those that were not stored.
     pub generated: u64,
-    /// Number of evaluated states.
+    /// Number of states whose heuristic value was computed.
     pub evaluated: u64,
 }
 
