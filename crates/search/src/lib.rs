@@ -1,6 +1,6 @@
 //! Heuristic search in ground tasks: admissible heuristics, A*, and satisficing search.
 //!
-//! Not part of this crate: PDDL, SAT, and actions that overlap in time.
+//! Absent: PDDL, SAT, and actions that overlap in time.
 
 #![allow(missing_docs, reason = "an interface of the workspace; names say what fields hold")]
 #![warn(

@@ -7,9 +7,9 @@ use task::plan::solution::Statistics;
 pub struct SearchStatistics {
     /// Number of expanded states.
     pub expanded: u64,
-    /// Number of generated successors, including those that were not stored.
+    /// Number of generated successors.
     pub generated: u64,
-    /// Number of states whose heuristic value was computed.
+    /// Number of evaluated states.
     pub evaluated: u64,
 }
 

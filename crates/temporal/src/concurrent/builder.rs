@@ -143,9 +143,9 @@ impl<'a> Builder<'a> {
         if errors.is_empty() { Ok(()) } else { Err(errors.into()) }
     }
 
-    /// Creates a start and an end for each combination of conditional variants of an instance, by
-    /// copying operators. Returns `true` if any operator was copied. Simultaneous runs of different
-    /// variants are not searched.
+    /// Creates a start and an end for each combination of a start and an end of an instance, by copying
+    /// operators. An instance has several of them if its effects are conditional. Returns `true` if any
+    /// operator was copied. Simultaneous runs of different combinations are not searched.
     pub(super) fn pair(&mut self, task: &mut Task) -> bool {
         let before = task.operators.len();
         for key in &self.order {

@@ -69,7 +69,7 @@ type Link = (OperatorId, bool);
 /// State in which a goal holds, and the happenings that lead there.
 type Achieved<T> = (TemporalState<T>, Vec<Link>);
 
-/// State before a goal of an order, and number of happenings up to there.
+/// Temporal state before a goal of an order is achieved, and the number of happenings up to there.
 #[derive(Clone)]
 struct Stage<T: TimeNumber = Int> {
     situation: TemporalState<T>,

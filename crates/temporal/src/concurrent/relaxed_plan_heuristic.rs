@@ -27,7 +27,7 @@ const MAX_REPETITIONS: u32 = 1 << 20;
 
 #[derive(Debug, Clone)]
 pub(super) struct HeuristicValue {
-    /// Weight of the relaxed plan.
+    /// Sum of the weights of the happenings in the relaxed plan, times their repetitions.
     pub(super) left: u64,
     /// Happenings of the relaxed plan without unsatisfied conditions, ascending.
     pub(super) preferred: Vec<OperatorId>,

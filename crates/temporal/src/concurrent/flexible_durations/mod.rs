@@ -54,11 +54,11 @@ pub(super) fn check(concurrent: &TemporalTask) -> Result<(), Errors> {
     .into())
 }
 
-/// Returns `true` if the exhaustive search covers every plan with all its possible times and
-/// durations.
+/// Returns `true` if the exhaustive search covers every plan with all its possible times and durations.
 ///
 /// Returns `false` in particular if
-/// - a chosen duration may be 0 or less than the separation (the action then becomes a single happening),
+/// - a chosen duration may be less than the separation, in particular 0 (the action is then a single
+///   happening),
 /// - a duration depends on the state and is not chosen,
 /// - several happenings can jointly maintain a condition at one time, or
 /// - the task has timed initial literals, since a plan may end right before them.
