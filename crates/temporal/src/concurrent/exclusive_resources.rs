@@ -1,10 +1,10 @@
 //! Lower bound on the makespan: necessary work divided among resources that do one action at a time.
 //!
-//! A variable is an *exclusive resource* if some of its values are *busy*, and busy values are left only by
-//! the ends of *occupying* actions. The start of an occupying action changes the variable from a value that
-//! is not busy to a busy one. Every other happening that sets a value that is not busy requires such a value
-//! before. The runs of occupying actions are therefore disjoint intervals. The start of a run reads what the
-//! end of the previous run has written, so both are at least the separation apart.
+//! A variable is an *exclusive resource* if its values can be divided into *free* and *busy* ones as follows.
+//! The start of an *occupying* action changes the variable from a free value to a busy one. Only the ends of
+//! occupying actions can make a busy variable free: every other happening that sets a free value requires a
+//! free value before. The runs of occupying actions are therefore disjoint intervals. The start of a run
+//! reads what the end of the previous run has written, so both are at least the separation apart.
 //!
 //! Given `m` resources, a plan with makespan `T` contains occupying actions of total duration at most `T` per
 //! resource, or `T + s` if each duration is increased by the separation `s`. The sum of the increased

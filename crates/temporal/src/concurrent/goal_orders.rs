@@ -46,10 +46,10 @@ use crate::concurrent::timed_relaxed_plan::{TimedRelaxation, TimedRelaxedPlan};
 
 /// Upper limit, per goal, on the number of relaxed plans whose actions are executed.
 const MAX_ROUNDS: usize = 60;
-/// Upper limit on the number of states that one best-first search evaluates, and on the number of
-/// these searches per goal. Orders that need more are dropped, so that tasks whose goals conflict
-/// leave the time to the other searches.
+/// Upper limit on the number of states that one best-first search evaluates.
 const MAX_ESCAPE: usize = 100;
+/// Upper limit on the number of best-first searches per goal. Orders that need more are dropped, so that
+/// tasks whose goals conflict leave the time to the other searches.
 const MAX_ESCAPES: usize = 3;
 /// Number of orders after which the search ends if it has found no plan.
 const MAX_FAILURES: usize = 12;
@@ -388,7 +388,7 @@ fn key<T: TimeNumber>(TemporalState { state, clocks, .. }: &TemporalState<T>) ->
 }
 
 /// Extends a sequence of happenings until a goal is reached, by executable parts of relaxed plans. Returns
-/// `None` if the goal is unreachable or the limits on the number of relaxed plans are exceeded.
+/// `None` if the goal is not reached within the limits.
 fn achieve<T: TimeNumber>(
     relaxation: &mut TimedRelaxation<'_, T>,
     (concurrent, expansion): (&TemporalTask<T>, &Expansion<'_, T>),

@@ -48,7 +48,7 @@ pub(super) struct Instance<T: TimeNumber = Int> {
     /// Duration in internal time units. Only a lower bound if the duration depends on the state or
     /// is chosen by the planner.
     pub(super) duration: T,
-    /// Number that holds the duration while the action runs, and the factor from this number to
+    /// Numeric variable that holds the duration while the action runs, and the factor from its value to
     /// internal time units. `None` if the duration is constant.
     pub(super) timer: Option<(NumericId, T)>,
     /// Whether the planner chooses the duration.

@@ -67,7 +67,7 @@ pub(super) struct TemporalTask<T: TimeNumber = Int> {
     /// Temporal properties of each operator, by operator id.
     pub(super) happenings: Vec<Happening<T>>,
     pub(super) instances: Vec<Instance<T>>,
-    /// Time (in internal units) and operator of each timed initial literal, in ascending order.
+    /// Time (in internal units) and operator of each group of simultaneous timed initial literals, ascending.
     pub(super) events: Vec<(T, OperatorId)>,
     /// For each key of an access kind (such as deleting a certain atom): its guard, if there is one. Every
     /// happening that must wait for such an access, except timed initial literals, requires a value of this

@@ -55,10 +55,11 @@ enum Timing {
     At(Time),
 }
 
-/// Fixed duration of an instance, or the number from which it follows.
+/// Duration of an instance: fixed, or computed from numbers when the action starts.
 enum Duration<T: TimeNumber> {
     Constant(Time),
-    /// Value that the start assigns to the number holding the duration, and its factor.
+    /// Expression that the start assigns to the number holding the duration, and the factor from this number
+    /// to internal time units.
     Assigned(Linear<Int>, T),
 }
 
@@ -75,11 +76,13 @@ pub(super) struct TimedRelaxation<'a, T: TimeNumber = Int> {
     /// Rule that adds each proposition, and the number of its repetitions.
     supporters: Vec<Option<(u32, u32)>>,
     is_settled: Vec<bool>,
-    /// Per rule: number of unreached conditions, sum of the numbers of relaxed actions of the
-    /// reached ones, position in the order in which rules fire, and latest time.
+    /// For each rule: number of its unreached conditions.
     unmet: Vec<u32>,
+    /// For each rule: sum of the numbers of relaxed actions of its reached conditions.
     sums: Vec<u32>,
+    /// For each rule: its position in the order in which rules fire.
     order: Vec<u32>,
+    /// For each rule: the latest time at which it may fire.
     latest: Vec<Time>,
     is_used: Vec<bool>,
     fired: u32,

@@ -1,15 +1,15 @@
 //! Temporal planning with durations that the planner chooses: a linear program for each sequence of
 //! happenings.
 //!
-//! The bounds of a duration are conditions at the start of its action, and effects may depend on
-//! the duration. A sequence has a plan if some times and durations satisfy all constraints, which
-//! form a linear program as in COLIN \[1\]. The program is solved in exact arithmetic
-//! (`linear_program`), because rounding errors could make plans invalid and infeasibility is part
-//! of proofs. An exhaustive and a greedy search run interleaved (`search`). If every action can
-//! have its minimal duration, the searches for fixed durations are used as well.
+//! The bounds of a duration are conditions at the start of its action, and effects may depend on the
+//! duration. A sequence has a plan if some times and durations satisfy all constraints, which form a linear
+//! program as in COLIN \[1\]. The program is solved in exact arithmetic (`linear_program`), because rounding
+//! errors could make plans invalid and infeasibility is part of proofs. An exhaustive and a greedy search run
+//! interleaved (`search`). If the variant of the task with minimal durations is supported, the searches for
+//! fixed durations are used as well.
 //!
-//! \[1\] A. Coles, A. Coles, M. Fox, D. Long: COLIN: planning with continuous linear numeric
-//! change, JAIR 44, 2012.
+//! \[1\] A. Coles, A. Coles, M. Fox, D. Long: COLIN: planning with continuous linear numeric change, JAIR 44,
+//! 2012.
 
 mod affine;
 mod answer;

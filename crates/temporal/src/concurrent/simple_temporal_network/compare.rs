@@ -19,9 +19,8 @@ impl<T: TimeNumber> SimpleTemporalNetwork<T> {
         }
     }
 
-    /// Removes accesses that can no longer delay a happening: those at least `separation` before
-    /// the last timed initial literals or before the last change of their guard, a variable given by
-    /// `guards` (see the field of the temporal task).
+    /// Removes accesses that can no longer delay a happening: those at least `separation` before the last
+    /// timed initial literals, or before the last change of their guard (see `TemporalTask::guards`).
     pub(in crate::concurrent) fn forget(&mut self, guards: &[Option<u32>], separation: T) {
         let mut entries = std::mem::take(&mut self.entries);
         entries.retain(|(key, time)| !self.is_past(*key, time, guards, separation));
