@@ -51,7 +51,7 @@ pub(super) struct Achiever {
 #[derive(Debug, Clone)]
 pub(super) enum Gain {
     Constant(f64),
-    /// A linear expression over the state before the operator: constant and terms.
+    /// A linear expression over the numbers of the state before the operator: constant and terms.
     Linear(f64, Vec<(NumericId, f64)>),
     /// A single application is assumed to suffice.
     Unlimited,

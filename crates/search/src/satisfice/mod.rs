@@ -130,9 +130,10 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
             }
         };
         let is_last = self.phase.saturating_add(1) == SEARCH_SEQUENCE.len();
-        // Each search but the last has the cost of its predecessor's plan as its limit, even if another
-        // component knows a cheaper plan. It may thus find a worse plan than that, but ends early, and the
-        // next search is less greedy. Finding a plan below `limit` would take long.
+        // Except in the last search, the limit is the cost of the plan that these searches found last, even
+        // if another component knows a cheaper plan. A search may then find a worse plan than the known one,
+        // but it ends early, and the next search is less greedy. Finding a plan below `limit` would take
+        // long.
         let own_limit = if is_last { limit } else { self.cost.as_ref() };
         let outcome = search.run(&mut self.known, own_limit, work, self.limits, &mut self.figures);
         let is_large = search.size() > self.limits.room() / MEMORY_SHARE;
