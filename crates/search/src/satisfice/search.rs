@@ -205,8 +205,8 @@ impl<N: TaskNumber> Search<N> {
                     self.nodes[id as usize] = node;
                 }
                 let start = (id as usize).saturating_mul(self.stride);
-                // A landmark counts as reached only if it was reached on each path that was the cheapest one to
-                // the state when it was found.
+                // A state that is reached again keeps only the landmarks that are also reached on the new
+                // path.
                 for (new, old) in reached.iter_mut().zip(&mut self.reached[start..]) {
                     *new &= *old;
                     *old = *new;

@@ -7,7 +7,7 @@
 //! processing time \[1\]. Local search then swaps and moves goals \[2\]; decoding a sequence of
 //! intermediate goals by a simple planner is the scheme of \[3\].
 //!
-//! The greedy search (`greedy`) usually expands each state only once, whatever its clocks are. So it
+//! The greedy search (`greedy`) usually expands each state only once, regardless of its times. So it
 //! rarely changes how actions are distributed among interchangeable objects. The search over goal
 //! orders proves nothing: it only yields plans, each of which was executed happening by happening.
 //!
