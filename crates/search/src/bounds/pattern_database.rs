@@ -22,8 +22,8 @@ pub struct Projection {
     sizes: Vec<usize>,
     initial: u32,
     goals: Vec<u32>,
-    /// For each operator: its cost with the cheapest designs, and its transitions. There are no transitions
-    /// if the operator neither reads nor changes the pattern.
+    /// For each operator: its cost with the cheapest designs (0 if it is negative), and its transitions.
+    /// There are no transitions if the operator neither reads nor changes the pattern.
     operators: Vec<(Int, Vec<Transition>)>,
     /// Minimum cost of an operator that neither reads nor changes the pattern; `None` if there is no such
     /// operator.

@@ -1,9 +1,10 @@
-//! Goal of a search: the goal of the task, or the goal of a segment of a plan.
+//! Goal of a segment of a plan.
 //!
-//! A segment is a sequence of consecutive steps of a plan. Steps that replace a segment must lead to a state in
-//! which the steps after the segment, its *suffix*, are still a plan. The facts that the suffix needs are
-//! computed by regression [1, section 3]. If the facts do not describe what the suffix needs (with derived
-//! variables, conditional effects, disjunctions or numbers), executing the suffix decides.
+//! A segment is a sequence of consecutive steps of a plan. Steps that replace a segment must lead to a state
+//! in which the steps after the segment, its *suffix*, are still a plan. The facts that the suffix needs are
+//! computed by regression \[1, section 3\]. Facts alone may not express the needs of the suffix (with derived
+//! variables, conditional effects, disjunctions or numbers). A state is then also tested by executing the
+//! suffix.
 //!
 //! \[1\] J. Rintanen: Regression for classical and nondeterministic planning, ECAI 2008.
 
@@ -12,7 +13,7 @@ use task::task::number::TaskNumber;
 use task::task::{Fact, State, Task};
 
 pub(super) struct SegmentGoal {
-    /// Facts that every goal state of the segment has, in ascending order.
+    /// Facts that a goal state of the segment must have, in ascending order.
     pub(super) facts: Vec<Fact>,
     suffix: Vec<GroundStep>,
     /// `true` if the facts suffice: the suffix is executable in every state that has them.

@@ -49,7 +49,7 @@ struct Numbers<N> {
 #[derive(Clone, Copy)]
 pub(super) struct ParentLink {
     pub(super) parent: u32,
-    /// Index of the operator with its combination of designs, see `SearchTask::step`.
+    /// Index of an operator with one of its combinations of designs, see `SearchTask::step`.
     pub(super) step: u32,
     pub(super) steps: u32,
 }
@@ -89,7 +89,8 @@ pub(super) struct StateRegistry<N> {
     tree_bytes: usize,
     table: HashTable<u32>,
     nodes: Vec<Node>,
-    /// For each node: the indices of the values of its compared variables, which are not part of the key.
+    /// For each node: the indices (in `numbers`) of the values of its compared variables, which are not part
+    /// of the key.
     others: Vec<u32>,
     numbers: Numbers<N>,
     key: Vec<u32>,

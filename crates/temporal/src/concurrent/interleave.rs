@@ -173,8 +173,8 @@ fn improve<T: TimeNumber>(
     }
 }
 
-/// Claim of an ended search. If the search is incomplete, only the initial lower bound holds for
-/// all plans.
+/// Outcome that is proved after the searches. If the exact search is incomplete, only the initial lower bound
+/// holds for all plans.
 fn claimed<T: TimeNumber>(
     search_end: SearchEnd<T>,
     (concurrent, search): (&TemporalTask<T>, &Search<'_, T>),
