@@ -181,8 +181,8 @@ impl Poses {
     }
 }
 
-/// Returns an argument by its position `number`, counted from 1. Without a position, `from_end`
-/// counts from the end, where 0 is the last argument. The error describes a missing argument.
+/// Returns the argument with the position `number`, counted from 1. If `number` is `None`, `from_end` is the position
+/// counted from the end, where 0 is the last argument. The error describes a missing argument.
 pub(super) fn argument(
     arguments: &[String],
     number: Option<NonZeroUsize>,
