@@ -23,7 +23,8 @@ const CLASSES: usize = MAX_DURATIONS.len() + 1;
 pub(crate) struct Threads {
     quick: Semaphore,
     searches: [Semaphore; CLASSES],
-    /// Number of searches that have left their class while the pools of longer ones were full.
+    /// Number of searches that run on extra threads. They have exceeded the maximum of their class while the pool of
+    /// the next class was full.
     extra: AtomicUsize,
     max_extra: usize,
     /// Estimated duration of a search by mission.
