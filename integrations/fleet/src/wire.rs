@@ -181,7 +181,7 @@ pub enum SafePoint {
     /// The end of the action under way, or at once between actions.
     #[default]
     ActionEnd,
-    /// The first event at which the robot has reached its goal and is between two actions.
+    /// The first event after the robot has reached its goal.
     Goal,
 }
 

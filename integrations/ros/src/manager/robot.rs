@@ -285,8 +285,8 @@ impl Robot {
     pub(super) fn request_mode(&mut self, name: &str) {
         let Some(function) = self.functions.get_mut(name) else { return };
         let (inputs, name) = (self.inputs.clone(), name.to_owned());
-        // The previous request must have ended first: an earlier observation that is still running would not show the
-        // change that has caused this request.
+        // The previous request is cancelled and must have ended first. Its observation may have begun before the
+        // change that has caused this request, and a second observation during the first one would be unsettled.
         let previous = function.mode_request.take();
         let end_previous = async move {
             if let Some(previous) = previous {

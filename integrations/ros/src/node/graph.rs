@@ -331,9 +331,9 @@ impl Graph {
     /// Returns `true` if a reply to this client arrives: its reply reader is matched with our reply writer. A
     /// server that replies earlier loses the reply.
     ///
-    /// Fast DDS identifies a client by its reply reader, and other enhanced clients by their request writer. Cyclone
-    /// DDS identifies a client by eight bytes that are no GUID. Then each participant with request writers must have
-    /// at least as many matched reply readers.
+    /// Fast DDS identifies a client by its reply reader, and other middlewares with the enhanced mapping by its
+    /// request writer. Cyclone DDS identifies a client by eight bytes that are no GUID. Then each participant with
+    /// request writers must have at least as many matched reply readers.
     pub(crate) fn can_reply(&self, topics: &Topics, client: Gid) -> bool {
         let client = client.to_bytes16();
         let state = self.state();

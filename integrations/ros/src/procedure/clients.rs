@@ -397,7 +397,7 @@ impl Clients {
         )))
     }
 
-    /// Returns `true` if a condition about messages holds.
+    /// Returns `true` if a condition about the last message on a topic holds, and for all other conditions.
     fn is_met(&self, condition: &Condition) -> bool {
         let last = |topic: &str, kind: &MessageType| {
             self.observed.get(&topic_key(topic, kind)).and_then(|observed| last_message(&observed.last))
