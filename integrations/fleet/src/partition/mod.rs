@@ -49,8 +49,8 @@ pub struct Settings {
     pub save_within: Duration,
     /// Time between two checks whether robots have to be saved.
     pub look: Duration,
-    /// Twice the number of undecided events of a partition in memory from which on robots with 16 or more of them get
-    /// no more. Later events of these robots are read again once the earlier ones are decided.
+    /// Threshold for the undecided events of a partition in memory. From half of it on, a robot with 16 or more such
+    /// events gets no more. Its later events are read again once the earlier ones are decided.
     pub ahead: usize,
     /// Maximum time that a partition waits for running loops when it is given back. Their events are decided by
     /// the next owner.

@@ -240,7 +240,8 @@ impl Driver {
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return Ok(()),
             }
-            // Simulated time may run faster or slower than real time, which determines `next`.
+            // Ticks follow the clock of the node, whose simulated time may run faster or slower than the real time of
+            // `next`.
             if self.clock.elapsed() >= next_tick {
                 next_tick = self.clock.elapsed() + PERIOD;
                 self.handle(Input::Tick)?;

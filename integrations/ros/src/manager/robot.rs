@@ -439,8 +439,8 @@ fn subscribe_function(
     subscribe_transitions(node, &topic, move || drop(sender.send(Input::Touched(name.clone()))))
 }
 
-/// Subscribes to parameter changes of the functions' nodes and of the nodes that steps use, and to the lifecycle of the
-/// latter.
+/// Subscribes to the parameter changes of the functions' nodes and of the nodes that steps use. Also subscribes to
+/// the lifecycle transitions of the nodes that steps use.
 fn subscribe_nodes(
     node: &Arc<Node>,
     settings: &Settings,

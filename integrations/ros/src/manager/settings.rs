@@ -191,7 +191,7 @@ impl Settings {
         if errors.is_empty() { Ok(()) } else { Err(errors.into()) }
     }
 
-    /// Checks the steps of designs against the designs of the mission, by functions.
+    /// Checks the steps in the settings against the mission. `designs` are the mission's designs, by function.
     ///
     /// # Errors
     /// A function or a design does not exist, a design has no steps, a function has both steps and names for

@@ -149,8 +149,8 @@ impl Node {
     }
 
     /// Ends the background tasks and announces the departure to participants of Fast DDS. The library announces it to
-    /// the others when the node is dropped. Without this call, the tasks may hold the participant until the program
-    /// ends, and the others notice the departure only when the lease expires.
+    /// other participants when the node is dropped. Without this call, the tasks may hold the participant until the
+    /// program ends, and other participants notice the departure only when the lease expires.
     pub fn close(&self) {
         let tasks = std::mem::take(&mut *self.tasks.lock().unwrap_or_else(PoisonError::into_inner));
         let canceled = futures::future::join_all(tasks.into_iter().map(Task::cancel));

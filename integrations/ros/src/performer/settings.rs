@@ -37,7 +37,8 @@ pub enum By {
         /// Name of the topic.
         topic: String,
     },
-    /// `system_modes`: the action sets the design of a function. Its arguments contain both.
+    /// `system_modes`: the action sets the design of a function. Two of its arguments are the function and the
+    /// design.
     ChangeMode {
         /// Position of the function, counted from 1; by default the last argument but one.
         function: Option<NonZeroUsize>,

@@ -122,7 +122,8 @@ pub struct Interface {
 }
 
 impl Interface {
-    /// Parses the definition of an interface, whose full name is such as `std_msgs/msg/String`.
+    /// Parses the definition of an interface. `full_name` is its name with package and folder, such as
+    /// `std_msgs/msg/String`.
     ///
     /// # Errors
     /// The name or a line of the text is wrong.

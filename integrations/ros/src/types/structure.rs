@@ -86,7 +86,7 @@ impl Expectation {
         expected.collect::<Result<_, String>>().map(Self)
     }
 
-    /// Checks received data.
+    /// Checks received data; `offset` is as for [`Structure::find`].
     ///
     /// # Errors
     /// A field has another value, or the data are incomplete.

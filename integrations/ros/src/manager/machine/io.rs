@@ -38,7 +38,7 @@ pub(in crate::manager) enum Input {
     Tick,
 }
 
-/// A call of `change_mode`, or the steps that have the same effect.
+/// Request to set a mode of a function, by a call of `change_mode` or by steps.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::manager) struct Change {
     pub(in crate::manager) function: String,
