@@ -243,7 +243,8 @@ fn has_colours() -> bool {
 async fn run(command: Command) -> Result<(), Errors> {
     match command {
         Command::Worker { server, work, name } => {
-            // Probes distinguish a worker that waits for its servers from one that hangs.
+            // The endpoints are opened first, so that probes can distinguish a worker that waits for its servers from
+            // one that hangs.
             let health = work.open_endpoints().await?;
             let store = server.open(60).await.map_err(|message| vec![message])?;
             let name = name.unwrap_or_else(own_name);

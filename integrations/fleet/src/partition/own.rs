@@ -271,7 +271,7 @@ impl<S: Store> Partition<S> {
         let is_page_full = events.len() == MAX_PAGE;
         let mut last = 0;
         for event in events {
-            // Later events are read in their order.
+            // Later events are still to come from the stream.
             if event.sequence <= self.seen.0 {
                 last = event.sequence;
                 if self.address(&event).is_some() {

@@ -27,12 +27,12 @@ use crate::types::ActionType;
 
 pub use caller::{Accepted, ActionCaller, GoalError, Pursued};
 
-/// Interval between two polls of an action server, because the client library has no stream of all
-/// events of a server.
+/// Interval at which an action server polls for requests, and an action client for messages. The client library has
+/// no stream of all these events.
 const POLL_INTERVAL: Duration = Duration::from_millis(2);
 
-/// Minimum time for which the result of an ended goal remains available to clients, as in `rcl_action`. Older
-/// results are removed when another goal ends.
+/// Minimum time for which the result of an ended goal remains available to clients. Older results are removed when
+/// another goal ends.
 const LIFETIME: Duration = Duration::from_secs(15 * 60);
 
 type Server<A> = ActionServer<<A as Action>::Goal, <A as Action>::Result, <A as Action>::Feedback>;
@@ -67,14 +67,14 @@ pub enum GoalEvent<A: Action> {
     Cancel(GoalId, CancelRequest),
 }
 
-/// Request for a new goal that the server has not answered yet.
+/// Unanswered request for a new goal.
 #[derive(Debug, Clone, Copy)]
 pub struct Wanted {
     request: RmwRequestId,
     goal: GoalId,
 }
 
-/// Request to cancel a goal that the server has not answered yet.
+/// Unanswered request to cancel a goal.
 #[derive(Debug, Clone, Copy)]
 pub struct CancelRequest {
     request: RmwRequestId,
@@ -105,7 +105,8 @@ impl<A: Action> std::fmt::Debug for Goals<A> {
     }
 }
 
-/// Requests to the three services of an action that wait until the client can receive the reply.
+/// Waiting requests to the three services of an action: to send a goal, to cancel goals and to get a result. Each
+/// request waits until its client can receive the reply (see [`ReplyGate`]).
 struct Gates<A: Action> {
     goals: ReplyGate<(GoalId, A::Goal)>,
     cancels: ReplyGate<ros2_client::action::CancelGoalRequest>,
@@ -226,7 +227,7 @@ impl<A: Action> Goals<A> {
         }
     }
 
-    /// Receives new requests, and handles the waiting requests whose client can receive the reply.
+    /// Receives at most one new request of each service, and handles the requests that need not wait any longer.
     /// Returns descriptions of invalid requests.
     fn poll(&self, graph: &Graph, gates: &mut Gates<A>, take: &mut impl FnMut(GoalEvent<A>)) -> Vec<String> {
         let Some(server) = self.server.get() else { return Vec::new() };
@@ -247,7 +248,7 @@ impl<A: Action> Goals<A> {
             Err(error) => errors.push(error.to_string()),
         }
         while let Some((request, (id, goal))) = gates.goals.pop(graph) {
-            // The client has sent a goal with a known id again.
+            // A request with a known goal id is a repetition and is ignored.
             if !self.goals().contains_key(&id) {
                 take(GoalEvent::Wanted(Wanted { request, goal: id }, goal));
             }
@@ -277,9 +278,9 @@ impl<A: Action> Goals<A> {
         }
     }
 
-    /// Passes on each goal that a cancel request selects: a single goal, all goals, or the goals
-    /// accepted up to a time (`action_msgs/srv/CancelGoal`). Answers with an error code if the
-    /// request selects no running goal.
+    /// Passes on each running goal that a cancel request selects: all goals, the goal with an id, the goals accepted
+    /// up to a time, or the goal with an id and those accepted up to a time (`action_msgs/srv/CancelGoal`). Answers
+    /// with an error code if the request selects no running goal.
     fn cancel(
         &self,
         request: RmwRequestId,

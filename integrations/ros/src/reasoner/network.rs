@@ -44,7 +44,7 @@ pub(super) struct Network {
     systems: BTreeMap<String, Arc<Caller<ChangeMode>>>,
     calling: BTreeMap<String, Task<()>>,
     procedures: Arc<Procedures>,
-    /// Ends running steps before their next one, by function.
+    /// Flags that make a running procedure end before its next step, by function.
     replaced: BTreeMap<String, Arc<AtomicBool>>,
     diagnosed: Diagnosed,
     events: Arc<Publisher<std_msgs::msg::String>>,
