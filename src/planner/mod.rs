@@ -170,6 +170,9 @@ impl<'m, 'r> Planner<'m, 'r> {
         let several = objectives.metrics.len() > 1;
         match (&self.separation, self.alternatives) {
             (Some(_), Some(_)) => Err(apart("plans whose actions overlap have no alternatives")),
+            (None, Some(_)) if !self.minimize.is_empty() => {
+                Err(apart("alternatives are plans with the problem's own metric, so there can be no objectives"))
+            }
             (Some(_), None) if several => {
                 Err(apart("plans whose actions overlap have one objective; add several with weights"))
             }
@@ -244,11 +247,11 @@ impl<'m, 'r> Planner<'m, 'r> {
         let point = planner::lexicographic(&task, &config, &mut self.improvement_listener());
         let reading = Reading::sequential(task.is_timed());
         let alternatives = match self.alternatives {
-            Some(limit) => {
+            Some(limit) if point.solution.status == Status::Optimal => {
                 (self.stage)("the plan is proved optimal; searching for other equally good plans");
                 self.further_plans(&task, &point.solution, limit)?
             }
-            None => None,
+            _ => None,
         };
         let mut planned = self.planned(point, objectives, Ground::Integers(task), reading, ground)?;
         planned.alternatives = alternatives;

@@ -100,12 +100,9 @@ impl Context<'_> {
     /// Adds rules that come from no document. Under the semantics of OWL, two different names can denote
     /// the same individual, so a comparison of names becomes the relation `differentFrom`.
     fn add_rules(&mut self, additional: Vec<Rule>) {
-        let owl = self.equality == Equality::Owl;
         for mut rule in additional {
             for atom in &mut rule.body {
-                if let (true, Atom::Different(left, right)) = (owl, &*atom) {
-                    *atom = self.different(*left, *right);
-                }
+                atom.replace_different(&mut |left, right| self.different(left, right));
             }
             self.rules.push(rule);
         }

@@ -53,13 +53,14 @@ impl Program {
             let bound = binding(rule).bound.0;
             let is_bound = |term: Term| term.as_variable().is_some_and(|v| bound[usize::from(v.0)]);
             for atom in &mut rule.body {
-                match *atom {
-                    Atom::Same(left, right) if left != right && !is_bound(left) && !is_bound(right) => {
-                        *atom = Atom::relation(same_as, [left, right]);
-                    }
-                    Atom::Different(left, right) => *atom = Atom::relation(different, [left, right]),
-                    _ => {}
+                if let Atom::Same(left, right) = *atom
+                    && left != right
+                    && !is_bound(left)
+                    && !is_bound(right)
+                {
+                    *atom = Atom::relation(same_as, [left, right]);
                 }
+                atom.replace_different(&mut |left, right| Atom::relation(different, [left, right]));
             }
         }
         let [x, y] = [0, 1].map(|number| Term::from(Variable(number)));
@@ -152,6 +153,17 @@ fn constants(program: &Program) -> impl Iterator<Item = Symbol> {
 }
 
 impl Atom {
+    /// Replaces a comparison of names by the atom that `replacement` returns. Those inside an aggregate are replaced, too.
+    pub fn replace_different(&mut self, replacement: &mut impl FnMut(Term, Term) -> Self) {
+        match self {
+            Self::Different(left, right) => *self = replacement(*left, *right),
+            Self::Aggregate { body, .. } => {
+                body.iter_mut().for_each(|atom| atom.replace_different(replacement));
+            }
+            _ => {}
+        }
+    }
+
     fn map(&self, term: &impl Fn(Term) -> Term) -> Self {
         let map_terms = |terms: &[Term]| terms.iter().copied().map(term).collect();
         match self {
