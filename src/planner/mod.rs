@@ -170,9 +170,9 @@ impl<'m, 'r> Planner<'m, 'r> {
         let several = objectives.metrics.len() > 1;
         match (&self.separation, self.alternatives) {
             (Some(_), Some(_)) => Err(apart("plans whose actions overlap have no alternatives")),
-            (None, Some(_)) if !self.minimize.is_empty() => {
-                Err(apart("alternatives are plans with the problem's own metric, so there can be no objectives"))
-            }
+            (None, Some(_)) if !self.minimize.is_empty() => Err(apart(
+                "alternatives are plans with the problem's own metric, so there can be no objectives",
+            )),
             (Some(_), None) if several => {
                 Err(apart("plans whose actions overlap have one objective; add several with weights"))
             }

@@ -93,10 +93,32 @@ struct Known<R> {
     result_requests: Vec<RmwRequestId>,
 }
 
+/// Request to cancel one or more goals, which has a single response.
+#[derive(Debug)]
+struct Cancellation {
+    request: RmwRequestId,
+    /// Number of selected goals for which [`Goals::canceling`] was not called yet.
+    undecided: usize,
+    canceling: Vec<GoalInfo>,
+}
+
+impl Cancellation {
+    /// Records whether a selected goal will be cancelled. Returns the response after the last goal.
+    fn decide(&mut self, goal: GoalInfo, will_be: bool) -> Option<(CancelGoalResponseEnum, Vec<GoalInfo>)> {
+        self.undecided = self.undecided.saturating_sub(1);
+        self.canceling.extend(will_be.then_some(goal));
+        let is_rejected = self.canceling.is_empty();
+        let code = if is_rejected { CancelGoalResponseEnum::Rejected } else { CancelGoalResponseEnum::None };
+        (self.undecided == 0).then(|| (code, std::mem::take(&mut self.canceling)))
+    }
+}
+
 /// Accepted goals of an action server.
 pub struct Goals<A: Action> {
     server: OnceLock<Server<A>>,
     goals: Mutex<BTreeMap<GoalId, Known<A::Result>>>,
+    /// Requests to cancel that are not answered yet.
+    cancellations: Mutex<Vec<Cancellation>>,
 }
 
 impl<A: Action> std::fmt::Debug for Goals<A> {
@@ -166,15 +188,23 @@ impl<A: Action> Goals<A> {
         }
     }
 
-    /// Answers a request to cancel a goal: `will_be` states whether the goal will be cancelled.
+    /// Decides whether a goal that a client wants to cancel will be cancelled. The client gets its response after the
+    /// decision about the last goal that its request selects.
     pub fn canceling(&self, request: CancelRequest, will_be: bool) {
-        let goals_canceling =
-            if will_be { vec![GoalInfo { goal_id: request.goal, stamp: request.info }] } else { Vec::new() };
         if will_be && let Some(known) = self.goals().get_mut(&request.goal) {
             known.status = GoalStatusEnum::Canceling;
         }
-        let code = if will_be { CancelGoalResponseEnum::None } else { CancelGoalResponseEnum::Rejected };
-        self.answer_cancel(request.request, code, goals_canceling);
+        let mut cancellations = self.cancellations.lock().unwrap_or_else(PoisonError::into_inner);
+        let position = cancellations.iter().position(|waiting| waiting.request == request.request);
+        let goal = GoalInfo { goal_id: request.goal, stamp: request.info };
+        let response = position.and_then(|position| {
+            let response = cancellations[position].decide(goal, will_be);
+            response.inspect(|_| drop(cancellations.swap_remove(position)))
+        });
+        drop(cancellations);
+        if let Some((code, canceling)) = response {
+            self.answer_cancel(request.request, code, canceling);
+        }
         self.publish_status();
     }
 
@@ -248,9 +278,12 @@ impl<A: Action> Goals<A> {
             Err(error) => errors.push(error.to_string()),
         }
         while let Some((request, (id, goal))) = gates.goals.pop(graph) {
-            // A request with a known goal id is a repetition and is ignored.
-            if !self.goals().contains_key(&id) {
-                take(GoalEvent::Wanted(Wanted { request, goal: id }, goal));
+            let wanted = Wanted { request, goal: id };
+            // Like the action server of rclpy, this one rejects a second goal with the same id.
+            if self.goals().contains_key(&id) {
+                self.reject(wanted);
+            } else {
+                take(GoalEvent::Wanted(wanted, goal));
             }
         }
         while let Some((request, cancel)) = gates.cancels.pop(graph) {
@@ -318,7 +351,10 @@ impl<A: Action> Goals<A> {
                 (false, _) => CancelGoalResponseEnum::UnknownGoal,
             };
             self.answer_cancel(request, code, Vec::new());
+            return;
         }
+        let cancellation = Cancellation { request, undecided: selected.len(), canceling: Vec::new() };
+        self.cancellations.lock().unwrap_or_else(PoisonError::into_inner).push(cancellation);
         for (goal, info) in selected {
             take(GoalEvent::Cancel(goal, CancelRequest { request, info, goal }));
         }
@@ -400,7 +436,11 @@ impl Node {
         let full = self.resolve(name);
         let action_name = client_name(&full)?;
         expect_action(&self.graph, &full, ActionNames::of::<A>());
-        let goals = Arc::new(Goals { server: OnceLock::new(), goals: Mutex::default() });
+        let goals = Arc::new(Goals {
+            server: OnceLock::new(),
+            goals: Mutex::default(),
+            cancellations: Mutex::default(),
+        });
         let (graph, weak, served) = (Arc::clone(&self.graph), Arc::downgrade(self), Arc::clone(&goals));
         self.spawn(async move {
             let mapping = graph.mapping().await;
@@ -436,5 +476,34 @@ impl Node {
             }
         });
         Ok(goals)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn goal(byte: u8) -> GoalInfo {
+        let id = serde_json::from_value(serde_json::json!({ "uuid": [byte; 16] })).expect("an id");
+        GoalInfo { goal_id: id, stamp: Time::ZERO }
+    }
+
+    fn cancellation(undecided: usize) -> Cancellation {
+        let request =
+            RmwRequestId { writer_guid: ros2_client::rustdds::GUID::GUID_UNKNOWN, sequence_number: 1.into() };
+        Cancellation { request, undecided, canceling: Vec::new() }
+    }
+
+    #[test]
+    fn a_request_to_cancel_several_goals_has_one_response() {
+        let mut several = cancellation(3);
+        assert!(several.decide(goal(1), true).is_none());
+        assert!(several.decide(goal(2), false).is_none());
+        let (code, goals) = several.decide(goal(3), true).expect("the last goal");
+        assert_eq!(code, CancelGoalResponseEnum::None);
+        let ids: Vec<_> = goals.iter().map(|goal| goal.goal_id).collect();
+        assert_eq!(ids, [goal(1).goal_id, goal(3).goal_id]);
+        let (code, goals) = cancellation(1).decide(goal(1), false).expect("the only goal");
+        assert_eq!((code, goals.len()), (CancelGoalResponseEnum::Rejected, 0));
     }
 }
