@@ -22,9 +22,9 @@ impl Deadline {
         Self { within, is_hard, number }
     }
 
-    /// Returns the names of two auxiliary actions, one for each condition of the deadline. The condition is
-    /// the precondition of its action. Neither action is ever executed; the effect of the second action
-    /// records that a soft deadline is satisfied.
+    /// Returns the names of two auxiliary actions, one for each condition of the deadline. The condition is the
+    /// precondition of its action. The actions are never part of a plan; the temporal planner only evaluates their
+    /// preconditions and effects.
     pub fn actions(&self) -> [String; 2] {
         ["begins", "ends"].map(|what| format!("deadline {} {what}", self.number))
     }

@@ -69,11 +69,11 @@ pub fn is_violation(action: &str) -> bool {
     is_hidden(action) && action.ends_with(preferences::VIOLATION)
 }
 
-/// Compiles preferences and trajectory constraints away. Preferences that no objective mentions are dropped.
+/// Compiles preferences and trajectory constraints away. If `objectives` is not empty, it replaces the metric of the
+/// problem. Preferences that neither mentions are dropped.
 ///
-/// # Errors
-/// Returns the unsupported constraints and preferences with their source locations, or an error if the deadline passes
-/// or the run is interrupted.
+/// # Errors Returns the unsupported constraints and preferences with their source locations, or an error if a limit is
+/// reached or the run is interrupted.
 pub fn compile<'t>(
     domain: &'t Domain,
     problem: &'t Problem,
@@ -128,8 +128,9 @@ pub fn compile<'t>(
         name_violations(&mut metric.expression);
     }
     if !used_preferences.is_empty() {
-        // Conditions of action preferences keep happenings apart like all other conditions, although the
-        // original task does not require this.
+        // Preferences in preconditions are compiled to effects that read the conditions of the preferences. Happenings
+        // that change such a condition are then separated from the action, although the original task does not require
+        // this.
         let mut preferences = task.0.actions.iter().flat_map(|action| &action.preferences);
         is_exact &= !preferences.any(|preference| used_preferences.contains(&preference.name.name));
         preferences::install(&mut task.0, &mut task.1, (wanted, &used_preferences), course);

@@ -20,7 +20,8 @@ pub struct GroundConfig {
 }
 
 impl Default for GroundConfig {
-    /// Uses the predicate names of the Metaplan paper and of the PDDL files of kas-lab.
+    /// Returns the predicate names of the Metaplan paper and of the PDDL files of kas-lab, without objectives and
+    /// without limits.
     fn default() -> Self {
         Self {
             solves: ["fd_solve_f", "fd_solves_f", "inferred-SolvesF", "solvesF"].map(Name::new).to_vec(),
@@ -57,7 +58,8 @@ pub struct Generality {
     /// If set to n, each initial number may be replaced by any multiple of 1/n. Grounding then infers nothing
     /// from the initial numbers of the problem.
     pub numbers: Option<Int>,
-    /// If set to n, the scale makes all multiples of 1/n integers, in addition to the numbers of the problem.
+    /// If set to n, numeric fluents are scaled such that all multiples of 1/n become integers, in addition to the
+    /// numbers of the problem.
     pub precision: Option<Int>,
     /// If set, the metric may contain fluents that effects change by state-dependent amounts. Optimality is
     /// then not provable.

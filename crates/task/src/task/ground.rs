@@ -133,7 +133,7 @@ pub enum Argument {
 /// objects for the parameters that determine these data.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Operator<N = Int> {
-    /// Index of the action schema in the domain.
+    /// Index of the action schema in the domain; for a wait, the number of schemas.
     pub schema: u32,
     pub arguments: Vec<Argument>,
     /// Functions that the action requires, each with the argument that is its design.

@@ -23,7 +23,8 @@ pub trait TaskNumber: Number + std::fmt::Debug + std::hash::Hash + Default {
     /// If `false`, the factor is always 1.
     const SCALED: bool;
 
-    /// Converts `number * scale`. Returns `None` if this type cannot represent the result.
+    /// Converts `number * scale`. For integers, returns `None` if the result is not an integer or exceeds [`LIMIT`] in
+    /// magnitude.
     fn from_rational(number: &Rational, scale: Int) -> Option<Self>;
 
     /// Returns a floating-point approximation, for estimates only.

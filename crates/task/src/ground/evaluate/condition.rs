@@ -71,8 +71,8 @@ impl Evaluation {
             Formula::Compare(comparison, left, right, place) => {
                 let difference = match (ground(world, left, binding), ground(world, right, binding)) {
                     (Ok(left), Ok(right)) => (left, right),
-                    // PDDL 2.1: an action whose conditional effect reads an undefined value is not
-                    // executable.
+                    // An action whose conditional effect reads an undefined value is not executable (PDDL 2.1). This is
+                    // not supported here.
                     (Err(Failure::Undefined), _) | (_, Err(Failure::Undefined)) if self.refuses_undefined => {
                         return Err(Failure::Error(Error::Unsupported {
                             construct: "a comparison in `when` with a value that is not defined".into(),

@@ -23,7 +23,7 @@ pub type Pattern<S> = (S, Option<Vec<Slot>>);
 /// An argument of a pattern.
 #[derive(Debug, Clone)]
 pub enum Slot {
-    /// An object at a fixed position.
+    /// Exactly this object.
     Object(ObjectId),
     /// A quantified variable and its candidate objects. All occurrences of the variable match the same
     /// object.

@@ -200,7 +200,8 @@ fn broken_by<'o>(
             Some((_, sum)) => *sum += weight,
             None => balance.push((key, weight)),
         };
-        // Adding a true atom does not increase the number, unless the operator also deletes the atom.
+        // Adding an atom that is required to be true does not increase the number, unless the operator also deletes the
+        // atom.
         let comes = |atom: &&AtomId| !change.requires(**atom) || deleted(atom);
         let added = change.adds.iter().filter(comes).filter_map(|atom| key_of(task, candidate, *atom));
         let added: SmallVec<[Key; 4]> = added.collect();
