@@ -10,7 +10,7 @@ use super::syntax_edits::{declare, hidden};
 /// must hold within a given time.
 #[derive(Debug, Clone)]
 pub struct Deadline {
-    /// Longest time between a state with the first condition and a state with the second condition.
+    /// Maximum time from a state with the first condition until the second condition holds.
     pub within: BigRational,
     /// `true` for a constraint, which every plan must satisfy; `false` for a preference.
     pub is_hard: bool,

@@ -47,7 +47,7 @@ pub struct CompiledTask<'t> {
     pub objectives: Cow<'t, [Metric]>,
     /// Deadlines (`always-within`), which are checked once the times of a plan are known.
     pub deadlines: Vec<Deadline>,
-    /// `false` if the compilation may constrain the times of happenings beyond the original task. Irrelevant
+    /// `false` if the compiled task may restrict the times of happenings more than the original task does. Irrelevant
     /// for sequential plans.
     pub is_exact: bool,
 }
@@ -69,8 +69,8 @@ pub fn is_violation(action: &str) -> bool {
     is_hidden(action) && action.ends_with(preferences::VIOLATION)
 }
 
-/// Compiles preferences and trajectory constraints away. If `objectives` is not empty, it replaces the metric of the
-/// problem. Preferences that neither mentions are dropped.
+/// Compiles preferences and trajectory constraints away. Preferences that do not occur in `objectives` (if this is
+/// empty: in the metric of the problem) are dropped.
 ///
 /// # Errors Returns the unsupported constraints and preferences with their source locations, or an error if a limit is
 /// reached or the run is interrupted.

@@ -43,8 +43,8 @@ pub trait TaskNumber: Number + std::fmt::Debug + std::hash::Hash + Default {
     /// sums of costs.
     fn is_moderate(&self) -> bool;
 
-    /// Returns a lower bound on the numbers n with n·`part` ≥ this number, where `part` > 0. Returns 0 if no
-    /// bound is known.
+    /// Returns a lower bound on the integers n with n·`part` ≥ this number, where `part` > 0. Returns 0 if no bound is
+    /// known.
     fn times_at_least(&self, part: &Self) -> u32;
 
     /// Returns `true` if no value of the quantity can overflow. For integers, the sum of the constant's

@@ -10,7 +10,8 @@ use crate::ground::vocabulary::partial_eval::{Residual, compare, truth};
 use crate::ground::vocabulary::world::World;
 use crate::lifted::{Bound, Formula};
 
-/// Evaluates a condition whose slot parameters are bound. A comparison with an undefined value is false.
+/// Evaluates a condition under a binding that assigns all slot parameters in it. A comparison with an undefined value
+/// is false.
 ///
 /// # Errors
 /// The deadline has passed, the run is interrupted, or the condition is not supported.
@@ -22,7 +23,7 @@ pub fn residual(
     Evaluation { refuses_undefined: false }.residual(world, formula, binding)
 }
 
-/// Evaluates the condition of a conditional effect whose slot parameters are bound.
+/// Evaluates the condition of a conditional effect under a binding that assigns all slot parameters in it.
 ///
 /// # Errors
 /// A comparison has an undefined value, the deadline has passed, the run is interrupted, or the condition is

@@ -63,7 +63,7 @@ pub fn groups(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Result<Vec
                 entry.1.push(atom);
             }
         }
-        // With two initially true atoms, the atoms of a key are not mutually exclusive.
+        // If two atoms with equal keys are initially true, the atoms with this key are not mutually exclusive.
         instances.extend(by_key.into_values().filter(|(weight, _)| *weight <= 1).map(|(_, atoms)| atoms));
     }
     cover(&instances, limits)

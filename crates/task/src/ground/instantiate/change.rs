@@ -1,5 +1,4 @@
-//! Composes the changes of an action into the state after the action, in terms of the state before it
-//! (regression).
+//! Computes the state after the changes of an action, as expressions over the state before the action (regression).
 
 use std::sync::Arc;
 
