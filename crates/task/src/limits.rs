@@ -26,8 +26,8 @@ pub struct Limits {
     thresholds: Thresholds,
 }
 
-/// Time for completing an answer after the deadline, in addition to a tenth of the time limit. It is less than the 0.2
-/// s that tests tolerate for a whole command, because the process must also start and print.
+/// Time for completing an answer after the deadline, in addition to a tenth of the time limit. It is less than what
+/// tests tolerate for a whole command (0.2 s), because the process must also start and print.
 const GRACE: Duration = Duration::from_millis(120);
 
 const DEFAULT_MEMORY: usize = 1 << 31;

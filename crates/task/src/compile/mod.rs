@@ -72,8 +72,9 @@ pub fn is_violation(action: &str) -> bool {
 /// Compiles preferences and trajectory constraints away. Preferences that do not occur in `objectives` (if this is
 /// empty: in the metric of the problem) are dropped.
 ///
-/// # Errors Returns the unsupported constraints and preferences with their source locations, or an error if a limit is
-/// reached or the run is interrupted.
+/// # Errors
+/// Returns the unsupported constraints and preferences with their source locations, or an error if a limit is reached
+/// or the run is interrupted.
 pub fn compile<'t>(
     domain: &'t Domain,
     problem: &'t Problem,

@@ -1,10 +1,10 @@
 //! Separable design parameters: parameters of action schemas that are function designs and need not be grounded. Also
 //! contains general queries on conditions and expressions, e.g. for their terms.
 //!
-//! In the explicit form (Metaplan paper, Listings 1 and 2), a schema has parameters `?fd` with a condition `(fd_solve_f
-//! ?fd ?f)`. Such a parameter is *separable* and becomes a slot if no fluent has it as an argument, and it does not
-//! occur in conditions of effects, in conditions that mix static atoms and fluents, or in products and quotients with
-//! fluents. The number of designs then does not multiply the number of ground operators.
+//! In the explicit form (Metaplan paper, Listings 1 and 2), a schema has parameters `?fd` with a condition
+//! `(fd_solve_f ?fd ?f)`. Such a parameter is *separable* and becomes a slot if no fluent has it as an argument, and it
+//! does not occur in conditions of effects, in conditions that mix static atoms and fluents, or in products and
+//! quotients with fluents. The number of designs then does not multiply the number of ground operators.
 
 use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
@@ -21,10 +21,10 @@ pub struct SlotParameter {
     pub(crate) function: Term,
 }
 
-/// Returns the design parameters of a schema with their functions, in ascending order. `solves` lists the
-/// predicates `(p DESIGN FUNCTION)` which state that a design solves a function. The conjuncts of the
-/// conditions at the start, over all and at the end are read in order. A conjunct is ignored if its design is
-/// already known as a design or function, or if its function is already known as a design.
+/// Returns the design parameters of a schema, in ascending order, each with its function. They occur in conjuncts
+/// `(p DESIGN FUNCTION)` of the conditions at the start, over all and at the end, for the predicates p in `solves`. The
+/// conjuncts are read in order; a conjunct is ignored if its design already has a role (design or function), or if its
+/// function is already a design.
 pub fn design_parameters(lifted: &Lifted, schema: &Schema, solves: &[Name]) -> Vec<SlotParameter> {
     let conjuncts = conjuncts(&schema.start_condition).into_iter().chain(conjuncts(&schema.middle_condition));
     let mut designs: Vec<SlotParameter> = Vec::new();

@@ -16,9 +16,9 @@ type Range = Option<(Rational, Rational)>;
 /// Splits every schema whose duration may be 0 into two schemas. The schemas for duration 0 are appended. A schema
 /// whose duration is always 0 is converted instead.
 ///
-/// # Errors Returns an error for each schema with a variable duration of which the planner takes the shortest
-/// admissible value, if this value may be 0 or less. The conditions for duration 0 differ from those for slightly
-/// longer durations.
+/// # Errors
+/// Returns an error for each schema with a variable duration of which the planner takes the shortest admissible value,
+/// if this value may be 0 or less. The conditions for duration 0 differ from those for slightly longer durations.
 pub fn split(lifted: &mut Lifted) -> Result<(), Errors> {
     let mut ranges: FxHashMap<FunctionId, (Rational, Rational)> = FxHashMap::default();
     for (function, _, value) in &lifted.values {
@@ -49,7 +49,7 @@ pub fn split(lifted: &mut Lifted) -> Result<(), Errors> {
                 };
                 let (is_zero, is_positive) = (compare(Comparison::Equal), compare(Comparison::Greater));
                 let mut copy = instant(schema);
-                // The condition on the duration belongs to the start, which thus reads the functions of the
+                // `is_zero` belongs to the condition at the start, so the start also reads the functions in the
                 // duration.
                 if let Some(joint) = &mut copy.joint {
                     joint.start = Formula::And(vec![is_zero.clone(), schema.start_condition.clone()]);

@@ -16,8 +16,8 @@ use crate::lifted::{
     Bound, Change, Effect, Expression, Formula, FunctionId, Lifted, ObjectId, PredicateId, Term,
 };
 
-/// A predicate or function with its arguments; quantified variables are placeholders. `None` as arguments
-/// matches all arguments.
+/// Pattern of atoms or numeric fluents: a predicate or function with its arguments, in which quantified variables are
+/// placeholders. `None` as arguments matches all arguments.
 pub type Pattern<S> = (S, Option<Vec<Slot>>);
 
 /// An argument of a pattern.

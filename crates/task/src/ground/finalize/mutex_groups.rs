@@ -38,7 +38,7 @@ type Key = SmallVec<[ObjectId; 4]>;
 
 const CANDIDATE_LIMIT: usize = 500;
 
-/// A mutex group whose atoms become the values of a finite-domain variable.
+/// A mutex group, and those of its atoms that become the values of a finite-domain variable.
 pub struct Group {
     /// Values of the variable: at least two atoms that belong to no other variable.
     pub(crate) atoms: Vec<AtomId>,
@@ -228,8 +228,8 @@ fn broken_by<'o>(
     None
 }
 
-/// Returns extensions of a violated candidate. Each extension adds a predicate that the operator deletes,
-/// with argument positions whose objects equal the key.
+/// Returns extensions of a violated candidate. Each extension adds the predicate of an atom that the operator deletes,
+/// with the argument positions at which the atom has the objects of the key.
 #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
 fn refinements(
     task: &GroundTask<'_>,

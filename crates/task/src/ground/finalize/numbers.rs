@@ -54,7 +54,7 @@ impl<N: TaskNumber> Numbers<N> {
             denominator.number(number);
             denominator.note(|| (task.world.numeric_name(*variable), None));
         }
-        // Values in other initial states are multiples of 1/precision.
+        // Multiples of 1/n become integers as well, if `generality` requires this.
         for precision in generality.numbers.into_iter().chain(generality.precision) {
             denominator.number(&Rational::new(1, precision));
         }
