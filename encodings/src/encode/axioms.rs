@@ -101,7 +101,7 @@ fn levels(
             let support = builder.formula.fresh(VariableMeaning::Ladder);
             builder.formula.add(Family::Axiom, [!support, *body]);
             for below in recursive_variables {
-                // In the first round no variable of the layer has been derived before.
+                // In the first round no variable of the layer has been derived before, so the rule supports nothing.
                 let first = later[variable].first().copied().unwrap_or(!Formula::truth());
                 builder.formula.add(Family::Axiom, [!support, first]);
                 for k in 1..=later[variable].len() {

@@ -112,8 +112,8 @@ impl Cost {
         Some(Self { lower, spent })
     }
 
-    /// Returns a lower bound on the cost of every plan, and weighted literals for the cost beyond it. Without
-    /// the encoding `CostEncoding::Apart`, there are no weighted literals.
+    /// Returns a lower bound on the cost of every plan, and weighted literals for the cost beyond it. There are no
+    /// weighted literals unless the encoding is `CostEncoding::Apart`.
     pub(super) fn payments(&self) -> (Int, &[(Lit, Int)]) {
         match &self.spent {
             Spent::Apart(literals) => (self.lower, literals),
@@ -268,8 +268,8 @@ impl Sum<'_, '_> {
         Some(spent)
     }
 
-    /// Adds the amounts of a source to the order encoding: `spent ≥ v` and `increment ≥ w` imply
-    /// `spent' ≥ v + w`. Sums above the gap are conflicts.
+    /// Adds the amounts of a source to the order encoding: `spent ≥ v` and `increment ≥ w` imply `spent' ≥ v + w`,
+    /// where `spent'` is the sum including this source. Sums above the gap are excluded.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "amounts are at most the gap, which is at most GROWTH_LIMIT; steps are in memory"

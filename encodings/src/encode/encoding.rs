@@ -24,7 +24,7 @@ use crate::encode::symmetry::Symmetry;
 use crate::encode::variables::Variables;
 use crate::sat::{Lit, Solver};
 
-/// The set of plans that a formula admits.
+/// Constraints on the plans that a formula admits.
 pub struct PlanConstraints<'a> {
     /// `allowed[step][operator]` is `true` if the operator may occur at the step. The number of
     /// steps is the horizon.

@@ -146,7 +146,7 @@ impl Happening {
         })
     }
 
-    /// Returns the condition under which an effect for which `is_kind` returns `true` changes the atom.
+    /// Returns the condition under which an effect of the kind that `is_kind` selects changes the atom.
     fn occurs(&self, atom: &Atom, is_kind: impl Fn(&Effect) -> bool) -> Condition {
         let changes = self.changes.iter().filter(|change| is_kind(&change.effect));
         any(changes.map(|change| {

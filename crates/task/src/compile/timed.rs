@@ -76,8 +76,8 @@ impl Monitors<'_> {
         if from.is_negative() && !is_asked(&zero) {
             return Ok(decided(true));
         }
-        // The initial state has time 0 and must satisfy the condition, even if a happening at time 0 leads to another
-        // state of this time.
+        // If time 0 is in the interval, the initial state must satisfy the condition, even if a happening at time 0
+        // leads to another state of this time.
         let at_first = from.is_positive() || !is_asked(&zero) || self.initial.holds(what);
         let broken = if hard { None } else { Some(self.remember("is broken", !at_first)) };
         let looked_at = self.remember("was looked at", false);

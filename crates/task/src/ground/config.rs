@@ -64,8 +64,8 @@ pub struct Generality {
     /// If set, the metric may contain fluents that effects change by state-dependent amounts. Optimality is
     /// then not provable.
     pub measures_ends: bool,
-    /// If set, fluents that actions change so as to improve the metric are treated like fluents with
-    /// state-dependent changes: their final values are added to the cost at the end of the plan.
+    /// If set, fluents with changes that improve the metric are treated like fluents with state-dependent changes:
+    /// their final values are added to the cost at the end of the plan.
     pub measures_rewards: bool,
     /// If set, the durations of all operators are 0 in the ground task, because the caller evaluates
     /// them. Their common denominator then does not matter.

@@ -21,7 +21,7 @@ pub(super) struct Numbers<N> {
     pub(super) initial: Vec<N>,
     pub(super) names: Vec<String>,
     ids: FxHashMap<NumericId, NumericId>,
-    /// Factors by which the stored values of some numeric variables are multiplied; 1 for missing variables.
+    /// Factors by which the values of some numeric variables are multiplied before they are stored; 1 for all others.
     multiples: FxHashMap<NumericId, Int>,
     pub(super) integers: Integers<N>,
 }

@@ -36,7 +36,7 @@ impl GroundChange {
         }
     }
 
-    /// Returns `true` if the reads contain the changed atom or numeric variable.
+    /// Returns `true` if `reads` contains the changed atom or numeric variable.
     pub(super) fn disturbs(&self, world: &World<'_>, reads: &Reads) -> bool {
         match self {
             Self::Atom(atom, _) => {

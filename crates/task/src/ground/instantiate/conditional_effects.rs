@@ -61,8 +61,8 @@ impl Start {
 pub(super) struct Middle<'m> {
     pub(super) over_all: &'m [Residual],
     pub(super) at_end: &'m [Residual],
-    /// If the task has timed events: the window of the action, and the conditions under which events
-    /// interfere with it.
+    /// If the task has timed events: the timeline window of the action (its position relative to the events), and the
+    /// conditions under which events interfere with it.
     pub(super) passage: Option<&'m (TimelineWindow<'m>, Interference)>,
 }
 
