@@ -36,8 +36,8 @@ pub enum Proof {
     /// The formula for plans of up to `step_bound` steps (cheaper than the known plan, if there is one) is
     /// unsatisfiable, and longer plans need not be considered.
     Sat {
-        /// Maximum number of steps of a plan that is cheaper than the known plan or, if there is no plan, of a shortest
-        /// plan.
+        /// Upper bound on the number of steps of a plan that is cheaper than the known plan or, if there is no plan, of
+        /// a shortest plan.
         step_bound: usize,
     },
     /// The cost of the plan equals a lower bound on the cost of all plans, for example the goal distance in a
