@@ -72,9 +72,10 @@ struct Conflict {
 
 #[derive(Default)]
 struct Uses {
-    /// Operators with a plain condition on the variable, by required value.
+    /// Operators whose condition contains a fact about the variable, by required value.
     require: BTreeMap<u32, Vec<OperatorId>>,
-    /// Operators that read the variable in another way than by a plain condition.
+    /// Operators that read the variable in a clause, in the condition of a conditional effect, or through a derived
+    /// variable.
     read: Vec<OperatorId>,
     write: Vec<(OperatorId, u32)>,
 }
@@ -146,8 +147,8 @@ impl Interference {
         Ok(Some(Self { both_orders: semantics == StepSemantics::ForAllStep, exclusions, conflicts, classes }))
     }
 
-    /// Returns the first exclusion group (operators of which at most one occurs at a step) that contains an
-    /// operator, or `None` if no group does. Operators with the same exclusion group never share a step.
+    /// Returns the index of the first exclusion group (operators of which at most one occurs at a step) that contains
+    /// an operator, or `None` if no group does. Operators with the same index never share a step.
     pub(super) fn class(&self, operator: OperatorId) -> Option<usize> {
         self.classes[operator.index()]
     }
@@ -253,7 +254,7 @@ impl Support {
         facts.chain(literals).filter_map(|variable| self.of.get(variable.index().checked_sub(self.basic)?))
     }
 
-    /// Returns the basic variables on which a condition depends other than by its plain facts.
+    /// Returns the basic variables that a condition reads in clauses or through derived variables.
     fn read_by(&self, condition: &Condition) -> Vec<usize> {
         let literals = condition.clauses.iter().flatten();
         let direct = literals.filter_map(|literal| self.if_basic(literal.fact.variable));
