@@ -489,8 +489,7 @@ mod tests {
     }
 
     fn cancellation(undecided: usize) -> Cancellation {
-        let request =
-            RmwRequestId { writer_guid: ros2_client::rustdds::GUID::GUID_UNKNOWN, sequence_number: 1.into() };
+        let request = RmwRequestId::default();
         Cancellation { request, undecided, canceling: Vec::new() }
     }
 
