@@ -5,10 +5,10 @@
 //! plan. K\* and related algorithms represent top-k plans in this way \[1\].
 //!
 //! If many states differ only in resources, expanding all of them is too much work. A label-setting search
-//! therefore comes first. Each of its labels represents all states that cost at least as much and have at
-//! most as much of each resource. If no path in the label graph leads from a label to the goal, no cheapest
-//! plan passes through a state that the label represents. The second search distinguishes all states and
-//! expands only those that the first search does not exclude.
+//! therefore comes first. Each of its labels (nodes) represents all states that differ from it only in resources,
+//! cost at least as much, and have at most as much of each resource. If no path in the label graph leads from a
+//! label to the goal, no cheapest plan passes through a state that the label represents. The second search
+//! distinguishes all states and expands only those that the first search does not exclude.
 //!
 //! \[1\] J. Lee, M. Katz, S. Sohrabi: On K* search for top-k planning, 2023; H. Aljazzar, S. Leue:
 //! K*: a heuristic search algorithm for finding the k shortest paths, Artificial Intelligence 175,
@@ -141,8 +141,8 @@ impl Labels {
         })
     }
 
-    /// Returns the labels (nodes) at `place` that cost at most as much as a state and are no worse in any
-    /// compared number, each with `true` if its cost is lower.
+    /// Returns the labels (nodes) at `place` that cost at most `cost` and are no worse than `state` in any compared
+    /// number, each with `true` if it costs less than `cost`.
     fn no_worse<'l>(
         &'l self,
         place: &Place,
@@ -209,8 +209,8 @@ struct Growth {
     steps: Vec<GroundStep>,
     numbers: FxHashMap<GroundStep, u32>,
     goals: Vec<bool>,
-    /// Open list. Keys are the estimated cost of the whole plan (0 in the second search) and then the highest
-    /// path cost; the last field is the index of the label (node).
+    /// Open list: estimated cost of the whole plan (0 in the second search), cost of the path, and index of the
+    /// label (node). The label with the least estimate is expanded first; of equal estimates, the greatest cost.
     open: BinaryHeap<Reverse<(Int, Reverse<Int>, u32)>>,
     is_complete: bool,
 }
@@ -277,10 +277,10 @@ impl<'a> Search<'a> {
     }
 
     /// Builds a graph from the initial state until it is complete, a time or memory limit is reached, or
-    /// `is_enough` returns `true`. Returns `None` if an operator has too many combinations of designs. The
-    /// optional `guide` holds the labels (nodes) of the first search, and whether a goal can be reached from
-    /// each of them. With a guide, every label represents a single state, and states that the guide excludes
-    /// are omitted. `is_enough` is called only with a guide.
+    /// `is_enough` returns `true`. Returns `None` if an operator has too many combinations of designs. The first
+    /// search has no `guide`. The second search has one: the labels (nodes) of the first search, and whether a goal
+    /// can be reached from each of them. Its own labels then represent single states, and states that the guide
+    /// excludes are omitted. `is_enough` is called only with a guide.
     fn explore(
         &self,
         labels: Labels,

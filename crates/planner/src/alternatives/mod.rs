@@ -45,8 +45,8 @@ pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Conf
     by_graph.or_else(|| by_formula(context, &bounds, first, most, config)).or(Some(unknown))
 }
 
-/// Searches for at most `most` other cheapest plans in the graph of all cheapest plans. Returns `None` if
-/// graph search is not applicable to the task.
+/// Lists at most `most` other cheapest plans from the graph of all cheapest plans. Returns `None` if graph search
+/// is not applicable to the task.
 fn by_graph(context: Context<'_>, bounds: &Bounds, first: &GroundPlan, most: usize) -> Option<Alternatives> {
     let task = context.task;
     let mut is_enough = |graph: &Graph| List::new(context, first, most, graph).0.is_full();
@@ -67,13 +67,12 @@ struct List {
 }
 
 impl List {
-    /// Lists the plans of a graph. Also returns whether there may be further plans.
+    /// Lists the plans of a graph. Also returns whether the list is exhaustive or the enumeration stopped early.
     fn new(context: Context<'_>, first: &GroundPlan, most: usize, graph: &Graph) -> (Self, End) {
         let mut list = Self { plans: Vec::new(), most };
         let first_plan = decode(context, first);
         let end = Paths::new(graph).each(&mut |steps| {
-            // If a label represents several states, some paths are not plans, because a resource does not
-            // suffice.
+            // If a label represents several states, a path need not be a plan: a resource may not suffice.
             if !graph.is_exact && replay(context.task, &steps).is_none_or(|(_, cost)| cost != first.cost) {
                 return true;
             }
