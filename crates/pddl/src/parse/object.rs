@@ -122,8 +122,8 @@ impl Parser<'_> {
         None
     }
 
-    /// Replaces an object-fluent term by a new variable for its value and records the atom that binds the
-    /// variable. Reports any other item, and a context that does not allow object fluents.
+    /// Replaces an object-fluent term by a new variable for its value and records the atom that binds the variable.
+    /// Reports an error for any other item, and if the context does not allow object fluents.
     pub(super) fn value_of(&mut self, item: Item<'_>) -> Option<Term> {
         if !self.is_object_fluent(item) {
             self.expected(item, "a variable or an object").help(
@@ -281,9 +281,8 @@ impl Parser<'_> {
         Mark { needs: self.objects.needs.len(), assigned: self.objects.assigned.len() }
     }
 
-    /// Quantifies universally over `variables` the needs of all effects parsed since `mark`. Needs are
-    /// conditions that effects impose on the state. Also adds the variables to the assignments recorded since
-    /// `mark`.
+    /// Handles `forall` around all effects parsed since `mark`. Their needs (conditions that effects impose on the
+    /// state) are quantified over `variables`, which are also added to the recorded assignments.
     pub(super) fn effects_below(&mut self, mark: Mark, variables: &[TypedName]) {
         for (_, need) in &mut self.objects.needs[mark.needs..] {
             let inner = std::mem::replace(need, Condition::And(Vec::new()));
@@ -294,8 +293,8 @@ impl Parser<'_> {
         }
     }
 
-    /// Makes the needs of all effects parsed since `mark` depend on `condition`. Needs are conditions that
-    /// effects impose on the state. Also adds the condition to the assignments recorded since `mark`.
+    /// Handles `when` around all effects parsed since `mark`. Their needs (conditions that effects impose on the
+    /// state) are required only if `condition` holds, which is also added to the recorded assignments.
     pub(super) fn effects_when(&mut self, mark: Mark, condition: &Condition) {
         for (_, need) in &mut self.objects.needs[mark.needs..] {
             let inner = std::mem::replace(need, Condition::And(Vec::new()));

@@ -30,8 +30,8 @@ pub(super) fn derive_facts(world: &World<'_>, state: &mut State) {
     }
 }
 
-/// An instance of an axiom with an opaque condition (one into which new facts cannot be joined). The instance
-/// is re-evaluated until its condition holds.
+/// An instance of an axiom with an opaque condition (one into which new facts cannot be joined). Until its
+/// condition holds, the instance is re-evaluated when a fact arrives that was missing.
 struct WaitingInstance {
     axiom: usize,
     arguments: Arguments,

@@ -45,8 +45,8 @@ const OVERHEAD: usize = size_of::<Node>() + 80;
 
 /// Minimises a metric that depends on the state. Returns `None` if the method is not applicable, e.g. with the SAT
 /// solver only, if an operator may improve the metric, or if operators have too many combinations of designs. Also
-/// returns `None` if there is a horizon and no plan within it was found, or if a limit is reached before the search
-/// begins.
+/// returns `None` if a limit is reached before the search begins. With a horizon, also returns `None` if no plan
+/// within it was found, unless it is proved that there is no plan at all.
 pub(super) fn minimise(
     task: &Task,
     config: &Config,
