@@ -147,8 +147,8 @@ impl Bindings {
         }
     }
 
-    /// Returns the attribute whose sum over the chosen designs is the value of a function.
-    /// Considers only explicit bindings.
+    /// Returns the attribute whose sum over the chosen designs is the value of the numeric function `name`,
+    /// according to an explicit binding.
     pub(super) fn chosen(&self, name: &Name) -> Option<String> {
         match self.own.get(name) {
             Some(Query::Chosen(attribute)) => Some(attribute.clone()),
@@ -156,8 +156,8 @@ impl Bindings {
         }
     }
 
-    /// Returns the attribute whose sum over the newly chosen designs is the value of a function.
-    /// Considers only explicit bindings.
+    /// Returns the attribute whose sum over the newly chosen designs (those that replace another design) is the
+    /// value of the numeric function `name`, according to an explicit binding.
     pub(super) fn reconfigured(&self, name: &Name) -> Option<String> {
         match self.own.get(name) {
             Some(Query::Reconfigured(attribute)) => Some(attribute.clone()),
@@ -243,9 +243,9 @@ fn parse_query(symbol: &str, query: &str) -> Result<Query, String> {
 /// the domain. Returns warnings and errors.
 ///
 /// Availability facts of the problem are removed with a warning, except those about the designs `own`, whose
-/// availability the problem decides. Values that the problem states take precedence. Symbols for which
-/// `stands` returns `true` count as declared, because the explicit form of a plain domain (with design
-/// parameters) does not have them.
+/// availability the problem decides. Values that the problem states take precedence. Bound symbols that the domain
+/// does not declare cause a warning, except those for which `stands` returns `true`: functions that the explicit
+/// form of a plain domain (with design parameters) replaces.
 pub(super) fn fill(
     domain: &Domain,
     problem: &mut Problem,

@@ -123,7 +123,7 @@ fn is_toml(line: &str) -> bool {
 /// a knowledge base. An empty text is accepted.
 ///
 /// # Errors
-/// Names the detected kind and a remedy. The text itself is not quoted.
+/// Names the detected kind and, for common mistakes, a remedy. The text itself is not quoted.
 pub fn expect(kind: Kind, file: &str, text: &str) -> Result<(), Message> {
     let detected = Kind::of(text);
     // A text that begins with a parenthesis may be malformed PDDL. The parser then reports a more
@@ -198,8 +198,8 @@ pub(crate) fn quoted(messages: Vec<Message>) -> Vec<Message> {
     messages.into_iter().map(quoted).collect()
 }
 
-/// Returns `true` if a file begins like a knowledge base, or cannot be read. No message can quote the content
-/// of an unreadable file.
+/// Returns `true` if a file begins like a knowledge base, is empty, or cannot be read. No message can quote the
+/// content of an unreadable file.
 fn is_knowledge(path: &Path) -> bool {
     let Ok(file) = std::fs::File::open(path) else { return true };
     let mut bytes = Vec::new();

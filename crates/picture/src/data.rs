@@ -92,8 +92,8 @@ pub struct Map {
 pub struct Place {
     /// Name of the place.
     pub name: String,
-    /// Coordinates: x increases to the right, y increases upwards. If coordinates are missing, the
-    /// places are laid out by their ways.
+    /// Coordinates: x increases to the right, y increases upwards. If a place of a map has none, all its places are
+    /// laid out by their ways.
     pub position: Option<(f64, f64)>,
     /// Whether an object is at the place initially.
     pub is_start: bool,

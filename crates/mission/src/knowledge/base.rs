@@ -29,7 +29,7 @@ const MANY_NAMES: usize = 32;
 #[derive(Debug, Clone)]
 pub struct Knowledge {
     pub(super) runtime: Runtime,
-    /// Cached queries of planning, kept consistent with `runtime`.
+    /// Cached results of the queries that planning makes, kept consistent with `runtime`.
     pub(super) catalogue: OnceLock<Arc<Catalogue>>,
     pub(super) waiting: Waiting,
     /// State after reading the documents. Shares all unchanged data with `runtime`.

@@ -75,9 +75,9 @@ impl CoAdaptation {
     /// the knowledge base requires no function for the domain's actions.
     ///
     /// # Errors
-    /// Function names that PDDL does not admit, contexts that are not predicates of the domain,
-    /// reserved names that the domain declares, and uses of functions where newly chosen designs
-    /// cannot be counted.
+    /// Function names that PDDL does not admit, contexts that are not predicates of the domain for parameters of
+    /// the action, reserved names that the domain declares, and uses of functions where newly chosen designs cannot
+    /// be counted.
     pub(super) fn new(
         domain: &Domain,
         problem: &Problem,
@@ -227,9 +227,8 @@ impl CoAdaptation {
         explicit
     }
 
-    /// Adds to the problem a fact for each design that meets a quality bound. A design that lacks
-    /// an estimate still meets the bound if no design of its functions has an estimate of the
-    /// attribute.
+    /// For each quality bound, adds facts to the problem for the designs that meet it. A design that lacks an
+    /// estimate still meets the bound if no design of its functions has an estimate of the attribute.
     pub(super) fn fill(&self, problem: &mut Problem, designs: &[FunctionDesign]) {
         for quality in self.quality() {
             for design in designs {
@@ -345,8 +344,9 @@ impl CoAdaptation {
         }
     }
 
-    /// Appends to `out`, for each `increase` and `decrease` effect whose amount contains a sum over the newly chosen
-    /// designs, a conditional effect for each design. It adds the design's share if the design replaces another one.
+    /// Appends to `out`, for each `increase` and `decrease` effect whose amount contains a sum over the newly
+    /// chosen designs, a conditional effect for each design. This effect adds the design's share of the sum if the
+    /// design replaces another one.
     fn changes(&self, effect: &Effect, designs: &[(Identifier, &Needed)], out: &mut Vec<Effect>) {
         match effect {
             Effect::And(parts) => parts.iter().for_each(|part| self.changes(part, designs, out)),

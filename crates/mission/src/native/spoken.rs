@@ -12,7 +12,7 @@ impl CoAdaptation {
         self.chosen.contains_key(function) || self.changed.contains_key(function)
     }
 
-    /// Rewrites a condition for display: the predicate that a design meets a quality bound becomes `(meets
+    /// Rewrites a condition for display: an atom which states that a design meets a quality bound becomes `(meets
     /// DESIGN BOUND)`.
     pub(crate) fn spoken(&self, condition: &str) -> String {
         let mut text = condition.to_owned();
