@@ -366,8 +366,8 @@ impl Fill<'_> {
                 format!("the problem's own `{predicate}` facts are ignored: the knowledge base decides{but}");
             self.warnings.push(Message::warning("M202", text));
         }
-        // After failed inference no design may count as available: an unknown failure must not be
-        // planned with.
+        // After failed inference, no design counts as available, because a design may have failed whose failure is
+        // not known yet.
         let is_known = self.is_known;
         for design in self.known.designs().iter().filter(|design| is_known && design.available) {
             self.fact(predicate, &[&design.individual.name]);

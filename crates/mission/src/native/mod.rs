@@ -161,7 +161,7 @@ impl CoAdaptation {
         errors
     }
 
-    /// Returns the functions bound to `reconfigured:ATTRIBUTE` that an action uses where changes of designs cannot be
+    /// Returns the functions bound to `reconfigured:ATTRIBUTE` that an action uses where reconfigurations cannot be
     /// counted, e.g. in a condition.
     fn not_counted(&self, action: &Action) -> BTreeSet<Name> {
         let uncounted = RefCell::new(BTreeSet::new());

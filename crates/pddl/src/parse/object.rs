@@ -2,8 +2,9 @@
 //!
 //! `(place-of ?x - tool) - place` becomes a predicate with one more argument: the value. The predicate holds
 //! for at most one value.
-//! - An object-fluent term in a condition becomes a variable below `exists`.
-//! - An object-fluent term in an effect becomes a variable below `forall` and `when`.
+//! - An object-fluent term in a condition becomes a variable that `exists` binds.
+//! - An object-fluent term in an effect becomes a variable that `forall` binds; `when` restricts the effect to the
+//!   value of the term.
 //! - An assignment adds the atom with the new value and deletes the atoms with all values. Additions override
 //!   deletions.
 //! - Conditions that an effect imposes on the state, such as the existence of a value, become conditions of
@@ -86,7 +87,7 @@ impl Parser<'_> {
         if self.objects.prefix.is_none() {
             let text = self.sink.source().text().to_ascii_lowercase();
             let mut prefix = "value".to_owned();
-            // A prefix that no variable of the file begins with makes all names with it unused.
+            // If no variable of the file begins with the prefix, all names with this prefix are unused.
             while text.contains(&format!("?{prefix}")) {
                 prefix.push('-');
             }

@@ -78,7 +78,8 @@ pub(super) fn by_formula(
             _ => break,
         }
     }
-    // With waits, several operators represent one action, and actions can have different positions.
+    // If the task has waits (steps that only advance the time), several operators can represent one action, and an
+    // action can have different positions in equal plans. So plans cannot be compared step by step.
     let has_waits = task.operators.iter().any(|operator| operator.wait.is_some());
     let choices = if complete && !has_waits { run.forced(&first.steps, &sequences) } else { None };
     let forced = choices.map(|choices| forced(task, &first.steps, &choices));

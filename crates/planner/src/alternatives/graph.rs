@@ -96,14 +96,13 @@ type Place = (Box<[u32]>, Box<[Int]>);
 struct Labels {
     all: Vec<(State, Int)>,
     places: FxHashMap<Place, Vec<u32>>,
-    /// Indices of the numeric variables that are compared, with their directions. All other numbers are part
-    /// of the [`Place`].
+    /// Numeric variables for which a label also represents worse values: their indices, and the directions in which
+    /// values are compared. All other numbers are part of the [`Place`].
     compared: Vec<(usize, Polarity)>,
     basic: usize,
 }
 
-/// Relation of a state, reached at some cost, to the existing labels (nodes) that agree with it except in
-/// compared numbers.
+/// Result of comparing a state and the cost of its path with the existing labels (nodes) at the same [`Place`].
 enum Known {
     /// Another label (node) costs less and is no worse in any compared number.
     Beaten,

@@ -52,7 +52,8 @@ fn by_graph(context: Context<'_>, bounds: &Bounds, first: &GroundPlan, most: usi
     let mut is_enough = |graph: &Graph| List::new(context, first, most, graph).0.is_full();
     let graph = cheapest(context, bounds, first.cost, &mut is_enough)?;
     let (list, end) = List::new(context, first, most, &graph);
-    // With waits, several operators represent one action, and actions can have different positions.
+    // If the task has waits (steps that only advance the time), several operators can represent one action, and an
+    // action can have different positions in equal plans. So plans cannot be compared step by step.
     let has_waits = task.operators.iter().any(|operator| operator.wait.is_some());
     let is_known = graph.is_complete && graph.is_exact && !has_waits;
     let forced = is_known.then(|| forced(task, &first.steps, &shared(task, &first.steps, &graph)));

@@ -1,10 +1,10 @@
 //! Branch and bound for metrics that depend on the state, by A\* with exact costs of paths.
 //!
 //! The portfolio for constant costs finds a first plan. Then a satisficing search for the task with lower bounds as
-//! costs runs in turns with A\*, and its plans are upper bounds. A path dominates another one if it costs no more and
-//! reaches a state that is as good: less (or more) of a number is no worse if no condition, cost or other number
-//! depends on it in the other direction. With a horizon, longer paths are pruned, and a path dominates only paths that
-//! are at least as long.
+//! costs runs in turns with A\*, and its plans are upper bounds. A path dominates another one if it costs no more
+//! and its state has the same facts and no worse numbers. Less of a number is never worse if no condition, cost or
+//! other number needs more of it (and vice versa). With a horizon, longer paths are pruned, and a path dominates
+//! only paths that are at least as long.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

@@ -219,8 +219,8 @@ impl<'a> Run<'a> {
         if let Some(reason) = live.solver.failure() {
             self.statistics.failure = Some(reason.to_owned());
         }
-        // A model of an external program is verified by executing the plan. Its claim of unsatisfiability is
-        // not verified.
+        // A model of an external program is verified by executing the plan. The program's claim of unsatisfiability
+        // is not verified.
         if let (Answer::Unsatisfiable, Backend::Program { command, arguments }) =
             (answer, &self.config.backend)
         {

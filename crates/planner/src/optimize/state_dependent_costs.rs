@@ -149,7 +149,8 @@ fn preferences(task: &Task, weights: &[(NumericId, Int)]) -> Vec<Preference> {
     {
         preferences[variable.index()].restrict(*coefficient > 0, compared);
     }
-    // Rules can be read positively and negatively.
+    // Derived facts can be required to be true or false, so for a number in a rule, neither less nor more is known
+    // to be no worse.
     let bodies = task.axioms.iter().flat_map(|layer| &layer.rules).map(|rule| &rule.body);
     for (variable, _) in bodies.flat_map(Condition::linears).flat_map(|linear| &linear.coefficients) {
         preferences[variable.index()] = Preference { less: false, more: false };
