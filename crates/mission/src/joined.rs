@@ -40,9 +40,9 @@ impl Mission {
     /// Joins a domain and a problem with a knowledge base, if there is one.
     ///
     /// # Errors
-    /// Errors of the knowledge base, and syntax errors of the domain and the problem. Without such errors: errors
-    /// of `[bindings.names]` and of co-adaptation. Symbols and types of PDDL are not checked; see
-    /// [`Mission::filled`].
+    /// Errors of the knowledge base, files of another kind, and syntax errors of the domain and the problem.
+    /// Without such errors: errors of `[bindings.names]`, required functions without a common design, and errors of
+    /// co-adaptation. Symbols and types of PDDL are not checked; see [`Mission::filled`].
     pub fn new(
         name: &str,
         knowledge: Option<Result<Knowledge, Errors>>,

@@ -27,7 +27,7 @@ pub(crate) struct Canvas {
     pub(crate) has_names_above: bool,
     /// Minimum average width of the steps of a plan.
     pub(crate) step: f64,
-    /// Distance of neighbouring places of a map to which it is enlarged, within limits.
+    /// Intended minimum distance of neighbouring places of a map.
     pub(crate) apart: f64,
 }
 

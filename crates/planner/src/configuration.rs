@@ -394,7 +394,7 @@ mod tests {
         for round in 0..3000 {
             let (functions, budgets) = random(&mut draw);
             let chosen = configure(&functions, &budgets, &Limits::none());
-            // If a budget is negative, `configure` selects no design.
+            // With a negative budget, perhaps no assignment is feasible.
             if budgets.iter().any(|budget| *budget < BigRational::zero()) {
                 continue;
             }

@@ -226,8 +226,8 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         })
     }
 
-    /// Replaces parts of the best plan by cheaper ones. The next budget is the greatest one after a success, and
-    /// half of this one after a failure.
+    /// Replaces parts of the best plan by cheaper ones. After a success, the next turn gets the greatest budget for
+    /// its round; after a failure, half of the current share, but at least a minimum.
     fn improve_best_plan(&mut self, work: usize, _: usize) -> Turn {
         let has_hope = self.exact.as_ref().is_some_and(InterleavedSearch::may_finish);
         let (least, most) = if has_hope && self.is_near() {
