@@ -62,8 +62,8 @@ pub struct Bindings {
 }
 
 impl Bindings {
-    /// Returns the default bindings, overridden by the explicit bindings `own`. It maps PDDL symbols to queries, e.g.
-    /// `speed` to `measured:speed`.
+    /// Returns the default bindings, overridden by the explicit bindings `own`. `own` maps PDDL symbols to queries,
+    /// e.g. `speed` to `measured:speed`.
     ///
     /// ```
     /// use std::collections::BTreeMap;

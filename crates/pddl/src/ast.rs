@@ -495,7 +495,7 @@ impl InitialElement {
 pub struct Metric {
     /// Direction of optimisation.
     pub direction: Direction,
-    /// Expression to optimise. It is evaluated in the final state of a plan.
+    /// Expression to optimise. The expression is evaluated in the final state of a plan.
     pub expression: Expression,
     /// Extent of the whole metric.
     pub span: Span,

@@ -10,8 +10,8 @@
 //! in three cases: another one for these functions has at least its worth and consumes no more of any budget; no
 //! completion respects the budgets; or an upper bound on its completions is less than the best known worth. The
 //! upper bound is a Lagrangian relaxation of the budgets, which is valid for any multipliers
-//! \[1\]. A subgradient method computes good multipliers in floating-point arithmetic \[2\]. They are then
-//! rounded, and the bound is evaluated exactly.
+//! \[1\]. A subgradient method computes good multipliers in floating-point arithmetic \[2\]. The multipliers are
+//! then rounded, and the bound is evaluated exactly.
 //!
 //! - \[1\] H. Everett: Generalized Lagrange Multiplier Method for Solving Problems of Optimum Allocation of
 //!   Resources, Operations Research 11(3), 1963.

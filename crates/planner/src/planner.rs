@@ -148,8 +148,8 @@ impl<'a> Planner<'a> {
         Ok(pareto(&task, &config, &mut hear))
     }
 
-    /// Returns a function that passes the optimizer's reports to the callback. It sets the interrupt flag if
-    /// the callback returns `Break`.
+    /// Returns a function that passes the optimizer's reports to the callback. This function sets the interrupt
+    /// flag if the callback returns `Break`.
     fn hear(&mut self) -> impl FnMut(Improvement) {
         let flag = self.config.limits.interrupt();
         let report = &mut self.report;

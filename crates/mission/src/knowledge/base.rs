@@ -232,8 +232,8 @@ impl Knowledge {
         &mut self.runtime
     }
 
-    /// Returns the designs, actions and measured values of the knowledge base for planning. They
-    /// are computed on first use and cached.
+    /// Returns the designs, actions and measured values of the knowledge base for planning. The result is computed
+    /// on first use and cached.
     pub fn catalogue(&self) -> &Catalogue {
         self.catalogue.get_or_init(|| Arc::new(Catalogue::new(&self.view())))
     }

@@ -1,16 +1,17 @@
 //! Native co-adaptation: compiles a plain domain to the explicit form, using the requirements that
 //! the knowledge base has for its actions.
 //!
-//! A domain is plain if it declares no type of function designs. An action that the knowledge base has as
-//! well (`move` as `move` or `a_move`, or by a binding) gets a parameter for the design of each function that
-//! the action requires. It also gets conditions: the design solves the function, is available, and meets the
-//! quality bounds of the action (`t:requiresQuality`). A quality bound with a context, which is a predicate of the
-//! domain, applies only while this predicate holds for the action's parameters.
+//! A domain is plain if it declares no type of function designs. An action that the knowledge base has as well
+//! (`move` as `move` or `a_move`, or by a binding) gets a parameter for the design of each function that the action
+//! requires. The action also gets conditions: the design solves the function, is available, and meets the quality
+//! bounds of the action (`t:requiresQuality`). A quality bound with a context, which is a predicate of the domain,
+//! applies only while this predicate holds for the action's parameters.
 //!
-//! A numeric function without parameters that is named like an estimated attribute, but is neither measured nor has an
-//! initial value, is replaced by the sum over the chosen designs. So is a function that is bound to `chosen:ATTRIBUTE`.
-//! A function that is bound to `reconfigured:ATTRIBUTE` is replaced by the sum over the newly chosen designs, i.e.
-//! those that replace another design of their function; the first design of a function is not counted.
+//! A numeric function without parameters that is named like an estimated attribute, but is neither measured nor has
+//! an initial value, is replaced by the sum over the chosen designs. A function that is bound to `chosen:ATTRIBUTE`
+//! is replaced in the same way. A function that is bound to `reconfigured:ATTRIBUTE` is replaced by the sum over
+//! the newly chosen designs, i.e. those that replace another design of their function; the first design of a
+//! function is not counted.
 //!
 //! As in an explicit domain, the planner chooses the designs for these parameters without grounding them into actions,
 //! unless reconfiguration costs make the designs part of the state.

@@ -282,8 +282,8 @@ impl Parser<'_> {
         Mark { needs: self.objects.needs.len(), assigned: self.objects.assigned.len() }
     }
 
-    /// Handles `forall` around all effects parsed since `mark`. Their needs (conditions that effects impose on the
-    /// state) are quantified over `variables`, which are also added to the recorded assignments.
+    /// Adds an enclosing `forall` to all effects parsed since `mark`: quantifies their needs (conditions that they
+    /// impose on the state) over `variables`, and adds `variables` to the recorded assignments.
     pub(super) fn effects_below(&mut self, mark: Mark, variables: &[TypedName]) {
         for (_, need) in &mut self.objects.needs[mark.needs..] {
             let inner = std::mem::replace(need, Condition::And(Vec::new()));
@@ -294,8 +294,8 @@ impl Parser<'_> {
         }
     }
 
-    /// Handles `when` around all effects parsed since `mark`. Their needs (conditions that effects impose on the
-    /// state) are required only if `condition` holds, which is also added to the recorded assignments.
+    /// Adds an enclosing `when` to all effects parsed since `mark`: makes their needs (conditions that they impose
+    /// on the state) depend on `condition`, and adds `condition` to the recorded assignments.
     pub(super) fn effects_when(&mut self, mark: Mark, condition: &Condition) {
         for (_, need) in &mut self.objects.needs[mark.needs..] {
             let inner = std::mem::replace(need, Condition::And(Vec::new()));

@@ -1,10 +1,10 @@
 //! Computes the derived facts of a state: the least fixpoint of the axioms, stratum by stratum, by semi-naive
 //! evaluation \[1\].
 //!
-//! A new fact is joined with the remaining conditions of each axiom that mentions its predicate. This is
-//! impossible if the axiom mentions a predicate of its own stratum below a negation, an implication or a
-//! universal quantifier (an *opaque* condition). The instances of such an axiom are re-evaluated when a fact
-//! arrives that was missing in their last evaluation.
+//! A new fact is joined with the remaining conditions of each axiom that mentions its predicate. Such a join is
+//! impossible if the axiom mentions a predicate of its own stratum below a negation, an implication or a universal
+//! quantifier (an *opaque* condition). The instances of such an axiom are re-evaluated when a fact arrives that was
+//! missing in their last evaluation.
 //!
 //! \[1\] F. Bancilhon, R. Ramakrishnan: An amateur's introduction to recursive query processing strategies, SIGMOD 1986.
 

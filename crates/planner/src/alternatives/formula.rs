@@ -1,8 +1,8 @@
 //! Enumerates further cheapest plans with the SAT solver.
 //!
-//! The formula describes the plans with at most the optimal cost. It has as many steps as such plans can have, but
-//! at most the configured horizon. If neither a bound nor a horizon is known, it has as many steps as the first
-//! plan. The formula is solved repeatedly; each time, the plans found before are excluded.
+//! The formula describes the plans with at most the optimal cost. The formula has as many steps as such plans can
+//! have, but at most the configured horizon. If neither a bound nor a horizon is known, it has as many steps as the
+//! first plan. The formula is solved repeatedly; each time, the plans found before are excluded.
 //!
 //! The choices that all cheapest plans share are the backbone of this formula \[1\]. Candidates are the
 //! choices of the first plan. The solver is queried for a plan that differs from the first plan in at least

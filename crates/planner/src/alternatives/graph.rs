@@ -278,8 +278,8 @@ impl<'a> Search<'a> {
     /// Builds a graph from the initial state until it is complete, a time or memory limit is reached, or
     /// `is_enough` returns `true`. Returns `None` if an operator has too many combinations of designs. The first
     /// search has no `guide`. The second search has one: the labels (nodes) of the first search, and whether a goal
-    /// can be reached from each of them. Its own labels then represent single states, and states that the guide
-    /// excludes are omitted. `is_enough` is called only with a guide.
+    /// can be reached from each of them. In the second search, labels represent single states, and states that the
+    /// guide excludes are omitted. `is_enough` is called only with a guide.
     fn explore(
         &self,
         labels: Labels,

@@ -291,7 +291,7 @@ impl Heuristic<Rational> for RoundedBounds {
     }
 }
 
-/// Returns a scaling factor for costs. It is the least common denominator if the scaled costs have at most
+/// Returns a scaling factor for costs. The factor is the least common denominator if the scaled costs have at most
 /// `COST_BITS` bits. Otherwise, it is a power of two for which the greatest cost has about `COST_BITS` bits.
 #[expect(
     clippy::arithmetic_side_effects,

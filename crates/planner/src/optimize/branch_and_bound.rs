@@ -35,8 +35,8 @@ use crate::optimize::state_dependent_costs::StateDependentCosts;
 const MAX_NODES: usize = 2_000_000;
 /// Maximum number of combinations of designs, over all operators.
 const MAX_COMBINATIONS: usize = 200_000;
-/// Maximum number of nodes that A\* takes from the open list in its first turn. Each further turn has twice as
-/// many.
+/// Maximum number of nodes that A\* takes from the open list in its first turn. The number doubles in each further
+/// turn.
 const TURN: usize = 5_000;
 /// Work units of a turn of the satisficing search, for each node of the preceding turn of A\*.
 const WORK: u64 = 1_000;

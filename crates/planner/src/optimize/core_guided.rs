@@ -32,7 +32,7 @@ const CORE_TRIM_ROUNDS: usize = 4;
 struct Search {
     /// Lower bound on the cost of every plan that the formula admits.
     lower: Int,
-    /// Weight of each soft literal, at least 1. It is added to the cost if the literal is true.
+    /// Weight of each soft literal, at least 1. The weight is added to the cost if the literal is true.
     weights: BTreeMap<Lit, Int>,
     totalizers: Vec<Totalizer>,
     /// Soft literals that are totalizer outputs: the index of the totalizer, and the number n such that the

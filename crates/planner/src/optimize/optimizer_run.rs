@@ -177,7 +177,7 @@ impl<'a> Run<'a> {
         Ok(FormulaScope { limit, allowed, step_bound })
     }
 
-    /// Creates a SAT solver without clauses. It stops at a limit or after `budget` conflicts.
+    /// Creates a SAT solver without clauses. The solver stops at a limit or after `budget` conflicts.
     pub(super) fn live(&self, budget: u64) -> IncrementalSolver {
         IncrementalSolver {
             solver: self.config.backend.start(&self.config.limits, budget),

@@ -82,8 +82,8 @@ pub(super) fn proved_by_search(mut run: Run<'_>, bounds: &Bounds, plan: GroundPl
 
 /// Confirms with the SAT solver that a plan whose cost equals the lower bound is optimal. The formula is
 /// independent of the bounds: its number of steps follows from the cheapest operator. Returns `None` if optimality
-/// is not confirmed. This is not attempted if an operator costs nothing, if the engine is [`Engine::Search`], or if
-/// the formula would be large and confirmation is not configured.
+/// is not confirmed. Confirmation is not attempted if an operator costs nothing, if the engine is
+/// [`Engine::Search`], or if the formula would be large and confirmation is not configured.
 fn confirm(run: &mut Run<'_>, incumbent: &GroundPlan) -> Option<Proof> {
     let cheapest =
         run.task.operators.iter().map(|operator| operator.cost.minimum()).min().filter(|c| *c > 0)?;

@@ -8,7 +8,7 @@ use task::limits::Limits;
 use task::plan::Step;
 
 /// A first step that every plan can begin with: the remaining part of a running action, with a configuration in
-/// which it can continue. It is not an operator of the task.
+/// which it can continue. The step is not an operator of the task.
 #[derive(Debug, Clone)]
 pub struct FirstStep {
     /// Functions of the action, with the designs selected for them.
@@ -25,7 +25,7 @@ pub struct FirstStep {
 /// A replanning query: the current situation and preferences for the plan.
 #[derive(Debug)]
 pub struct Query<'a> {
-    /// Problem with the current state and availability. It must belong to the domain of the replanner and
+    /// Problem with the current state and availability. The problem must belong to the domain of the replanner and
     /// have passed the checks.
     pub problem: &'a Problem,
     /// Alternative first steps. If there are any, every plan must begin with one of them.
