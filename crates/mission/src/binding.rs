@@ -44,8 +44,8 @@ enum Query {
     /// Numeric function without parameters in a plain domain (without a type of designs): the sum
     /// of an attribute over the designs that are chosen for an action.
     Chosen(String),
-    /// Numeric function without parameters in a plain domain (without a type of designs): the sum of an
-    /// attribute over those designs chosen for an action that replace another design of their function.
+    /// Numeric function without parameters in a plain domain (without a type of designs): the sum of an attribute
+    /// over the newly chosen designs of an action, i.e. the designs that replace another design of their function.
     Reconfigured(String),
     /// Action schema of a plain domain (without a type of designs): the corresponding action of the
     /// knowledge base.

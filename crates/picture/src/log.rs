@@ -56,7 +56,8 @@ impl Log {
     }
 
     /// Returns the happenings (inputs and decisions) that the page lists, in chronological order. If there are too
-    /// many, reports from the robot are omitted first, beginning with the latest, then the latest of the others.
+    /// many, reports from the robot are omitted first, and then other happenings, each time beginning with the
+    /// latest.
     fn listed(&self) -> Vec<&Happening> {
         if self.happenings.len() <= LISTED {
             return self.happenings.iter().collect();

@@ -1,11 +1,12 @@
 //! Native co-adaptation: compiles a plain domain to the explicit form, using the requirements that
 //! the knowledge base has for its actions.
 //!
-//! A domain is plain if it declares no type of function designs. An action that the knowledge base has as well
-//! (`move` as `move` or `a_move`, or by a binding) gets a parameter for the design of each function that the action
-//! requires. The action also gets conditions: the design solves the function, is available, and meets the quality
-//! bounds of the action (`t:requiresQuality`). A quality bound with a context, which is a predicate of the domain,
-//! applies only while this predicate holds for the action's parameters.
+//! A domain is plain if it declares no type of function designs. An action can correspond to an action of the
+//! knowledge base by its name (`move` to `move` or `a_move`) or by a binding. It then gets a parameter for the
+//! design of each function that the action requires. The action also gets conditions: the design solves the
+//! function, is available, and meets the quality bounds of the action (`t:requiresQuality`). A quality bound with a
+//! context, which is a predicate of the domain, applies only while this predicate holds for the action's
+//! parameters.
 //!
 //! A numeric function without parameters that is named like an estimated attribute, but is neither measured nor has
 //! an initial value, is replaced by the sum over the chosen designs. A function that is bound to `chosen:ATTRIBUTE`
@@ -55,8 +56,7 @@ pub struct CoAdaptation {
     changed: BTreeMap<Name, String>,
 }
 
-/// Required functions and quality bounds of an action, and the number of its parameters before those
-/// for designs are added.
+/// Required functions and quality bounds of an action, and the number of its parameters in the plain domain.
 #[derive(Debug, Clone)]
 struct Needs {
     functions: Vec<Needed>,
@@ -76,9 +76,9 @@ impl CoAdaptation {
     /// the knowledge base requires no function for the domain's actions.
     ///
     /// # Errors
-    /// Function names that PDDL does not admit, contexts that are not predicates of the domain for parameters of
-    /// the action, reserved names that the domain declares, and uses of functions where newly chosen designs cannot
-    /// be counted.
+    /// Function names that PDDL does not admit. Contexts of quality bounds that are not predicates of the domain
+    /// with fitting parameters. Reserved names that the domain declares. Uses of functions where newly chosen
+    /// designs cannot be counted.
     pub(super) fn new(
         domain: &Domain,
         problem: &Problem,

@@ -141,7 +141,7 @@ impl Labels {
     }
 
     /// Returns the labels (nodes) at `place` that cost at most `cost` and are no worse than `state` in any compared
-    /// number, each with `true` if it costs less than `cost`.
+    /// number. Each label has the flag `true` if it costs less than `cost`.
     fn no_worse<'l>(
         &'l self,
         place: &Place,

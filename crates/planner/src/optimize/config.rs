@@ -14,9 +14,9 @@ pub enum Strategy {
     Auto,
     /// Linear search: finds cheaper and cheaper plans until the formula is unsatisfiable.
     Tighten,
-    /// Core-guided search: unsatisfiable cores raise the lower bound until a plan with this cost exists.
-    /// Without an upper bound on the number of steps of a cheapest plan, this strategy equals `Tighten`. The
-    /// same holds while the SAT solver has a budget, because other components of the planner take turns with it.
+    /// Core-guided search: unsatisfiable cores raise the lower bound until a plan with this cost exists. Without an
+    /// upper bound on the number of steps of a cheapest plan, this strategy equals `Tighten`. The same holds while
+    /// the SAT solver has a budget because it takes turns with other components of the planner.
     Cores,
 }
 
