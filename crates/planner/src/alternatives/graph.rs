@@ -79,7 +79,7 @@ pub(super) fn cheapest(
     let search = Search::new(context, bounds, cost)?;
     let guide = Labels::comparing(context.task);
     let (guide, graph) = search.explore(guide, None, &mut |_| false)?;
-    // The second search would reach the same limit as the first.
+    // The second search would probably reach the limit as well.
     if !graph.is_complete {
         return Some(graph);
     }

@@ -299,7 +299,7 @@ impl<'a> Search<'a> {
             for operator in self.generator.applicable(self.task, &state) {
                 for position in 0..self.choices[operator.index()].len() {
                     if pulse.beat().is_err() || self.is_full(limits) {
-                        // The next run expands the node again; known successors are duplicates.
+                        // The node is not completely expanded, so it stays open and counts for the lower bound.
                         self.open.push(Reverse(priority));
                         return Some(End::Stopped);
                     }

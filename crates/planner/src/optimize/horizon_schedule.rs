@@ -64,7 +64,7 @@ impl HorizonSchedule {
             match decide(run, bounds, horizon, allowance) {
                 (_, Some(plan)) => return FirstPlanOutcome::Plan(plan),
                 (Answer::Unsatisfiable, None) => self.refuted = self.refuted.max(horizon),
-                // A plan whose cost overflows cannot be used, and longer plans cost no less.
+                // A plan whose cost overflows cannot be used. Other plans are not tried.
                 (Answer::Satisfiable, None) => return FirstPlanOutcome::Over,
                 (Answer::Interrupted, None) => {
                     // With an unlimited budget, an interruption means that the numbers are too large for a
