@@ -50,8 +50,8 @@ pub fn ground_exact(domain: &Domain, problem: &Problem, config: &GroundConfig) -
 }
 
 impl ExactTask {
-    /// Returns `true` if the costs of a problem without metric are durations, and `false` if they count
-    /// actions.
+    /// Returns `true` if the costs are durations, and `false` if they count actions. Only meaningful for a problem
+    /// without metric.
     pub fn is_timed(&self) -> bool {
         self.0.is_measured_by_time(&Rational::one())
     }

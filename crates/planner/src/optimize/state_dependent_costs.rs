@@ -121,8 +121,8 @@ fn weights(task: &Task) -> Option<(Int, Vec<(NumericId, Int)>)> {
     Some((factor, pairs.collect::<Option<_>>()?))
 }
 
-/// Whether less, or more, of a number is never worse: with the changed number, every continuation stays possible, and
-/// its steps increase the cost by no more.
+/// Preferences about a number: whether less of it is never worse, and whether more is never worse. With the changed
+/// number, every continuation stays possible, and its steps increase the cost by no more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Preference {
     pub(super) less: bool,
