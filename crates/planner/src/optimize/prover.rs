@@ -1,5 +1,5 @@
-//! Proves optimality with formulas, one for each stage. A stage limits the cost to a part of the gap between the lower
-//! bound and the cost of the best plan; the parts grow.
+//! Proves optimality in stages. Each stage has a formula for the plans whose cost is at most a limit between the
+//! lower bound and the cost of the best plan. The limit rises from stage to stage.
 
 use std::time::Instant;
 
