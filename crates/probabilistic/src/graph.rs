@@ -10,8 +10,8 @@ const UNSEEN: u32 = 0;
 /// Number that marks a node whose component is complete.
 const DONE: u32 = u32::MAX;
 
-/// Number of nodes from which on a component is large: unused stack memory is released before the
-/// component is reported.
+/// Number of nodes from which on a component is large. Before a large component is reported, unused memory of
+/// the depth-first search is released.
 const SHRINK_THRESHOLD: usize = 100_000;
 
 struct Frame {

@@ -115,8 +115,8 @@ impl<S: Eq + Hash> States<S> {
         Self { list: Vec::new(), numbers }
     }
 
-    /// Looks a state up in its home slot only. Memory accesses dominate the time of a lookup; those
-    /// of several calls overlap.
+    /// Looks a state up in its home slot only. The time of a lookup is mostly that of a memory access, and the
+    /// memory accesses of successive calls overlap.
     pub(crate) fn probe(&self, state: &S, code: impl FnOnce(&S) -> usize) -> Probe {
         match &self.numbers {
             Numbers::Table(table) => {

@@ -39,7 +39,7 @@ pub use answer::{Answer, Listed, Outcome, Precision, Quantity};
 pub use options::{Exactness, Options};
 pub use table::{PolicyTable, Row};
 
-/// Number of transitions from which on a model is explored in doubles instead of rationals by default.
+/// Number of transitions from which on a model is explored in doubles instead of rationals, by default.
 const MAX_EXACT_TRANSITIONS: usize = 150_000;
 
 /// Returns the default budget of exact arithmetic for one property of a model with this number of
@@ -127,8 +127,7 @@ pub fn check_all<'p>(
     }
     required.sort_unstable();
     required.dedup();
-    // With several properties, one property may need states beyond the point where another is
-    // decided.
+    // With several properties, one property may need states behind those at which another property is decided.
     let end = match &properties[..] {
         [Ok(only)] => end_of(only, &program.names, options),
         _ => None,

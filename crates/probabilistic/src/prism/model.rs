@@ -33,7 +33,7 @@ pub(super) struct Group<N> {
     pub index: Option<(u32, i64, Vec<Vec<u32>>)>,
 }
 
-/// For each value of a variable from `least` on, the actions that may be enabled, as a bit set.
+/// For each value of a variable from `least` on, the actions that may be enabled with this value, as a bit set.
 #[derive(Debug, Clone)]
 pub(super) struct Mask {
     pub variable: u32,
