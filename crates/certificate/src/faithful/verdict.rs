@@ -13,7 +13,8 @@ pub enum Faithful {
         /// Number of those instances that need no operator, because they do not change the task
         /// state and their cost is not negative.
         idle: usize,
-        /// Whether plans are measured by duration, because the problem has no metric.
+        /// Whether plans are measured by their duration, because the problem has no metric and actions take
+        /// time.
         timed: bool,
     },
     /// The task is not faithful; the first difference found.
