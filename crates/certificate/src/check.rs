@@ -22,7 +22,7 @@ const CHOICE_LIMIT: usize = 1 << 20;
 /// Upper limit on the number of pairwise comparisons of design combinations, summed over all
 /// operators; about 1 s of work.
 const COMPARISON_LIMIT: usize = 1 << 25;
-/// Work of enumerating one combination of designs, in comparisons.
+/// Work of enumerating one combination of designs, in units of one comparison.
 const COMBINATION_COST: usize = 2;
 
 /// Sizes of a checked optimality proof.

@@ -69,7 +69,8 @@ fn sum((a, b): (i64, NonZeroU64), (c, d): (i64, NonZeroU64), is_difference: bool
     let common = if b == d { b } else { divisor(b, d) };
     let (left, right) = (b / common, d / common);
     let sum = i128::from(a) * i128::from(right) + c * i128::from(left);
-    // Only factors of the denominators' common divisor can remain in numerator and denominator.
+    // The numerator and the denominator can only have common factors that divide the common divisor of the two
+    // denominators.
     let factor = if common == 1 { 1 } else { divisor(remainder(sum, common), common) };
     reduced(sum / i128::from(factor), u128::from(left) * u128::from(d / factor))
 }

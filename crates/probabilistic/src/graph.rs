@@ -34,8 +34,8 @@ pub fn visit_components<'a, E>(
     successors: impl Fn(u32) -> &'a [u32],
     mut take: impl FnMut(&[u32]) -> Result<(), E>,
 ) -> Result<(), E> {
-    // For each node, the least visit number of a node with an incomplete component that is known to
-    // be reachable from it.
+    // For each node, the least visit number of the nodes that are known to be reachable from it and whose
+    // component is incomplete.
     let mut low = vec![UNSEEN; n];
     let mut stack: Vec<u32> = Vec::new();
     let mut frames: Vec<Frame> = Vec::new();

@@ -1,13 +1,11 @@
-//! Computes the Pareto front of two objectives, and the optimum of one objective under a bound on
-//! the other.
+//! Computes the Pareto front of two objectives, and the optimum of one objective under a bound on the other.
 //!
-//! Each objective is a loss to be minimised: an expected cost until a target is reached, or the
-//! probability of missing a target. Until the first target is reached, a weighted sum of both
-//! losses is minimised. Afterwards only one objective remains, and its optimal value is the
-//! terminal value of the state (Etessami et al., LMCS 4(4:8), 2008). The weights are normals of the
-//! segments between known vertices, so each minimum is a new vertex or proves the segment (Forejt,
-//! Kwiatkowska and Parker, ATVA 2012). Each vertex is attained by a policy whose memory is the set
-//! of reached targets.
+//! Each objective is a loss to be minimised: an expected cost until a target is reached, or the probability of
+//! missing a target. Until the first target is reached, a weighted sum of both losses is minimised. Afterwards
+//! only one objective remains, and its optimal value is the terminal value of the state (Etessami et al., LMCS
+//! 4(4:8), 2008). The weights are normals of the segments between known vertices, so each minimum is a new
+//! vertex, or proves that the segment belongs to the front (Forejt, Kwiatkowska and Parker, ATVA 2012). Each
+//! vertex is attained by a policy whose memory is the set of reached targets.
 
 use std::collections::VecDeque;
 
@@ -127,8 +125,8 @@ impl<'a, N: Number> Pareto<'a, N> {
         (0..self.mdp.states()).map(terminal_value).collect()
     }
 
-    /// Minimises the weighted sum of both losses over the allowed choices. Returns the solution and
-    /// all its optimal choices.
+    /// Minimises the weighted sum of both losses over the allowed choices. Returns the solution and the set of
+    /// all optimal choices.
     fn solve(
         &self,
         weights: &[N; 2],

@@ -89,9 +89,9 @@ pub fn with_secondary<N: Number>(
     solve(second, None)
 }
 
-/// Returns the Markov chain of a policy, conditioned on reaching `end` (Doob's h-transform). Each
-/// transition is weighted with the probability `success` of its target. Also returns the original
-/// choice of each choice in the result.
+/// Returns the Markov chain of a policy, conditioned on reaching `end` (Doob's h-transform): each transition is
+/// weighted with `success`, the probability of reaching `end`, of its target. Also returns the original choice
+/// of each choice in the result.
 pub fn conditioned<N: Number>(
     mdp: &Mdp<N>,
     policy: &[u32],

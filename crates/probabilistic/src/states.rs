@@ -90,8 +90,8 @@ const fn number_of(entry: u64, hash: u32) -> Option<u32> {
 }
 
 fn hash<S: Hash>(state: &S) -> u32 {
-    // The hasher rotates its best bits away from the top; the multiplication mixes all bits into
-    // the top again.
+    // The best bits of this hash are not the leading ones. The multiplication mixes all bits into the upper
+    // half, which is used.
     upper(FxBuildHasher.hash_one(state).wrapping_mul(0x9E37_79B9_7F4A_7C15))
 }
 

@@ -157,9 +157,9 @@ pub fn check_all<'p>(
     Ok(reports)
 }
 
-/// Returns a state condition at which the property is decided, so that exploration can stop there.
-/// Returns `None` if a state does not decide the property. Also returns `None` if a policy is
-/// requested or given, or a secondary reward is set, because a policy continues after such a state.
+/// Returns a condition on states at which the property is decided, so that exploration can stop there. Returns
+/// `None` if no such condition is known. Also returns `None` if a policy is requested or given, or a secondary
+/// reward is set, because a policy continues after such a state.
 fn end_of(property: &Property, names: &Names, options: &Options<'_>) -> Option<Expr> {
     if options.policy || options.evaluate.is_some() || options.secondary.is_some() {
         return None;

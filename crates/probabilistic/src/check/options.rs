@@ -9,7 +9,7 @@ use crate::property::Declarations;
 /// Choice between exact and floating-point arithmetic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Exactness {
-    /// Exact arithmetic for models with fewer than 150,000 transitions, within a budget. Otherwise, doubles
+    /// Exact arithmetic within a budget, for models with up to about 150,000 transitions. Otherwise, doubles
     /// with guaranteed bounds.
     #[default]
     Auto,

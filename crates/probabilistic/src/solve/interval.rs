@@ -246,8 +246,8 @@ impl<'a, N: Number> Rows<'a, N> {
                     return Some((lower, upper));
                 }
             }
-            // The lower bound was not close enough to the value for its increase to be an upper
-            // bound.
+            // The increased lower bound was no upper bound, because the lower bound was not yet close enough to
+            // the value.
             threshold *= 0.1;
         }
         None
