@@ -5,10 +5,10 @@
 //! can hold, and no operator decreases it by more than its cost.
 //!
 //! A need is a lower bound on the required value of a number under three conditions. Wherever the goal can
-//! hold, the need is at most the value that the goal requires. An operator decreases the need by at most the
-//! amount by which it certainly decreases the number, and if it can decrease the number, it requires that the
-//! number stays at least 0. Every other change of the number occurs only where the need is 0, or leads from an
-//! infinite need to an infinite one.
+//! hold, the need is at most the value that the goal requires. An operator that never increases the number may
+//! decrease the need, but only by the amount by which it always decreases the number; if it can decrease the
+//! number, it must require that the number stays at least 0. Every other change of the number occurs only where
+//! the need is 0, or leads from an infinite need to an infinite one.
 
 use crate::integer::Integer;
 use crate::model::{Conditional, Fact, Linear, Literal, Model, Operator, Quantity};

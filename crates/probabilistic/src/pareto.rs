@@ -3,7 +3,7 @@
 //! Each objective is a loss to be minimised: an expected cost until a target is reached, or the probability of
 //! missing a target. Until the first target is reached, a weighted sum of both losses is minimised. Afterwards
 //! only one objective remains, and its optimal value is the terminal value of the state (Etessami et al., LMCS
-//! 4(4:8), 2008). The weights are normals of the segments between known vertices, so each minimum is a new
+//! 4(4:8), 2008). The weights are normals of the segments between known vertices. So each minimum is a new
 //! vertex, or proves that the segment belongs to the front (Forejt, Kwiatkowska and Parker, ATVA 2012). Each
 //! vertex is attained by a policy whose memory is the set of reached targets.
 

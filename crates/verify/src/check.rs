@@ -96,9 +96,9 @@ impl<'a> Verifier<'a> {
     /// proof itself is not checked.
     ///
     /// # Errors
-    /// M121: the certificate cannot be read, its ground task is not faithful to its PDDL files, its plan is not
-    /// as claimed, its argument is malformed, a limit is reached, or its task has derived variables, for which
-    /// there are no verification conditions.
+    /// M121 if the certificate cannot be read, its argument is malformed, or a limit is reached. Also M121 if
+    /// its ground task is not faithful to its PDDL files, its plan is not as claimed, or its task has derived
+    /// variables, for which there are no verification conditions.
     pub fn conditions(&self) -> Result<String, Errors> {
         conditions(self.directory, &|| self.is_over()).map_err(Errors::from)
     }

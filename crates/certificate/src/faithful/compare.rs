@@ -324,9 +324,9 @@ impl<'c> Comparison<'c> {
     }
 
     /// Returns `true` if the clock of the task represents the time after the case (outcome of an action
-    /// instance under a condition): the task has no clock, or the operator leaves it unchanged, advances it by
-    /// the duration of the case, or sets it to a value that represents every possible end time (see
-    /// `timeline`).
+    /// instance under a condition). The task may have no clock, or the operator leaves it unchanged or advances
+    /// it by the duration of the case. Otherwise, the operator must set it to a value that represents every
+    /// possible end time (see `timeline`).
     fn keeps_time(&self, (operator, choice): (&Operator, &[u32]), case: &Case) -> bool {
         let Some(number) = self.task.names.numbers.get(&timeline::clock()) else { return true };
         // An unchanged clock value represents the later time, too.

@@ -1,6 +1,6 @@
-//! Analyses the derived atoms: computes which of them hold in all states or in no state of the witness (the
-//! over-approximation of the reachable states), and which derived variables of the task lie on dependency cycles or
-//! between cycles.
+//! Analyses the derived atoms. Computes which of them hold in all states or in no state of the witness (the
+//! over-approximation of the reachable states). Also computes which derived variables of the task lie on
+//! dependency cycles or between cycles.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 

@@ -23,7 +23,7 @@ pub(super) struct Made<'m> {
 pub(super) enum Mismatch {
     Differs(String),
     /// It is not proved that at most one of these atoms (the values of a variable) holds after the case
-    /// (outcome of an action instance under a condition), or too many partial states would have to be examined.
+    /// (outcome of an action instance under a condition). Or too many partial states would have to be examined.
     Unknown(String),
 }
 

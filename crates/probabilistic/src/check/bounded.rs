@@ -24,12 +24,12 @@ use crate::solve::{Direction, Problem, Work, solve_within};
 const MAX_BUDGET: usize = 100_000;
 
 impl<N: Number> Query<'_, N> {
-    /// Computes for each state the minimal or maximal probability of reaching a terminal state of `problem`
-    /// while the reward structure `name` accumulates at most the bound in `steps`.
+    /// Computes for each state the minimal or maximal probability of reaching a terminal state of `problem`.
+    /// Until then, the reward structure `name` must accumulate at most the bound in `steps`.
     ///
-    /// Returns an error if a policy is given, if there is a lower bound on the reward, if the bound is negative
-    /// (or `<0`) or not below [`MAX_BUDGET`], or if a reward is not a nonnegative whole number. Without any
-    /// bound, solves `problem` itself.
+    /// Returns an error if a policy is given, or if there is a lower bound on the reward. An upper bound must
+    /// be nonnegative (for `<`: positive) and below [`MAX_BUDGET`], and all rewards must be nonnegative whole
+    /// numbers. Without any bound, solves `problem` itself.
     pub fn until_within_reward(
         &self,
         problem: Problem<'_, N>,

@@ -75,9 +75,9 @@ impl<N: Number> Rows<N> {
     }
 
     /// Moves the row `row`, with its entries at the positions `entries`, to the row index `to`, which is not
-    /// after `row`. Also eliminates its self-loop: entries in column `loop_column` are dropped, and the other
-    /// entries are divided by the probability of not looping. Returns `false` if this probability is 0; the row
-    /// `to` is then not valid.
+    /// after `row`. Also eliminates its self-loop: entries in column `loop_column` are dropped, and the
+    /// remaining parts of the row are divided by the probability of not looping. Returns `false` if this
+    /// probability is 0; the row `to` is then not valid.
     pub fn move_without_loop(
         &mut self,
         row: usize,

@@ -80,8 +80,7 @@ impl<N: Number> Run<'_, N> {
             return attractor(local, outside_sure).0;
         }
         // A state is sure under all policies if no policy can stay in the component forever (in an end
-        // component), and none can leave it to a state that is not sure. States from which a policy can do so
-        // are marked as unsure.
+        // component) and none can leave it to an unsure state. All other states are marked as unsure.
         let ends = end_components(local, |_| true);
         let mut unsure = ends.inside;
         let owners = local.owners();
