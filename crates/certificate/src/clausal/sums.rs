@@ -325,8 +325,8 @@ impl Adder<'_> {
             }
             let uses = &self.model.uses[uses as usize];
             for (row, value) in self.model.tables[table as usize].iter().enumerate() {
-                // The row is the mixed-radix number of the designs; the last slot is the lowest
-                // digit.
+                // The row number has one digit per slot (mixed radix): the design of the slot. The last slot is
+                // the lowest digit.
                 let mut remaining_row = row;
                 let mut condition = vec![-chosen];
                 for slot in slots.iter().rev() {

@@ -311,7 +311,7 @@ impl<'r> Reader<'r> {
         }
         if self.depth.saturating_sub(self.unfolding.base) > UNFOLDING_LIMIT {
             self.unfolding.pending = Some(key.clone());
-            // This error aborts the evaluation, and `unfold_from` repeats it.
+            // This error aborts the evaluation. `unfold_from` then repeats the evaluation.
             return Err(Cause::Stopped);
         }
         let outer = std::mem::take(&mut self.binding);

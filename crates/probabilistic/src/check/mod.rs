@@ -127,7 +127,8 @@ pub fn check_all<'p>(
     }
     required.sort_unstable();
     required.dedup();
-    // With several properties, one property may need states behind those at which another property is decided.
+    // One of several properties may need states that are reached only through states at which another property
+    // is decided.
     let end = match &properties[..] {
         [Ok(only)] => end_of(only, &program.names, options),
         _ => None,

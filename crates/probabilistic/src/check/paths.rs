@@ -76,7 +76,7 @@ impl<N: Number> Query<'_, N> {
             }
             Path::Repeatedly(goal) => self.repeatedly(direction, &self.truth(goal)?),
             Path::Persistently(goal) => {
-                // The complement: bad states are visited infinitely often.
+                // The complement: states outside `goal` are visited infinitely often.
                 let bad = inverse(self.truth(goal)?);
                 Ok(complement(self.repeatedly(opposite(direction), &bad)?))
             }

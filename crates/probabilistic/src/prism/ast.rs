@@ -147,7 +147,7 @@ pub struct StepBound {
     pub strict: bool,
 }
 
-/// The aggregate of the rewards along a path whose expected value is computed.
+/// The aggregate of the rewards along a path. Its expected value is computed.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RewardPath {
     /// `F`: the sum until a state that satisfies the expression is reached.

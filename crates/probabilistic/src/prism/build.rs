@@ -1,4 +1,4 @@
-//! Compiles declarations, commands and rewards of the syntax tree to programs.
+//! Compiles declarations, commands and rewards of the syntax tree to parts of a program.
 
 use num_traits::Signed;
 

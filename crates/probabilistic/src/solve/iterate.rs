@@ -49,8 +49,8 @@ pub fn iterate<N: Number>(
     let large = !N::EXACT && quotient.blocks() >= SWEEP_MIN_BLOCKS;
     for _ in 0..MAX_ROUNDS {
         let mut improved = false;
-        // Sweeps save time while they take no longer than elimination. Without fill-in, elimination
-        // is fast.
+        // The sweeps may take about as long as the last elimination. Without fill-in, elimination is fast, so
+        // there are few sweeps.
         let eliminated = work.touched().saturating_sub(touched).saturating_mul(SWEEP_SPEED);
         let sweeps =
             eliminated.checked_div(quotient.rows.columns.len() as u64).unwrap_or(0).clamp(SWEEPS.0, SWEEPS.1);

@@ -11,8 +11,8 @@ use crate::number::{Number, count, is_whole};
 use crate::solve::local::NONE;
 use crate::solve::problem::{Direction, Run};
 
-/// Upper limit on the number of states of a component that is solved by shortest paths, because the
-/// best open state is found by linear search.
+/// Upper limit on the number of states of a component that is solved by shortest paths, because the next state
+/// is found by linear search.
 const MAX_STATES: usize = 64;
 
 /// The working memory of the shortest-path algorithm, reused for all components.
