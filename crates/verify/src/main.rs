@@ -11,8 +11,7 @@ use mission::file;
 use mission::message::{ErrorAnswer, Errors, Message};
 use mission::visible::{pretty, visible, visible_json};
 
-/// Exit statuses, which are equal to those of `metaplan verify`: verified, unreadable input,
-/// rejected certificate, internal error.
+/// Exit status if the certificate is verified. All exit statuses are equal to those of `metaplan verify`.
 const VERIFIED: u8 = 0;
 const BAD_INPUT: u8 = 3;
 const INVALID: u8 = 30;
