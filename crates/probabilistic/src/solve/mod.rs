@@ -169,8 +169,10 @@ impl<N: Number> Run<'_, N> {
         }
         if let Some((value, choice, spread)) = best {
             if !N::EXACT {
-                // Values are never negative. If the value is 0, only the error of the selected choice is used.
-                self.solution.errors[state] = if value.is_zero() { spread } else { error };
+                // Values are never negative. So a least value of 0 has only the error of the selected choice. A greatest
+                // value of 0 may hide a choice whose value underflowed.
+                let is_least = self.problem.direction == Direction::Min && value.is_zero();
+                self.solution.errors[state] = if is_least { spread } else { error };
             }
             self.solution.values[state] = value;
             self.solution.policy[state] = choice;
