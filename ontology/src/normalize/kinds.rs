@@ -205,8 +205,8 @@ impl Declared {
             || iri.starts_with(rdf::NS)
     }
 
-    /// Returns `true` if the node is an ontology, class or property and not an individual. A blank node that is no
-    /// ontology counts as a class.
+    /// Returns `true` for an ontology, for any other blank node (which counts as a class), and for a declared class or
+    /// property that is not also an individual.
     fn is_entity(&self, graph: &Graph, node: &NamedOrBlankNode) -> bool {
         // Statements about an ontology header are usually annotations.
         if graph.of(node).any(|(_, triple)| is_type(triple, owl::ONTOLOGY)) {
