@@ -193,9 +193,9 @@ impl Settings {
     /// Reads the settings from a file that contains only the section `adaptation`. Names of components and attributes
     /// in the file must occur in `knowledge`.
     ///
-    /// # Errors The file cannot be read or contains errors. Only the errors of one stage are returned: the first syntax
-    /// error; or all unknown keys and all values of a wrong type; or the first number that cannot be used; or all
-    /// unknown names.
+    /// # Errors
+    /// The file cannot be read or contains errors. Only the errors of one stage are returned: the first syntax error; or
+    /// all unknown keys and all values of a wrong type; or the first number that cannot be used; or all unknown names.
     pub fn read(file: &Path, knowledge: Option<&Knowledge>) -> Result<Self, Errors> {
         let (section, origin) = manifest::read::<Section>(file)?;
         let settings = section.adaptation.settings(&origin)?;

@@ -72,7 +72,7 @@ impl<S: Store> Partition<S> {
                     (saved.event, write(store, Bucket::Robots, &key, &bytes(&saved), revision).await)
                 }
                 // Not expected: a robot whose snapshot could not be parsed at recovery has revision 0 here. The
-                // snapshot is left as it is, without the mark.
+                // snapshot keeps its content and gets no mark.
                 Ok(None) => {
                     return Done::Kept { robot: name, event: 0, behind: false, revision: Ok(revision) };
                 }
