@@ -317,8 +317,9 @@ impl Planner<'_> {
                 let is_known = |column: &usize| bound.is_bound(sources[*column]);
                 let columns: Vec<usize> = (0..sources.len()).filter(is_known).collect();
                 let mask = columns.iter().fold(0, |mask, column| mask | 1 << column);
-                // Most rows of a closure are not links; visiting each of them would take longer than deriving all
-                // conclusions.
+                // Few rows of a transitive relation are links (rows that the rule itself did not derive). An
+                // index for links contains only these, because visiting all rows would take longer than
+                // deriving all conclusions.
                 let excluded_rule = is_link.then_some(self.number);
                 let index =
                     (mask != 0).then(|| self.store.get_mut(*relation).index_without(mask, excluded_rule));

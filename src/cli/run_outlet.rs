@@ -130,7 +130,8 @@ impl Outlet {
         Ok(())
     }
 
-    /// Writes answers to a line, each with the line's number; more may follow. Writes nothing if there are no answers.
+    /// Writes answers to an input line, each with the number of that line. Does not acknowledge the line, because more
+    /// answers may follow. Writes nothing if there are no answers.
     pub(super) fn answer_so_far(&self, line: u64, answers: &[impl Serialize]) -> io::Result<()> {
         if answers.is_empty() {
             return Ok(());
@@ -139,8 +140,8 @@ impl Outlet {
         self.say(&lines.collect::<String>())
     }
 
-    /// Writes the last answers to a line, each with the line's number, and the acknowledgement of
-    /// the line.
+    /// Writes the last answers to an input line, each with the number of that line, and the acknowledgement of the
+    /// line.
     pub(super) fn answer(&self, line: u64, answers: &[impl Serialize], read: Instant) -> io::Result<()> {
         let mut text = String::new();
         for answer in answers {

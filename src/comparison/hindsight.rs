@@ -193,7 +193,8 @@ pub fn hindsight(mission: &Coadaptation, risk: Risk, penalty: f64, spent: Spent)
         let value = bounds[start].min(penalty);
         expected += left * rate * value;
         left *= 1.0 - rate;
-        // The remaining terms of the sum cannot change the result noticeably.
+        // The remaining terms are negligible, or all have the value without a loss. They are added after the
+        // loop.
         if left < 1e-15 || (value - never[start]).abs() < 1e-12 {
             break;
         }

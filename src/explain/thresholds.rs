@@ -1,4 +1,6 @@
-//! The smallest changes of measurements and of values of the problem that lead to another plan.
+//! Searches for the smallest changes of measurements and of values of the problem that lead to another plan.
+//! Values of the problem are changed in growing steps of up to 100 %, then by bisection. So a nearer change
+//! that is undone within a step is not found.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;

@@ -198,7 +198,8 @@ mod tests {
         }
     }
 
-    /// A report of the action implies its reconfiguration, but does not prove that no copy is on its way.
+    /// A report of the action implies its reconfiguration, but does not prove that no copy of the
+    /// reconfiguration is on its way.
     #[test]
     fn a_reconfiguration_supersedes_the_implied_one() {
         let (mut beliefs, mut answers) = (beliefs(), Vec::new());
@@ -211,7 +212,8 @@ mod tests {
             last.map(|effect| effect.supersedes.clone())
         };
         assert_eq!(superseded(&beliefs), Some(vec![1]));
-        // An acknowledgement proves it.
+        // After the acknowledgement of effect 3, no copy of an earlier reconfiguration can be on its way, so
+        // the next one supersedes none.
         let _ = beliefs.acknowledge(3);
         request(&mut beliefs, step("fd_amcl_kinect"), &mut answers);
         assert_eq!(superseded(&beliefs), Some(Vec::new()));

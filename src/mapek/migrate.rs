@@ -1,4 +1,5 @@
-//! Migration: moves a robot to another version of its mission without losing what it has reported.
+//! Migration: moves a robot to another version of its mission. What the robot has reported is kept, except for reports
+//! that the noise filters still hold back.
 //!
 //! Facts and values are merged three ways: those that differ from the initial state of the former version are taken from
 //! the robot, all others from the new version. The plan is not transferred, because the new version needs another one.

@@ -194,8 +194,8 @@ impl Settings {
     /// in the file must occur in `knowledge`.
     ///
     /// # Errors
-    /// The file cannot be read or contains errors. Either all unknown keys, or the first wrong value, or all unknown
-    /// names are returned.
+    /// The file cannot be read or contains errors. Only the errors of one stage are returned: the first syntax error; or
+    /// all unknown keys and all values of a wrong type; or the first number that cannot be used; or all unknown names.
     pub fn read(file: &Path, knowledge: Option<&Knowledge>) -> Result<Self, Errors> {
         let (section, origin) = manifest::read::<Section>(file)?;
         let settings = section.adaptation.settings(&origin)?;

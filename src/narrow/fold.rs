@@ -1,5 +1,7 @@
-//! Partial evaluation of derived predicates: predicates that no action can change become initial facts. Other
-//! derived predicates get upper bounds, where possible.
+//! Partial evaluation of the derived predicates of a knowledge base's vocabulary: predicates that no action
+//! can change become initial facts. Others get upper bounds, where possible. A derived predicate outside of
+//! the vocabulary is included only if its axioms mention only included predicates and bind all their
+//! variables.
 //!
 //! The clauses of settled predicates, which no action can change (`settle`), have no negated atoms. Their
 //! extension is therefore the least fixpoint over the initial facts, the same set in every state. It is

@@ -268,7 +268,7 @@ pub enum ActionBody {
     },
 }
 
-/// `([at start|at end] (OPERATOR ?duration EXPRESSION))`.
+/// `(OPERATOR ?duration EXPRESSION)`, or the same in `(at start …)` or `(at end …)`.
 #[derive(Debug, Clone)]
 pub struct DurationConstraint {
     /// Time at which the expression is evaluated. Default: `AtStart`.

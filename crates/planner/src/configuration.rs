@@ -117,10 +117,12 @@ impl Label {
     }
 }
 
-/// Lagrangian multipliers of the budgets in units of 2^-`PRICE_BITS`, and the resulting upper bounds.
+/// Lagrangian multipliers (prices) of the budgets, and upper bounds on the worth that remains after paying these
+/// prices. Both are in units of 2^-`PRICE_BITS`.
 struct LagrangeMultipliers {
     each: Vec<BigInt>,
-    /// For each function: upper bound on the worth of this and all later functions. A final entry is 0.
+    /// For each function: greatest sum of the reduced worths (worth minus priced demands) of this and all later
+    /// functions, of which each contributes at least 0. A final entry is 0.
     after: Vec<BigInt>,
 }
 

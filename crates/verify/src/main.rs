@@ -44,7 +44,8 @@ enum Format {
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    // The default panic hook would print a stack trace; the message is printed below instead.
+    // The default panic hook would also print the message, in any format. It is printed below instead, in the
+    // selected format.
     std::panic::set_hook(Box::new(|_| {}));
     let outcome = std::panic::catch_unwind(|| run(&arguments));
     ExitCode::from(match outcome {

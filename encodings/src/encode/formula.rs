@@ -30,7 +30,8 @@ pub enum Family {
     Axiom,
     /// Clauses by which each function in use has exactly one suitable design.
     Selection,
-    /// Symmetry breaking: interchangeable designs and objects are used in a fixed order.
+    /// Symmetry breaking: of interchangeable designs of a slot only the first is used, and interchangeable
+    /// objects are first used in a fixed order.
     Symmetry,
     /// Clauses for exact integer arithmetic on numeric variables.
     Numeric,

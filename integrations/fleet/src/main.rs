@@ -93,7 +93,8 @@ enum Command {
     },
 }
 
-/// Options of the missions and of the amount of work at a time.
+/// Options of a worker: its missions, the number of its threads, the robots that it keeps in memory, its snapshots, and
+/// the address of its metrics.
 #[derive(Debug, Args)]
 struct Work {
     /// Read missions from the manifests in this directory. The name of a mission is its file name without `.toml`.

@@ -8,7 +8,8 @@
 //! becomes a rule with an empty head, an integrity constraint.
 //!
 //! Axioms outside of OWL 2 RL are lowered in part if possible (for example one direction of an equivalence),
-//! and the remaining part is reported. Conclusions are therefore always sound and possibly incomplete.
+//! and the remaining part is reported. With the semantics of OWL ([`Equality::Owl`]), conclusions are
+//! therefore sound and possibly incomplete.
 //!
 //! - [1] OWL 2 Web Ontology Language Profiles, W3C 2012, section 4.3.
 

@@ -1,4 +1,4 @@
-//! Normalises merged triples, so that horned-owl reads them without loss.
+//! Normalises merged triples, so that horned-owl skips as few of them as possible.
 //!
 //! horned-owl's RDF reader matches exact patterns and skips triples that deviate: rules and axioms whose node
 //! is an IRI instead of a blank node, atoms with an annotation, data atoms about an individual, empty bodies,

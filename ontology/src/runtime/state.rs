@@ -69,7 +69,8 @@ impl Runtime {
         objectives
     }
 
-    /// Returns one derivation for each status of an objective, and one if the objective is updatable.
+    /// Returns one derivation for each status of an objective and for each value of its `o_updatable`. If a
+    /// status or value was latched (kept as an assertion), the derivation is the one at that time.
     ///
     /// # Errors
     /// Returns [`Error::Unknown`] if there is no such objective.

@@ -25,9 +25,9 @@ pub(super) type EdgeId = u32;
 pub(super) struct Edge {
     pub left: Symbol,
     pub right: Symbol,
-    /// Stated facts among the premises.
+    /// Stated facts among the premises of this edge.
     pub facts: Vec<Fact>,
-    /// Earlier edges among the premises.
+    /// Earlier edges (recorded equalities) among the premises of this edge.
     pub edges: Vec<EdgeId>,
     /// Derivation of the pair when the edge was created, down to stated facts and other pairs; the first
     /// step is the pair itself. Empty if the pair is stated.

@@ -121,7 +121,8 @@ impl<'l> Layers<'l> {
         self.costs = next;
     }
 
-    /// Returns the minimal cost of k steps, or `None` if no row is reachable in exactly k steps.
+    /// Returns the minimal cost of exactly k steps in the abstraction (k: number of calls of `advance`), or
+    /// `None` if no sequence of k steps exists.
     fn spent(&self) -> Option<Integer> {
         self.costs.iter().flatten().min().cloned()
     }

@@ -44,8 +44,8 @@ pub(super) struct Edge {
     pub(super) step: u32,
 }
 
-/// Graph of labels and the steps between them. A label (node) represents a state or, in the first search, a
-/// set of states.
+/// Graph of labels and the steps between them. A label (node) represents a state or, in the first of the two
+/// searches (see the head of this file), all states that are no better in resources and cost.
 pub(super) struct Graph {
     /// Edges in ascending order of [`Edge::from`], and then of their steps.
     pub(super) edges: Vec<Edge>,

@@ -1,8 +1,9 @@
 //! Portfolio of exact search, satisficing search and SAT, which take turns.
 //!
 //! The work of a round is twice that of the previous round. Each component gets a share of the work; the shares of
-//! satisficing search and SAT shrink while they are unsuccessful. Work is counted in units instead of time, so
-//! results without a time limit are deterministic. The plans and bounds of a component limit the others.
+//! satisficing search and SAT shrink while they are unsuccessful. Work is counted in units instead of time, so results
+//! without a time limit are deterministic, except with an external SAT solver: its conflicts are limited by time. The
+//! plans and bounds of a component limit the others.
 
 use std::time::Instant;
 

@@ -19,11 +19,12 @@ use crate::optimize::sat_budget::{FORMULA_LIMIT, SatBudget};
 const CONFIRM_BUDGET: SatBudget = SatBudget { clauses: 50_000, conflicts: 60 };
 /// Number of operator variables of a formula above which confirmation is attempted only if it is configured.
 const CONFIRM_SIZE: usize = 5_000;
-/// Product of the number of operators and the number of steps above which confirmation is attempted only if it
-/// is configured.
+/// Product of the number of operators and the number of steps above which a result of the search is confirmed only if
+/// this is configured.
 const CONFIRM_PRODUCT: usize = 1_500;
-/// Number of operator variables above which confirmation by a formula without bounds is attempted only if it is
-/// configured.
+/// Number of operator variables (operators × steps) above which [`confirm`] attempts a confirmation only if it is
+/// configured. Its formula does not use the lower bounds of the search to exclude operators, so it is larger than
+/// others.
 const CONFIRM_LIMIT: usize = 400;
 /// Cost limit from which formulas become large, so that confirmation is attempted only if it is configured. Such
 /// costs arise from scaled products of decimals.

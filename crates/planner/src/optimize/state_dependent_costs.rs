@@ -1,10 +1,10 @@
 //! Exact costs of paths, and lower bounds on them, for a metric whose fluents change by amounts that depend on the
 //! state \[1\], here without a decomposition of the costs. `branch_and_bound` minimises such a metric.
 //!
-//! The cost of a path is the sum of its operator costs plus the weighted values of the measured fluents (fluents of
-//! the metric) in its last state. Each operator has a lower bound on the increase of this cost, over the reachable
-//! intervals of all numbers. With these bounds as constant costs, the heuristics of the task are admissible if no
-//! bound is negative.
+//! The cost of a path is the sum of its operator costs plus the weighted values of the measured fluents (fluents of the
+//! metric) in its last state. Each operator has a lower bound on the increase of this cost, over the intervals of all
+//! numbers in reachable states \[2\]. With these bounds as constant costs, the heuristics of the task are admissible if
+//! no bound is negative.
 //!
 //! \[1\] F. Geißer, T. Keller, R. Mattmüller: Delete relaxations for planning with state-dependent action costs,
 //! IJCAI 2015.

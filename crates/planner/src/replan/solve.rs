@@ -190,8 +190,8 @@ fn starts(base: &GroundBase, situation: &ReplanState, query: &Query<'_>) -> Opti
     query.first.iter().enumerate().map(start).collect()
 }
 
-/// Selects one of several optimal plans by the tie-breaking rules of this file. Also returns the index of its
-/// first step.
+/// Selects one of several optimal plans by the tie-breaking rules of this file. Also returns the index in `query.first`
+/// of the step that precedes the plan; `None` if the query has no first steps.
 fn choose(
     set: &AvailabilityContext,
     query: &Query<'_>,

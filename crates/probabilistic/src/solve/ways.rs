@@ -1,10 +1,11 @@
-//! Solves components by shortest paths if each choice leads either out of the component or to a single other
-//! state of it. In both cases, the choice may also loop.
+//! Solves components of at most 64 states by shortest paths if each choice leads either out of the component
+//! or to a single other state of it. In both cases, the choice may also loop.
 //!
 //! Reconfigurations that succeed, or that are repeated until they succeed, have this form. Nearly all
-//! components of a co-adaptation process consist of them. The best values are propagated from the choices that
-//! leave the component (Dijkstra 1959). No system of equations is solved, and the only rounding errors are
-//! those of a few sums and quotients.
+//! components of a co-adaptation process consist of them. The best values are propagated from the choices
+//! that leave the component (Dijkstra 1959). Only least rewards and greatest probabilities need this; the
+//! other values are 0 or infinite. No system of equations is solved, and the only rounding errors are those
+//! of a few sums and quotients.
 
 use crate::mdp::dense;
 use crate::number::{Number, count, is_whole};

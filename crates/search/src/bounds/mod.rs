@@ -30,7 +30,7 @@ use task::number::Int;
 use task::task::quantity::NumericId;
 use task::task::{State, VariableId};
 
-/// Greatest upper bound on the number of steps that is computed.
+/// Upper bounds on the number of steps are computed only if they are below this number.
 const STEP_LIMIT: usize = 4_000;
 /// Maximum number of abstract states of a projection to two variables.
 const STATE_LIMIT: usize = 20_000;
@@ -54,7 +54,7 @@ pub struct Bounds {
 /// The plans within a limit on cost and steps: their maximum length, and the operators of each step.
 pub struct ReachableWindow {
     /// Upper bound on the number of steps of plans within the cost limit. `None` if there is no cost limit,
-    /// or no projection yields a bound of at most `STEP_LIMIT`.
+    /// or no projection proves a bound below `STEP_LIMIT`.
     pub steps: Option<usize>,
     /// For each step and each operator: whether the operator can occur at the step. The number of steps is
     /// the lesser of `steps` and the horizon given to [`Bounds::window`]; 0 if there is neither.

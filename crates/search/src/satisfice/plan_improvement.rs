@@ -5,7 +5,8 @@
 //! segment to the goal of the segment ([`SegmentGoal`]), with a limited number of evaluated states. A pass
 //! without a success is followed by a pass with longer segments. After the longest segments, the limit on
 //! evaluated states doubles, and the segments are short again. Between passes, steps that do not interfere
-//! are exchanged at random, so that related steps meet in a segment.
+//! are exchanged at random, so that related steps meet in a segment. The steps of very long plans, and of all
+//! plans of tasks with derived variables, keep their order.
 //!
 //! As in \[1\], which calls segments windows, but with random linear extensions of the plan instead of blocks
 //! of a partial order.

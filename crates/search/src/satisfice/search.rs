@@ -2,10 +2,11 @@
 //!
 //! A state is evaluated when it is expanded, and its successors are queued with its heuristic values \[1\].
 //! The two heuristics are the cost of the relaxed plan and the number of required landmarks; their open lists
-//! alternate. The first search of a sequence uses unit costs, and later searches use operator costs with
-//! decreasing weights \[2\]. A state without a relaxed plan is a dead end. If the open lists are empty and
-//! `incomplete` is `false`, all states were visited that can be reached without dead ends and without
-//! operators that the h² mutexes prove useless.
+//! alternate. Without landmarks, and in the search for a segment of a plan, only the first heuristic is used.
+//! The first search of a sequence uses unit costs, and later searches use operator costs with decreasing
+//! weights \[2\]. A state without a relaxed plan is a dead end. If the open lists are empty and `incomplete`
+//! is `false`, all states were visited that can be reached without dead ends and without operators that the
+//! h² mutexes prove useless.
 //!
 //! If the relaxed plan repeats an operator, the search also applies the operator several times at once,
 //! without evaluating the states between \[3\].

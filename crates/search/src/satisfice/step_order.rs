@@ -1,7 +1,8 @@
 //! Order of the steps of a plan: which steps interfere, and random linear extensions of this partial order.
 //!
 //! Two steps interfere if one of them assigns a variable that the other reads or assigns \[1\]. Exchanging
-//! neighbours that do not interfere changes neither the result nor the applicability.
+//! neighbours that do not interfere changes neither the result nor the applicability. With derived variables,
+//! or with more than `MAX_STEPS` steps, all steps count as interfering.
 //!
 //! \[1\] C. Bäckström: Computational aspects of reordering plans, JAIR 9, 1998.
 

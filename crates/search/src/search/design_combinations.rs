@@ -316,8 +316,8 @@ mod tests {
             let operator = operator(&costs, &uses, &excluded, &numbers);
             let limits = Limits::none();
             prop_assert_eq!(pareto_optimal_combinations(&operator, monotone, true, &limits), Ok(Some(expected(&operator, monotone, true))));
-            // Of several combinations with equal cost and quantity, any one may be kept. So the test compares
-            // costs and quantities, not designs.
+            // With `all = false`, any one of several combinations with equal cost and equal numeric effect may be kept.
+            // So costs and effects are compared, not designs.
             let values = |choices: Vec<(Vec<u32>, Int)>| {
                 let sizes = operator.sizes();
                 let remaining = |choice: &[u32]| operator.numeric_effects[0].value.quantity.at(choice, &sizes);

@@ -1,16 +1,18 @@
-//! Tie-breaking among plans of equal cost: selects a canonical plan.
+//! Tie-breaking among the plans that have the cost and the number of steps of a known plan: selects a
+//! canonical plan.
 //!
-//! The canonical plan has the fewest steps, and among these plans the fewest reconfigurations, i.e. changes
-//! of a function's design. A step at which two functions change their designs counts twice. If there is a
-//! reference plan, the number of steps that are not in it is minimised before the reconfigurations. Remaining
-//! ties are broken by model order: step by step, it compares the position of the action in the domain, the
-//! positions of its arguments in the problem, and its designs. Names are not compared. Unless the reference
-//! plan contains it, a design is not selected if a strictly better design exists (cheaper, or with less
-//! consumption).
+//! The number of steps is not minimised here: the canonical plan has the fewest steps only if the known plan
+//! has. It has the fewest reconfigurations, i.e. changes of a function's design. A step at which two
+//! functions change their designs counts twice. If there is a reference plan, the number of steps that are
+//! not in it is minimised before the reconfigurations. Remaining ties are broken by model order: step by
+//! step, it compares the position of the action in the domain, the positions of its arguments in the problem,
+//! and its designs. Names are not compared. Unless the reference plan contains it, a design is not selected
+//! if a strictly better design exists (cheaper, or with less consumption).
 //!
 //! The cost and length of the known plan bound two searches: the first minimises reconfigurations, and the
 //! second is a depth-first search in model order that stops at the first plan. If these searches exceed their
-//! limits, the known plan is returned, which need not be canonical.
+//! limits or the second one ends with a shorter plan, the known plan is returned, which need not be
+//! canonical.
 
 use std::cell::{Cell, RefCell};
 use std::cmp::Reverse;

@@ -8,7 +8,7 @@
 //! LM-cut. The LM-cut search first gets a quarter of the other's work, and later the same work. A search then
 //! gets only half of its work if its lower bound lags behind that of the other, or if its memory may not
 //! suffice. The result of the search that finishes first is returned. Work is counted in units instead of
-//! time, so the result is deterministic.
+//! time, so the result without a time limit is deterministic.
 
 use std::sync::Arc;
 

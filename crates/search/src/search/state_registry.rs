@@ -2,8 +2,9 @@
 //!
 //! Finite-domain values are packed into as few bits as they need. Equal numbers are stored once, and states
 //! refer to them by index. A *place* is the combination of the finite-domain values and the numbers that must
-//! be equal for dominance. A hash table finds the place of a state. The states of a place differ only in cost
-//! and in comparable numbers. Those that no other state of the place dominates form its Pareto front.
+//! be equal for dominance. A hash table finds the place of a state. The states of a place differ only in
+//! cost, in comparable numbers, and in numbers that are ignored. Those that no other state of the place
+//! dominates form its Pareto front.
 
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! Rescheduling: starts the actions of a plan with timed events as early as possible.
+//! Rescheduling: moves actions of a plan with timed events to earlier starts, one action at a time.
 //!
 //! Waiting is free, so an optimal plan may delay an action until an event that only a later action needs. For
 //! each action, the operators for its other timeline windows are therefore tried, with the necessary waits. A

@@ -1,4 +1,5 @@
-//! Concurrent plans of a PDDL task, with the least makespan or the best weighted sum of makespan and costs.
+//! Finds concurrent plans of a PDDL task, with the least makespan or the best weighted sum of makespan and
+//! costs. At a limit, the best known plan is returned, which need not be optimal.
 //!
 //! A plan must satisfy the semantics of [`validate`](pddl::validate). In addition, at any time each function
 //! that running actions require has only one design, and each duration is 0 or at least the *separation*

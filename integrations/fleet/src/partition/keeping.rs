@@ -50,7 +50,8 @@ impl<S: Store> Partition<S> {
     /// Starts to mark the snapshot of a suspended robot, so that the progress of the partition does not wait for the
     /// robot. Does nothing if the snapshot has this mark or is being written. Returns `true` if a write was started.
     fn set_apart(&mut self, name: &str) -> bool {
-        // If the robot has no snapshot, all its known events and decisions are later than the progress.
+        // For a robot without a snapshot, an empty one is stored. It ends at the progress of the partition, because all
+        // known events and decisions of the robot have greater sequence numbers.
         let (event, decision) = (self.progress.events, self.progress.decisions);
         let Some(slot) = self.slots.get_mut(name) else { return false };
         if slot.suspended.is_none() || slot.is_apart || slot.is_saving {
@@ -70,7 +71,8 @@ impl<S: Store> Partition<S> {
                     let saved = Saved { behind: true, ..saved };
                     (saved.event, write(store, Bucket::Robots, &key, &bytes(&saved), revision).await)
                 }
-                // A snapshot that cannot be parsed is kept. Its robot was not restored, so it is not suspended.
+                // Not expected: a robot whose snapshot could not be parsed at recovery has revision 0 here. The
+                // snapshot keeps its content and gets no mark.
                 Ok(None) => {
                     return Done::Kept { robot: name, event: 0, behind: false, revision: Ok(revision) };
                 }

@@ -475,7 +475,8 @@ fn type_hash(user_data: &[u8]) -> Option<String> {
 /// valid length are returned unchanged.
 fn without_length(user_data: &[u8]) -> &[u8] {
     let Some((length, content)) = user_data.split_first_chunk() else { return user_data };
-    // The byte order is that of the announcement, which the library does not expose.
+    // The length has the byte order of the discovery message, which the library does not expose. So both orders are
+    // tried, and the first length that fits is used.
     let lengths = [u32::from_le_bytes(*length), u32::from_be_bytes(*length)];
     let content = lengths.into_iter().find_map(|length| content.get(..length as usize));
     content.unwrap_or(user_data)

@@ -59,7 +59,7 @@ struct NodeClient {
     get_parameters: Caller<GetParameters>,
 }
 
-/// Last message on a topic, with the time at which it was published.
+/// Message on a topic that was published last, with the time of its publication (if unknown, of its arrival).
 type LastMessage = Arc<Mutex<Option<(SystemTime, Vec<u8>)>>>;
 
 /// Last message on a topic, and the publisher of this program on it.
