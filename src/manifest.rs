@@ -192,7 +192,7 @@ fn shortened(path: &Path) -> PathBuf {
 
 /// Returns the faults of a manifest, sorted by position. The parser reports only the first fault, so each faulty entry
 /// is overwritten with blanks and the text is parsed again. If the text is not TOML, only the first fault is returned.
-/// A description occurs at most once, and a missing field counts only as the first fault.
+/// Faults with equal descriptions are returned once. A missing field is returned only if it is the first fault.
 fn mistakes<S: DeserializeOwned>(text: &str, first: toml::de::Error, name: &str) -> Vec<Message> {
     let mut messages: Vec<(Option<(usize, usize)>, Message)> = Vec::new();
     let (mut remaining, mut error) = (text.to_owned(), first);

@@ -43,12 +43,12 @@ pub(crate) fn from_json(value: &Value) -> Option<BigRational> {
     }
 }
 
-/// Formats a number as decimal text. A fraction without a finite decimal expansion is rounded.
+/// Formats a number as decimal text, rounded to at most 34 fractional digits.
 pub(crate) fn decimal(value: &BigRational) -> String {
     rules::Decimal::from_rational(value).to_string()
 }
 
-/// Converts a number to a JSON number. A fraction without a finite decimal expansion is rounded.
+/// Converts a number to a JSON number, rounded to at most 34 fractional digits.
 pub(crate) fn to_json(value: &BigRational) -> Value {
     decimal(value).parse::<serde_json::Number>().map_or(Value::Null, Value::Number)
 }

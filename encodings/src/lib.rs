@@ -1,7 +1,7 @@
-//! SAT encodings of ground planning tasks, in which function designs are selected together with the
-//! operators, and SAT solvers behind one trait.
+//! SAT encodings of ground planning tasks, in which function designs are selected together with the operators, and SAT
+//! solvers behind one trait.
 //!
-//! Absent: PDDL and OWL. The ground task already contains which designs are available.
+//! The crate reads neither PDDL nor OWL. The ground task already contains which designs are available.
 
 #![allow(missing_docs, reason = "an interface of the workspace; names say what fields hold")]
 #![warn(

@@ -1,6 +1,6 @@
 //! Shipped domains and problems, embedded as text for templates and examples.
 
-/// The plain domain of the ground vehicle, `ugv/plain.pddl`.
+/// The domain of the ground vehicle without function designs, `ugv/plain.pddl`.
 pub const UGV_PLAIN: &str = include_str!("../ugv/plain.pddl");
 
 /// The problem of the ground vehicle, `ugv/problem.pddl`.

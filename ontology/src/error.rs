@@ -51,7 +51,7 @@ pub enum Error {
     Unreadable {
         /// Path of the file.
         file: PathBuf,
-        /// Message of the operating system.
+        /// Cause, usually a message of the operating system.
         reason: String,
     },
     /// O102: a document is not well-formed.
@@ -113,9 +113,9 @@ pub enum Error {
     TooDeep {
         /// The document.
         file: String,
-        /// Subject of the expression, if the syntax gives no position.
+        /// IRI that the expression describes, if found.
         about: Option<String>,
-        /// Position of the expression, if the syntax gives one.
+        /// Position of the nesting, or of an occurrence of the IRI `about`, if found.
         position: Option<Position>,
         /// Maximum nesting depth.
         deepest: usize,

@@ -1,11 +1,11 @@
 //! Reads OWL 2 knowledge bases of a robot and lowers them to rules and facts.
 //!
-//! [`read_files`] reads RDF/XML, Turtle, N-Triples, OWL/XML and functional-style documents with their imports
-//! into an [`Ontology`]. [`lower`](lower()) translates it to a `rules::Program` and facts. [`tomasys`] is the
-//! typed view of the conclusions of an engine. [`runtime`] updates an engine with the reports of a robot.
-//! [`kb`] contains the embedded knowledge bases.
+//! [`read_files`] reads RDF/XML, Turtle, N-Triples, OWL/XML and functional-style documents with their imports into an
+//! [`Ontology`]. [`lower`](lower()) translates it to a `rules::Program` and facts. [`tomasys`] is the typed view of
+//! the conclusions of an engine. [`runtime`] updates an engine with the reports of a robot. [`kb`] contains the
+//! embedded knowledge bases.
 //!
-//! Absent: PDDL, plans, clocks and the network.
+//! Not part of this crate: PDDL, plans, clocks and network access.
 
 pub mod vocab;
 

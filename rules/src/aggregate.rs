@@ -15,13 +15,15 @@ use crate::symbol::{Symbol, Symbols};
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Function {
     pub aggregate: Aggregate,
-    /// The value to aggregate in each row: a column (as a variable number), or a constant.
+    /// Aggregated operand: the value in a column of each row, or a constant. A column is given as the number of a
+    /// variable. Ignored by `count`.
     pub value: Source,
 }
 
 impl Function {
-    /// Returns the aggregate of the rows. `None` if it has no value, for example the minimum of no rows, or
-    /// if an operand other than that of `count` is not a literal.
+    /// Returns the aggregate of the rows. `count` always has a value. Otherwise `None` if an operand is not a
+    /// literal, if a minimum or maximum has no rows or incomparable values, or if a sum has a value that is not a
+    /// number.
     pub fn evaluate<'r>(
         &self,
         rows: impl Iterator<Item = &'r [Symbol]>,

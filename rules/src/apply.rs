@@ -1,8 +1,8 @@
 //! Evaluation of a program, and its incremental maintenance under insertion and deletion of facts.
 //!
-//! Every derived row records one derivation, by which it was found, and the recorded derivations never support each
-//! other in a circle. Deletion is delete-and-rederive [1], restricted to the recorded derivations: a row is
-//! over-deleted only if a change affects its recorded derivation. The original algorithm over-deletes a row if a
+//! Every derived row (stored fact) records one derivation, by which it was found, and the recorded derivations never
+//! support each other in a circle. Deletion is delete-and-rederive [1], restricted to the recorded derivations: a row
+//! is over-deleted only if a change affects its recorded derivation. The original algorithm over-deletes a row if a
 //! change affects *any* of its derivations. Over-deleted rows are rederived stratum by stratum, so that a deletion
 //! seldom propagates far.
 //!
@@ -30,8 +30,8 @@ use crate::vocabulary::SAME_AS;
 /// The joins are planned again if the number of facts exceeds this multiple of the number at the last
 /// planning.
 const REPLAN_FACTOR: usize = 4;
-/// Minimum number of facts assumed for the last planning, so that small engines are not planned after
-/// every update.
+/// Lower limit on the number of facts that is multiplied by [`REPLAN_FACTOR`], so that small engines are not planned
+/// again after every update.
 const REPLAN_FROM: usize = 32;
 
 impl Engine {
@@ -114,8 +114,8 @@ impl Engine {
         for fact in delta.insert.iter().chain(&delta.delete) {
             check_fact(fact, &self.symbols)?;
         }
-        // After an interrupt, the caller expects a prompt return. A copy is restored faster than a new
-        // derivation.
+        // After an interrupt, the caller expects a prompt return. Restoring a copy is faster than deriving all facts
+        // again.
         let before = self.limits.interrupt.is_some().then(|| self.clone());
         let result = match self.equality.take() {
             Some(equality) => self.apply_equally(equality, &delta, None),
@@ -145,9 +145,9 @@ impl Engine {
         }
     }
 
-    /// Applies a change of the stated rows, like [`Engine::apply`], but expects and returns rows of the store as they
-    /// are: with equality, each name is the representative of its class of equal names. After an error, the store is
-    /// in an undefined state.
+    /// Applies a change of the stated facts like [`Engine::apply`], but with rows of the store instead of facts. With
+    /// equality, a row contains the representatives of the classes of equal names. Returns the change of rows. After
+    /// an error, the store is in an undefined state.
     pub(crate) fn apply_rows(&mut self, delta: Delta) -> Result<Delta, Error> {
         self.replan()?;
         let stated = state_change(self, delta);

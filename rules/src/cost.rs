@@ -9,7 +9,8 @@ use rustc_hash::FxHashSet;
 
 use crate::store::{Relation, RelationId, Row, Store, state};
 
-/// Approximate number of rows that are sampled per relation (up to twice as many).
+/// Approximate number of rows that are sampled per relation. Because the stride is an integer, up to twice as many
+/// are sampled.
 const SAMPLE: usize = 1024;
 /// Assumed number of rows of an empty relation, and minimum of the assumed number for a relation that rules
 /// have yet to fill.

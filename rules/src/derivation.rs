@@ -10,8 +10,9 @@ use crate::symbol::{Symbol, Symbols};
 /// in the corresponding tree.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Derivation {
-    /// Steps of the derivation; the first step is the explained fact. The order is breadth-first: every
-    /// other fact comes after the first fact that it supports.
+    /// Steps of the derivation. From [`Engine::why`](crate::Engine::why), the first step is the explained fact, and
+    /// every other fact comes after the first fact that it supports (breadth-first order). From
+    /// [`Engine::everything`](crate::Engine::everything), supports come before the facts that they support.
     pub steps: Vec<DerivationStep>,
 }
 
@@ -39,15 +40,17 @@ pub enum Reason {
     Rule {
         /// Identity of the rule.
         identity: RuleIdentity,
-        /// Variables of the rule with their values, without variables local to aggregates. Names have no
-        /// question mark.
+        /// Pairs of the name of a variable, without question mark, and its value. Variables local to aggregates are
+        /// omitted.
         bindings: Vec<(String, Symbol)>,
         /// Positions in [`Derivation::steps`] of the facts matched by the relation atoms of the body, in
         /// order.
         supports: Vec<usize>,
-        /// Facts whose absence the negated atoms of the body require, in order.
+        /// Facts whose absence the negated atoms of the body require, in order. Empty if the derivation is of
+        /// [`Engine::everything`](crate::Engine::everything).
         absent: Vec<Fact>,
-        /// Aggregates of the body, in order.
+        /// Aggregates of the body, in order. Empty if the derivation is of
+        /// [`Engine::everything`](crate::Engine::everything).
         aggregates: Vec<Aggregated>,
     },
 }

@@ -13,19 +13,19 @@ pub enum Error {
     /// The text is not a well-formed rule.
     #[error("{file}:{line}:{column}: R101 {message}")]
     Syntax {
-        /// The source as named by the caller.
+        /// Name of the rule text, as given by the caller.
         file: String,
         /// Line, counted from 1.
         line: u32,
         /// Column in characters, counted from 1.
         column: u32,
-        /// Expected and actual token.
+        /// Description of the error, usually the expected and the actual token.
         message: String,
     },
     /// An undeclared prefix.
     #[error("{file}:{line}:{column}: R102 undeclared prefix `{prefix}:`")]
     UndeclaredPrefix {
-        /// The source as named by the caller.
+        /// Name of the rule text, as given by the caller.
         file: String,
         /// Line, counted from 1.
         line: u32,
@@ -37,7 +37,7 @@ pub enum Error {
     /// A `swrlb` name without a built-in.
     #[error("{file}:{line}:{column}: R104 there is no built-in `{name}`{}", did_you_mean(&format!("{SWRLB}{name}")))]
     UnknownBuiltIn {
-        /// The source as named by the caller.
+        /// Name of the rule text, as given by the caller.
         file: String,
         /// Line, counted from 1.
         line: u32,
@@ -51,7 +51,7 @@ pub enum Error {
         "{file}:{line}:{column}: R104 built-in `{name}` works on lists, which the engine does not support"
     )]
     RefusedBuiltIn {
-        /// The source as named by the caller.
+        /// Name of the rule text, as given by the caller.
         file: String,
         /// Line, counted from 1.
         line: u32,
@@ -66,7 +66,7 @@ pub enum Error {
         did_you_mean(name)
     )]
     ForeignBuiltIn {
-        /// The source as named by the caller.
+        /// Name of the rule text, as given by the caller.
         file: String,
         /// Line, counted from 1.
         line: u32,
@@ -75,13 +75,13 @@ pub enum Error {
         /// IRI of the built-in.
         name: String,
     },
-    /// A relation atom that is neither a class, a property, nor derived by a rule.
+    /// A relation atom whose arguments fit neither a class nor a property, and whose relation no rule derives.
     #[error(
         "{file}:{line}:{column}: R104 <{name}> with {count} arguments is not a class, a property or anything that a rule \
          concludes, and a built-in of this name is not known"
     )]
     UnknownRelation {
-        /// The source as named by the caller.
+        /// Name of the rule text, as given by the caller.
         file: String,
         /// Line, counted from 1.
         line: u32,
@@ -95,7 +95,7 @@ pub enum Error {
     /// An atom outside plain SWRL, although [`crate::Syntax::swrl_only`] is set.
     #[error("{file}:{line}:{column}: R105 {what} is not SWRL")]
     NotSwrl {
-        /// The source as named by the caller.
+        /// Name of the rule text, as given by the caller.
         file: String,
         /// Line, counted from 1.
         line: u32,
@@ -130,7 +130,7 @@ pub enum Error {
         /// Number of arguments.
         count: usize,
     },
-    /// A head atom that no rule can derive.
+    /// A head atom that no rule can derive, such as a built-in.
     #[error("R205 rule {rule}: a head may not contain {what}")]
     HeadAtom {
         /// The rule.

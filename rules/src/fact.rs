@@ -9,7 +9,8 @@ use crate::symbol::{Symbol, Symbols};
 /// Arguments of a fact. Up to three are stored inline.
 pub type Arguments = SmallVec<[Symbol; 3]>;
 
-/// A ground atom. A class assertion has one argument, a property assertion two; other arities are free.
+/// A ground atom: a class assertion with one argument, a property assertion with two, or a fact of any other
+/// relation.
 #[derive(Clone, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]
 pub struct Fact {
     /// Class, property or relation.

@@ -1,16 +1,13 @@
-//! Evaluates one semi-naive round with a fixed program of crepe (a Datalog compiler) that interprets join
-//! plans.
+//! Evaluates one semi-naive round: a fixed program of crepe (a Datalog compiler) interprets the join plans of the
+//! rules.
 //!
-//! The tuples of the program contain block numbers, so evaluation is set-at-a-time: crepe's bookkeeping
-//! costs nothing per match, and the store is never copied. `Match` is a block of partial matches with
-//! the number of plan steps that the block has passed. A block is extended by the next atom through a
-//! look-up in the persistent store, to which the program has a reference. `Head` is a block of complete
-//! matches.
+//! A block is a list of matches of a rule's body. The tuples of the program contain only the numbers of blocks, so
+//! that crepe's bookkeeping costs nothing per match, and the store is never copied. `Match` holds blocks of partial
+//! matches, each with the number of its plan steps so far; `Head` holds blocks of complete matches. A step
+//! extends a block by look-ups in the store, to which the program has a reference, and consumes the block.
 //!
-//! A block has one owner: the rule that extends a block consumes it. A small block passes the following
-//! steps of its plan within one rule application, until the block is large or complete. A typical update
-//! starts plans on one or two matches each, which pass all steps before the program starts; its
-//! bookkeeping would take longer than the steps.
+//! A small block passes several steps at once, because crepe's bookkeeping would take longer than the steps. In a
+//! typical update, each plan starts from one or two matches, which pass all steps before the program would start.
 
 use std::cell::RefCell;
 use std::hash::{BuildHasherDefault, Hash, Hasher};
@@ -39,7 +36,7 @@ pub(crate) struct Seed {
 #[derive(Clone, Debug)]
 pub(crate) enum Start {
     Nothing,
-    /// Changed rows of a relation: a range of [`Round::rows`].
+    /// Start rows of a relation: a range of [`Round::rows`].
     Rows {
         relation: RelationId,
         from: u32,
@@ -74,7 +71,7 @@ pub(crate) struct Round<'a> {
     /// Number of variables per match, indexed by compiled rule.
     pub widths: &'a [usize],
     pub symbols: RefCell<&'a mut Arc<Symbols>>,
-    /// Changed rows. Each [`Seed`] refers to a range.
+    /// Rows from which plans start. A [`Start::Rows`] refers to a range of them.
     pub rows: &'a [Row],
     /// Whether the plans match against the state before the update, to find invalid derivations. The
     /// store holds a superset of that state.
@@ -92,7 +89,7 @@ type BlockId = u32;
 #[derive(Debug, Default)]
 pub(crate) struct Buffers(RefCell<Vec<Vec<Symbol>>>);
 
-/// Maximum capacity of a buffer that is used again, and maximum number of such buffers.
+/// Maximum capacity, in symbols, of a buffer that is used again.
 const BUFFER_SYMBOLS: usize = 1 << 10;
 const MAX_BUFFERS: usize = 16;
 

@@ -27,9 +27,9 @@ const ROWS_PER_INTERRUPT_CHECK: u64 = 1 << 14;
 /// Limits of one derivation or update.
 #[derive(Clone, Debug)]
 pub struct Limits {
-    /// Number of steps that one update may take. A step extends one partial match of a rule's body. A value
-    /// that a recursive rule computes for the first time costs 25,000 steps, and 25,000 more for every 8
-    /// bytes of its digits or text.
+    /// Number of steps that one update may take. Roughly, a step extends one partial match of a rule's body. A value
+    /// that a recursive rule computes for the first time costs 25,000 steps, and 25,000 more for every 8 bytes of its
+    /// digits or text.
     pub steps: u64,
     /// Function that can stop an update. It is called after about every 16,000 visited rows and charged
     /// steps, i.e. every few microseconds to a millisecond.

@@ -1,6 +1,6 @@
-//! Lowers rules to conditions and head templates over relations. The atoms of an aggregate become a
-//! separate rule. This rule derives one row for each match, in a relation without a name: first the group,
-//! then the local variables.
+//! Lowers rules to conditions and head templates over relations. The atoms of an aggregate become a separate rule,
+//! which derives one row for each match. The rows are in a relation without a name; the first columns are the
+//! variables of the group, the others the local variables.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -17,12 +17,11 @@ use crate::vocabulary::{DIFFERENT_FROM, SAME_AS};
 pub(crate) struct Lowering<'a> {
     symbols: &'a mut Symbols,
     store: &'a mut Store,
-    /// Relation of the matches of each integrity constraint, with the position of the constraint in the
-    /// program.
+    /// For each integrity constraint: the relation of its matches, and its position in the program.
     constraints: &'a mut Vec<(RelationId, usize)>,
-    /// Relations without a name that are in use.
+    /// Relations without a name (matches of constraints and aggregates) that are in use.
     used: FxHashSet<RelationId>,
-    /// Maps each arity to a number below which all relations without a name are in use.
+    /// Maps each arity to the number from which the next unused relation without a name is searched.
     first_candidates: FxHashMap<usize, u32>,
     pub lowered: Vec<Lowered>,
 }

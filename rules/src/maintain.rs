@@ -58,7 +58,7 @@ pub(crate) fn state_change(engine: &mut Engine, delta: Delta) -> Stated {
             continue;
         }
         relation.clear(row, state::ASSERTED);
-        // A row with a recorded derivation still holds; only its assertion ends.
+        // A row with a recorded derivation is not deleted for now; only its assertion ends.
         if relation.record(row) == Record::NONE {
             relation.set(row, state::DOOMED);
             stated.doomed.push((id, row));

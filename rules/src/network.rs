@@ -22,8 +22,8 @@ pub(crate) struct Network {
     pub widths: Vec<usize>,
     pub plans: Vec<Plan>,
     pub strata: Vec<Stratum>,
-    /// Number of the stratum of each relation, in dependency order. These numbers also count strata
-    /// without rules, which `strata` omits.
+    /// Indexed by relation: the number of its stratum. A relation has a number at least as large as those on which it
+    /// depends. The numbers also count strata without rules, which `strata` omits.
     stratum_of: Vec<usize>,
     /// Relation of `owl:sameAs`, if it is interpreted as equality.
     pub same_as: Option<RelationId>,
@@ -31,8 +31,7 @@ pub(crate) struct Network {
     pub planned_for: usize,
     /// Indexed by relation: the strata whose rules read or derive the relation.
     pub readers: Vec<Vec<u32>>,
-    /// Relation of the matches of each integrity constraint, with the position of the constraint in the
-    /// program.
+    /// For each integrity constraint: the relation of its matches, and its position in the program.
     pub constraints: Vec<(RelationId, usize)>,
 }
 

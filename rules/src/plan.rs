@@ -125,10 +125,9 @@ pub(crate) struct Lowered {
     pub width: usize,
     pub heads: Vec<Template>,
     pub body: Vec<Condition>,
-    /// Whether the rule states only that a relation is transitive. Its conclusions are chains of
-    /// *links*, that is, rows that this rule did not derive. Therefore the second atom of the body is
-    /// matched with links only. Each conclusion is then found once for each last link of a chain, and
-    /// not once for each row in the middle.
+    /// Whether the rule states only that a relation is transitive: `r(?x, ?y) ^ r(?y, ?z) -> r(?x, ?z)`. Its second
+    /// atom is then matched only with *links*, i.e. rows that this rule did not derive. Every conclusion is a chain
+    /// of links, and is found once for each possible last link instead of once for each name in the middle.
     pub is_closure: bool,
 }
 
@@ -224,7 +223,7 @@ impl Bound {
 }
 
 pub(crate) struct Planner<'a> {
-    /// The planner adds the indexes that the plans need.
+    /// Store, to which the planner adds the indexes that the plans need.
     pub store: &'a mut Store,
     pub lowered: &'a Lowered,
     pub number: u32,
@@ -256,9 +255,9 @@ impl Planner<'_> {
         self.plan(Vec::new(), None, 0)
     }
 
-    /// Creates a plan that starts from a row with the operands `seed`, which is the row of condition
-    /// `skip` if given. Conditions before `fresh_from` match no fresh rows. Returns `None` if the budget
-    /// is exhausted, or if a condition remains unbound, which [`check`] rules out.
+    /// Creates a plan that starts from a row with the operands `seed`, which is the row of condition `skip` if given.
+    /// Conditions before `fresh_from` match no fresh rows. Returns `None` if planning is interrupted, or if a
+    /// condition remains unbound, which [`crate::safety::check`] rules out.
     fn plan(&mut self, seed: Vec<Source>, skip: Option<usize>, fresh_from: usize) -> Option<Plan> {
         if !self.budget.visit(1, self.number) {
             return None;
@@ -318,8 +317,9 @@ impl Planner<'_> {
                 let is_known = |column: &usize| bound.is_bound(sources[*column]);
                 let columns: Vec<usize> = (0..sources.len()).filter(is_known).collect();
                 let mask = columns.iter().fold(0, |mask, column| mask | 1 << column);
-                // Most rows of a closure are not links; visiting each of them would take longer than deriving all
-                // conclusions.
+                // Few rows of a transitive relation are links (rows that the rule itself did not derive). An
+                // index for links contains only these, because visiting all rows would take longer than
+                // deriving all conclusions.
                 let excluded_rule = is_link.then_some(self.number);
                 let index =
                     (mask != 0).then(|| self.store.get_mut(*relation).index_without(mask, excluded_rule));

@@ -72,11 +72,11 @@ pub enum Aggregate {
     /// Sum of a term over all matches; 0 without matches. The sum is exact for decimals, and otherwise
     /// has the widest floating-point type among the values. There is no sum if a value is not a number.
     Sum(Term),
-    /// Minimum of a term over all matches. There is no minimum without matches, or if a value is incomparable with
-    /// all candidates for it.
+    /// Minimum of a term over all matches. There is no minimum without matches, or if a value is not comparable with
+    /// it, such as text among numbers.
     Min(Term),
-    /// Maximum of a term over all matches. There is no maximum without matches, or if a value is incomparable with
-    /// all candidates for it.
+    /// Maximum of a term over all matches. There is no maximum without matches, or if a value is not comparable with
+    /// it, such as text among numbers.
     Max(Term),
 }
 
@@ -117,7 +117,7 @@ pub struct RuleIdentity {
     pub source: Arc<str>,
     /// Label given by the author.
     pub label: Option<Arc<str>>,
-    /// Position in the source, counted from 0.
+    /// Position of the rule in the source, counted from 0.
     pub position: u32,
 }
 
@@ -128,7 +128,7 @@ impl RuleIdentity {
     }
 }
 
-/// Formats the identity as `source#position`, followed by the label, if any.
+/// Formats the identity as `source#position`, followed by the label in parentheses, if there is one.
 impl fmt::Display for RuleIdentity {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}#{}", self.source, self.position)?;

@@ -1,9 +1,8 @@
-//! Store of the facts that hold: rows of symbols, with hash indexes on exactly the columns that rules look
-//! up.
+//! Store of the facts that hold: rows of symbols, with hash indexes on the columns that are looked up.
 //!
-//! A relation holds the facts of one predicate and arity. A row is a number. Its arguments are contiguous
-//! in one vector, and its state is one byte. An index links the rows with equal key columns into a doubly
-//! linked list, so that insertion and deletion take O(indexes) time and allocate nothing per row.
+//! A relation holds the facts of one predicate and arity. A row is a number. Its arguments are contiguous in one
+//! vector, and its state is one byte. An index links the rows with equal key columns into a doubly linked list, so
+//! that insertion and deletion take O(indexes) time and allocate nothing per row.
 
 use hashbrown::HashTable;
 use rustc_hash::{FxBuildHasher, FxHashMap};
@@ -133,7 +132,7 @@ pub(crate) struct Relation {
 #[derive(Clone, Debug)]
 struct Index {
     columns: u32,
-    /// Rule whose derived rows are not in the index.
+    /// Number of the rule whose derived rows are not in the index; `None` if all rows are in the index.
     excluded_rule: Option<u32>,
     heads: HashTable<Row>,
     next: Vec<Row>,
@@ -307,8 +306,8 @@ impl Relation {
         self.indexes.len() - 1
     }
 
-    /// Returns the index on the largest subset of the columns `bound`, and the columns of this index (bit
-    /// masks). Ignores indexes without the rows of some rule; `None` if no index fits.
+    /// Returns the index on the largest subset of the columns `bound`, and the columns of this index (bit masks).
+    /// Ignores indexes that omit the rows of a rule; `None` if no index fits.
     pub fn best_index(&self, bound: u32) -> Option<(usize, u32)> {
         let fits = |index: &Index| index.columns & !bound == 0 && index.excluded_rule.is_none();
         let usable = self.indexes.iter().enumerate().filter(|(_, index)| fits(index));

@@ -1,8 +1,8 @@
-//! Stratification: orders relations such that each is complete before a rule negates it. The strata are the
-//! strongly connected components of the relation "is used to derive", dependencies first.
+//! Stratification: orders relations such that each is complete before a rule negates it. The strata are the strongly
+//! connected components of the dependency graph of the relations, dependencies first.
 //!
-//! Every component is a stratum, even without negation. Thus rows that are over-deleted in a component are
-//! rederived before later components see them.
+//! Every component is a stratum, even without negation. Thus rows that are over-deleted in a component are rederived
+//! before later components see them.
 
 use petgraph::algo::kosaraju_scc;
 use petgraph::graph::{DiGraph, NodeIndex};

@@ -62,11 +62,11 @@ pub enum Obstacle {
         /// `None`.
         gap: Option<BigRational>,
     },
-    /// An aggregate has a different value, or no value.
+    /// An aggregate has another value than the required one, no value, or a value that occurs nowhere else.
     Aggregate {
         /// The aggregate.
         aggregate: Aggregate,
-        /// Required value; `None` for any value.
+        /// Required value; `None` if none is required.
         wanted: Option<Symbol>,
         /// Actual value; `None` if the aggregate has no value.
         found: Option<Literal>,
@@ -143,9 +143,9 @@ impl fmt::Display for DisplayObstacle<'_> {
 }
 
 impl Engine {
-    /// Returns the nearest miss of each rule head that unifies with the fact, in the order of rules: the
-    /// binding of the rule body with the lowest weight of unsatisfied atoms that a limited search finds. Empty
-    /// if the fact holds, or if no rule could derive it.
+    /// Returns the nearest miss of each rule head that unifies with the fact: the binding of the rule body with the
+    /// lowest weight of unsatisfied atoms that a limited search finds. Empty if the fact holds, or if no rule could
+    /// derive it.
     pub fn why_not(&self, fact: &Fact) -> Vec<NearMiss> {
         let relation = self.store.find(fact.predicate, fact.arguments.len());
         let Some(relation) = relation.filter(|_| !self.holds(fact)) else { return Vec::new() };

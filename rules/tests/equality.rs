@@ -77,6 +77,14 @@ fn facts_follow_inserted_and_deleted_pairs() {
 }
 
 #[test]
+fn aggregates_count_individuals_that_are_stated_to_differ() {
+    let rules = "p(?x) ^ ?n = count { p(?y) ^ differentFrom(?x, ?y) } -> others(?x, ?n)";
+    let others = |a, b| format!("= p(a) ^ p(b) ^ others(a, \"{a}\"^^integer) ^ others(b, \"{b}\"^^integer)");
+    let (none, one) = (others(0, 0), others(1, 1) + " ^ differentFrom(a, b) ^ differentFrom(b, a)");
+    check(rules, "p(a), p(b)", &[&none, "+differentFrom(a, b)", &one, "-differentFrom(a, b)", &none]);
+}
+
+#[test]
 fn pairs_of_names_that_no_other_atom_binds_are_matched() {
     let stated = "p(a), sameAs(a, b)";
     check("sameAs(?x, ?y) ^ differentFrom(?x, c) -> q(?x, ?y)", stated, &["= p(a) ^ p(b)"]);

@@ -10,7 +10,7 @@ use crate::message::Message;
 
 const FORMAT: &str = "metaplan-compare/1";
 
-/// Names of the start and the goal of a comparison, if it is not for the mission's own start and goal.
+/// Names of the start and the goal of a comparison.
 pub type Pair = (String, String);
 
 /// Names of the measures of a candidate, in the order of the table's columns.
@@ -32,9 +32,10 @@ pub const MEASURES: [&str; 12] = [
 /// Row of the table of `metaplan compare`: a candidate (a plan or policy) with its measures.
 #[derive(Debug, Clone)]
 pub struct Row {
-    /// Start and goal of the row's comparison; `None` if only one pair is compared.
+    /// Start and goal of the row's comparison. `None` for the mission's own start and goal, and for added rows.
     pub pair: Option<Pair>,
-    /// Kind of the candidate: `a` to `f`, or `+`.
+    /// Kind of the candidate: `a` to `e` (see [`Candidate::kind`]), `f` for the hindsight bounds, or `+` for an added
+    /// row.
     pub kind: String,
     /// Name of the candidate.
     pub name: String,
@@ -235,7 +236,7 @@ struct Milliseconds {
 }
 
 impl ComparisonAnswer {
-    /// Part for a comparison in which all candidates were computed.
+    /// Creates the answer for a comparison in which all candidates were computed.
     pub fn new(pair: Option<&Pair>, comparison: &Comparison) -> Self {
         let figures = Figures {
             front: comparison.front.clone(),
@@ -249,7 +250,7 @@ impl ComparisonAnswer {
         Self::of(pair, rows(pair, comparison), Some(figures), &comparison.costs)
     }
 
-    /// Part for a comparison that was stopped by the time limit, with the candidates measured until
+    /// Creates the answer for a comparison that was stopped by the time limit, with the candidates evaluated until
     /// then.
     pub fn begun(pair: Option<&Pair>, candidates: &[Candidate], costs: &Costs) -> Self {
         Self::of(pair, begun_rows(pair, candidates), None, costs)

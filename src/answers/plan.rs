@@ -233,7 +233,7 @@ pub struct Preparation {
     pub ground: Duration,
 }
 
-/// Converts a duration to milliseconds, rounded to microseconds.
+/// Converts a duration to milliseconds, with three decimals.
 pub fn milliseconds(duration: Duration) -> f64 {
     (duration.as_secs_f64() * 1e6).round() / 1e3
 }
@@ -283,7 +283,8 @@ impl PlanAnswer {
         self
     }
 
-    /// Adds the set of unavailable designs that prevents every plan. Adds nothing if `blocking` contains no designs.
+    /// Adds the set of unavailable designs that prevents every plan. Adds nothing if `blocking` is `None`, or if
+    /// other causes prevent every plan.
     #[must_use]
     pub fn with_blocking(mut self, blocking: Option<&Blocking>) -> Self {
         self.blocking = match blocking {
@@ -309,7 +310,7 @@ impl PlanAnswer {
 }
 
 impl ParetoAnswer {
-    /// Creates the answer from those points of the Pareto front that have a plan. `objectives` are
+    /// Creates the answer from the points of the Pareto front; points without a plan are omitted. `objectives` are
     /// the texts of the objectives.
     pub fn new(mission: &str, objectives: &[String], front: &Front, preparation: &Preparation) -> Self {
         let solved = front.points.iter().filter(|point| point.solution.plan.is_some());

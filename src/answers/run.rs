@@ -38,8 +38,8 @@ pub(super) struct RecoveryPart {
 }
 
 impl RecoveryPart {
-    /// Creates the state from the number of handled lines, the greatest sequence number `seq` of a
-    /// line, and the ranges of skipped numbers.
+    /// Creates the state from the number of handled lines, the greatest sequence number `seq` of a line, the ranges
+    /// of skipped numbers, and the result of opening the journal.
     pub(super) fn new(lines: u64, seq: Option<u64>, missing: Vec<[u64; 2]>, recovery: &Recovery) -> Self {
         Self {
             resumed: recovery.replayed.is_some(),
@@ -98,7 +98,7 @@ pub struct NumberedAnswer<'a, A> {
 }
 
 impl<'a, A> NumberedAnswer<'a, A> {
-    /// Answer caused by a line.
+    /// Answer caused by the input line with the number `line`.
     pub fn new(answer: &'a A, line: u64) -> Self {
         Self { answer, line }
     }
@@ -113,7 +113,7 @@ pub struct HandledLine {
 }
 
 impl HandledLine {
-    /// Acknowledgement of a line, `microseconds` microseconds after it was read.
+    /// Acknowledgement of the input line with the number `line`, `microseconds` microseconds after it was read.
     pub fn new(line: u64, microseconds: u128) -> Self {
         Self { answer: "handled", line, microseconds }
     }

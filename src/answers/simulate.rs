@@ -190,9 +190,9 @@ pub fn runs_of(runs: &[Run], strategy: Strategy) -> impl Iterator<Item = &Run> +
     runs.iter().filter(move |run| run.strategy == strategy)
 }
 
-/// Compares each run of `strategy` with the run of the loop (strategy `Joint`) at the same position. Returns the number
-/// of runs in which `strategy` did better, and the number in which it did worse. Returns `None` if the loop has no
-/// runs.
+/// Compares the n-th run of `strategy` with the n-th run of the loop (strategy `Joint`), for each n. Returns the
+/// number of runs in which `strategy` did better, and the number in which it did worse. Returns `None` if the loop
+/// has no runs.
 pub fn beside_joint(runs: &[Run], strategy: Strategy) -> Option<(usize, usize)> {
     let mut joint = runs_of(runs, Strategy::Joint).peekable();
     joint.peek()?;

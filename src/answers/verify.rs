@@ -47,7 +47,7 @@ impl<'a> VerifyAnswer<'a> {
     }
 }
 
-/// Formats a line about the theorem.
+/// Formats a line that states which parts the theorem covers, or why it does not apply.
 pub fn theorem_line(theorem: &Theorem) -> String {
     let mut line = String::new();
     let _ = match theorem {

@@ -1,5 +1,5 @@
-//! Exports all facts of a mission's knowledge base, each with one derivation. `rules::replay` checks the
-//! derivations. Of the code that evaluates rules, it uses only that of single built-ins and aggregates.
+//! Exports all facts of a mission's knowledge base, each with one derivation. The checker `rules::replay` shares only
+//! the code of single built-ins and aggregates with the rule engine.
 
 use rules::{DerivationStep, Engine, Literal, Reason, Symbol, Value};
 

@@ -1,5 +1,5 @@
-//! Exports the part of a certificate about the knowledge base: its document, its origin (domain, problem, bindings,
-//! rules, and the changes since the knowledge base was read), and the derivations of all facts.
+//! Exports the part of a certificate about the knowledge base: a document with its axioms, its origin (domain,
+//! problem, bindings, rules, and the changes since the knowledge base was read), and the derivations of all facts.
 
 use ontology::OutputSyntax;
 use pddl::print_problem;
@@ -39,7 +39,7 @@ pub(super) fn files(mission: &Mission) -> Result<Option<[(&'static str, String);
         changes: knowledge.statements(),
     };
     let wrong = |error: &dyn std::fmt::Display| Message::error("M120", format!("no certificate: {error}"));
-    // Derivations refer to rules by their positions in this document, so the engine has to be built from it.
+    // Derivations refer to rules by their positions in this document, so the engine is built from the document.
     let Stated { symbols, program, facts, .. } = stated(&document, &origin).map_err(|error| wrong(&error))?;
     let engine = Engine::new(symbols, program, facts)
         .map_err(|errors| first(errors.iter().map(Message::from_rules).collect()))?;

@@ -157,7 +157,7 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
     whole.commit().map_err(failed)
 }
 
-/// Creates the witness (an over-approximation of the reachable states), and uses it to compare the ground task
+/// Creates the witness (an over-approximation of the reachable states). Uses it to check that the ground task agrees
 /// with the PDDL files, as `verify` does. Returns an error if they differ or cannot be compared.
 fn compared((domain, problem): (&str, &str), task: &str, limits: &Limits) -> Result<String, String> {
     let (domain, problem) = read_pddl(domain, problem)?;
@@ -171,8 +171,8 @@ fn compared((domain, problem): (&str, &str), task: &str, limits: &Limits) -> Res
     Ok(witness)
 }
 
-/// Writes the formula "there is a better plan" and its refutation; without `metric`, the formula is "there is a
-/// plan". Returns `Refutation::None` with the reasons if no refutation is found or its proof is too large.
+/// Writes the formula "there is a better plan" (without `metric`: "there is a plan") and its refutation to files in
+/// `directory`. Returns `Refutation::None` with the reasons if no refutation is found or its proof is too large.
 fn refutation(
     directory: &Path,
     documents: (&str, &str),

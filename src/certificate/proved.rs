@@ -1,8 +1,8 @@
-//! Runs the proved checker (`proved/`, extracted from Coq) on a certificate, and compares its answer with
-//! that of `metaplan-verify`.
+//! Runs the proved checker (`proved/`, extracted from Coq) on a certificate, and compares its answer with that of
+//! `metaplan-verify`.
 //!
-//! Two programs are called. `metaplan-proved-prepare` is not trusted: it writes evidence. `metaplan-proved-check`
-//! decides by the function that the theorem `optimal` is about.
+//! Two programs are called. `metaplan-proved-prepare` writes evidence for the claim and need not be trusted.
+//! `metaplan-proved-check` checks the evidence with the function about which the theorem `optimal` is proved.
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -15,7 +15,8 @@ use crate::message::Message;
 
 const PREPARE: &str = "metaplan-proved-prepare";
 const CHECK: &str = "metaplan-proved-check";
-/// Exit statuses of the programs; `proved/ocaml/check.ml` defines them.
+/// Exit status of both programs on success. The next two constants are other exit statuses of
+/// `metaplan-proved-check`; `proved/ocaml/check.ml` defines them.
 const PROVED: i32 = 0;
 const REJECTED: i32 = 3;
 const NOT_PROVED: i32 = 30;
@@ -26,7 +27,7 @@ const MEMORY_LIMIT: u64 = 4 << 20;
 /// Parts of a verification that the theorem makes statements about.
 const COVERED_PARTS: [&str; 3] = ["task", "plan", "argument"];
 
-/// The programs of the proved checker.
+/// Paths of the two programs of the proved checker.
 #[derive(Debug, Clone)]
 pub struct ProvedChecker {
     prepare: PathBuf,
@@ -44,13 +45,14 @@ pub enum Theorem {
         /// Parts of the verification that the theorem covers.
         parts: Vec<&'static str>,
     },
-    /// There is no statement, for this reason: for example, the proved checker does not cover a construct.
+    /// It is not shown that the claim follows from the theorem, for the given reason: for example, the proved checker
+    /// does not cover a construct.
     None(String),
 }
 
 impl ProvedChecker {
-    /// Finds the programs in `folder` if it is given. Otherwise finds them beside the running program or in a
-    /// directory of `PATH`.
+    /// Finds the two programs in `folder` if it is given. Otherwise finds them in the directory of the running
+    /// program or in a directory of `PATH`.
     ///
     /// # Errors
     /// M145: no directory has both programs.
@@ -80,8 +82,9 @@ impl ProvedChecker {
             })
     }
 
-    /// Runs the proved checker on the certificate in `directory`, which `report` is about. If the two checkers
-    /// disagree, adds a failed part `theorem` to the report. Ends the programs as soon as `stop` returns `true`.
+    /// Runs the proved checker on the certificate in `directory`. `report` is the result of `metaplan-verify` for
+    /// this certificate. If the two checkers disagree, adds a failed part `theorem` to the report. Ends the programs
+    /// as soon as `stop` returns `true`.
     ///
     /// # Errors
     /// M145: a program cannot be started, or a temporary file cannot be written.
@@ -149,7 +152,7 @@ impl ProvedChecker {
 enum Answer {
     Accepted(String),
     Rejected,
-    /// There is no decision, for this reason.
+    /// The checker has decided nothing, for the given reason.
     None(String),
 }
 
@@ -159,8 +162,8 @@ enum Ended {
     Other(String),
 }
 
-/// Returns `true` if a statement of the proved checker is the claim of the certificate. The program has the
-/// claim from evidence, which is not trusted.
+/// Returns `true` if the statement of the proved checker equals the claim of the certificate. They can differ,
+/// because the program takes its claim from the untrusted evidence.
 fn states(statement: &str, claim: &Claim) -> bool {
     match claim {
         Claim::Unsolvable => statement == "proved: there is no plan",
@@ -218,7 +221,7 @@ fn run(
     }
 }
 
-/// Returns the main memory of a process in kilobytes of 2^10 bytes, where the platform reports it as a file.
+/// Returns the resident memory of a process in kilobytes of 2^10 bytes; `None` on platforms without `/proc`.
 fn memory(child: &Child) -> Option<u64> {
     let text = fs::read_to_string(format!("/proc/{}/status", child.id())).ok()?;
     let line = text.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;

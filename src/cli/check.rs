@@ -144,7 +144,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     if messages.is_empty() {
         return Ok(exit);
     }
-    // JSON answers contain the warnings.
+    // JSON answers contain these messages in `refused`.
     if common.format != Format::Json {
         output::warnings(common, &messages);
     }

@@ -82,13 +82,12 @@ impl Wanted {
             && self.least.is_none()
     }
 
-    /// Creates the configurator for a knowledge base, with the functions of `--objective` as additional
-    /// objectives. Without this option and without objectives in the knowledge base, all functions are
-    /// objectives.
+    /// Creates the configurator for a knowledge base, with the functions of `--objective` as additional objectives.
+    /// Without this option and without objectives in the knowledge base, all functions are objectives.
     ///
     /// # Errors
-    /// All names in the options that are not in the knowledge base, and requirements for functions that this
-    /// method does not add as objectives.
+    /// All names in the options that are not in the knowledge base, negative budgets, and requirements for functions
+    /// that this method does not add as objectives.
     pub(super) fn configurator(&self, knowledge: Knowledge) -> Result<Configurator, Failure> {
         let worth = match (&self.most, &self.least) {
             (Some(attribute), _) => Worth::Most(attribute.clone()),

@@ -23,7 +23,8 @@ use crate::cli::values::seconds;
 
 const INTERVAL: Duration = Duration::from_millis(10);
 
-/// Additional time, after 1.1 times the time limit, until a command without an answer is ended.
+/// Time that is added to 1.1 times the time limit. After that, a command that has not begun to write an answer is
+/// ended.
 const GRACE: Duration = Duration::from_millis(150);
 
 /// The option `--time-limit` of commands that have nothing to show before their end, and of those that show what they have.
@@ -101,8 +102,8 @@ impl Guard {
         // at the hard limit.
         #[cfg(unix)]
         let _ = signal_hook::flag::register(signal_hook::consts::SIGXCPU, Arc::clone(&interrupt));
-        // A second handler cannot exist. If the platform rejects this one, Ctrl-C ends the program
-        // as usual. A user who presses Ctrl-C again does not want the best plan found either.
+        // No other handler was set before. If the platform rejects this handler, Ctrl-C ends the program as usual. A
+        // second Ctrl-C ends the program without the best plan found.
         let _ = ctrlc::set_handler(move || {
             if interrupt.swap(true, Ordering::Relaxed) {
                 std::process::exit(130);
@@ -116,8 +117,8 @@ fn nothing_to_show() -> Message {
     Message::error("M130", "a limit was reached before there was a result")
 }
 
-/// The time and memory limits plus a margin. The program is ended if it reaches them after reading its input and has
-/// not begun to print an answer.
+/// The time limit plus a tenth and [`GRACE`], and the memory limit plus a tenth. A program that reaches one of them
+/// after it has read its input is ended, unless it has begun to write an answer.
 struct Deadline {
     started: Instant,
     time: Option<Duration>,
@@ -150,9 +151,9 @@ fn processor_time() -> Option<Duration> {
     Some(Duration::from_millis(user.saturating_add(system).saturating_mul(10)))
 }
 
-/// Starts a thread that ends the program if the limits do not end it. Reading does not poll the
-/// limits: the thread ends the program when a limit is reached. All later stages should poll the
-/// limits. In case a loop does not (a bug), the thread ends the program a tenth of the limit later.
+/// Starts a thread that ends the program if it does not stop at a limit by itself. Reading does not poll the limits:
+/// the thread ends the program when a limit is reached. All later stages should poll the limits. In case a loop does
+/// not (a bug), the thread ends the program about a tenth of the limit later.
 fn give_up_late(limits: Limits, has_read: Arc<AtomicBool>, late: Deadline, common: Common) {
     std::thread::spawn(move || {
         while !has_read.load(Ordering::Relaxed) && !limits.reached() {

@@ -153,7 +153,7 @@ pub fn main() -> ExitCode {
 }
 
 /// Runs the command, and writes a trace if requested. If the command succeeds but its trace cannot be written,
-/// this is the error.
+/// returns the error about the trace.
 fn traced(cli: &Cli) -> Result<Exit, Failure> {
     let trace = cli.common.trace.as_deref().map(Trace::begin).transpose()?;
     let outcome = run(cli);

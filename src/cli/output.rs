@@ -22,7 +22,7 @@ static ANSWER_LOST: AtomicBool = AtomicBool::new(false);
 /// Set once an answer, a part of one, or a file is being written.
 static HAS_BEGUN: AtomicBool = AtomicBool::new(false);
 
-/// Maximum number of messages shown; further messages are only counted.
+/// Maximum number of messages of a failure shown as text; further messages are only counted.
 const MESSAGE_LIMIT: usize = 20;
 
 /// Maximum number of warnings shown per code; further warnings are only counted.
@@ -49,7 +49,7 @@ pub fn document(text: &str) {
     }
 }
 
-/// Returns `true` if an answer could not be written.
+/// Returns `true` if an answer could not be written for another reason than a closed pipe.
 pub fn answer_lost() -> bool {
     ANSWER_LOST.load(Ordering::Relaxed)
 }

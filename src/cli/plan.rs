@@ -301,8 +301,8 @@ fn finish(
             output::note(&beside(planned, arguments, common));
         }
         (Some(text), None) => output::answer(&(drawn + &text)),
-        // Programs that read plans accept nothing else, so without a plan, neither the file nor standard output is
-        // written.
+        // Programs that read plans accept only plans. So without a plan, nothing is written to the file or to
+        // standard output.
         (None, _) => output::note(&beside(planned, arguments, common)),
     }
     Ok(())

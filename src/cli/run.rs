@@ -181,8 +181,8 @@ fn keep_going(
 /// Time of planning before the first heartbeat (line with the progress), and between two heartbeats.
 const HEARTBEAT: Duration = Duration::from_secs(1);
 
-/// Starts a thread that reports the progress every second while a plan is being computed. It runs until the program
-/// ends.
+/// Starts a thread that prints the progress every second while a plan is being computed. The thread runs until the
+/// program ends.
 fn heartbeat(watch: Watch, line: Arc<AtomicU64>, outlet: Outlet) {
     std::thread::spawn(move || {
         let mut reported: Option<(u64, Instant, Instant)> = None;

@@ -1,6 +1,5 @@
-//! Session of the configuration loop: connects the loop with its input and output, in two modes, for lines of a
-//! file and for lines as they arrive. Designs are chosen without planning, so each line is answered completely
-//! in both modes.
+//! Session of the configuration loop: connects the loop with its input and output, in two modes: for a file, and for
+//! lines as they arrive. Designs are chosen without planning, so each line is answered completely in both modes.
 
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::time::{Duration, Instant};
@@ -37,7 +36,8 @@ impl<'a> KeeperSession<'a> {
         Self { common, keeper, journal, outlet, clock, begun, has_times: false }
     }
 
-    /// Answers all lines of a file, without reacting to the passing of time between them.
+    /// Answers all lines of a file. Filters that become due between two lines are handled together with the later
+    /// line.
     pub(super) fn replay(mut self, mut events: Lines) -> Result<(), Failure> {
         let mut flow = self.begin()?;
         while flow == Flow::GoesOn {
@@ -89,8 +89,8 @@ impl<'a> KeeperSession<'a> {
         flow(self.outlet.answer(self.keeper.lines(), &answers, read))
     }
 
-    /// Returns the time until a filter changes a belief without a further report, for example after a debounce
-    /// time. `None` if no filter does, or if lines have times.
+    /// Returns the time until a filter changes a belief or reports a silent sensor without a further line, for
+    /// example after a debounce time. Returns `None` if no filter does, or if lines have times.
     fn pause(&mut self) -> Option<Duration> {
         let due = self.keeper.due().filter(|_| !self.has_times)?;
         Some(due.saturating_sub(self.begun + self.clock.now()).max(MIN_PAUSE))

@@ -80,7 +80,8 @@ impl Outlet {
         Ok(Self { recorder, is_told: Arc::default(), live })
     }
 
-    /// Publishes a line of input before it is handled, with its number and the time since the start of the mission.
+    /// Adds a line of input to the recording and the web page, before the line is handled. `line` is its number, and
+    /// `now` the time since the start of the mission.
     pub(super) fn heard(&self, line: u64, now: Duration, text: &str) {
         if let Some((recorder, _)) = &self.recorder {
             recorder.event(line, now, text);
@@ -108,8 +109,8 @@ impl Outlet {
         }
     }
 
-    /// Writes lines to standard output at once, so that lines of other threads do not interleave. Also adds the lines
-    /// to the recording and the web page, if requested.
+    /// Writes lines to standard output in one piece, so that lines of other threads do not interleave. Also adds the
+    /// lines to the recording and the web page, if requested.
     pub(super) fn say(&self, lines: &str) -> io::Result<()> {
         let lines = visible_json(lines);
         let mut stdout = io::stdout().lock();
@@ -129,7 +130,8 @@ impl Outlet {
         Ok(())
     }
 
-    /// Writes answers to a line, each with the line's number; more may follow. Writes nothing if there are no answers.
+    /// Writes answers to an input line, each with the number of that line. Does not acknowledge the line, because more
+    /// answers may follow. Writes nothing if there are no answers.
     pub(super) fn answer_so_far(&self, line: u64, answers: &[impl Serialize]) -> io::Result<()> {
         if answers.is_empty() {
             return Ok(());
@@ -138,8 +140,8 @@ impl Outlet {
         self.say(&lines.collect::<String>())
     }
 
-    /// Writes the last answers to a line, each with the line's number, and the acknowledgement of
-    /// the line.
+    /// Writes the last answers to an input line, each with the number of that line, and the acknowledgement of the
+    /// line.
     pub(super) fn answer(&self, line: u64, answers: &[impl Serialize], read: Instant) -> io::Result<()> {
         let mut text = String::new();
         for answer in answers {
@@ -163,7 +165,7 @@ impl Outlet {
     }
 }
 
-/// Returns `true` if the reader of the answers has closed the pipe.
+/// Returns `true` if the reader of the answers has closed the pipe. Other errors in writing are returned as errors.
 pub(super) fn is_over(written: io::Result<()>) -> Result<bool, Message> {
     match written {
         Ok(()) => Ok(false),

@@ -19,8 +19,7 @@ use crate::cli::common::{Common, Failure};
 use crate::cli::run_lines::{Line, Lines};
 use crate::cli::run_outlet::{Outlet, is_over, unwritten, warn_if_unrecorded};
 
-/// Capacity of the channel of inputs, and number of waiting inputs up to which the queue is filled from the
-/// channel.
+/// Capacity of the channel of inputs. Also the length up to which `gather` fills the queue of waiting inputs.
 pub(super) const MAX_WAITING: usize = 1024;
 
 /// Maximum number of consecutive cancelled searches. The next search runs to its end; otherwise
@@ -191,8 +190,8 @@ impl<'a> Session<'a> {
         now
     }
 
-    /// Reacts to a line, and also deliberates if no further line is waiting (`is_last`) and no search is
-    /// necessary. A line of a recording is answered completely.
+    /// Reacts to a line. Also deliberates if no further line is waiting (`is_last`), the reaction has no effects, and
+    /// no search is necessary or running. A line of a recording (MCAP) is answered completely.
     fn line(&mut self, line: &Line, read: Instant, is_last: bool) -> Result<Flow, Failure> {
         if self.close()? == Flow::Over {
             return Ok(Flow::Over);

@@ -201,7 +201,7 @@ pub(super) fn knowledge(
     if wrong.is_empty() { Ok(knowledge) } else { Err(Failure { exit: Exit::Usage, messages: wrong.into() }) }
 }
 
-/// Rejects inconsistent knowledge, because anything follows from it.
+/// Returns an error if the knowledge base is inconsistent, because then every statement follows from it.
 pub(super) fn consistent(knowledge: Option<&Knowledge>) -> Result<(), Failure> {
     planner::consistent(knowledge).map_err(|messages| Failure { exit: Exit::Inconsistent, messages })
 }

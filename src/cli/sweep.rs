@@ -108,7 +108,7 @@ fn check(study: &Study, common: &Common, read: &Read<'_>) -> Result<(), Failure>
             // A file that is generated for the run does not exist yet.
             Err(error) if study.generates() && error.kind() == ErrorKind::ValueValidation => continue,
             Err(error) => {
-                // All runs repeat a mistake of the first run, so it is reported once.
+                // A mistake in an option that all runs have occurs in each sampled run, but is reported once.
                 let text = refusal(&error);
                 if mistakes.iter().all(|mistake: &Message| !mistake.message.starts_with(&text)) {
                     mistakes.push(study.mistake(&path, &text));

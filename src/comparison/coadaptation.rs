@@ -1,9 +1,8 @@
-//! Extracts the data of a co-adaptation process from a filled problem: places, arcs, configurations
-//! and their costs. In this decision process, a robot moves between places and changes its
+//! Extracts the data of a co-adaptation process from a PDDL problem with the facts of the knowledge base: places,
+//! arcs, configurations and their costs. In this decision process, a robot moves between places and changes its
 //! configuration.
 //!
-//! The PDDL symbols have default names; the section `[probabilistic]` of a manifest can give other
-//! names.
+//! The PDDL symbols have default names; the section `[probabilistic]` of a manifest can give other names.
 use std::collections::BTreeMap;
 
 use num_bigint::BigInt;
@@ -111,8 +110,7 @@ pub struct Arc {
     pub from: usize,
     /// Number of the place at which the arc ends.
     pub to: usize,
-    /// The traversal with each configuration, by the configuration's number. `None` if the arc
-    /// cannot be traversed with it.
+    /// Traversals by the number of the configuration. `None` if the arc cannot be traversed with the configuration.
     pub by: Vec<Option<Traversal>>,
 }
 
@@ -135,7 +133,7 @@ pub struct Configuration {
 pub struct Battery {
     /// Number of levels at the start.
     pub initial: u32,
-    /// Level that the battery must still have after each move.
+    /// Lowest level that is allowed after each action that needs energy.
     pub reserve: u32,
     /// Size of a level, in the mission's unit of energy.
     pub unit: u32,
@@ -165,7 +163,8 @@ pub struct Coadaptation {
     pub initial: usize,
     /// The arcs, sorted by start and end.
     pub arcs: Vec<Arc>,
-    /// Change from each configuration to each other one, where possible: `switches[old][new]`.
+    /// Change from configuration `old` to `new`: `switches[old][new]`. `None` if there is no such change, as for
+    /// `old` = `new`.
     pub switches: Vec<Vec<Option<Switch>>>,
     /// The battery, if there is one.
     pub battery: Option<Battery>,
@@ -348,7 +347,8 @@ pub(super) fn fits(places: usize, configurations: usize) -> Result<(), Errors> {
     Err(vec![Message::error("M127", text)].into())
 }
 
-/// Sorts names, with numbers in natural order (`l2` before `l10`), and removes duplicates.
+/// Sorts names by the part before the first digit (shorter parts first); with equal parts, `l2` precedes `l10`.
+/// Removes duplicates.
 fn natural(names: &mut Vec<String>) {
     let key = |name: &String| {
         let digits = name.trim_start_matches(|c: char| !c.is_ascii_digit());

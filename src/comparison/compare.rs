@@ -22,10 +22,11 @@ pub type Listener<'a> = dyn FnMut(&[Candidate], &Costs) + 'a;
 /// Settings of a comparison.
 #[derive(Clone)]
 pub struct Config<'a> {
-    /// The sources of uncertainty in the process in which all candidates are evaluated.
+    /// Sources of uncertainty in the process in which all candidates are evaluated, and whether it includes the
+    /// battery.
     pub risk: Risk,
-    /// Time added for a failed mission. `None` for ten times the time that the first plan takes if nothing
-    /// fails (at least 10; 10,000 if there is no plan).
+    /// Time added if a mission does not reach the goal. `None` for ten times the time that the first plan takes if
+    /// nothing fails (at least 10; 10,000 if there is no plan).
     pub penalty: Option<f64>,
     /// Priority of the published procedure: time (0), energy (1) or safety (2).
     pub priority: usize,
@@ -59,7 +60,7 @@ pub struct Comparison {
     /// Lower bounds on the time and on the energy that any decision rule needs to reach the goal, even a
     /// clairvoyant one.
     pub hindsight: [Hindsight; 2],
-    /// Time added for a failed mission.
+    /// Time added if a mission does not reach the goal.
     pub penalty: f64,
     /// Reason why the plan with replanning cannot be worse than the best policy, if this follows without
     /// computation. `None` also if the computed price of determinism is not 0.
@@ -78,26 +79,28 @@ impl Comparison {
         self.candidates.iter().find(|candidate| candidate.kind == kind)?.measures.penalised_time
     }
 
-    /// Returns the price of determinism: the penalised time of the plan with replanning minus that
-    /// of the best policy. `None` if a value is missing or infinite.
+    /// Returns the price of determinism: the penalised time of the plan with replanning minus that of the best
+    /// policy. Returns `None` if one of these times is missing or infinite.
     pub fn price_of_determinism(&self) -> Option<f64> {
         Some(self.penalised('c')? - self.penalised('a')?)
     }
 
-    /// Returns the price of the open loop: the penalised time of the plan without replanning minus
-    /// that of the best policy. `None` if a value is missing or infinite.
+    /// Returns the price of the open loop: the penalised time of the plan without replanning minus that of the best
+    /// policy. Returns `None` if one of these times is missing or infinite.
     pub fn price_of_open_loop(&self) -> Option<f64> {
         Some(self.penalised('b')? - self.penalised('a')?)
     }
 
-    /// Returns the penalised time that replanning saves. `None` if a value is missing or infinite.
+    /// Returns the penalised time that replanning saves. Returns `None` if the penalised time with or without
+    /// replanning is missing or infinite.
     pub fn value_of_replanning(&self) -> Option<f64> {
         Some(self.penalised('b')? - self.penalised('c')?)
     }
 }
 
-/// Evaluates and compares all candidates. `planner` is called for the start, and once for each other state that
-/// needs a new plan. `report` is called after each new result.
+/// Evaluates and compares all candidates. `planner` is called for the start, and once for each other state that needs
+/// a new plan. `report` is called after the first plan, after the exploration of the process, and after each
+/// candidate.
 ///
 /// # Errors
 /// Errors of the planner, or too many states.

@@ -1,6 +1,7 @@
-//! Evaluates the loss of a component during a mission: after each move of the run without failures,
-//! and at a given rate. A clairvoyant policy, which knows the time of the loss, gives lower bounds
-//! (hindsight optimisation).
+//! Evaluates the loss of a component during a mission, in two ways. First, the robot executes the plan and nothing
+//! else fails: total times of the mission are computed for a loss after 0, 1, 2, … moves. Second, each move loses the
+//! component with a given probability: lower bounds are computed by a clairvoyant policy, which knows in advance when
+//! the loss happens (hindsight optimisation).
 
 use num_traits::ToPrimitive;
 use probabilistic::explore::{Bounds, explore};
@@ -13,19 +14,20 @@ use crate::comparison::planned::{NoResult, PlanTable};
 use crate::comparison::process::{Action, Process, Risk, Valuation};
 use crate::comparison::referee::Referee;
 
-/// Total times of a mission under four ways to react, if a component is lost after a given number of moves and
-/// nothing else fails.
+/// Total times of a mission in which a component is lost after a given number of moves and no move fails, for four
+/// reactions to the loss.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct LossAt {
     /// Number of moves before the loss.
     pub moves: usize,
-    /// Total time of the plan. `None` if the plan cannot be continued unchanged after the loss.
+    /// Total time of the plan, continued unchanged after the loss. `None` if the rest of the plan needs the lost
+    /// component.
     pub open_loop: Option<f64>,
     /// Total time if a new plan is computed after the loss. `None` if there is no plan.
     pub replanned: Option<f64>,
-    /// Total time if an optimal policy is computed after the loss. `None` if the goal cannot be
-    /// reached.
+    /// Expected total time if an optimal policy is computed after the loss. `None` if it is infinite, e.g. because
+    /// the goal cannot be reached.
     pub solved_again: Option<f64>,
     /// Total time of the policy that takes a possible loss into account from the start, and may take another
     /// route. `None` if this policy does not reach the goal.
@@ -88,8 +90,8 @@ pub(super) fn report(
 /// Number of actions after which a run is considered infinite.
 const MAX_ACTIONS: usize = 100_000;
 
-/// Returns the total time of a policy if the component is lost after `moves` moves and nothing else
-/// fails. `None` if the policy does not reach the goal.
+/// Returns the total time of a policy if the component is lost after `moves` moves and nothing else fails. Returns
+/// `None` if the policy does not reach the goal.
 fn anticipated(referee: &Referee<'_>, policy: &[u32], start: Valuation, moves: usize) -> Option<f64> {
     let mission = referee.mission;
     let (mut at, mut left, mut time) = (start, moves, 0.0);
@@ -107,8 +109,8 @@ fn anticipated(referee: &Referee<'_>, policy: &[u32], start: Valuation, moves: u
     None
 }
 
-/// Returns `true` if the remaining plan does not need the lost component, beginning with this
-/// configuration.
+/// Returns `true` if no action of the remaining plan needs the lost component. `configuration` is the configuration
+/// before these actions.
 fn carries_on(mission: &Coadaptation, configuration: usize, remaining_plan: &[Action]) -> bool {
     let mut configuration = configuration;
     remaining_plan.iter().all(|action| match action {
@@ -125,8 +127,8 @@ fn time_from(mission: &Coadaptation, configuration: usize, plan: &[Action]) -> f
     time_of(&from, plan)
 }
 
-/// Returns `spent` plus the least time from the state `from` to the goal if nothing else fails.
-/// `None` if the goal cannot be reached.
+/// Returns `spent` plus the least expected time from the state `from` to the goal, if no move fails. Returns `None`
+/// if the expected time is infinite.
 fn solved_again(referee: &Referee<'_>, from: Valuation, spent: f64) -> Result<Option<f64>, NoResult> {
     let risk = Risk { collisions: false, failures: false, ..referee.risk };
     let process =
@@ -138,10 +140,10 @@ fn solved_again(referee: &Referee<'_>, from: Valuation, spent: f64) -> Result<Op
     Ok(solution.filter(|s| !s.infinite.contains(0)).map(|s| spent + s.values[0]))
 }
 
-/// Number of moves after which a loss is neglected.
+/// Number of moves after which a loss is treated as if it never happened.
 const HORIZON: usize = 2000;
 
-/// The quantity that a bound is about: time or energy.
+/// Quantity for which a lower bound is computed: time or energy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Spent {
     /// Time, in the mission's time unit.
@@ -169,14 +171,14 @@ pub struct Hindsight {
     /// Least time or energy of a mission that reaches its goal without a loss. `None` if the goal
     /// cannot be reached.
     pub least: Option<f64>,
-    /// Expected least time or energy for a clairvoyant controller, which knows in advance the move at which the
-    /// component is lost. At most the penalty is counted in each case, for example if the loss makes the goal
-    /// unreachable. `None` if the expected value is infinite.
+    /// Least expected time or energy for a clairvoyant controller, which knows in advance the move at which the
+    /// component is lost. Each case counts at most the penalty, for example if the loss makes the goal unreachable.
+    /// `None` if the expected value is infinite. Equal to `least` if no loss is considered.
     pub expected: Option<f64>,
 }
 
-/// Computes the lower bounds for time or energy. Collisions, failures and the battery are neglected. This can
-/// only decrease the bounds, so they stay valid.
+/// Computes the lower bounds for time or energy. Collisions, failures and the battery are neglected: without them,
+/// the goal can only be reached sooner or with less energy.
 pub fn hindsight(mission: &Coadaptation, risk: Risk, penalty: f64, spent: Spent) -> Hindsight {
     let start = mission.start * mission.configurations.len() + mission.initial;
     let never = relaxed(mission, spent, false, None);
@@ -191,7 +193,8 @@ pub fn hindsight(mission: &Coadaptation, risk: Risk, penalty: f64, spent: Spent)
         let value = bounds[start].min(penalty);
         expected += left * rate * value;
         left *= 1.0 - rate;
-        // The remaining terms of the sum cannot change the result noticeably.
+        // The remaining terms are negligible, or all have the value without a loss. They are added after the
+        // loop.
         if left < 1e-15 || (value - never[start]).abs() < 1e-12 {
             break;
         }
@@ -201,9 +204,9 @@ pub fn hindsight(mission: &Coadaptation, risk: Risk, penalty: f64, spent: Spent)
     Hindsight { least, expected: Some(expected).filter(|value| value.is_finite()) }
 }
 
-/// Returns the least time or energy from each pair of place and configuration to the goal. With `lost`,
-/// configurations that need the component cannot be used. If `later` is given, it has the values from the pair
-/// that the next move reaches.
+/// Returns the least time or energy to the goal for each pair of place and configuration. With `lost`, configurations
+/// that need the lost component cannot be used. If `later` is given, it has a value for each pair, which is used as
+/// the time or energy after the next move.
 fn relaxed(mission: &Coadaptation, spent: Spent, lost: bool, later: Option<&[f64]>) -> Vec<f64> {
     let designs = mission.configurations.len();
     let at = |place: usize, design: usize| place * designs + design;

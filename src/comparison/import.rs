@@ -108,9 +108,9 @@ const DESIGNS: [Design; 6] = [
     ),
 ];
 
-/// A speed of the robot: name, metres per second, power in milliwatts in addition to that of the
-/// localisation method, and `true` if collisions count at this speed. All measurements of the map
-/// are for full speed, the first entry.
+/// A speed of the robot: name, metres per second, power in milliwatts in addition to that of the localisation method,
+/// and `true` if collisions count at this speed. All measurements of the map are for full speed, the first entry of
+/// `SPEEDS`.
 struct Speed(&'static str, f64, f64, bool);
 
 const SPEEDS: [Speed; 3] = [
@@ -160,7 +160,8 @@ impl LegalConfiguration {
     }
 }
 
-/// Speed in metres per second from which the energy of a move is computed.
+/// Full speed in metres per second. The energy of a move is computed from it, and the time if the map has no
+/// measurements.
 const SPEED: f64 = 0.68;
 /// Factor in the energy of a move at full speed, in the map's unit: length in metres × [`SPEED`] × power in
 /// milliwatts × this factor.
@@ -175,8 +176,8 @@ fn pair(a: &str, b: &str) -> Corridor {
     if a <= b { (a.to_owned(), b.to_owned()) } else { (b.to_owned(), a.to_owned()) }
 }
 
-/// Returns the measurement in `field` for each corridor and localisation method that have one, rounded to
-/// `digits` decimals. Of several measurements, also in opposite directions, the last one is used.
+/// Returns the measurement in `field` for each corridor and localisation method that have one, rounded to `digits`
+/// decimals. Of several measurements of a corridor, in any direction, the last one is used.
 fn measured(
     list: &[Measured<'_>],
     field: &str,
@@ -201,7 +202,7 @@ fn rounded(value: f64, digits: usize) -> f64 {
 /// Converts the text of a map to the files of a mission.
 ///
 /// # Errors
-/// The text is not a map of this form, or a place or configuration in `options` does not exist.
+/// The text is not a map of the supported form, or a place or configuration in `options` does not exist.
 pub fn import_map(file: &str, text: &str, options: &MapOptions) -> Result<Files, Errors> {
     let map = Map::read(file, text)?;
     let places = map.places();

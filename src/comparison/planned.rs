@@ -17,7 +17,7 @@ use crate::message::Errors;
 /// A plan from a state of the process, and the effort of computing the plan.
 #[derive(Debug, Clone, Default)]
 pub struct Planned {
-    /// Actions of the plan. `None` if there is no plan, or none that the process can express.
+    /// Actions of the plan. `None` if there is no plan, or if the process has no such actions.
     pub actions: Option<Vec<Action>>,
     /// Number of variables of the largest formula.
     pub variables: u64,
@@ -27,7 +27,7 @@ pub struct Planned {
     pub time: Stages,
 }
 
-/// Running times by stage, for a solution of the process or for a plan.
+/// Running times by stage, for model checking or for a plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Stages {
     /// Time of building the process, or the ground task with its formulas.
@@ -45,8 +45,8 @@ impl Stages {
     }
 }
 
-/// Callback that computes a plan from a state of the process. It is called at most once for each state; the collision
-/// flag of a state is ignored.
+/// Callback that computes a plan from a state of the process. It is called at most once for states that differ only
+/// in the collision flag.
 pub type PlanFinder<'a> = dyn FnMut(&Valuation) -> Result<Planned, Errors> + 'a;
 
 /// Computational costs of model checking and of planning.
@@ -60,16 +60,16 @@ pub struct Costs {
     /// Number of decisions of the policies for single objectives, in all states that the policies
     /// reach.
     pub decisions: usize,
-    /// Running times for the process, for all objectives together.
+    /// Running times of model checking, for all objectives together.
     pub process: Stages,
-    /// Peak memory in megabytes until the process was solved, including memory that the planner has
-    /// not released.
+    /// Peak memory in megabytes until the process was solved, including memory that the planner has not released.
+    /// `None` if the platform does not report it.
     pub process_memory: Option<u64>,
     /// Number of computed plans.
     pub plans: usize,
     /// Running times of the first plan, with cold caches.
     pub first_plan: Stages,
-    /// Peak memory in megabytes during the first plan.
+    /// Peak memory in megabytes during the first plan. `None` if the platform does not report it.
     pub plan_memory: Option<u64>,
     /// Total time of all further plans, with warm caches.
     pub more_plans: Duration,
@@ -127,7 +127,8 @@ impl PlanTable<'_, '_> {
         Ok(planned.actions)
     }
 
-    /// Evaluates the decision rule that follows plans and plans again in every state that no earlier plan expects.
+    /// Evaluates the decision rule that follows computed plans. A new plan is computed in every state that no earlier
+    /// plan expects.
     pub(super) fn play(&mut self, referee: &Referee<'_>) -> Result<Measures, NoResult> {
         // Next action of a computed plan, by the state in which the plan expects to execute it.
         let mut expected: BTreeMap<Valuation, Action> = BTreeMap::new();

@@ -10,8 +10,8 @@ use probabilistic::{Direction, Error, Mdp, Number, Problem};
 
 use crate::comparison::process::{Process, State};
 
-/// Decision rule: returns the number of the action for a state and a number of executed steps (0 if steps are
-/// not counted). `None` or an impossible action ends the mission.
+/// Decision rule: returns the number of the action in a state. The second argument is the number of executed steps, 0
+/// if steps are not counted. `None` or an impossible action ends the mission.
 pub type Decide<'a> = dyn FnMut(State, u32) -> Option<u32> + 'a;
 
 struct FixedProcess<'a, 'b, N> {
@@ -78,15 +78,16 @@ pub struct Measures {
     pub energy_if_successful: Option<f64>,
     /// Expected time plus the penalty for missions that do not reach the goal.
     pub penalised_time: Option<f64>,
-    /// Expected number of states in which a new plan is needed.
+    /// Expected number of visits to states in which a new plan is needed.
     pub replans: f64,
-    /// Number of states that are reachable with the decision rule.
+    /// Number of states that are reachable with the decision rule. If steps are counted, a state counts once for each
+    /// number of steps.
     pub states: usize,
 }
 
-/// Evaluates a decision rule. `process` must have all rewards of `REWARDS`. With `counts`, steps are counted,
-/// so that decisions can depend on their number. `penalty` is the time added for a failed mission. `reserve` is
-/// the battery level for [`Measures::goal_with_reserve`]. `replans` is called after all decisions are made, and
+/// Evaluates a decision rule. `process` must have all rewards of `REWARDS`. With `counts`, steps are counted, so that
+/// decisions can depend on their number. `penalty` is the time added if a mission does not reach the goal. `reserve`
+/// is the battery level for [`Measures::goal_with_reserve`]. `replans` is called after all decisions are made, and
 /// returns `true` for states in which a new plan was needed.
 ///
 /// # Errors

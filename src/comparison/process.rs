@@ -98,9 +98,8 @@ struct Move<N> {
     action: u32,
     to: usize,
     levels: u32,
-    /// Probabilities of success without a collision, success with a collision, and failure. The
-    /// first array is for moves at which the component is not lost, the second for moves at which
-    /// it is lost.
+    /// Probabilities of success without a collision, success with a collision, and failure. In the first array, the
+    /// component is not lost during the move; in the second array, it is.
     outcomes: [[N; 3]; 2],
     rewards: Vec<N>,
 }
@@ -126,9 +125,9 @@ pub struct Process<N> {
     /// For each configuration, `true` if it needs the component that may be lost.
     lost: Vec<bool>,
     risk: Risk,
-    /// Number of the selected rewards.
+    /// Number of selected rewards.
     rewards: usize,
-    /// Number of battery levels, including the empty one.
+    /// Number of battery levels, including the empty one; 1 without a battery.
     levels: usize,
 }
 
@@ -274,8 +273,7 @@ impl<N: Number> Generator<N> for Process<N> {
         self.rewards
     }
 
-    /// Returns the number of state codes. States that differ only in the configuration have
-    /// adjacent codes; states with similar battery levels have close codes.
+    /// Returns the number of state codes.
     fn codes(&self) -> Option<usize> {
         self.levels.checked_mul(self.moves.len())?.checked_mul(8)?.checked_mul(self.lost.len())
     }
@@ -309,9 +307,9 @@ impl<N: Number> Generator<N> for Process<N> {
         for step in &self.moves[s.place][s.configuration] {
             let Some(battery) = self.enough(s.battery, step.levels) else { continue };
             let arrived = Valuation { place: step.to, battery, ..s };
-            // A failed mission is over, so its battery and its collisions affect no later choice.
+            // A failed mission is over, so neither the next place nor a collision is recorded.
             let failed = Valuation { failed: true, battery, ..s };
-            // The loss happens during the move, so each outcome exists with and without it.
+            // The loss happens during the move, so each outcome exists with and without a loss.
             for (lost, ends) in [s.lost, true].into_iter().zip(&step.outcomes) {
                 let ways = [
                     Valuation { lost, ..arrived },

@@ -279,8 +279,8 @@ pub(super) fn command(action: String, guard: Expr, updates: Vec<Update>) -> Comm
     Command { action: Some(action), guard, updates, place: Place::default() }
 }
 
-/// Converts outcomes to updates, without those of probability 0. A single outcome has no explicit
-/// probability.
+/// Converts outcomes to updates of a PRISM command. Outcomes of probability 0 are omitted, and a single outcome gets
+/// no explicit probability.
 pub(super) fn updates(ends: impl IntoIterator<Item = (BigRational, Assignments)>) -> Vec<Update> {
     let possible: Vec<_> = ends.into_iter().filter(|(probability, _)| !probability.is_zero()).collect();
     let certain = possible.len() == 1;

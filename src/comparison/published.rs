@@ -17,7 +17,7 @@ use crate::comparison::process::Action;
 use probabilistic::Number;
 
 pub(super) const ROUTES: usize = 5;
-/// Weight of the priority property, and weight of each other property.
+/// Weights of the priority property and of each other property in the utility.
 const WEIGHTS: [f64; 2] = [0.6, 0.2];
 const MAX_PARTIAL_ROUTES: usize = 2_000_000;
 
@@ -96,8 +96,7 @@ pub fn shortest_routes(mission: &Coadaptation, wanted: usize) -> Vec<Vec<usize>>
     found
 }
 
-/// Returns the length of the shortest route from each place to the goal. `None` if there is no
-/// route.
+/// Returns the length of the shortest route from each place to the goal, `None` where there is no route.
 fn to_goal(mission: &Coadaptation, length: &dyn Fn(usize) -> u64) -> Vec<Option<u64>> {
     let mut entering = vec![Vec::new(); mission.places.len()];
     for (number, arc) in mission.arcs.iter().enumerate() {
@@ -121,8 +120,9 @@ fn to_goal(mission: &Coadaptation, length: &dyn Fn(usize) -> u64) -> Vec<Option<
     best
 }
 
-/// Returns time, energy and probability of no collision that the published model predicts for a
-/// route with one configuration. `None` if the route cannot be traversed with this configuration.
+/// Returns the time, the energy and the probability of no collision that the published model predicts for a route
+/// with one configuration, including the initial change to this configuration. Returns `None` if the route cannot be
+/// traversed with it.
 fn believed(mission: &Coadaptation, route: &[usize], configuration: usize) -> Option<[f64; 3]> {
     let way: Option<Vec<&Traversal>> =
         route.iter().map(|arc| mission.arcs[*arc].by[configuration].as_ref()).collect();
@@ -136,8 +136,8 @@ fn believed(mission: &Coadaptation, route: &[usize], configuration: usize) -> Op
     Some([time, energy, 1.0 - last_risky.unwrap_or(0.0)])
 }
 
-/// Runs the published procedure with the priority on time (0), energy (1) or safety (2). `None` if
-/// no route can be traversed.
+/// Runs the published procedure with the priority on time (0), energy (1) or safety (2). Returns `None` if no route
+/// can be traversed.
 pub fn published(mission: &Coadaptation, priority: usize) -> Option<Published> {
     let available = |configuration: &usize| mission.configurations[*configuration].available;
     let mut candidates = Vec::new();

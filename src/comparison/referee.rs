@@ -12,8 +12,7 @@ use crate::comparison::coadaptation::Coadaptation;
 use crate::comparison::play::{Measures, play};
 use crate::comparison::process::{Action, Process, REWARDS, Risk, State, Valuation};
 
-/// Name of the objective that a policy optimises, and the policy: the number of a choice for each
-/// state.
+/// Name of the objective that a policy optimises, and the policy: the number of the chosen choice for each state.
 pub type NamedPolicy = (String, Vec<u32>);
 
 /// The decision process in which all candidates are evaluated, with its explored states.
@@ -80,15 +79,14 @@ impl Referee<'_> {
         policies
     }
 
-    /// Minimises the expected time to `goal`, where reaching a state without a path to the goal
-    /// costs the penalty. `reachable` has the greatest probability of reaching the goal for each
-    /// state.
+    /// Minimises the expected time until `goal` or a state without a path to the goal is reached. Such a state adds
+    /// the penalty. `reachable` has the greatest probability of reaching the goal for each state.
     pub fn penalised(&self, goal: &FixedBitSet, reachable: &Solution<f64>) -> Option<Solution<f64>> {
         let n = self.explored.mdp.states();
         let mut terminal = goal.clone();
         let mut worth = vec![0.0; n];
         for (state, worth) in worth.iter_mut().enumerate() {
-            // The mission has failed in such a state, so the penalty is due.
+            // The goal cannot be reached from such a state, so the penalty is due.
             if reachable.values[state] <= 0.0 {
                 terminal.insert(state);
                 *worth = self.penalty;
@@ -123,8 +121,8 @@ impl Referee<'_> {
         self.mission.battery.filter(|_| self.risk.battery).map_or(0, |battery| battery.reserve)
     }
 
-    /// Returns the action of a policy in a state. `None` if the state was not explored or the
-    /// mission has ended.
+    /// Returns the action of a policy in a state. Returns `None` if the state was not explored, or if the policy
+    /// chooses no action there.
     pub fn decision(&self, policy: &[u32], situation: Valuation) -> Option<Action> {
         let state = State::from(situation);
         let number = self.explored.states.number(self.process.code(&state), &state)?;

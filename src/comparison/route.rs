@@ -1,4 +1,4 @@
-//! Computes the best configurations for a fixed route by dynamic programming over its arcs.
+//! Computes the fastest sequence of configurations for a fixed route, by dynamic programming over its arcs.
 
 use num_rational::BigRational;
 

@@ -1,11 +1,11 @@
-//! Exports a mission as a PRISM model of the published setting. [`program`](super::program())
-//! exports the corrected model.
+//! Exports a mission as a PRISM model of the published setting. [`program`](super::program()) exports the corrected
+//! model.
 //!
-//! The model follows those that Cámara, Schmerl and Garlan (SEAMS 2020) generate for each route. There is at
-//! most one reconfiguration, before the first move; then the robot follows one of the five shortest routes.
-//! Each move that can collide overwrites the flag `collided`, a move never fails, and an empty battery has no
-//! consequence. The authors generate one model per route. Here the route is the first choice, so a single query
-//! determines the best route, and the constant `ROUTE` can fix the route.
+//! The model follows the models that Cámara, Schmerl and Garlan (SEAMS 2020) generate for each route. There is at
+//! most one reconfiguration, before the first move; then the robot follows one of the five shortest routes. Each move
+//! that can collide overwrites the flag `collided`, a move never fails, and an empty battery has no consequence. The
+//! authors generate one model per route. Here the first choice selects the route, so a single query determines the
+//! best route. The constant `ROUTE` can fix the route.
 
 use num_rational::BigRational;
 use num_traits::{One, Zero};
@@ -21,10 +21,9 @@ use crate::comparison::program::{
 };
 use crate::comparison::published::{ROUTES, shortest_routes};
 
-/// Returns the model of the published setting. Its variables are the route `r` (0 before it is chosen), the
-/// number `p` of arcs that the robot has traversed, the configuration `c` and, if the mission has a battery,
-/// its level `b`. The flag `rd` is set after a reconfiguration; the flag `collided` is true if the last risky
-/// move has collided.
+/// Returns the model of the published setting. Its variables are the route `r` (0 before it is chosen), the number
+/// `p` of arcs that the robot has traversed, the configuration `c` and, if the mission has a battery, its level `b`.
+/// The flag `rd` is set after a reconfiguration; the flag `collided` is true if the latest risky move has collided.
 pub fn published_program(mission: &Coadaptation) -> Model {
     let routes = shortest_routes(mission, ROUTES);
     let writer = RouteWriter { mission, routes };
@@ -77,8 +76,8 @@ impl RouteWriter<'_> {
         variables
     }
 
-    /// Returns the update that subtracts an energy from the battery, with 0 as the lower limit.
-    /// Empty if nothing changes.
+    /// Returns the assignment that subtracts an energy from the battery level, with 0 as the lower limit. Empty
+    /// without a battery, or for an energy of 0 levels.
     fn spent(&self, energy: &BigRational) -> Vec<(String, Expr, Place)> {
         if self.mission.battery.is_none() {
             return Vec::new();

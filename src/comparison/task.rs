@@ -30,9 +30,10 @@ const MAX_STATES: usize = 50_000;
 pub struct Tasked {
     /// Data of the process.
     pub coadaptation: Coadaptation,
-    /// For each task state, a predecessor and the action that leads from there. `None` for the start.
+    /// For each task state, the previous state on some path from the start, and the action between them. `None` for
+    /// the start.
     origins: Vec<Option<(usize, Act)>>,
-    /// For each place and each action of the task, the number of the arc and the configuration.
+    /// For each place and each action that is executable there, the number of the arc and the configuration.
     moves: Vec<HashMap<Act, (usize, usize)>>,
 }
 
@@ -78,12 +79,11 @@ impl Tasked {
         explorer.finish(parts)
     }
 
-    /// Returns the problem that remains in a state of the process: the mission's problem after the
-    /// actions that lead to the state's place.
+    /// Returns the problem that remains in a state of the process: the mission's problem after the actions that lead
+    /// to the state's place and, if the component is lost, after its loss.
     ///
     /// # Errors
-    /// The mission does not fit its domain after the loss of the component, or an action cannot be
-    /// executed.
+    /// The mission does not fit its domain after the loss of the component, or an action cannot be executed.
     pub fn problem(&self, mission: &Mission, situation: &Valuation) -> Result<Problem, Errors> {
         let mut way = Vec::new();
         let mut place = situation.place;
@@ -120,8 +120,8 @@ impl Tasked {
         Ok(left)
     }
 
-    /// Converts the steps of a plan to actions of the process, beginning in a given state and ending at the goal.
-    /// Returns `None` if a step before the goal is not an action of the process.
+    /// Converts the steps of a plan to actions of the process. The plan starts in the state `situation`; steps after
+    /// the goal are ignored. Returns `None` if a step before the goal is not an action of the process.
     pub fn actions(&self, situation: &Valuation, steps: &[Step]) -> Option<Vec<Action>> {
         let (mut place, mut configuration) = (situation.place, situation.configuration);
         let mut actions = Vec::new();
@@ -154,7 +154,7 @@ struct Explorer<'a> {
     /// Traversals by configuration, for each pair of places.
     arcs: BTreeMap<(usize, usize), BTreeMap<usize, Traversal>>,
     origins: Vec<Option<(usize, Act)>>,
-    /// For each place and action, the number of the next place and the configuration.
+    /// For each place and each action that is executable there, the number of the next place and the configuration.
     moves: Vec<HashMap<Act, (usize, usize)>>,
 }
 

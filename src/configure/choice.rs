@@ -19,9 +19,11 @@ pub enum Worth {
     /// `performance`; otherwise, also with several estimations, 0.001.
     #[default]
     Mros,
-    /// The design's estimation of the given attribute type (local name), 0 if the design has none; larger is better.
+    /// The design's estimation of the given attribute type (local name); 0 if the design has none. Larger estimations
+    /// are better.
     Most(String),
-    /// The design's estimation of the given attribute type (local name), 0 if the design has none; smaller is better.
+    /// The negated estimation of the given attribute type (local name); 0 if the design has none. Smaller estimations
+    /// are better.
     Least(String),
 }
 
@@ -45,9 +47,9 @@ pub struct Configuration {
     pub choices: Vec<Choice>,
     /// Sum of the utilities of the chosen designs.
     pub utility: BigRational,
-    /// `true` if it is proved that no other choice is better, `false` if a limit was reached before the proof. A choice
-    /// is better if it serves more functions; with equally many, if it misses fewer requirements; then if it has more
-    /// utility.
+    /// `true` if it is proved that no other choice is better, `false` if a limit was reached before the proof. A
+    /// choice is better if it serves more objectives; with equally many, if it misses fewer requirements; then if it
+    /// has more utility.
     pub optimal: bool,
 }
 
@@ -93,8 +95,8 @@ pub enum Verdict {
     RuledOut(Vec<String>),
     /// The design is not better than the chosen one: it misses more requirements, or equally many without more utility.
     Less,
-    /// The design is usable and would be better, but conflicts with the designs of other objectives; the reason is a
-    /// sentence.
+    /// The design is usable and preferred to the chosen one, if any, but was not chosen together with the designs of
+    /// the other objectives; the reason is a sentence.
     Together(String),
 }
 
@@ -118,7 +120,7 @@ impl Group {
     }
 }
 
-/// Returns the local name of the design that currently provides an objective's function; `None` if no design does.
+/// Returns the local name of the design that currently provides an objective's function; `None` if there is none.
 pub(super) fn current(objective: &Objective) -> Option<&str> {
     let designs = objective.groundings.iter().filter_map(|grounding| grounding.design.as_ref());
     designs.map(|design| design.name.as_str()).next()
@@ -257,7 +259,7 @@ struct Whole<'a> {
     designs: &'a [Option<usize>],
     /// Designs of the objectives that are not in need. These objectives keep their designs.
     kept: &'a [&'a Offer],
-    /// Remaining budgets after the demands of the kept designs.
+    /// Remaining budgets after the demands of the kept designs; at least 0.
     left: &'a [BigRational],
 }
 

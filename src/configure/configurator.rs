@@ -42,8 +42,8 @@ impl Goal {
 pub struct Configurator {
     knowledge: Knowledge,
     wishes: Wishes,
-    /// Local names of objectives that stay in need, because no design could serve them or the robot could not change
-    /// the design.
+    /// Local names of objectives that stay in need, because no design was chosen for them or the robot could not
+    /// change the design.
     pub(super) pending: BTreeSet<String>,
 }
 
@@ -182,8 +182,8 @@ impl Configurator {
         Ok(())
     }
 
-    /// Restores the previous design of an objective after the robot could not change it. The
-    /// objective stays in need.
+    /// Restores the previous design `before` of an objective after the robot could not change the design; `None`
+    /// removes the design. The objective stays in need.
     ///
     /// # Errors
     /// The objective or the design does not exist, or the rules do not terminate.

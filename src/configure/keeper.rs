@@ -1,5 +1,5 @@
 //! The configuration loop: asserts the robot's reports in the knowledge base, and chooses and requests designs for
-//! objectives that need one.
+//! objectives that need a design.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
@@ -38,18 +38,19 @@ pub enum Service {
     Reconfigure {
         /// The objective.
         objective: String,
-        /// Function of the objective.
+        /// Function of the objective, if it has one.
         function: Option<String>,
         /// The previous design, if there was one.
         from: Option<String>,
         /// The new design. `None` if the objective was removed.
         to: Option<String>,
-        /// Reasons, as sentences: why the design changes now, and why better designs were not
-        /// chosen.
+        /// Reasons, as sentences: why the objective needs a design, why better designs were not chosen, and which
+        /// requirements the new design misses. Or that the objective was removed.
         because: Vec<String>,
-        /// `true` if it is proved that no choice for all objectives in need is better.
+        /// `true` if it is proved that no choice for all objectives in need is better, or if the objective was
+        /// removed.
         optimal: bool,
-        /// Number of the effect, from 1.
+        /// Number by which acknowledgements refer to this change, from 1.
         effect: u64,
         /// `true` if the change may have been requested before the program was restarted.
         #[serde(skip_serializing_if = "std::ops::Not::not")]
@@ -61,7 +62,7 @@ pub enum Service {
     Unserved {
         /// The objective.
         objective: String,
-        /// Function of the objective.
+        /// Function of the objective, if it has one.
         function: Option<String>,
         /// Reasons, as sentences: why the objective needs a design, and why each design was not chosen.
         because: Vec<String>,
@@ -84,7 +85,7 @@ impl Service {
     }
 }
 
-/// Maximum number of stored changes of designs. An older change cannot be undone.
+/// Maximum number of stored changes of designs. If there are more, the oldest ones are dropped and cannot be undone.
 const MAX_CHANGES: usize = 256;
 
 /// A requested change of an objective's design. If the change fails, it is undone, even after its acknowledgement.
@@ -120,7 +121,7 @@ pub struct Keeper {
 }
 
 impl Keeper {
-    /// Creates the loop. `limit` is the time limit of each choice. Unless filters are added, every report is believed
+    /// Creates the loop. `limit` is the time limit of each choice. Unless filters are added, every report is asserted
     /// at once.
     pub fn new(configurator: Configurator, limit: Option<Duration>) -> Self {
         let available = available(configurator.knowledge());
@@ -160,8 +161,8 @@ impl Keeper {
         Self { unrecorded, ..self }
     }
 
-    /// Returns the next time, since the start, at which a filter changes a belief without a further report; `None` if
-    /// no filter does. The caller should handle a tick event at this time.
+    /// Returns the earliest time, since the start, at which a filter changes a belief or reports a silent sensor
+    /// without a further line. Returns `None` if no filter does. The caller should handle a tick event at this time.
     pub fn due(&self) -> Option<Duration> {
         self.filters.due(&self.states)
     }
@@ -206,9 +207,9 @@ impl Keeper {
         self.handle_at(observation, self.now)
     }
 
-    /// Handles a line and returns the answers. `now`, the time since the start, is used if the line has no time of its
-    /// own. Time never decreases: an earlier time is replaced by the time of the previous line. A line is refused if
-    /// its sequence number was used before, or if its own time skips too much.
+    /// Handles a line and returns the answers. `now`, the time since the start, is used if the line has no time of
+    /// its own. Time never decreases: an earlier time is replaced by the time of the previous line. A line is refused
+    /// if its sequence number was used before, or if its number or its own time is too far ahead.
     pub fn handle_at(&mut self, observation: &Observation, now: Duration) -> Vec<KeeperAnswer> {
         let mut answers = Vec::new();
         self.lines += u64::from(!observation.is_timer);
@@ -307,9 +308,9 @@ impl Keeper {
             .ok_or_else(|| Refusal::new("M305", format!("no effect with the number {effect} was requested")))
     }
 
-    /// Undoes a failed change of design: marks the new design as not realisable, so that the next best design is
-    /// chosen, and restores the previous design unless a later change replaced it. Does nothing if the change is
-    /// unknown or was undone before.
+    /// Undoes a failed change of design. Marks the new design as not realisable, so that the next best design is
+    /// chosen. Restores the previous design, unless a later change of the same objective is stored. Does nothing if
+    /// the failed change is not stored (any more).
     fn undo(&mut self, effect: u64) -> Result<(), Message> {
         let Some(PendingChange { objective, from, to }) = self.pending_changes.remove(&effect) else {
             return Ok(());
@@ -322,7 +323,8 @@ impl Keeper {
         self.configurator.revert(&objective, from.as_deref())
     }
 
-    /// Asserts the beliefs that filters change because of the time, e.g. reports that were held back and are now due.
+    /// Asserts the beliefs that filters change because of the passing of time: reports that were held back and are
+    /// now due, and assumed values of silent sensors.
     fn elapse(&mut self, answers: &mut Vec<KeeperAnswer>) {
         let mut filter_answers = Vec::new();
         let due: Vec<Accepted> = self.filters.elapse(&mut self.states, self.now, &mut filter_answers);

@@ -114,7 +114,8 @@ fn snapshot(keeper: &Keeper) -> Snapshot {
     }))
 }
 
-/// Parses the assertions that were added to, and removed from, those of the OWL documents.
+/// Parses the assertions that were added to the assertions of the OWL documents, and the assertions that were
+/// removed.
 fn statements(data: &Value) -> Option<Statements> {
     let list = |name: &str| {
         data.get(name)?.as_array()?.iter().map(statement_from_record).collect::<Option<Vec<_>>>()

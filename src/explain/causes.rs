@@ -53,10 +53,10 @@ pub struct Availability {
 pub struct Cause {
     /// The alteration that removes this cause; other causes may remain.
     pub alteration: Alteration,
-    /// The rules and facts by which this cause alone rules the design out, i.e. after the other alterations of a
-    /// minimal set.
+    /// The rules and facts by which this cause alone rules the design out, i.e. those after the other alterations of
+    /// a minimal set.
     pub because: Vec<String>,
-    /// The knowledge base after the other alterations of that set, for further analysis.
+    /// The knowledge base after the other alterations of the minimal set, for further analysis.
     pub knowledge: Knowledge,
 }
 
@@ -87,8 +87,8 @@ pub fn causes(knowledge: &Knowledge, design: &FunctionDesign) -> Causes {
     Causes { causes: causes_of(knowledge, design, &ways), are_all_needed: ways.len() == 1 }
 }
 
-/// Returns a cause for each different alteration in `ways`, unless reasoning fails. Its reasons are the
-/// conclusions that remain after all other alterations of its set.
+/// Returns a cause for each different alteration in `ways`, unless reasoning fails. The reasons of a cause are the
+/// conclusions that still rule the design out after all other alterations of its set.
 fn causes_of(knowledge: &Knowledge, design: &FunctionDesign, ways: &[Vec<Alteration>]) -> Vec<Cause> {
     let mut causes: Vec<Cause> = Vec::new();
     for (way, alteration) in ways.iter().flat_map(|way| way.iter().map(move |alteration| (way, alteration))) {
@@ -102,9 +102,8 @@ fn causes_of(knowledge: &Knowledge, design: &FunctionDesign, ways: &[Vec<Alterat
     causes
 }
 
-/// Returns minimal sets of alterations that make a design available (see [`repairs`]). Recoveries of
-/// components, and measurements, that only concern other designs are considered only if alterations that
-/// concern this design do not suffice.
+/// Returns minimal sets of alterations that make a design available (see [`repairs`]). Alterations that concern only
+/// other designs are tried only if the alterations that concern this design do not suffice.
 fn ways(knowledge: &Knowledge, design: &FunctionDesign) -> Vec<Vec<Alteration>> {
     let candidates = candidates(knowledge, design);
     let ways = repairs(knowledge, design, &candidates);
@@ -206,8 +205,8 @@ fn subsets(count: usize) -> impl Iterator<Item = Vec<usize>> {
     })
 }
 
-/// Returns a subset of `set` that still suffices, after trying once to remove each alteration. No proper subset
-/// suffices if availability is monotone in the alterations.
+/// Returns a subset of `set` that still suffices, after trying once to remove each alteration. If availability is
+/// monotone in the alterations, no proper subset of the result suffices.
 fn minimal<'a>(
     mut set: Vec<&'a Alteration>,
     suffice: &dyn Fn(&[&'a Alteration]) -> bool,
@@ -287,9 +286,9 @@ pub(super) fn singly(mission: &Mission, repairs: &[Repair], limits: &Limits) -> 
     Ok(changes)
 }
 
-/// Returns alterations that may change whether a design is available. They concern its components,
-/// and measurements that it depends on. New measurements are values at or just beyond the bounds in
-/// its requirements, or around its estimation if no requirement concerns the attribute.
+/// Returns alterations that may change whether a design is available: of its components, and of measurements. New
+/// measurements are values at or just beyond the bounds in the design's requirements, or around the design's
+/// estimation if no requirement concerns the attribute.
 fn candidates(knowledge: &Knowledge, design: &FunctionDesign) -> Vec<Alteration> {
     let is_own = |component: &str| design.components.iter().any(|needed| needed.iri == component);
     let mut alterations = components(knowledge, design.available, &is_own);
@@ -335,9 +334,10 @@ fn components(knowledge: &Knowledge, working: bool, is_own: &dyn Fn(&str) -> boo
         .collect()
 }
 
-/// Returns targets for an attribute with the value `from` at which the requirements `bounds` hold: at least the
-/// greatest violated minimum, and at most the least violated maximum. With `hold`, returns targets at which a
-/// requirement that holds now is violated: below the greatest such minimum, and above the least such maximum.
+/// Returns targets for an attribute with the value `from` and the requirements `bounds`. Without `hold`, violated
+/// requirements become satisfied: the targets are at least the greatest violated minimum, and at most the least
+/// violated maximum. With `hold`, a satisfied requirement becomes violated: the targets are below the greatest
+/// satisfied minimum, and above the least satisfied maximum.
 fn targets<'a>(bounds: impl Iterator<Item = &'a Requirement>, from: &BigRational, hold: bool) -> Vec<Target> {
     let (mut least, mut most): (Vec<&BigRational>, Vec<&BigRational>) = (Vec::new(), Vec::new());
     for requirement in bounds {
@@ -353,7 +353,8 @@ fn targets<'a>(bounds: impl Iterator<Item = &'a Requirement>, from: &BigRational
     least.into_iter().chain(most).collect()
 }
 
-/// Returns targets (bounds for the value) at a bound and just beyond it, as seen from the current value `from`.
+/// Returns targets (bounds for the value) at a bound and just beyond it, as seen from the current value `from`. If
+/// the value equals the bound: just below and just above it.
 fn around(bound: &BigRational, from: &BigRational) -> Vec<Target> {
     let bound = bound.clone();
     match from.cmp(&bound) {

@@ -1,12 +1,12 @@
-//! Explanations: why a design is available or unavailable, why it is chosen or not chosen, and
-//! which changes lead to another plan.
-//!
-//! Availability is explained by reasoning without planning: [`availability`]. "Why is this design not chosen?"
-//! is answered by planning again with this design as the only one for its functions, as if it were available.
-//! The metric of this plan minus that of the best plan is the price of the design. "What would change the
-//! plan?" is answered by trying the values at which a requirement begins or ceases to hold. For numeric values
-//! of the problem, such as a battery, bisection is used between a value with the current plan and a value with
+//! Explanations: why a design is available or unavailable, why it is chosen or not chosen, and which changes lead to
 //! another plan.
+//!
+//! Availability is explained by reasoning without planning: [`availability`]. "Why is this design not chosen?" is
+//! answered by planning again with this design as the only one for its functions, as if it were available. The metric
+//! of this plan minus that of the best plan is the price of the design. "What would change the plan?" is answered by
+//! planning with other values. A measured attribute is set to the values at which a requirement begins or ceases to
+//! hold. A numeric value of the problem, such as a battery, is varied by bisection between a value with the current
+//! plan and a value with another plan.
 
 mod causes;
 mod parts;
@@ -51,8 +51,8 @@ pub struct DesignExplanation {
     /// Each single alteration in [`Availability::ways`], with the best plan after this alteration
     /// alone.
     pub changes: Vec<Change>,
-    /// `true` if all plans of the explanation are proved to be optimal, or to be missing because no plan
-    /// exists. `false` if a limit was reached or reasoning failed.
+    /// `true` if each plan of the explanation is proved optimal, or proved not to exist. `false` if a limit was
+    /// reached or reasoning failed.
     pub complete: bool,
 }
 

@@ -28,7 +28,7 @@ pub struct Alteration {
     pub to: Target,
 }
 
-/// A set of alterations that only together make a design available or unavailable.
+/// A set of alterations that together make the explained design available or unavailable.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Repair {
     /// All alterations of the set.
@@ -84,7 +84,8 @@ impl Target {
     }
 }
 
-/// Smallest difference between two values that are treated as different: one millionth.
+/// Distance of one millionth: between a strict bound and the value that is tried beyond it, and the error of bounds
+/// found by bisection.
 pub(super) fn little() -> BigRational {
     BigRational::new(1.into(), 1_000_000.into())
 }

@@ -1,4 +1,6 @@
-//! The smallest changes of measurements and of values of the problem that lead to another plan.
+//! Searches for the smallest changes of measurements and of values of the problem that lead to another plan.
+//! Values of the problem are changed in growing steps of up to 100 %, then by bisection. So a nearer change
+//! that is undone within a step is not found.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
@@ -27,10 +29,10 @@ pub struct SmallestChanges {
     pub complete: bool,
 }
 
-/// Searches for the smallest changes of single values that lead to another plan. Each measured attribute is set to the
-/// values, below and above the current one, at which a requirement of a design begins or ceases to hold. Each positive
-/// numeric value of the problem is changed downwards and upwards by at most 100 %. At a limit, returns the partial
-/// results. `hear` is called with the name of each value before it is varied.
+/// Searches for the smallest changes of single values that lead to another plan. Each measured attribute is set to
+/// the values, below and above the current one, at which a requirement of a design begins or ceases to hold. Each
+/// positive numeric value of the problem is changed downwards and upwards by at most 100 %. At a limit, returns the
+/// partial results. `hear` is called with `the best plan` and then with the name of each value, before the search.
 ///
 /// # Errors
 /// The mission cannot be planned for.
@@ -90,8 +92,8 @@ struct VariedMission<'a> {
 }
 
 impl VariedMission<'_> {
-    /// Computes the best plan after a value of the mission is set. Returns `None` if a limit is reached before the plan
-    /// is proved optimal, or its absence is proved.
+    /// Computes the best plan after a value of the mission is set. Returns `None` if a limit is reached before it is
+    /// proved that the plan is optimal, or that there is no plan.
     fn with(&self, name: &str, value: &BigRational) -> Result<Option<BestPlan>, Errors> {
         if self.limits.reached() {
             return Ok(None);

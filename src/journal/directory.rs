@@ -1,5 +1,5 @@
-//! Reads the segment files and snapshot files of a journal's directory, each with its first fault, and opens files that
-//! only their user can access.
+//! Reads the segments and snapshots in a journal's directory. For each faulty file, the first fault is described. Also
+//! opens files that only their user can access.
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
@@ -22,16 +22,16 @@ pub(super) struct Segment {
     pub(super) digest: String,
     pub(super) before: Link,
     pub(super) after: Link,
-    /// Sound records of the segment, without its header.
+    /// Records of the segment before its first fault, without the header.
     pub(super) records: Vec<Record>,
-    /// Number of bytes of the header and the sound records at the beginning of the file.
+    /// Number of bytes at the beginning of the file that contain the header and `records`.
     pub(super) sound: u64,
     pub(super) end: End,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum End {
-    /// The segment ends with a complete record and its line break.
+    /// The last line, a record or the header, is complete and has its line break.
     Whole,
     /// The segment ends with a complete record whose line break is missing or damaged.
     Unbroken,
@@ -162,8 +162,8 @@ impl JournalFiles {
     }
 }
 
-/// Returns `true` if `after` begins at the link (position in the chain of records) where `before` ends. If a crash has
-/// prevented the `end` record of `before`, the check assumes this record, and `after` must have no records yet.
+/// Returns `true` if `after` begins at the link (position in the chain of records) where `before` ends. If `before` has
+/// no `end` record, because a crash has prevented it, this record is assumed, and `after` must have no records yet.
 pub(super) fn follows(before: &Segment, after: &Segment) -> bool {
     if before.is_closed() {
         return before.end == End::Whole && before.after == after.before;
@@ -216,8 +216,8 @@ fn segment(bytes: &[u8], number: u64) -> Result<Segment, String> {
     Ok(segment)
 }
 
-/// Returns the length in bytes of the record in a line that has no line break, but may have another
-/// character in its place.
+/// Returns the length in bytes of the record in a last line without a line break. The line may have another character
+/// in place of the line break.
 fn after_length(line: &[u8], at: &Link) -> usize {
     if at.read(line).is_some() { line.len() } else { line.len() - 1 }
 }

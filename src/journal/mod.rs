@@ -1,28 +1,25 @@
-//! Write-ahead journal: every observation and every decision of a loop is written before its answers leave the program.
-//! [`Sync`] says when the written data is flushed to the disk.
+//! Write-ahead journal: each observation of a loop, and each decision on it, is written before the answers of the
+//! decision leave the program. [`Sync`] defines when the written data is flushed to the disk.
 //!
 //! A directory contains segments `journal-N` and snapshots `snapshot-N`. Each segment except segment 0 begins at the
 //! snapshot with its number. The last two segments and snapshots are kept. Records are numbered and chained by hashes,
-//! see `record`. An observation is written before it is handled, and the decision before any of its answers leaves the
-//! program \[1\]. Opening restores the loop from the newest sound snapshot that only sound segments follow, or from the
-//! beginning. It then replays the later observations with the recorded plans. The answers must equal the recorded ones,
-//! except for explanations; otherwise the journal is rejected.
+//! see `record`. Writing before acting follows \[1\]. Opening restores the loop from the newest sound snapshot that
+//! only sound segments follow, or from the beginning. It then replays the later observations with the recorded plans.
+//! The answers must equal the recorded ones, except for explanations; otherwise the journal is rejected.
 //!
 //! A crash may leave the last record incomplete. This record is cut off, kept in a separate file, and reported. A
 //! complete record is never cut off. A missing line break or `end` record at the end of a segment is added. Any other
 //! fault in a needed segment is an error, and a fault in a file that is not needed is a warning.
 //!
-//! A checkpoint creates the new segment first, then writes the `end` record of the old segment,
-//! then the snapshot. So a missing segment is detected, and a crash during a checkpoint is not
-//! mistaken for a missing segment.
+//! A checkpoint creates the new segment first, then writes the `end` record of the old segment, then the snapshot. So a
+//! missing segment is detected, and a crash during a checkpoint is not mistaken for a missing segment.
 //!
 //! Only one process at a time can open a journal for writing. It holds a lock on the file `lock`, which the operating
 //! system releases when the process ends. The file also stores the number of records, by which missing records are
 //! detected.
 //!
-//! If a write fails, the loop stops, and no further answer leaves the program. With
-//! [`Unrecorded::Continue`], the segment is renamed instead, so that the journal cannot be resumed, and
-//! the loop continues without it.
+//! If a write fails, the loop stops, and no further answer leaves the program. With [`Unrecorded::Continue`], the
+//! segment is renamed instead, so that the journal cannot be resumed, and the loop continues without it.
 //!
 //! - \[1\] C. Mohan et al.: ARIES, a transaction recovery method, ACM TODS 17, 1992.
 

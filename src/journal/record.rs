@@ -81,8 +81,9 @@ pub(super) fn snapshot(after: &Link, digest: &str, segment: u64, data: &Value) -
         .0
 }
 
-/// Parses the first line of a file: the header of a segment, or a snapshot. Both contain the digits of the record
-/// before. Returns the record, the link before it and the link after it; `None` if it has another kind or is damaged.
+/// Parses the first line of a file: the header of a segment, or a snapshot. Both contain the digits of the previous
+/// record. Returns the line's record, the link before it and the link after it. Returns `None` if the line is damaged
+/// or is not of the given kind.
 pub(super) fn opening(line: &[u8], kind: &str) -> Option<(Record, Link, Link)> {
     let (record, _) = parse(line)?;
     let before = Link { next: record.number, digits: record.text(3)?.to_owned() };

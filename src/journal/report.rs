@@ -13,7 +13,7 @@ use crate::message::Message;
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct JournalReport {
-    /// Descriptions of the segments and snapshots, one sentence each.
+    /// Descriptions of the segments and snapshots, one line each.
     pub parts: Vec<String>,
     /// Faults: an error if the journal cannot be used, a warning otherwise.
     pub messages: Vec<Message>,
@@ -33,7 +33,7 @@ pub struct Entry {
     pub kind: String,
     /// For an event, the time since the start of the mission, in microseconds.
     pub time: Option<u64>,
-    /// The line of an event, or the answers of a reaction or decision.
+    /// The line of an event, or the answers of a reaction or decision; null for an `end` record.
     pub content: Value,
 }
 

@@ -54,9 +54,9 @@ fn wrong(text: &str, why: &str) -> Message {
     )
 }
 
-/// Returns `true` if a `Host` header names this machine by a loopback address. This check prevents
-/// DNS rebinding: a page of another site whose name resolves to this machine would send that site's
-/// name.
+/// Returns `true` if a `Host` header names this machine as `localhost` or by a loopback address. This check prevents
+/// DNS rebinding: if the name of another site resolves to this machine, the browser sends the name of that site in this
+/// header.
 pub(super) fn is_local_host(host: &str) -> bool {
     let without_port = |host: &str| host.rsplit_once(':').map_or(host, |(name, _)| name).to_owned();
     let name = match host.strip_prefix('[').and_then(|rest| rest.split_once(']')) {

@@ -12,8 +12,8 @@ use serde_json::{Value, json};
 use crate::live::keep::{design_key, keys};
 use crate::mapek::DesignChange;
 
-/// Maximum number of lines that the loop has queued and the thread of [`listen`] has not read. Further lines are
-/// dropped and counted.
+/// Maximum number of lines in the queue from the loop to the thread of [`listen`]. Further lines are dropped and
+/// counted.
 const MAX_QUEUED_LINES: usize = 4096;
 const MAX_QUEUED_BYTES: usize = 16 << 20;
 
@@ -41,7 +41,8 @@ struct RetainedLines {
     lines: VecDeque<Arc<str>>,
     bytes: usize,
     first: u64,
-    /// For each key, the line that defines its current state, and the number of this line.
+    /// For each key (part of the loop's state, such as `function f`), the latest line about it, and the number of this
+    /// line.
     words: BTreeMap<String, (u64, Arc<str>)>,
     ended: bool,
 }
@@ -56,8 +57,9 @@ pub(super) enum News {
 }
 
 impl Hub {
-    /// Returns, in order, the lines that define the current state of a key and are older than the retained
-    /// lines. Also returns the number of the first retained line.
+    /// Returns the latest line about each key (part of the loop's state, such as `function f`), if this line is no
+    /// longer among the retained lines. The result is in the order of the lines' numbers. Also returns the number of
+    /// the first retained line.
     pub(super) fn state(&self) -> (Vec<Arc<str>>, u64) {
         let state = self.lock();
         let mut visited = BTreeSet::new();
@@ -86,8 +88,8 @@ impl Hub {
         }
     }
 
-    /// Appends a line, and stores it as the current state of `keys`. Above the limits, drops the oldest lines, and the
-    /// keys that changed longest ago.
+    /// Appends a line, and stores it as the latest line about each of `keys`. Above the limits, drops the oldest lines,
+    /// and the keys that changed longest ago.
     fn take(&self, line: Arc<str>, keys: Vec<String>) {
         let mut state = self.lock();
         let number = state.end();

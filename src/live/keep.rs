@@ -5,7 +5,7 @@ use std::borrow::Cow;
 
 use serde::Deserialize;
 
-/// The fields of an answer that determine its keys.
+/// The fields of an answer that determine its keys, i.e. the parts of the state that the answer is about.
 #[derive(Deserialize)]
 struct About<'a> {
     #[serde(borrow, default)]

@@ -1,5 +1,4 @@
-//! Web page that shows a running loop: its events and answers, over HTTP/1.1 \[1\] and server-sent
-//! events \[2\].
+//! Web page that shows a running loop: its events and answers, over HTTP/1.1 \[1\] and server-sent events \[2\].
 //!
 //! The page cannot influence the loop. [`Live::heard`], [`Live::said`], [`Live::known`] and [`Live::planned`] never
 //! block: lines that exceed the queue are dropped and counted. A bounded number of lines is retained, including the
@@ -9,7 +8,7 @@
 //! | path | content |
 //! |---|---|
 //! | `/`, `/live.css`, `/live.js` | the page |
-//! | `/plan` | picture of the current plan as it was when it was made: timeline, numbers, map |
+//! | `/plan` | picture of the plan that was last adopted: timeline, numbers, map |
 //! | `/events` | the current state, the retained lines, then all new lines |
 //!
 //! On a loopback address, local clients need no token unless one is configured. Without a token, a request is rejected

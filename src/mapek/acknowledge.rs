@@ -1,15 +1,14 @@
 //! Determines the believed design of each function from acknowledgements and failures of reconfigurations.
 //!
-//! Unless another design is observed later, the believed design of a function is the design of its last acknowledged
-//! reconfiguration. An event with the number of a reconfiguration acknowledges it. Messages can cross, be duplicated or
-//! arrive out of order: of two acknowledged reconfigurations of one function, the one requested later counts. A
-//! superseded reconfiguration without an answer can still be acknowledged. Before this acknowledgement, its design is
-//! not believed, and the design of the function is uncertain.
+//! An event with the number of a reconfiguration acknowledges it. Unless another design is observed or a failure is
+//! reported later, the function is believed to have the design of its last acknowledged reconfiguration. Messages can
+//! cross, be duplicated or arrive out of order: of two acknowledged reconfigurations of one function, the one requested
+//! later counts. A reconfiguration that a later one has superseded can still be acknowledged; until then its design is
+//! not believed.
 //!
-//! A report that an action has started, progressed or succeeded implies the arrival of its request, and nothing else.
-//! Under this rule alone, robots without acknowledgements would never have a believed design. Therefore, until an
-//! effect is acknowledged by its number, such a report also implies the reconfigurations before the request:
-//! an action starts with the configuration of its request.
+//! A report that an action has started, progressed or succeeded implies that the request of the action has arrived.
+//! Some robots never acknowledge an effect by its number. For such a robot, the report also implies that the
+//! reconfigurations before the request have arrived, because an action starts with the configuration of its request.
 
 use crate::mapek::answer::Command;
 use crate::mapek::beliefs::Beliefs;
@@ -123,9 +122,8 @@ impl Beliefs {
         Failure::Stale
     }
 
-    /// Records the failure of a reconfiguration to `design` that was not acknowledged. The function keeps its believed
-    /// design, unless this is `design`. In this case the reconfiguration has failed after the function was observed
-    /// with `design`, and the function's design becomes unknown.
+    /// Records the failure of a reconfiguration to `design` that was not acknowledged. If the function is believed to
+    /// have this design, its design becomes unknown. Otherwise the function keeps its believed design.
     fn unanswered_failed(&mut self, function: &str, design: String) -> Failure {
         if self.configuration.get(function) == Some(&design) {
             self.configuration.remove(function);
@@ -138,7 +136,8 @@ impl Beliefs {
     /// pending, the order of observation and reconfiguration is unknown, and so is the design.
     fn configured(&mut self, effect: u64, function: String, design: String) -> Receipt {
         let history = self.receipts.functions.entry(function.clone()).or_default();
-        // A superseded reconfiguration without an answer may have been carried out in between.
+        // A superseded reconfiguration with a smaller number may have been carried out without an answer. Then the
+        // previous design is unknown.
         let is_before_known = history.superseded.range(..effect).next().is_none();
         history.superseded.retain(|number, _| *number > effect);
         history.implied = history.implied.filter(|implied| *implied > effect);

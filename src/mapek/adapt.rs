@@ -28,11 +28,11 @@ use crate::number;
 /// Number of consecutive failures of one step after which planning pauses until something else changes.
 const MAX_FAILURES: u32 = 3;
 
-/// Lower limit on the base of the pauses before a search that hit its time limit is repeated. The base is the time
-/// limit of a search. The first pause is twice the base, and each further pause is twice the previous one.
+/// Least base of the pauses after searches without a proved outcome. The base is the time limit of a search if that is
+/// longer. The first pause is twice the base, and each further pause is twice the previous one.
 const MIN_RETRY: Duration = Duration::from_secs(10);
 
-/// Upper limit on the pause before a search that hit its time limit is repeated.
+/// Upper limit on the pause before a search without a proved outcome is repeated.
 const MAX_RETRY: Duration = Duration::from_secs(3600);
 
 /// Entry of `Beliefs::improvement_causes`, among the names of designs, that represents changed facts.
@@ -41,7 +41,7 @@ const FACTS: &str = "facts";
 /// Reason for planning, which determines the condition under which the new plan is adopted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Need {
-    /// The action under way could not continue unchanged, and a safe effect was requested.
+    /// The action under way could not continue unchanged. Other designs for it, or its suspension, were requested.
     Interrupted,
     /// A new plan is needed, for example because the current plan is invalid or missing.
     Must,
@@ -57,13 +57,14 @@ pub(super) struct Adaptation<'a> {
 }
 
 impl Adaptation<'_> {
-    /// Decides from changes and findings of the analysis whether a plan is needed. If so, searches for a plan and
-    /// adopts it.
+    /// Decides from changes and findings of the analysis whether a plan is needed. If so, searches for a plan, and
+    /// adopts it or keeps the current one.
     pub(super) fn adapt(&mut self, changes: Changes, findings: Findings, answers: &mut Vec<Answer>) {
         let is_observed = changes.observed;
         self.decide(changes, findings, answers);
-        // The action continues with the observed design, but may be waiting for the previous one. Therefore, the
-        // observed design is requested. An unfinished deliberation must not change the beliefs.
+        // A function was reported with a design that the loop has not requested, and the action under way continues
+        // with it. The robot may still wait for the design that was requested before, so the reported design is
+        // requested. A deliberation that lacks a plan (`is_missing`) must not change the beliefs.
         if is_observed && !self.planner.is_missing {
             self.configure_again(answers);
         }
@@ -86,7 +87,8 @@ impl Adaptation<'_> {
                 self.replan(interruptions, Need::Interrupted, answers);
                 return;
             }
-            // A suspended action remains in trouble until something improves; planning again before that is useless.
+            // A suspended action still cannot continue until something improves, so planning again before that is
+            // useless.
             let is_news = is_change || !running.suspended;
             if let Some(reason) = trouble(self.beliefs, &running, changes.facts).filter(|_| is_news) {
                 self.replan(vec![reason], Need::Must, answers);
@@ -160,8 +162,8 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Ends a suspension of the action under way that was to last only until planning has finished. If the action is
-    /// not being cancelled, its designs are available and its remainder is executable, the action is resumed.
+    /// Ends a suspension of the action under way that was requested only until planning has finished. Resumes the
+    /// action if it is not being cancelled, its designs are available, and its remainder is executable.
     pub(super) fn release(&mut self, answers: &mut Vec<Answer>) {
         let Some(mut running) =
             self.beliefs.running.clone().filter(|running_action| running_action.provisional)
@@ -176,8 +178,9 @@ impl Adaptation<'_> {
         self.beliefs.running = Some(running);
     }
 
-    /// Searches for a better plan if the repetition of an unfinished search is due, or if the settle time has passed
-    /// since the last reason why a better plan may exist.
+    /// Searches for a better plan if the repetition of a search without a proved outcome is due, or if the settle time
+    /// has passed since the last reason why a better plan may exist. Does not search without a plan, or while
+    /// conclusions are missing.
     fn improve(&mut self, answers: &mut Vec<Answer>) {
         let has_plan = self.beliefs.plan.is_some() && !self.beliefs.reached;
         if !has_plan {
@@ -253,7 +256,7 @@ impl Adaptation<'_> {
     fn configure_again(&mut self, answers: &mut Vec<Answer>) {
         let Some(mut running) = self.beliefs.running.take() else { return };
         let is_active = !running.suspended && !running.cancelling;
-        // Without a design to be sent the objectives are up to date.
+        // If no design must be sent, the objectives in the knowledge base are up to date.
         if is_active
             && running.step.configuration.iter().any(|pair| must_be_sent(self.beliefs, &running, pair))
         {
@@ -262,9 +265,10 @@ impl Adaptation<'_> {
         self.beliefs.running = Some(running);
     }
 
-    /// Cancels or suspends the action under way if it cannot continue, or if this is better than `going_on`. The plan
-    /// `going_on` starts with the remainder of the action. Returns `true` if the action was interrupted, or if the
-    /// decision needs a plan that the planner may not search for.
+    /// Decides whether to cancel or suspend the action under way. Compares `going_on`, a plan that begins with the
+    /// remainder of the action, with a plan after its cancellation. Unless `need` is [`Need::Interrupted`], an action
+    /// that can continue is interrupted only if it is proved that no plan continues it. Returns `true` if the action
+    /// was interrupted, or if the decision needs a plan that the planner may not search for.
     fn interrupt(&mut self, reason: &str, need: Need, going_on: &Outcome, answers: &mut Vec<Answer>) -> bool {
         let Some(running) = self.beliefs.running.clone() else { return false };
         let can_go_on = goes_on_with(&running, going_on) || self.can_go_on(&running);
@@ -390,8 +394,8 @@ impl Adaptation<'_> {
     }
 }
 
-/// Returns `true` if a plan begins with the remainder of the action under way, with its present designs. The remainder
-/// is then executable, because the planner has simulated it.
+/// Returns `true` if the plan `going_on`, which begins with the remainder of the action under way, keeps the action's
+/// present designs. The remainder is then executable, because the planner has simulated it.
 fn goes_on_with(running: &Running, going_on: &Outcome) -> bool {
     let first = going_on.steps.as_ref().and_then(|steps| steps.first());
     first.is_some_and(|first| first.configuration == running.step.configuration)

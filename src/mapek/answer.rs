@@ -72,7 +72,7 @@ pub enum Answer {
         effect: Option<u64>,
         /// Number of the action.
         action: u64,
-        /// Seconds since the request, or since the last report.
+        /// Seconds since the last request of the effect, or since the request or last report of the action.
         seconds: u64,
         /// Reaction of the loop.
         outcome: OverdueOutcome,
@@ -88,8 +88,8 @@ pub enum Answer {
         value: Value,
         /// Reason for holding the report: `range`, `jump`, `hysteresis`, `debounce`, `confirm` or `heal`.
         because: &'static str,
-        /// Number of held reports since the last believed crossing of a bound, or since the last believed change of the
-        /// component's status.
+        /// Number of reports held back since the count was last reset, for example by a believed crossing of a bound or
+        /// change of a component's status.
         held: u64,
         /// Time at which the report will be believed unless another report arrives; `None` if the passage of time does
         /// not confirm the report.

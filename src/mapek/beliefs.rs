@@ -185,8 +185,8 @@ impl Beliefs {
         &self.configuration
     }
 
-    /// Returns a pair of function and requested design for each outstanding reconfiguration, i.e. one that is neither
-    /// acknowledged nor superseded.
+    /// Returns the function and the requested design of each reconfiguration that is outstanding: the robot has
+    /// reported neither its arrival nor its failure, and no later one has superseded it.
     pub fn pending(&self) -> impl Iterator<Item = (&str, &str)> {
         self.outstanding.values().filter_map(|effect| match &effect.command {
             Command::Reconfigure { function, to, .. } => Some((function.as_str(), to.as_str())),
@@ -250,7 +250,7 @@ impl Beliefs {
         self.outstanding.values()
     }
 
-    /// Number of handled lines.
+    /// Number of received lines, including refused ones. Timers are not counted.
     pub fn lines(&self) -> u64 {
         self.lines
     }
@@ -276,8 +276,8 @@ impl Beliefs {
         self.reached
     }
 
-    /// Returns `true` if a design is believed to be available. For a design that the knowledge base lacks, the problem
-    /// has to state this. Without a knowledge base, all designs are available.
+    /// Returns `true` if a design is believed to be available. If the problem decides on the availability of the
+    /// design, the problem has to state it. Without a knowledge base, all designs are available.
     pub(super) fn is_available(&self, design: &str) -> bool {
         self.mission.knowledge().is_none() || self.available.contains(design) || self.mission.provides(design)
     }
@@ -306,7 +306,7 @@ impl Beliefs {
         }
     }
 
-    /// Returns the action under way and the remaining plan in the form of the validator.
+    /// Returns the action under way and the remaining plan as input for the validator.
     fn remaining_plan(&self) -> PlanText {
         let running = self.running.iter().map(|running| &running.step);
         plan_text(running.chain(self.plan.iter().flatten()))

@@ -7,9 +7,10 @@ use crate::mapek::answer::Answer;
 #[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub(super) struct Changes {
     pub(super) base: Base,
-    /// Whether inputs of planning have changed: facts or values of the problem, or facts of the knowledge base.
+    /// Whether inputs of planning have changed: facts or values of the problem, or facts of the knowledge base. Effects
+    /// of the progress and success of actions do not count.
     pub(super) facts: bool,
-    /// Whether facts of the problem have changed, and not only values.
+    /// Whether a report has changed facts of the problem or a design of the action under way, and not only values.
     pub(super) predicates: bool,
     /// Whether the goal has changed, which invalidates all remembered plans.
     pub(super) goal: bool,
@@ -18,7 +19,8 @@ pub(super) struct Changes {
     pub(super) ended: bool,
     /// Whether a function of the action under way was reported with a design that the loop has not requested.
     pub(super) observed: bool,
-    /// Reasons why the action under way could not continue unchanged. A safe effect was requested for each reason.
+    /// Reasons why the action under way could not continue unchanged. For each reason, other designs or a suspension
+    /// were requested.
     pub(super) interruptions: Vec<String>,
     /// Reasons to plan, as sentences, that apply even if the current plan is valid.
     pub(super) reasons: Vec<String>,

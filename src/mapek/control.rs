@@ -33,17 +33,18 @@ use crate::mission::Mission;
 /// Limit on reasoning steps per update of the knowledge base; see [`rules::Limits`]. The robot waits during reasoning.
 const MAX_REASONING_STEPS: u64 = 100_000_000;
 
-/// Number of names and values interned since the start, or since the knowledge base was rebuilt, above which it is
-/// rebuilt. The rebuilt knowledge base lacks those that are not used any more.
+/// Maximum number of names and values that may be added to the knowledge base after the start, or after it was last
+/// rebuilt. Above it, the knowledge base is rebuilt without the names and values that are not used any more.
 const MAX_GROWTH: usize = 1024;
 
-/// A line is refused if its own time is later than the clock and also later than the previous line's time, both by more
-/// than this time. The number of seconds equals the limit on gaps between sequence numbers.
+/// Upper limit on the time stated in a line, measured from the clock or from the time of the previous line, whichever
+/// is later. A line with a later time is refused.
 const MAX_TIME_STEP: Duration = Duration::from_secs(1_000_000);
 
-/// Returns the time at which a line is handled, and an error if the line's own time skips too much. Such a time is
-/// ignored. `previous` is the time of the previous line. `now` is used if the line has no time of its own, or if this
-/// time is ignored. Time never decreases.
+/// Returns the time at which a line is handled. `previous` is the time of the previous line, `now` the time of the
+/// clock, and `own` the time that the line states. The time of the clock is used if the line states none. If the stated
+/// time is too late (see [`MAX_TIME_STEP`]), it is ignored, and an error is returned, too. The returned time is never
+/// before `previous`.
 pub(crate) fn time_of_line(
     previous: Duration,
     now: Duration,
@@ -95,7 +96,8 @@ pub struct Loop {
     /// Number of changes of the planning problem since the start, which identifies the current problem.
     pub(super) question: u64,
     digest: String,
-    /// Growth of the knowledge base directly after it was last rebuilt: the new names and values that are in use.
+    /// Number of names and values that the knowledge base had in addition to those of its documents when it was last
+    /// rebuilt; 0 before.
     rebuilt_growth: usize,
 }
 
@@ -226,7 +228,8 @@ impl Loop {
             if let Some(sequence) = observation.sequence {
                 self.beliefs.numbers.insert(sequence);
             }
-            // The observed design becomes a function grounding before the analysis.
+            // Before the analysis, the knowledge base must contain the observed design as the one in use (function
+            // grounding).
             if let Some(running) = self.beliefs.running.as_ref().filter(|_| changes.observed) {
                 let step = running.step.clone();
                 objectives(&mut self.beliefs, Some(&step), &mut answers);
@@ -347,7 +350,7 @@ impl Loop {
         let is_due = growth > self.rebuilt_growth + MAX_GROWTH;
         let Some(base) = self.beliefs.mission.knowledge_mut().filter(|_| is_due) else { return };
         let statements = base.statements();
-        // The statements were consistent and within the budget before, so that restoring them succeeds.
+        // The statements were consistent and within the budget before, so restoring them succeeds.
         let _ = base.restore(&statements);
         self.rebuilt_growth = base.growth();
     }

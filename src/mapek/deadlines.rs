@@ -1,10 +1,9 @@
 //! Deadlines for unacknowledged effects and for actions without reports.
 //!
-//! Deadlines are checked at each line, including ticks. Messages that a robot never sends have no deadline:
-//! acknowledgements are expected only after the first acknowledgement of an effect by its number. An action is
-//! cancelled only if a message about it is overdue that can be expected: progress, if the action has reported progress
-//! before; a start or acknowledgement, if the robot has sent such messages before. The end of a cancelled action is
-//! expected from every robot.
+//! Deadlines are checked at each line, including ticks. Acknowledgements have deadlines only after the robot has first
+//! acknowledged an effect by its number. An overdue action is cancelled only if the robot has sent messages of the
+//! missing kind before: progress of this action, the start or progress of some action, or an acknowledgement. Every
+//! robot is expected to report the end of a cancelled action.
 
 use std::time::Duration;
 
@@ -18,8 +17,8 @@ use crate::number;
 /// acknowledged in time.
 pub(super) type Expired = Vec<u64>;
 
-/// Repeats overdue effects, and repeats or cancels an overdue action. Returns the reconfigurations that count as
-/// failed. Does nothing if deadlines are disabled, i.e. if the setting is 0.
+/// Repeats overdue effects. Repeats the request of an overdue action, cancels the action, or only reports the delay.
+/// Returns the reconfigurations that count as failed. Does nothing if deadlines are disabled, i.e. if the setting is 0.
 pub(super) fn handle_overdue(
     beliefs: &mut Beliefs,
     settings: &Settings,
@@ -61,10 +60,10 @@ fn is_request(effect: &Effect) -> bool {
     matches!(effect.command, Command::Request { .. })
 }
 
-/// Returns the effect number of the request of the action under way, if the action is suspended and the suspension is
-/// acknowledged. A suspended action has no deadline, so its request is repeated like any other effect. Such a request
-/// starts the action in the suspended state. Before the acknowledgement of the suspension, a repeated request might
-/// start the action moving.
+/// Returns the effect number of the request of the action under way if the action is suspended and the suspension is
+/// acknowledged. A suspended action has no deadline, so its request, if unacknowledged, is repeated like other effects
+/// and starts the action in the suspended state. Before the suspension is acknowledged, a repeated request might start
+/// the action without suspending it.
 fn suspended_request(beliefs: &Beliefs) -> Option<u64> {
     let running = beliefs.running.as_ref().filter(|action| action.suspended && !action.cancelling)?;
     let is_about = |effect: &Effect| effect.action == running.action && effect.command.controls_execution();
@@ -109,9 +108,9 @@ fn check_effects(beliefs: &mut Beliefs, deadline: Duration, answers: &mut Vec<An
     expired
 }
 
-/// Returns the outstanding cancellation of the action under way, if the robot has never acknowledged an effect by
-/// its number. For this robot, the cancellation is repeated until the action ends, because every robot must report
-/// the end of an action.
+/// Returns the outstanding cancellation of the action under way, if the robot has never acknowledged an effect by its
+/// number. For such a robot, the cancellation is repeated until the action ends, because every robot must report the
+/// end of an action.
 fn open_cancel(beliefs: &Beliefs) -> Option<&Effect> {
     let running = beliefs.running.as_ref().filter(|action| action.cancelling)?;
     let is_cancel = |effect: &&Effect| {
@@ -155,8 +154,8 @@ fn check_action(beliefs: &mut Beliefs, settings: &Settings, answers: &mut Vec<An
     answers.push(Answer::Overdue { effect: is_unacknowledged.then_some(request), action, seconds, outcome });
     match outcome {
         OverdueOutcome::Repeated => {
-            // A robot that has never acknowledged an effect by its number gets no other repetitions of these effects.
-            // Therefore, reconfigurations before the request are repeated here.
+            // For a robot that has never acknowledged an effect by its number, the effects before the request, such as
+            // reconfigurations, are repeated only here.
             let from = if beliefs.receipts.are_sent() { request } else { 0 };
             let effects = beliefs.outstanding.range(from..=request).map(|(_, effect)| effect.clone());
             answers.extend(effects.map(|effect| Answer::Effect(Effect { repeated: true, ..effect })));

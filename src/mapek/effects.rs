@@ -46,8 +46,8 @@ pub(super) fn request(beliefs: &mut Beliefs, step: PlannedStep, answers: &mut Ve
 /// Requests those designs of an action that must be sent (see [`must_be_sent`]), i.e. mainly for functions that are
 /// expected to have another design. Then makes the action's functions the objectives of the knowledge base.
 ///
-/// A requested action can still be waiting for designs that were requested before. Therefore, changed designs of the
-/// action are requested even if the functions already have them.
+/// A requested action can still be waiting for its previous designs. Therefore, a changed design of the action is
+/// requested even if the function already has it.
 pub(super) fn reconfigure(beliefs: &mut Beliefs, running: &mut Running, answers: &mut Vec<Answer>) {
     for pair in &running.step.configuration {
         if must_be_sent(beliefs, running, pair) {
@@ -116,9 +116,9 @@ pub(super) fn effect(beliefs: &mut Beliefs, action: u64, command: Command, answe
 }
 
 /// Makes the functions of a step, and no others, the objectives of the knowledge base, grounded by the step's designs.
-/// Omits functions with a design that the knowledge base lacks, i.e. on whose availability the problem itself decides.
-/// Without a step, removes all objectives. Then analyzes the knowledge base and adds changes to `answers`, and also an
-/// error of the knowledge base. Does nothing without a knowledge base.
+/// Omits functions with a design on whose availability the problem decides instead of the knowledge base. Without a
+/// step, removes all objectives. Then analyzes the knowledge base. Adds the changes to `answers`, and also an error of
+/// the knowledge base. Does nothing without a knowledge base.
 pub(super) fn objectives(beliefs: &mut Beliefs, step: Option<&PlannedStep>, answers: &mut Vec<Answer>) {
     let mission = &beliefs.mission;
     let mut objectives_with_designs = step.map_or_else(Vec::new, |step| step.configuration.clone());
@@ -198,7 +198,8 @@ mod tests {
         }
     }
 
-    /// A report of the action implies its reconfiguration, but does not prove that no copy is on its way.
+    /// A report of the action implies its reconfiguration, but does not prove that no copy of the
+    /// reconfiguration is on its way.
     #[test]
     fn a_reconfiguration_supersedes_the_implied_one() {
         let (mut beliefs, mut answers) = (beliefs(), Vec::new());
@@ -211,7 +212,8 @@ mod tests {
             last.map(|effect| effect.supersedes.clone())
         };
         assert_eq!(superseded(&beliefs), Some(vec![1]));
-        // An acknowledgement proves it.
+        // After the acknowledgement of effect 3, no copy of an earlier reconfiguration can be on its way, so
+        // the next one supersedes none.
         let _ = beliefs.acknowledge(3);
         request(&mut beliefs, step("fd_amcl_kinect"), &mut answers);
         assert_eq!(superseded(&beliefs), Some(Vec::new()));

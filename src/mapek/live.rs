@@ -137,7 +137,8 @@ pub(super) fn first_steps(question: &Question<'_>) -> Option<Vec<(PlannedStep, F
     let mut first = Vec::new();
     for (mut step, change) in steps.into_iter().zip(advances) {
         let Ok(mut change) = change else { continue };
-        // The gate exists only in the shortened domain, and not in the planner's domain.
+        // The gate (fact that holds once the remainder has ended) exists only in the shortened domain, and not in the
+        // planner's domain.
         change.added.retain(|atom| atom.predicate.name.as_str() != GATE);
         // Without a metric, plans are measured by their number of steps.
         let one_step = BigRational::from_integer(1.into());

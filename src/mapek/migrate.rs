@@ -1,4 +1,5 @@
-//! Migration: moves a robot to another version of its mission without losing what it has reported.
+//! Migration: moves a robot to another version of its mission. What the robot has reported is kept, except for reports
+//! that the noise filters still hold back.
 //!
 //! Facts and values are merged three ways: those that differ from the initial state of the former version are taken from
 //! the robot, all others from the new version. The plan is not transferred, because the new version needs another one.
@@ -101,7 +102,7 @@ fn merged(
         };
         let name = record[0].to_string();
         match (former.get(&name), robot.remove(&name)) {
-            // The robot has another value than the former version, or the fact is false for it.
+            // The robot has another value than the former version. In the next arm, the fact is false for the robot.
             (before, Some(now)) if before != Some(&now) => init.extend(element_from_record(&now)),
             (Some(_), None) => {}
             _ => init.push(element.clone()),

@@ -65,8 +65,8 @@ impl Monitor {
         &self.filters
     }
 
-    /// Applies the changes of belief that filters make because of the time, e.g. reports that were held back and are
-    /// due now. Returns refusals of changes that do not fit the mission.
+    /// Applies the changes of belief that become due by the passage of time, e.g. reports that filters have held back.
+    /// Returns refusals of changes that do not fit the mission.
     pub(super) fn elapse(&mut self, beliefs: &mut Beliefs, changes: &mut Changes) -> Vec<Refusal> {
         let due = self.filters.elapse(&mut beliefs.filters, beliefs.now, &mut changes.filtered);
         let mut update = BeliefUpdate { monitor: self, beliefs, changes };

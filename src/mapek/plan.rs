@@ -49,8 +49,8 @@ pub(crate) struct Planner {
 }
 
 impl Planner {
-    /// Returns a recorded, prepared or cached outcome, or searches for a plan. If searches are forbidden, sets
-    /// `is_missing` and returns an outcome without a plan.
+    /// Returns an outcome that is recorded (for replay), prepared by another thread, or cached. Otherwise searches for
+    /// a plan. If searches are forbidden, sets `is_missing` and returns an outcome without a plan.
     pub fn plan(&mut self, question: &Question<'_>) -> Outcome {
         // Recorded and prepared outcomes have an order. Therefore, they are consumed even if the memo has the answer.
         let recorded = self.recorded.pop_front().or_else(|| self.prepared(question));

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 const MAX_SUPERSEDED: usize = 16;
 
 /// History of acknowledged and superseded reconfigurations, by function. A reconfiguration is superseded if a later
-/// request replaces it before the robot has acknowledged it.
+/// request replaces it before its acknowledgement, or if it is not acknowledged in time.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct Receipts {
     /// Whether any effect was acknowledged explicitly, by its number.

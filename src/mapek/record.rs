@@ -49,7 +49,7 @@ fn essence(mut answer: Value) -> Value {
             strip("objectives", "because");
         }
         "contradicted" => strip("contradictions", "facts"),
-        // Without a task plan, the reasons for a design are explanations, too.
+        // In the loop of `run --configure`, the reasons for a design are explanations, too.
         "reconfigure" | "unserved" => {
             if let Some(object) = answer.as_object_mut() {
                 object.remove("because");

@@ -45,8 +45,8 @@ pub trait Recoverable {
     /// Deliberates with the recorded `plans` instead of a search.
     fn deliberate_again(&mut self, plans: &[Value]) -> Vec<Self::Answer>;
 
-    /// Returns the journal's record of a reaction or deliberation: its answers, and the plans computed for them. Called
-    /// once after each of them.
+    /// Returns the journal's record of a reaction or deliberation: its answers, and the plans computed for them. Is
+    /// called once after each reaction or deliberation.
     fn decision(&mut self, answers: &[Self::Answer]) -> Decision;
 
     /// Returns the effects that were not acknowledged, for repetition after a restart.

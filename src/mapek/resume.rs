@@ -1,5 +1,5 @@
 //! Compiles the action under way into the PDDL domain, so that each plan of the remaining mission begins with the
-//! remainder of this action, under any designs.
+//! remainder of this action. The designs of the remainder are open.
 //!
 //! The paper (see [`crate::mapek`]) plans from the state in which the action has ended. Here, planning starts in the
 //! current state, with the remainder of the action as the first step. So the designs of all remaining steps are chosen
@@ -45,7 +45,7 @@ pub(crate) fn resume(domain: &Domain, running: &PlannedStep, done: &BigRational)
                 require(&mut copy, Condition::Equal(variable, constant, Span::default()));
             }
         }
-        // The gate opens only once, so that the remainder occurs exactly once.
+        // The copy requires that the gate fact does not hold, and adds this fact. So the remainder occurs exactly once.
         require(&mut copy, Condition::Not(Box::new(Condition::Atom(gate()))));
         open(&mut copy);
         // The copy comes first: among schemas with the same name, the first applicable one is used.

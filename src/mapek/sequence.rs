@@ -16,7 +16,7 @@ const MAX_RANGES: usize = 256;
 /// erroneous.
 const MAX_AHEAD: u64 = 1_000_000;
 
-/// Upper limit on the first sequence number.
+/// Upper limit on the sequence number of the first line.
 const MAX_FIRST: u64 = 1 << 62;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -163,7 +163,8 @@ pub struct Settings {
     /// is sought. Default: 5 s.
     pub settle: Duration,
     /// Time limit of one search for a plan. At the limit, the best plan found is used. A repetition after a search
-    /// without a proved outcome has twice the limit of that search, at most 8 times this limit. Default: 10 s.
+    /// without a proved outcome has twice the limit of that search, at most 8 times this limit. `None` for no limit.
+    /// Default: 10 s.
     pub time_limit: Option<Duration>,
     /// Whether to prefer, among optimal plans of equal length, one that shares most steps with the current plan. The
     /// choice then depends on the history, and not only on the situation.
@@ -172,8 +173,8 @@ pub struct Settings {
     pub filters: FilterSettings,
     /// Effect requested before planning if the action under way cannot continue unchanged: other designs or suspension.
     pub safe_reaction: SafeReaction,
-    /// Minimum time after which an unacknowledged effect, or an action without reports, is overdue. 0 disables
-    /// deadlines. Default: 10 s.
+    /// Time without acknowledgement after which an effect is overdue, and minimum time without a report after which an
+    /// action is overdue. 0 disables deadlines. Default: 10 s.
     pub deadline: Duration,
     /// Multiple of an action's expected duration after which the action is overdue if no report arrives. Default: 3.
     pub deadline_factor: f64,
@@ -193,8 +194,8 @@ impl Settings {
     /// in the file must occur in `knowledge`.
     ///
     /// # Errors
-    /// The file cannot be read or contains errors. Either all unknown keys, or the first wrong value, or all unknown
-    /// names are returned.
+    /// The file cannot be read or contains errors. Only the errors of one stage are returned: the first syntax error; or
+    /// all unknown keys and all values of a wrong type; or the first number that cannot be used; or all unknown names.
     pub fn read(file: &Path, knowledge: Option<&Knowledge>) -> Result<Self, Errors> {
         let (section, origin) = manifest::read::<Section>(file)?;
         let settings = section.adaptation.settings(&origin)?;
@@ -215,7 +216,7 @@ impl Settings {
         Errors::unless_empty(origin.quote(mistakes))
     }
 
-    /// Returns warnings, for `lint`, about settings with which sensor noise causes reconfigurations.
+    /// Returns warnings, for `lint`, about settings with which noise causes reconfigurations or searches.
     pub(crate) fn doubts(&self, knowledge: Option<&Knowledge>) -> Vec<Message> {
         let mut doubts = self.filters.doubts(knowledge);
         if self.settle.is_zero() && knowledge.is_some() {

@@ -135,7 +135,7 @@ impl PlannedStep {
             action: Name::new(&self.action),
             arguments: self.arguments.iter().map(|argument| Name::new(argument)).collect(),
             start: None,
-            // The duration was chosen by the planner. The validator computes it from the domain.
+            // The validator computes the duration from the domain, so the planner's duration is not passed.
             duration: None,
             line: 0,
         }

@@ -3,7 +3,7 @@
 //! The copy records each planning problem (*question*) with its outcome. The loop then uses the recorded outcomes
 //! without a search, provided that no observation has changed the question in the meantime. Progress of the action
 //! under way, ticks, and repeated reports do not change the question. After such progress, however, the plan is no
-//! longer reported as optimal.
+//! longer reported as optimal. Late plans can be used, too, if they fit the situation.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;

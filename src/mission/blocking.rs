@@ -20,9 +20,9 @@ use crate::mission::planning::ground_with;
 /// Reason why a mission is unsolvable.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Blocking {
-    /// Minimal set of unavailable designs, sorted by local name. The mission has no plan while all
-    /// of them are unavailable, even if every other design is available. If any one of them becomes
-    /// available, in addition to all other designs, it has a plan.
+    /// Minimal set of unavailable designs, sorted by local name. The mission has no plan while all of them are
+    /// unavailable, even if every other design is available. If any one of them becomes available, in addition to all
+    /// other designs, the mission has a plan.
     Designs(Vec<String>),
     /// Designs are not the reason: the mission has no plan even if every design is available.
     Other,

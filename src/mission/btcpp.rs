@@ -24,8 +24,8 @@ struct Node {
     ports: Vec<(String, String)>,
 }
 
-/// Returns the XML of a behaviour tree for a sequential plan. The plan's arguments must be as in
-/// the domain's file.
+/// Returns the XML of a behaviour tree for a sequential plan. The plan's arguments must be those of the domain's file,
+/// without the designs that the knowledge base has added.
 pub fn btcpp_text(mission: &Mission, plan: &Plan) -> String {
     let mut text = Vec::new();
     // Writing to memory does not fail.

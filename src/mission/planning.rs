@@ -119,7 +119,8 @@ pub(crate) fn ground_with(
 /// Returns a planner for problems that differ from `problem` only in their state and availability
 /// of designs. Returns `None` if the mission does not support this.
 pub(crate) fn replanner(mission: &Mission, problem: &Problem, limits: &Limits) -> Option<Replanner> {
-    // Narrowing depends on the facts of a problem, so each problem would need another domain.
+    // This domain is narrowed for planning. Narrowing depends on the facts of a problem, so each problem would need
+    // another domain.
     if mission.completed_predicates().is_some() {
         return None;
     }

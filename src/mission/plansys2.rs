@@ -24,8 +24,8 @@ pub struct PlanLine {
     pub duration: Exact,
 }
 
-/// Delays actions so that each action that starts after the end of another starts at least a thousandth after it. Equal
-/// actions get different starts. Returns the given plan if the delayed plan is invalid, or if a limit is reached.
+/// Delays actions so that each action that starts at or after the end of another starts at least a thousandth after it.
+/// Equal actions get different starts. Returns the given plan if the delayed plan is invalid, or if a limit is reached.
 #[must_use]
 pub fn spaced(mission: &Mission, problem: &Problem, plan: Plan, reading: &Reading, limits: &Limits) -> Plan {
     let mut later = plan.clone();

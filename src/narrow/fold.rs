@@ -1,5 +1,7 @@
-//! Partial evaluation of derived predicates: predicates that no action can change become initial facts. Other
-//! derived predicates get upper bounds, where possible.
+//! Partial evaluation of the derived predicates of a knowledge base's vocabulary: predicates that no action
+//! can change become initial facts. Others get upper bounds, where possible. A derived predicate outside of
+//! the vocabulary is included only if its axioms mention only included predicates and bind all their
+//! variables.
 //!
 //! The clauses of settled predicates, which no action can change (`settle`), have no negated atoms. Their
 //! extension is therefore the least fixpoint over the initial facts, the same set in every state. It is
@@ -74,8 +76,8 @@ impl Folded {
     }
 }
 
-/// Adds to `vocabulary` the predicates whose axioms mention only predicates of the vocabulary and
-/// bind all their variables. Other axioms, for example about maps, may have very large extensions.
+/// Adds to `vocabulary` the predicates whose axioms mention only predicates of the vocabulary and bind all their
+/// variables. Other predicates, for example about maps, may have very large extensions.
 fn with_small(axioms: &[(&Name, Option<Vec<Clause>>)], mut vocabulary: HashSet<Name>) -> HashSet<Name> {
     let is_small = |clauses: &[Clause], vocabulary: &HashSet<Name>| {
         let is_known = |part: &Literal| match part {

@@ -1,10 +1,10 @@
 //! Computes upper bounds on the extensions of derived predicates in all reachable states.
 //!
-//! An open predicate, which actions can change, stays derived. Its parameters have no types, but only facts
-//! that actions add can extend it, which often leaves few candidates. If its facts can be bounded, the
-//! predicate gets a companion `possible-…`: a static predicate that is true wherever the open predicate can be
-//! true. In every state, an atom of the predicate is equivalent to its conjunction with the companion's atom.
-//! With this conjunction, grounding enumerates few objects for each variable.
+//! An open predicate, which actions can change, stays derived. Its parameters have no types, so grounding would try all
+//! objects. Often few objects are possible, because only facts that actions add can extend the predicate. If these
+//! facts can be bounded, the predicate gets a companion `possible-…`: a static predicate that is true wherever the open
+//! predicate can be true. In every state, an atom of the predicate is equivalent to its conjunction with the
+//! companion's atom. With this conjunction, grounding enumerates few objects for each variable.
 
 use std::collections::{BTreeMap, BTreeSet};
 

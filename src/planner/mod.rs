@@ -67,12 +67,11 @@ pub struct Planner<'m, 'r> {
 }
 
 impl<'m, 'r> Planner<'m, 'r> {
-    /// Creates a planner for the mission's problem, filled with facts and values from the knowledge
-    /// base. By default, the planner has no limits and reports no improvements.
+    /// Creates a planner for the mission's problem, filled with facts and values from the knowledge base. By default,
+    /// the planner has no time limit and reports no improvements.
     ///
     /// # Errors
-    /// Facts or values from the knowledge base do not fit the domain; M110 if the knowledge is
-    /// inconsistent.
+    /// Facts or values from the knowledge base do not fit the domain; M110 if the knowledge is inconsistent.
     pub fn new(mission: &'m Mission) -> Result<Self, Errors> {
         consistent(mission.knowledge())?;
         let (problem, warnings) = mission.filled()?;
@@ -134,8 +133,8 @@ impl<'m, 'r> Planner<'m, 'r> {
         self
     }
 
-    /// Requests up to `most` further plans of the optimal cost, or none if `most` is `None`. Requires
-    /// sequential plans, a single objective, and numbers that are not too large for integers.
+    /// Requests up to `most` further plans of the optimal cost, or none if `most` is `None`. Requires sequential plans,
+    /// the problem's own metric, and numbers that are not too large for integers.
     #[must_use]
     pub fn alternatives(mut self, most: impl Into<Option<usize>>) -> Self {
         self.alternatives = most.into();
@@ -171,6 +170,9 @@ impl<'m, 'r> Planner<'m, 'r> {
         let several = objectives.metrics.len() > 1;
         match (&self.separation, self.alternatives) {
             (Some(_), Some(_)) => Err(apart("plans whose actions overlap have no alternatives")),
+            (None, Some(_)) if !self.minimize.is_empty() => Err(apart(
+                "alternatives are plans with the problem's own metric, so there can be no objectives",
+            )),
             (Some(_), None) if several => {
                 Err(apart("plans whose actions overlap have one objective; add several with weights"))
             }
@@ -245,11 +247,11 @@ impl<'m, 'r> Planner<'m, 'r> {
         let point = planner::lexicographic(&task, &config, &mut self.improvement_listener());
         let reading = Reading::sequential(task.is_timed());
         let alternatives = match self.alternatives {
-            Some(limit) => {
+            Some(limit) if point.solution.status == Status::Optimal => {
                 (self.stage)("the plan is proved optimal; searching for other equally good plans");
                 self.further_plans(&task, &point.solution, limit)?
             }
-            None => None,
+            _ => None,
         };
         let mut planned = self.planned(point, objectives, Ground::Integers(task), reading, ground)?;
         planned.alternatives = alternatives;

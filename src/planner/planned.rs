@@ -91,9 +91,9 @@ impl Planned<'_> {
         self.limits.reached()
     }
 
-    /// Returns the numeric fluents of the metric that the search did not minimise, in PDDL. Actions change them by
-    /// state-dependent amounts, which the search does not minimise if an action may improve the metric, with the SAT
-    /// solver alone, or with overlapping actions.
+    /// Returns, in PDDL, the numeric fluents of the metric that the search did not minimise. Actions change them by
+    /// amounts that depend on the state. The search does not minimise such fluents if an action may improve the metric,
+    /// if it uses only the SAT solver, or if actions overlap.
     pub fn not_minimised(&self) -> Vec<String> {
         // The search states a bound on the metric if it minimises the whole metric.
         if self.solution.lower_bound.is_some() || self.solution.status != Status::Feasible {

@@ -47,9 +47,8 @@ fn metric(scene: Scene<'_>, plan: &Plan, course: &Course, axis: Axis) -> Option<
     ((last - cost).abs() <= 1e-6 * cost.abs().max(1.0)).then_some(points)
 }
 
-/// Returns the cost of the plan after each step. The part of the cost that belongs to no step is
-/// added before the first step. If actions overlap, this part is the makespan, so it is spread
-/// evenly over time instead.
+/// Returns the cost of the plan after each step. The part of the cost that belongs to no step is added before the first
+/// step. If actions overlap, this part, such as the makespan, is spread evenly over time instead.
 fn spent(plan: &Plan, steps: &[Step], axis: Axis) -> Vec<(f64, f64)> {
     let costs = plan.steps.iter().map(|step| step.cost.to_f64());
     let remainder = plan.cost.to_f64() - costs.clone().sum::<f64>();

@@ -10,7 +10,7 @@ use crate::report::plan::drawn;
 use crate::report::positions::Positions;
 use crate::report::seen::{Designs, Scene, known_designs};
 
-/// Maximum number of drawn steps of a plan. Later steps appear as the plan advances.
+/// Maximum number of drawn steps of a plan. Further steps are only counted.
 const MAX_STEPS: usize = 500;
 
 /// Draws remaining plans of a loop. The designs of the mission and the coordinates of places do not

@@ -1,27 +1,25 @@
 //! Baseline strategies for comparison with the adaptation loop. Each baseline lacks a capability of the loop.
 //!
-//! All strategies receive the same observations as the loop, request actions in the same way, and
-//! use the same planner. They differ in when they plan and in how they choose designs:
+//! All strategies receive the same observations as the loop, request actions in the same way, and use the same planner.
+//! They differ in when they plan and in how they choose designs:
 //!
 //! - *none* executes its first plan, and stops when an action fails;
-//! - *failure* plans actions and designs together again after an action has failed, as PLANTA does
-//!   \[1\];
-//! - *greedy* chooses the design of each function separately: the admissible design with the lowest
-//!   cost of the next action. It chooses at each request of an action, and when a running action
-//!   loses a design. MROS chooses similarly: the design of greatest utility among those that no
-//!   failure or measurement excludes \[2\]. The task is planned again when an action has failed;
+//! - *failure* plans actions and designs together again after an action has failed, as PLANTA does \[1\];
+//! - *greedy* chooses the design of each function separately: the admissible design with the best metric of the next
+//!   action. It chooses at each request of an action, and when a running action loses a design. MROS chooses similarly:
+//!   the design of greatest utility among those that no failure or measurement excludes \[2\]. The task is planned
+//!   again when an action has failed;
 //! - *random* works as *greedy*, but chooses a random admissible design.
 //!
 //! All baselines except *none* also plan again if no step is left, the goal is not reached, and other designs are
 //! available than at the last planning.
 //!
-//! [`Admission`] defines which designs are admissible. If a function has no admissible design, the
-//! action keeps the planned design if that is available, and otherwise gets an available one; the
-//! action may become possible later. If the action is impossible with the chosen designs but
-//! possible with the designs of its plan, the planned designs are used.
+//! [`Admission`] defines which designs are admissible. If a function has no admissible design, the action keeps the
+//! planned design if that is available, and otherwise gets an available one; the action may become possible later. If
+//! the action is impossible with the chosen designs but possible with the designs of its plan, the planned designs are
+//! used.
 //!
-//! \[1\] Rezende Silva et al., PLANTA, 2025. \[2\] Bozhinoski et al., MROS, Advanced Robotics 36,
-//! 2022.
+//! \[1\] Rezende Silva et al., PLANTA, 2025. \[2\] Bozhinoski et al., MROS, Advanced Robotics 36, 2022.
 
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
@@ -147,8 +145,8 @@ impl Controller {
         self.plan = self.control.plan_anew().unwrap_or_default().into();
     }
 
-    /// Requests the next action of the plan if no action is running. If the plan is empty, the goal is not reached and
-    /// the available designs have changed, plans again first, except with [`Strategy::None`].
+    /// Requests the next action of the plan if no action is running. Plans again first if the plan is empty, the goal
+    /// is not reached, and the available designs have changed since the last planning; never with [`Strategy::None`].
     fn go_on(&mut self, answers: &mut Vec<Answer>) {
         if self.gave_up || self.control.beliefs().running().is_some() {
             return;
@@ -164,7 +162,7 @@ impl Controller {
             // A plan may exist if the availability of designs changes.
             self.replan();
             if let Some(step) = self.plan.pop_front() {
-                // The recursive call requests the step, and ends because the plan is not empty.
+                // The plan is not empty, so the recursive call requests the step and does not plan again.
                 self.plan.push_front(step);
                 self.go_on(answers);
             }

@@ -1,12 +1,10 @@
 //! Simulates missions with a robot model, to compare control strategies in the same world.
 //!
-//! An [`Experiment`] runs one mission until the goal is reached, the robot is lost, the strategy
-//! gives up, or the time budget is used up. The results are those of the mission (success, its
-//! metric), those that SUAVE reports \[1\], and the stability of the control (reconfigurations,
-//! distinct configurations).
+//! An [`Experiment`] runs one mission until the goal is reached, the robot is lost, the strategy gives up, or the time
+//! budget is used up. The results are the success and the metric of the mission, the figures that SUAVE reports \[1\],
+//! and the stability of the control (reconfigurations, distinct configurations).
 //!
-//! - \[1\] Rezende Silva et al., SUAVE: an exemplar for self-adaptive underwater vehicles, SEAMS
-//!   2023.
+//! - \[1\] Rezende Silva et al., SUAVE: an exemplar for self-adaptive underwater vehicles, SEAMS 2023.
 
 mod admissible;
 mod baseline;

@@ -50,7 +50,8 @@ pub struct Run {
     pub ending: Ending,
     /// Unit of the times of this result.
     pub time_unit: TimeUnit,
-    /// The mission's metric at the end.
+    /// Value of the mission's metric at the end, or the duration of the mission if there is no metric or its value is
+    /// undefined.
     pub cost: f64,
     /// Whether the metric is maximised.
     pub maximize: bool,
@@ -64,7 +65,7 @@ pub struct Run {
     pub cancelled: usize,
     /// Number of plans that were requested or computed.
     pub plans: usize,
-    /// Number of requested changes of a function from one design to another.
+    /// Number of requested reconfigurations, except those of functions whose previous design was unknown.
     pub reconfigurations: usize,
     /// Number of distinct configurations with which actions were requested.
     pub distinct: usize,
@@ -73,7 +74,8 @@ pub struct Run {
     pub reactions: Vec<f64>,
     /// Time at which the pipeline was found. `None` if it was not found.
     pub found: Option<f64>,
-    /// Inspected length of the pipeline. `None` if the mission does not inspect.
+    /// Inspected length of the pipeline. `None` if the simulation names no function for the length, or the function has
+    /// no value.
     pub distance: Option<f64>,
 }
 

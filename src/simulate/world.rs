@@ -1,10 +1,9 @@
-//! The simulated robot: its true state, which changes with time, by disturbances and by the running
-//! action.
+//! The simulated robot: its true state, which changes with time, by disturbances and by the running action.
 //!
 //! Conditions, durations and effects of actions follow the mission's own domain, with a seeded deviation of the
-//! duration. An action stalls while it is suspended, if its designs are not available, or if its conditions do not hold
-//! for the remaining part. It fails when it has stalled for the simulation's `patience`. The seed alone determines
-//! everything random, so all strategies face the same world.
+//! duration. An action stalls while it is suspended, and while its conditions, such as the availability of its designs,
+//! do not hold for its remaining part. It fails when it has stalled for the simulation's `patience`. The seed alone
+//! determines everything random, so all strategies face the same world.
 
 use num_rational::BigRational;
 use ontology::tomasys::change::Status;
@@ -101,7 +100,7 @@ impl World {
                 });
             }
         }
-        // Failures of different components are generated one component after the other.
+        // The changes were generated one component after the other.
         component_changes.sort_by(|left, right| left.time.total_cmp(&right.time));
         let times = settings
             .events

@@ -17,9 +17,10 @@ const POLL_INTERVAL: Duration = Duration::from_millis(5);
 /// Maximum number of characters of a run's standard error output that are stored.
 const MAX_MESSAGE_CHARACTERS: usize = 2000;
 
-/// Executes a run of a study with `program`, and waits for its end. Returns `None` if a limit is reached first; the run
-/// is killed in this case. The generator of the run's files is not subject to the limits, but its duration counts
-/// towards the time limit of the run.
+/// Executes a run of a study with `program`, and waits for its end. Returns `None` if a limit in `limits` is reached
+/// first; the run is killed in this case. If the study's time limit is reached, the run is killed, too, but a result is
+/// returned. The generator of the run's files is not subject to the limits, but its duration counts towards the time
+/// limit of the run.
 ///
 /// # Errors
 /// The program cannot be executed, or the generator of its files cannot be executed or fails.

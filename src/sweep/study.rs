@@ -341,7 +341,7 @@ impl Study {
         self.keys.iter().map(|(key, _)| (key.clone(), is_repetition(key))).collect()
     }
 
-    /// Returns the time limit of a run, in seconds.
+    /// Returns the time limit of a run in seconds, or `None` for no limit.
     pub fn time_limit(&self) -> Option<f64> {
         self.sections.time_limit
     }

@@ -15,11 +15,11 @@ pub struct Argument {
     pub format: String,
     /// Lower bounds on the remaining cost of states (admissible heuristics).
     pub potentials: Vec<Potential>,
-    /// Lower bounds on the value that a numeric variable needs for reaching the goal.
+    /// Lower bounds on the value that a numeric variable must have so that the goal can be reached.
     pub needs: Vec<Need>,
-    /// States that cover (dominate) every reachable state with a cost below the claim that no
-    /// potential or need prunes. None of these labels is a goal state with a smaller cost than
-    /// claimed.
+    /// The labels: states with the cost of reaching them. They cover (dominate) each reachable state that costs
+    /// less than the claim, unless a potential or a need prunes the state. No label is a goal state that costs
+    /// less than the claim.
     pub labels: Vec<Label>,
 }
 
@@ -35,8 +35,8 @@ pub struct Potential {
     pub values: Vec<Option<Integer>>,
 }
 
-/// A lower bound on the value of a numeric variable that is needed to reach the goal, as a function
-/// of a few variables.
+/// A lower bound on the value that a numeric variable must have so that the goal can be reached, as a function
+/// of the values of a few variables (a pattern).
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Need {
@@ -44,12 +44,11 @@ pub struct Need {
     pub number: u32,
     /// The variables of the pattern, as in [`Potential::pattern`].
     pub pattern: Vec<u32>,
-    /// The bound for each combination of values; ordered as in [`Potential::values`]. `null` means
-    /// that no goal state is reachable.
+    /// The bound for each combination of values, ordered as in [`Potential::values`]. `null` means that no goal
+    /// state is reachable.
     pub values: Vec<Option<Integer>>,
 }
 
-/// A reached state without its derived variables, and the cost of reaching the state: (values,
-/// numbers, cost).
+/// A state without its derived variables, and the cost of reaching the state: (values, numbers, cost).
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Label(pub Vec<u32>, pub Vec<Integer>, pub Integer);

@@ -1,5 +1,5 @@
-//! Checks an optimality proof (argument) against the ground task, by induction over the labels of
-//! the argument. Uses integer arithmetic only.
+//! Checks an optimality proof (argument) against the ground task, by induction over the steps of plans: the
+//! labels (states with costs) of the argument cover all states that matter. Uses integer arithmetic only.
 
 use std::rc::Rc;
 
@@ -22,7 +22,7 @@ const CHOICE_LIMIT: usize = 1 << 20;
 /// Upper limit on the number of pairwise comparisons of design combinations, summed over all
 /// operators; about 1 s of work.
 const COMPARISON_LIMIT: usize = 1 << 25;
-/// Work of enumerating one combination of designs, in comparisons.
+/// Work of enumerating one combination of designs, in units of one comparison.
 const COMBINATION_COST: usize = 2;
 
 /// Sizes of a checked optimality proof.
@@ -219,9 +219,9 @@ impl Checker<'_> {
         })
     }
 
-    /// Returns `true` if a label (state of the proof) or a lower bound proves that every plan through a
-    /// state, reached at cost `paid`, costs at least the claim. Without a claim, proves that there is no such
-    /// plan.
+    /// Returns `true` if a plan through a state, reached at cost `paid`, cannot be cheaper than the claim
+    /// (without a claim: cannot exist). This follows from a lower bound, or from a label (state of the proof)
+    /// that covers the state.
     fn is_covered(&self, state: &State, paid: &Integer) -> bool {
         let too_expensive = self.potentials.iter().any(|potential| match (potential.at(state), &self.cost) {
             (None, _) => true,
@@ -245,10 +245,10 @@ impl Checker<'_> {
 
 /// Returns the non-dominated combinations of designs of each operator.
 ///
-/// A combination dominates another one under three conditions. It costs no more, it satisfies every
-/// condition that the other satisfies, and it leaves every number at least as high (equal, if
-/// larger numbers may hurt). A label (state of the proof) that covers the successor by the
-/// dominating combination then also covers the successor by the dominated combination.
+/// A combination dominates another one if it costs no more, satisfies every condition that the other one
+/// satisfies, and leaves every number at least as high (equal, if larger numbers may hurt). A label (state of
+/// the proof) that covers the successor by the dominating combination then also covers the successor by the
+/// dominated one.
 fn choices(model: &Model, monotone: bool) -> Result<Vec<Rc<[Choice]>>, Fault> {
     let mut fronts: FxHashMap<_, Rc<[Choice]>> = FxHashMap::default();
     let mut count = 0_usize;
@@ -256,7 +256,7 @@ fn choices(model: &Model, monotone: bool) -> Result<Vec<Rc<[Choice]>>, Fault> {
     let mut choices = Vec::new();
     for operator in &model.operators {
         let quantities: Vec<_> = quantities(operator).collect();
-        // Operators with equal tables share a Pareto front.
+        // Operators with equal slots, exclusions, costs and numeric expressions share a Pareto front.
         let key = (operator.uses, operator.exclusions, &operator.cost, quantities.clone());
         let front = if let Some(known) = fronts.get(&key) {
             Rc::clone(known)
@@ -275,8 +275,8 @@ fn choices(model: &Model, monotone: bool) -> Result<Vec<Rc<[Choice]>>, Fault> {
     Ok(choices)
 }
 
-/// Computes the non-dominated combinations of designs of one operator, see [`choices`]. Adds the
-/// work to `comparisons`.
+/// Computes the non-dominated combinations of designs of one operator (see [`choices`]). Adds the work, in
+/// comparisons of two combinations, to `comparisons`.
 fn front(
     model: &Model,
     operator: &Operator,

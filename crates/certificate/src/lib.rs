@@ -1,25 +1,23 @@
 //! Checks optimality certificates of plans by integer arithmetic.
 //!
-//! The optimality proof is a closed set of labels \[1\]. A label is a state with the cost of
-//! reaching it. A label *covers* another state with the same variable values if this state costs no
-//! less and has no larger numbers (equal numbers, if larger numbers may hurt). *Potentials* are
-//! lower bounds on the remaining cost, as tables over a few variables. *Needs* are lower bounds on
-//! a required resource.
+//! The optimality proof is a closed set of labels \[1\]. A label is a state with the cost of reaching it. A
+//! label *covers* a state with the same values of variables if the state costs no less and has no larger
+//! numbers (equal numbers, if larger numbers may hurt). *Potentials* are lower bounds on the remaining cost, as
+//! tables over a few variables. *Needs* are lower bounds on numbers that are required to reach the goal.
 //!
-//! Three conditions are checked. The initial state is covered or pruned (by a potential or a need),
-//! no label is a goal state cheaper than the claim, and each successor of a label is covered or
-//! pruned. Then no plan of any length is cheaper than the claim, by induction over its steps. A
-//! claim without a cost states that the task has no plan.
+//! Three conditions are checked. The initial state is covered or pruned (by a potential or a need), no label is
+//! a goal state cheaper than the claim, and each successor of a label is covered or pruned. Then no plan of any
+//! length is cheaper than the claim, by induction over its steps. A claim without a cost states that the task
+//! has no plan.
 //!
 //! [`faithful()`] checks that a ground task is faithful to its PDDL files, without grounding them.
-//! [`check_refutation`] checks an additional proof for small tasks: a formula, its refutation, and
-//! a bound on the number of steps. [`verification_conditions`] exports the label proof to SMT
-//! solvers.
+//! [`check_refutation`] checks an additional proof for small tasks: a formula, its refutation, and a bound on
+//! the number of steps. [`verification_conditions`] exports the label proof to SMT solvers.
 //!
-//! Absent: planner code. The crate links no grounder, no search and no SAT solver.
+//! The crate contains no planner code: it links no grounder, no search and no SAT solver.
 //!
-//! \[1\] S. Eriksson, G. Röger, M. Helmert: Unsolvability certificates for classical planning,
-//! ICAPS 2017 (inductive sets); labels as in M. Desrochers, F. Soumis, INFOR 26(3), 1988.
+//! \[1\] S. Eriksson, G. Röger, M. Helmert: Unsolvability certificates for classical planning, ICAPS 2017
+//! (inductive sets); labels as in M. Desrochers, F. Soumis, INFOR 26(3), 1988.
 
 #![warn(
     clippy::cast_possible_truncation,

@@ -23,7 +23,7 @@ impl Model {
         self.basic as u32..self.variables.len() as u32
     }
 
-    /// Returns the value which means that no atom of a variable holds: the last one.
+    /// Returns the last value of a variable, which means that none of its atoms holds.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::arithmetic_side_effects,
@@ -104,7 +104,7 @@ impl Model {
     pub(super) fn quantity(&self, quantity: &Quantity, choice: &[u32], sizes: &[usize]) -> Integer {
         let mut sum = quantity.constant.clone();
         for (slots, table) in &quantity.tables {
-            // The row is the mixed-radix number of the chosen designs.
+            // The row is the number whose digits are the chosen designs (mixed radix).
             let mut row = 0;
             for slot in slots {
                 row = row * sizes[*slot as usize] + choice[*slot as usize] as usize;

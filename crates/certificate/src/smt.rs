@@ -16,11 +16,11 @@ use crate::integer::Integer;
 use crate::model::{Condition, Fact, Linear, Literal, Model, Operator, Quantity};
 
 /// Returns the verification conditions for a claim, as SMT-LIB text. The claim is interpreted as in
-/// [`crate::check`]. Returns `None` for tasks with derived variables, because their least fixpoints
-/// have no compact encoding.
+/// [`crate::check`]. Returns `None` for tasks with derived variables, because their least fixpoints have no
+/// compact encoding.
 ///
 /// # Errors
-/// A document is malformed.
+/// A document is malformed, or the claim is not integral in the units of the task.
 pub fn verification_conditions(
     task: &str,
     argument: &str,
@@ -72,7 +72,7 @@ fn literal((own, positive): &Literal) -> String {
     if *positive { fact(*own) } else { format!("(not {})", fact(*own)) }
 }
 
-/// Writes a query whether a state satisfies all assertions; `about` becomes a comment.
+/// Writes the query whether some state satisfies all assertions; `about` becomes a comment.
 fn question(text: &mut String, about: &str, declarations: &str, assertions: &[String]) {
     let _ = write!(text, "; {about}\n(push)\n{declarations}");
     for assertion in assertions {
@@ -122,8 +122,8 @@ impl Writer<'_> {
         let needs = self.argument.needs.iter().map(|need| self.exhausted(need));
         let labels = self.argument.labels.iter().map(|label| self.covers(label));
         let mut parts = any(potentials.chain(needs).chain(labels));
-        // An empty clause in the goal means that grounding found the goal unreachable; the
-        // invariant is then trivial.
+        // An empty clause in the goal means that grounding found the goal unreachable. The invariant is then
+        // simply true.
         if self.model.goal.clauses.iter().any(Vec::is_empty) {
             "true".clone_into(&mut parts);
         }

@@ -1,15 +1,14 @@
-//! Tables of lower bounds over the values of a few variables (abstraction heuristics), and the
-//! check that they are lower bounds.
+//! Tables of lower bounds over the values of a few variables (abstraction heuristics), and the check that they
+//! are lower bounds.
 //!
-//! A potential is a lower bound on the remaining cost under two conditions: it is at most 0
-//! wherever the goal can hold, and no operator decreases it by more than its cost.
+//! A potential is a lower bound on the remaining cost under two conditions: it is at most 0 wherever the goal
+//! can hold, and no operator decreases it by more than its cost.
 //!
-//! A need is a lower bound on the required value of a number under three conditions. Wherever the
-//! goal can hold, the need is at most the value that the goal requires. An operator that decreases
-//! the number, and requires that the number stays at least 0, decreases the need by at most the
-//! same amount. Every other change of the number occurs only where the need is 0, or leads from an
-//! infinite need to an infinite one. An operator may require more than it uses: `battery >= 5`
-//! suffices for a use of 4.
+//! A need is a lower bound on the required value of a number under three conditions. Wherever the goal can
+//! hold, the need is at most the value that the goal requires. An operator that never increases the number may
+//! decrease the need, but only by the amount by which it always decreases the number; if it can decrease the
+//! number, it must require that the number stays at least 0. Every other change of the number occurs only where
+//! the need is 0, or leads from an infinite need to an infinite one.
 
 use crate::integer::Integer;
 use crate::model::{Conditional, Fact, Linear, Literal, Model, Operator, Quantity};
@@ -114,9 +113,9 @@ impl<'t> Table<'t> {
         targets
     }
 
-    /// Calls `check` with the bounds before and after each abstract transition of each operator. An
-    /// operator whose condition and effects do not contain the pattern's variables is checked once.
-    /// Returns an error if `check` returns `false`.
+    /// Calls `check` with the bounds before and after each abstract transition of each operator. An operator
+    /// whose condition and effects do not contain the pattern's variables is checked only once. Returns an
+    /// error if `check` returns `false`.
     fn each_transition(
         &self,
         model: &Model,
@@ -160,10 +159,9 @@ pub(super) fn check_potential(model: &Model, table: &Table<'_>) -> Result<(), St
     })
 }
 
-/// The effect of an operator on a number, as far as it matters for needs (lower bounds on the
-/// number).
+/// The effect of an operator on a number, as far as it matters for needs (lower bounds on the number).
 enum Use {
-    /// Decreases the number by at least this amount (≥ 0). If the amount can be positive, requires
+    /// Decreases the number by at least this amount (≥ 0). If the number can decrease, the operator requires
     /// that the result is at least 0.
     Lowers(Integer),
     Other,

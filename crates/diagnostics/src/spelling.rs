@@ -1,11 +1,11 @@
 //! Spelling suggestions: finds the known name that is most similar to an unknown name.
 
-/// Returns the name in `known` with the smallest edit distance to `written`; among equally similar
-/// names, the first one. `None` if no name is similar enough.
+/// Returns the name in `known` with the smallest edit distance to `written`; among equally similar names, the
+/// first one. Returns `None` if no name is similar enough.
 ///
-/// Case does not matter, and a different order of the words counts as one edit. The maximum distance is a
-/// third of the letters of `written`, rounded down, but at least 1 and at most 3. For a single letter, only
-/// the same letter is returned, because it is similar to every other letter.
+/// Case does not matter, and a different order of the words counts as one edit. The maximum distance is a third
+/// of the letters of `written`, rounded down, but at least 1 and at most 3. For a single letter it is 0,
+/// because any other letter has the distance 1.
 pub fn nearest<'n>(written: &str, known: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
     let written = written.to_lowercase();
     let limit = match written.chars().count() {

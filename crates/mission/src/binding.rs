@@ -44,8 +44,8 @@ enum Query {
     /// Numeric function without parameters in a plain domain (without a type of designs): the sum
     /// of an attribute over the designs that are chosen for an action.
     Chosen(String),
-    /// Numeric function without parameters in a plain domain (without a type of designs): the sum of an
-    /// attribute over those designs chosen for an action that replace another design of their function.
+    /// Numeric function without parameters in a plain domain (without a type of designs): the sum of an attribute
+    /// over the newly chosen designs of an action, i.e. the designs that replace another design of their function.
     Reconfigured(String),
     /// Action schema of a plain domain (without a type of designs): the corresponding action of the
     /// knowledge base.
@@ -62,8 +62,8 @@ pub struct Bindings {
 }
 
 impl Bindings {
-    /// Returns the default bindings, overridden by the explicit bindings `own`. It maps PDDL symbols to queries, e.g.
-    /// `speed` to `measured:speed`.
+    /// Returns the default bindings, overridden by the explicit bindings `own`. `own` maps PDDL symbols to queries,
+    /// e.g. `speed` to `measured:speed`.
     ///
     /// ```
     /// use std::collections::BTreeMap;
@@ -147,8 +147,8 @@ impl Bindings {
         }
     }
 
-    /// Returns the attribute whose sum over the chosen designs is the value of a function.
-    /// Considers only explicit bindings.
+    /// Returns the attribute whose sum over the chosen designs is the value of the numeric function `name`,
+    /// according to an explicit binding.
     pub(super) fn chosen(&self, name: &Name) -> Option<String> {
         match self.own.get(name) {
             Some(Query::Chosen(attribute)) => Some(attribute.clone()),
@@ -156,8 +156,8 @@ impl Bindings {
         }
     }
 
-    /// Returns the attribute whose sum over the newly chosen designs is the value of a function.
-    /// Considers only explicit bindings.
+    /// Returns the attribute whose sum over the newly chosen designs (those that replace another design) is the
+    /// value of the numeric function `name`, according to an explicit binding.
     pub(super) fn reconfigured(&self, name: &Name) -> Option<String> {
         match self.own.get(name) {
             Some(Query::Reconfigured(attribute)) => Some(attribute.clone()),
@@ -243,9 +243,9 @@ fn parse_query(symbol: &str, query: &str) -> Result<Query, String> {
 /// the domain. Returns warnings and errors.
 ///
 /// Availability facts of the problem are removed with a warning, except those about the designs `own`, whose
-/// availability the problem decides. Values that the problem states take precedence. Symbols for which
-/// `stands` returns `true` count as declared, because the explicit form of a plain domain (with design
-/// parameters) does not have them.
+/// availability the problem decides. Values that the problem states take precedence. Bound symbols that the domain
+/// does not declare cause a warning, except those for which `stands` returns `true`: functions that the explicit
+/// form of a plain domain (with design parameters) replaces.
 pub(super) fn fill(
     domain: &Domain,
     problem: &mut Problem,
@@ -366,8 +366,8 @@ impl Fill<'_> {
                 format!("the problem's own `{predicate}` facts are ignored: the knowledge base decides{but}");
             self.warnings.push(Message::warning("M202", text));
         }
-        // After failed inference no design may count as available: an unknown failure must not be
-        // planned with.
+        // After failed inference, no design counts as available, because a design may have failed whose failure is
+        // not known yet.
         let is_known = self.is_known;
         for design in self.known.designs().iter().filter(|design| is_known && design.available) {
             self.fact(predicate, &[&design.individual.name]);

@@ -71,8 +71,8 @@ impl Naming {
         self.individual.contains('*')
     }
 
-    /// Returns the object name that this entry gives to an individual. `name` is a local name or
-    /// IRI. `None` if the entry does not apply.
+    /// Returns the object name that this entry gives to the individual with the local name or IRI `name`. `None` if
+    /// the entry does not apply.
     pub(crate) fn call(&self, name: &str) -> Option<String> {
         let Some((head, tail)) = self.individual.split_once('*') else {
             return (self.individual == name).then(|| self.object.clone());

@@ -1,4 +1,4 @@
-//! Lints: legal but suspicious missions, which adapt less than their authors expect. Most of these
+//! Lints: warnings about legal but suspicious missions, which adapt less than their authors expect. Most of these
 //! lints report names that occur only in the knowledge base or only in the PDDL files.
 
 use std::collections::BTreeSet;

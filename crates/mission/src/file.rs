@@ -17,7 +17,7 @@ mod output;
 /// Error code for a file of an unexpected kind.
 pub(crate) const CODE: &str = "M131";
 
-/// Limit on the size of the files that `read` reads, in bytes. It does not apply to standard input.
+/// Limit on the size of the files that `read` reads, in bytes. The limit does not apply to standard input.
 const LARGEST: u64 = 1 << 28;
 
 /// Reads a regular file.
@@ -118,12 +118,12 @@ fn is_toml(line: &str) -> bool {
     }
 }
 
-/// Checks that a text is of the expected kind. A text of unknown kind may be a malformed text of the expected
-/// kind. It is accepted as PDDL if it begins with a parenthesis, as a manifest if it does not, and always as
-/// a knowledge base. An empty text is accepted.
+/// Checks that a text is of the expected kind. A text of unknown kind may be a malformed text of the expected kind.
+/// Such a text is accepted as PDDL if it begins with a parenthesis, as a manifest if it does not, and always as a
+/// knowledge base. An empty text is accepted.
 ///
 /// # Errors
-/// Names the detected kind and a remedy. The text itself is not quoted.
+/// Names the detected kind and, for common mistakes, a remedy. The text itself is not quoted.
 pub fn expect(kind: Kind, file: &str, text: &str) -> Result<(), Message> {
     let detected = Kind::of(text);
     // A text that begins with a parenthesis may be malformed PDDL. The parser then reports a more
@@ -198,8 +198,8 @@ pub(crate) fn quoted(messages: Vec<Message>) -> Vec<Message> {
     messages.into_iter().map(quoted).collect()
 }
 
-/// Returns `true` if a file begins like a knowledge base, or cannot be read. No message can quote the content
-/// of an unreadable file.
+/// Returns `true` if a file begins like a knowledge base, is empty, or cannot be read. No message can quote the
+/// content of an unreadable file.
 fn is_knowledge(path: &Path) -> bool {
     let Ok(file) = std::fs::File::open(path) else { return true };
     let mut bytes = Vec::new();

@@ -40,8 +40,9 @@ impl Mission {
     /// Joins a domain and a problem with a knowledge base, if there is one.
     ///
     /// # Errors
-    /// Errors of the knowledge base, the domain, the problem and the bindings. Names and bindings are checked
-    /// only if the files have no errors.
+    /// Errors of the knowledge base, files of another kind, and syntax errors of the domain and the problem.
+    /// Without such errors: errors of `[bindings.names]`, required functions without a common design, and errors of
+    /// co-adaptation. Symbols and types of PDDL are not checked; see [`Mission::filled`].
     pub fn new(
         name: &str,
         knowledge: Option<Result<Knowledge, Errors>>,
@@ -149,7 +150,8 @@ impl Mission {
     /// Marks a component of the knowledge base as failed.
     ///
     /// # Errors
-    /// The knowledge base has no such component, or the mission has no knowledge base.
+    /// The knowledge base has no such component, inference exceeds its limits, or the mission has no knowledge
+    /// base.
     pub fn fail(&mut self, component: &str) -> Result<(), Message> {
         self.current.take();
         match &mut self.knowledge {
@@ -185,7 +187,8 @@ impl Mission {
     /// warnings.
     ///
     /// # Errors
-    /// The contributions of the knowledge base do not fit the domain.
+    /// The domain or the filled problem has errors, for example undeclared symbols, or contributions of the
+    /// knowledge base that do not fit the domain.
     pub fn filled(&self) -> Result<(Problem, Vec<Message>), Errors> {
         let _span = info_span!("fill").entered();
         let mut problem = self.problem.clone();
@@ -223,8 +226,8 @@ impl Mission {
         self.planta.as_ref().map(Planta::known)
     }
 
-    /// Rewrites a condition for display: in the explicit form of a plain domain, the predicate that a design
-    /// meets a quality bound is replaced by `(meets DESIGN BOUND)`.
+    /// Rewrites a condition for display. In the explicit form of a plain domain, an atom which states that a design
+    /// meets a quality bound becomes `(meets DESIGN BOUND)`.
     pub fn spoken(&self, condition: &str) -> String {
         self.adaptation
             .as_ref()

@@ -132,8 +132,8 @@ impl Message {
         Self(Box::new(details))
     }
 
-    /// Adds the source line of the message as an excerpt. `text` is the content of the message's
-    /// file.
+    /// Adds the source line of the message as an excerpt, if the message has a line and a column. `text` is the
+    /// content of the message's file.
     #[must_use]
     pub fn with_source(mut self, text: &str) -> Self {
         let details = &mut *self.0;

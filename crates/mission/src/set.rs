@@ -19,8 +19,8 @@ impl Mission {
     ///   replaces all facts that differ in the last argument only.
     ///
     /// # Errors
-    /// No case matches, a value is not a decimal number, an attribute is only estimated, or the knowledge
-    /// base decides on the availability of the design.
+    /// No case matches, a value is not a decimal number, an attribute is only estimated, inference exceeds its
+    /// limits, or the knowledge base decides on the availability of the design.
     pub fn set(&mut self, name: &str, value: &str) -> Result<(), Message> {
         self.current.take();
         let value = value.trim();
@@ -38,8 +38,8 @@ impl Mission {
         self.set_in_problem(name, value).map(|_| ())
     }
 
-    /// Sets a numeric function or fact of the problem. Like [`Mission::set`], but ignores the
-    /// measured attributes of the knowledge base. Returns `false` if the initial state already has this value or fact.
+    /// Sets a numeric function or fact of the problem. Like [`Mission::set`], but ignores the measured attributes
+    /// of the knowledge base. Returns `false` if the initial state already agrees with the setting.
     ///
     /// # Errors
     /// No symbol of the problem matches, a value is not a decimal number, or the knowledge base decides on
@@ -123,7 +123,8 @@ impl Mission {
         true
     }
 
-    /// Returns `true` if the initial state has an element that fits `is_target`, and all of these fit `is_equal`.
+    /// Returns `true` if the initial state has elements that fit `is_target`, and all these elements fit
+    /// `is_equal`.
     fn has_only(
         &self,
         is_target: impl Fn(&InitialElement) -> bool,

@@ -250,8 +250,8 @@ pub enum Trajectory {
 pub enum ActionBody {
     /// `:action`.
     Instantaneous {
-        /// `:precondition` without its preferences, together with the conditions that object fluents in the
-        /// effect impose. An empty conjunction without constraints.
+        /// `:precondition` without its preferences, together with the conditions that object fluents in the effect
+        /// impose. An empty conjunction if there are no such conditions.
         precondition: Condition,
         /// `:effect`.
         effect: Effect,
@@ -268,7 +268,7 @@ pub enum ActionBody {
     },
 }
 
-/// `([at start|at end] (OPERATOR ?duration EXPRESSION))`.
+/// `(OPERATOR ?duration EXPRESSION)`, or the same in `(at start …)` or `(at end …)`.
 #[derive(Debug, Clone)]
 pub struct DurationConstraint {
     /// Time at which the expression is evaluated. Default: `AtStart`.
@@ -423,8 +423,8 @@ pub enum Effect {
     Delete(Atom),
     /// `(forall (…) …)`.
     ForAll(Vec<TypedName>, Box<Effect>),
-    /// `(when CONDITION EFFECT)`. In a durative action, both the condition and the effect have the time of
-    /// the effect's entry in [`ActionBody::Durative`].
+    /// `(when CONDITION EFFECT)`. In a durative action, condition and effect have the same time, which is stored
+    /// with the effect in [`ActionBody::Durative`].
     When(Condition, Box<Effect>),
     /// A numeric effect.
     Assign(Assignment, Atom, Expression, Span),
@@ -495,7 +495,7 @@ impl InitialElement {
 pub struct Metric {
     /// Direction of optimisation.
     pub direction: Direction,
-    /// Expression to optimise. Its value is that in the final state of a plan.
+    /// Expression to optimise. The expression is evaluated in the final state of a plan.
     pub expression: Expression,
     /// Extent of the whole metric.
     pub span: Span,

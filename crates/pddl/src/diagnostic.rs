@@ -1,7 +1,7 @@
 //! Diagnostics and their display: the source line, a caret, and a suggested correction.
 //!
-//! Codes are stable. P100 to P119 concern the form of a file, P120 to P149 names and types, P150 the text of
-//! a plan.
+//! Codes are stable. P100 to P119 mostly concern the form of a file, P120 to P149 mostly names and types, and P150
+//! the text of a plan.
 
 use std::error::Error;
 use std::fmt;
@@ -43,7 +43,7 @@ impl Severity {
 pub struct Diagnostic {
     /// Stable code `P1xx`.
     pub code: &'static str,
-    /// Severity of a diagnostic.
+    /// Severity: error or warning.
     pub severity: Severity,
     /// Description of the problem: one sentence without full stop.
     pub message: String,
@@ -137,9 +137,8 @@ impl Diagnostic {
     }
 }
 
-/// Number of diagnostics after which a [`Sink`] only counts. One more is stored; if others follow, the
-/// message P119 with the number of omitted diagnostics replaces it. A file in another language would produce
-/// very many.
+/// Limit on the number of diagnostics of one file. One more diagnostic is still stored; if there are several more,
+/// the message P119 with their number is stored instead. A file in another language would produce very many.
 const MAX_DIAGNOSTICS: usize = 200;
 
 #[derive(Debug)]
@@ -201,8 +200,8 @@ impl<'s> Sink<'s> {
         self.diagnostics.len() + self.beyond_limit
     }
 
-    /// Returns `true` if more than [`MAX_DIAGNOSTICS`] diagnostics are stored. Further ones are only counted,
-    /// so suggestions need not be computed.
+    /// Returns `true` if more than [`MAX_DIAGNOSTICS`] diagnostics are stored. Further diagnostics are then only
+    /// counted, so suggestions for them need not be computed.
     pub(crate) fn is_full(&self) -> bool {
         self.diagnostics.len() > MAX_DIAGNOSTICS
     }

@@ -19,7 +19,7 @@ pub struct Excerpt {
     message: String,
 }
 
-/// Maximum number of bytes of a line that are shown before and after the beginning of the marked range.
+/// Maximum number of bytes that an excerpt contains on each side of the beginning of the marked range.
 const CONTEXT: usize = 150;
 
 #[expect(

@@ -3,8 +3,7 @@
 //! The parser accepts the extensions of real files, with a warning where they deviate from the standard, and
 //! continues after an error. [`validate`] executes plans on the syntax tree with exact rational numbers.
 //!
-//! Absent: grounding, solvers, and the file system.
-//!
+//! The crate contains neither grounding nor solvers, and does not access the file system.
 #![doc = include_str!("../README.md")]
 #![warn(
     clippy::cast_possible_truncation,

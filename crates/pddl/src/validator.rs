@@ -33,7 +33,7 @@ pub struct Validator<'a> {
 }
 
 impl<'a> Validator<'a> {
-    /// Creates a validator for sequential plans with exact durations.
+    /// Creates a validator for sequential plans, with the default tolerance of [`Options`].
     pub fn new(domain: &'a Domain, problem: &'a Problem) -> Self {
         Self { domain, problem, options: Options::default() }
     }

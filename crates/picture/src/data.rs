@@ -92,8 +92,8 @@ pub struct Map {
 pub struct Place {
     /// Name of the place.
     pub name: String,
-    /// Coordinates: x increases to the right, y increases upwards. If coordinates are missing, the
-    /// places are laid out by their ways.
+    /// Coordinates: x increases to the right, y increases upwards. If a place of a map has none, all its places are
+    /// laid out by their ways.
     pub position: Option<(f64, f64)>,
     /// Whether an object is at the place initially.
     pub is_start: bool,
@@ -128,7 +128,7 @@ pub struct Design {
     pub needs: Vec<String>,
     /// The numbers of the steps of the plan that use the design, from 1.
     pub steps: Vec<usize>,
-    /// Derivation of why the design is available or unavailable.
+    /// Derivations that explain why the design is available or unavailable.
     pub because: Vec<Reason>,
 }
 
@@ -241,7 +241,7 @@ impl Kind {
     }
 }
 
-/// The contents of a page for an answer other than a single plan.
+/// The contents of a page for an answer other than a single plan, such as a Pareto front.
 #[derive(Debug, Clone, Default)]
 pub struct Sheet {
     /// Name of the subject of the page.

@@ -25,9 +25,9 @@ pub(crate) struct Canvas {
     /// Whether the names of rows are above the rows instead of to their left, which leaves more
     /// width for the drawing.
     pub(crate) has_names_above: bool,
-    /// Minimum width of a step of a plan.
+    /// Minimum average width of the steps of a plan.
     pub(crate) step: f64,
-    /// Minimum distance of neighbouring places of a map.
+    /// Intended minimum distance of neighbouring places of a map.
     pub(crate) apart: f64,
 }
 

@@ -1,9 +1,9 @@
 //! Graph layout for places without coordinates. Distances in the picture approximate the lengths of
 //! shortest paths, in numbers of ways.
 //!
-//! The method is stress majorization (E. Gansner, Y. Koren, S. North: Graph drawing by stress
-//! majorization, GD 2004). The start layout is deterministic: coordinates are path lengths from two
-//! places far apart, and from a third place far from both.
+//! The method is stress majorization (E. Gansner, Y. Koren, S. North: Graph drawing by stress majorization, GD
+//! 2004). The start layout is deterministic: its coordinates follow from the path lengths from two places far
+//! apart, and from a third place far from both.
 
 use std::collections::VecDeque;
 

@@ -21,8 +21,8 @@ const MARGIN_PART: f64 = 0.12;
 const UPPER_MARGIN: f64 = 35.0;
 /// Height of a map of a single place without its margins, in pixels.
 const LEAST_HEIGHT: f64 = 60.0;
-/// Height to which a map is scaled at most, unless its places are then too close to each other, in
-/// pixels.
+/// Upper limit on the height of a map, in pixels. A map is higher if its places would otherwise be too close to
+/// each other.
 const HEIGHT: f64 = 420.0;
 /// Upper limit on the length of short ways (5 % quantile) in pixels, which keeps small maps small.
 const FARTHEST: f64 = 130.0;
@@ -64,7 +64,7 @@ struct Leg {
     shape: Shape,
 }
 
-/// The drawing of a leg: a line, or a loop around `centre`, with an arrow.
+/// The drawing of a leg (all moves from one place to another): a line, or a loop around `centre`, with an arrow.
 struct Shape {
     line: Line,
     centre: Option<Point>,
@@ -183,15 +183,15 @@ fn looped((x, y): Point, neighbours: &[Point]) -> Shape {
     Shape { line: (centre, arrow), centre: Some(centre), arrow, along: (-dy, dx), outwards: (dx, dy) }
 }
 
-/// Formats the step numbers of a leg; at most three numbers are listed.
+/// Formats the numbers of the steps that move along a leg; at most three numbers are listed.
 fn numbers(leg: &Leg) -> String {
     let numbers: Vec<String> = leg.steps.iter().take(3).map(ToString::to_string).collect();
     numbers.join(",") + if leg.steps.len() > 3 { "…" } else { "" }
 }
 
-/// Finds a position for the step numbers of a leg and marks it as occupied. The position is nearer
-/// to the leg's arrow than to all other arrows, overlaps nothing, and crosses no line if possible.
-/// Returns the left end of the base line, or `None` if no position is free.
+/// Finds a position for the step numbers of a leg (all moves from one place to another) and marks it as occupied.
+/// The position is nearer to the leg's arrow than to all other arrows, overlaps nothing, and crosses no line if
+/// possible. Returns the left end of the base line, or `None` if no position is free.
 fn number(
     leg: &Leg,
     legs: &[Leg],

@@ -56,8 +56,8 @@ pub(crate) fn clean(text: &str) -> String {
     text.chars().map(|character| if allowed(character) { character } else { '\u{fffd}' }).collect()
 }
 
-/// Formats the previous design of a function whose design has changed; `before` is empty if it is
-/// unknown.
+/// Formats the note that the design of a function has changed, such as ` (changed, before: d1)`. `before` is the
+/// previous design, or empty if it is unknown.
 pub(crate) fn alternative(before: &str) -> String {
     if before.is_empty() { " (changed)".to_owned() } else { format!(" (changed, before: {before})") }
 }

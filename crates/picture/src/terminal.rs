@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use crate::data::{Axis, Plan, Step};
 use crate::scale::number;
 
-/// Minimum number of columns of a picture.
+/// Minimum number of columns of a picture, including the names of its rows.
 const LEAST: usize = 60;
 /// Minimum number of columns of a step in a picture that is to scale.
 const COLUMN: usize = 4;

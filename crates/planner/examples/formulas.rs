@@ -1,8 +1,7 @@
-//! Plans with the SAT solver only, and prints its statistics. Usage: `formulas DOMAIN PROBLEM SOLVER STRATEGY
-//! SECONDS`.
+//! Plans with the SAT solver only. Usage: `formulas DOMAIN PROBLEM SOLVER STRATEGY SECONDS`.
 //!
-//! Prints one line with the status, cost, lower bound, steps, number of solver calls, conflicts and seconds.
-//! Used to compare strategies.
+//! Prints one line with the status, cost, lower bound, horizon (number of steps), number of solver calls, number of
+//! conflicts, and seconds. Used to compare strategies.
 
 #![allow(clippy::print_stdout)]
 

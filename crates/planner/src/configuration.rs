@@ -1,17 +1,17 @@
 //! Optimal selection of designs without a plan, for functions that compete for components or share budgets.
 //!
-//! The best assignment serves as many functions as possible, then violates the fewest requirements, and then
-//! has the greatest sum of utilities. Ties are broken in favour of earlier designs of earlier functions. The
-//! three criteria are combined into one integer, the worth: an additional served function outweighs all
-//! requirements, and one requirement outweighs all utilities. A component that only one design can use is
+//! The best assignment serves as many functions as possible, then violates the fewest requirements, and then has
+//! the greatest sum of utilities. Ties are broken in favour of earlier designs of earlier functions. The three
+//! criteria are combined into one integer, the *worth* of an assignment: an additional served function outweighs
+//! all requirements, and one requirement outweighs all utilities. A component that only one design can use is
 //! modelled as a budget of 1.
 //!
-//! The algorithm is dynamic programming over the functions with dominance pruning. A partial assignment is
-//! pruned in three cases: another partial assignment has at least its worth and consumes no more of any
-//! budget; no completion respects the budgets; or an upper bound on its completions is less than the best
-//! known worth. The upper bound is a Lagrangian relaxation of the budgets, which is valid for any multipliers
-//! \[1\]. A subgradient method computes good multipliers in floating-point arithmetic \[2\]. They are then
-//! rounded, and the bound is evaluated exactly.
+//! The algorithm is dynamic programming over the functions with dominance pruning. A partial assignment is pruned
+//! in three cases: another one for these functions has at least its worth and consumes no more of any budget; no
+//! completion respects the budgets; or an upper bound on its completions is less than the best known worth. The
+//! upper bound is a Lagrangian relaxation of the budgets, which is valid for any multipliers
+//! \[1\]. A subgradient method computes good multipliers in floating-point arithmetic \[2\]. The multipliers are
+//! then rounded, and the bound is evaluated exactly.
 //!
 //! - \[1\] H. Everett: Generalized Lagrange Multiplier Method for Solving Problems of Optimum Allocation of
 //!   Resources, Operations Research 11(3), 1963.
@@ -58,10 +58,10 @@ pub struct Assignment {
     pub optimal: bool,
 }
 
-/// Computes the best assignment of designs to functions that respects the budgets and uses each exclusive
-/// component at most once. The best assignment serves the most functions, then violates the fewest
-/// requirements, then has the greatest utility; among equals, earlier designs are preferred. At a limit,
-/// returns the best known assignment. If no assignment respects the budgets, no design is selected.
+/// Computes the best assignment of designs to functions that respects the budgets and uses each exclusive component
+/// at most once. The best assignment serves the most functions, then violates the fewest requirements, then has the
+/// greatest utility; among equals, earlier designs are preferred. At a limit, returns the best known assignment. If
+/// no assignment that respects the budgets is found, no design is selected.
 pub fn configure(functions: &[Vec<DesignChoice>], budgets: &[BigRational], limits: &Limits) -> Assignment {
     let problem = Problem::new(functions, budgets);
     let (prices, incumbent) = problem.prices();
@@ -91,7 +91,7 @@ struct Problem {
     least: Vec<Vec<BigInt>>,
 }
 
-/// A partial assignment: selected designs of the first functions.
+/// A partial assignment: the selected designs of the functions up to some index.
 #[derive(Clone, Default)]
 struct Label {
     designs: Vec<Option<usize>>,
@@ -117,10 +117,12 @@ impl Label {
     }
 }
 
-/// Lagrangian multipliers of the budgets in units of 2^-`PRICE_BITS`, and the resulting upper bounds.
+/// Lagrangian multipliers (prices) of the budgets, and upper bounds on the worth that remains after paying these
+/// prices. Both are in units of 2^-`PRICE_BITS`.
 struct LagrangeMultipliers {
     each: Vec<BigInt>,
-    /// For each function: upper bound on the worth of this and all later functions. A final entry is 0.
+    /// For each function: greatest sum of the reduced worths (worth minus priced demands) of this and all later
+    /// functions, of which each contributes at least 0. A final entry is 0.
     after: Vec<BigInt>,
 }
 
@@ -186,16 +188,16 @@ impl Problem {
         Label { spent: vec![BigInt::zero(); self.budgets.len()], ..Label::default() }
     }
 
-    /// Returns `true` if, for each budget separately, the functions from index `from` on can stay within the
-    /// budget.
+    /// Returns `true` if the functions from index `from` on have designs that stay within each budget, considered
+    /// separately.
     fn fits(&self, label: &Label, from: usize) -> bool {
         let Some(least) = self.least.get(from) else { return true };
         let ahead = label.spent.iter().zip(least).map(|(spent, least)| spent + least);
         ahead.zip(&self.budgets).all(|(spent, budget)| spent <= *budget)
     }
 
-    /// Assigns to each function in turn the design with the highest preference that fits the remaining
-    /// budgets, if there is one. If the result violates a budget, no function is served.
+    /// Assigns to each function in turn the most preferred design that leaves enough of each budget, if there is
+    /// one. If the result violates a budget, no function is served.
     fn greedy(&self, preference: impl Fn(&Item) -> f64) -> Label {
         let mut label = self.nothing();
         for (at, designs) in self.functions.iter().enumerate() {
@@ -213,8 +215,8 @@ impl Problem {
         self.functions.iter().fold(self.nothing(), |label, _| label.with(None, None))
     }
 
-    /// Computes good multipliers by a subgradient method, which lowers the upper bound. Also returns the best
-    /// assignment found by greedy selection along the way.
+    /// Computes multipliers with a low upper bound by a subgradient method. Also returns the best assignment found
+    /// by greedy selection along the way.
     #[expect(clippy::cast_possible_truncation, reason = "rounding is meant; bounds hold for whatever prices")]
     fn prices(&self) -> (LagrangeMultipliers, Label) {
         let float = |number: &BigInt| number.to_f64().unwrap_or(f64::MAX);
@@ -282,7 +284,7 @@ impl Problem {
         (&label.worth << PRICE_BITS) + paid + prices.after.get(from).cloned().unwrap_or_default()
     }
 
-    /// Finds the best assignment. `incumbent` is a feasible assignment, whose worth is used for pruning.
+    /// Finds the best assignment. Partial assignments that cannot reach the worth of `incumbent` are pruned.
     fn search(
         &self,
         prices: &LagrangeMultipliers,
@@ -394,7 +396,7 @@ mod tests {
         for round in 0..3000 {
             let (functions, budgets) = random(&mut draw);
             let chosen = configure(&functions, &budgets, &Limits::none());
-            // If a budget is negative, `configure` selects no design.
+            // With a negative budget, perhaps no assignment is feasible.
             if budgets.iter().any(|budget| *budget < BigRational::zero()) {
                 continue;
             }
@@ -457,8 +459,8 @@ mod tests {
         }
     }
 
-    /// Solves the multiple-choice knapsack problem by dynamic programming over amounts. Returns the number of
-    /// served functions and the utility.
+    /// Solves the multiple-choice knapsack problem by dynamic programming over the amounts of the budget. Returns
+    /// the number of served functions and the utility.
     fn by_amounts(functions: &[Vec<(i64, usize)>], budget: usize) -> (usize, i64) {
         let mut best = vec![(0, 0); budget + 1];
         for designs in functions {

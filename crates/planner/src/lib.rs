@@ -1,7 +1,7 @@
 //! Finds plans of PDDL tasks and proves their optimality: a portfolio of heuristic search and SAT, multiple
 //! objectives, alternative plans, replanning, certificates, and the selection of designs without a plan.
 //!
-//! Absent: OWL. The availability of designs is part of the problem as facts.
+//! The crate does not use OWL. The problem states as facts which designs are available.
 
 #![warn(
     clippy::cast_possible_truncation,

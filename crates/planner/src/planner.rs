@@ -54,8 +54,8 @@ impl<'a> Planner<'a> {
         Self { domain, problem, grounding, config, report: Box::new(|_| ControlFlow::Continue(())) }
     }
 
-    /// Sets a time limit, counted from now and including grounding. At the limit, the best known plan is
-    /// returned, or during grounding an error.
+    /// Sets a time limit, counted from now and including grounding. At the limit, the best known plan is returned;
+    /// if grounding is not finished, an error.
     #[must_use]
     pub fn time_limit(self, time: Duration) -> Self {
         let limits = self.config.limits.clone().with_time(time);
@@ -69,7 +69,8 @@ impl<'a> Planner<'a> {
         self.limits(limits)
     }
 
-    /// Sets the limits. Another thread can interrupt planning by setting the flag [`Limits::interrupt`].
+    /// Sets the limits of grounding and search. Another thread can interrupt planning by setting the flag
+    /// [`Limits::interrupt`].
     #[must_use]
     pub fn limits(mut self, limits: Limits) -> Self {
         self.grounding.limits = limits.clone();
@@ -147,8 +148,8 @@ impl<'a> Planner<'a> {
         Ok(pareto(&task, &config, &mut hear))
     }
 
-    /// Returns a function that passes the optimizer's reports to the callback. It sets the interrupt flag if
-    /// the callback returns `Break`.
+    /// Returns a function that passes the optimizer's reports to the callback. This function sets the interrupt
+    /// flag if the callback returns `Break`.
     fn hear(&mut self) -> impl FnMut(Improvement) {
         let flag = self.config.limits.interrupt();
         let report = &mut self.report;

@@ -49,7 +49,8 @@ pub enum Error {
     StateLimit {
         /// Number of reached states.
         states: usize,
-        /// The upper limit on the number of states.
+        /// The upper limit on the number of states. If choices or transitions cannot be numbered, equal to
+        /// `states`.
         limit: usize,
     },
     /// The caller cancelled the exploration.
@@ -64,8 +65,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// Returns the errors located in the text of the model or the property; empty for other kinds
-    /// of error.
+    /// Returns the errors located in the text of the model or the property. Empty for other kinds of error.
     pub fn diagnostics(&self) -> &[Diagnostic] {
         match self {
             Self::Model(problems) | Self::Property(problems) => problems,

@@ -95,7 +95,7 @@ impl<S: Clone, N: Number> Choices<S, N> {
         [self.transitions.len(), self.ends.len(), self.rewards.len()]
     }
 
-    /// Removes everything that was written after [`Self::mark`] returned this position.
+    /// Removes all choices and transitions that were written after [`Self::mark`] returned these lengths.
     pub(crate) fn back_to(&mut self, [transitions, ends, rewards]: [usize; 3]) {
         self.transitions.truncate(transitions);
         self.ends.truncate(ends);
@@ -115,7 +115,8 @@ impl<S: Clone, N: Number> Choices<S, N> {
 pub struct Bounds<'a> {
     /// Upper limit on the number of reached states.
     pub states: usize,
-    /// Callback that receives the number of states periodically; `false` cancels the exploration.
+    /// Callback that periodically receives the number of reached states; its result `false` cancels the
+    /// exploration.
     pub progress: &'a dyn Fn(usize) -> bool,
 }
 
@@ -126,8 +127,8 @@ impl<'a> Bounds<'a> {
         Self { states, ..self }
     }
 
-    /// Sets the callback that receives the number of states periodically; `false` cancels the
-    /// exploration.
+    /// Sets the callback that periodically receives the number of reached states; its result `false` cancels
+    /// the exploration.
     #[must_use]
     pub fn with_progress(self, progress: &'a dyn Fn(usize) -> bool) -> Self {
         Self { progress, ..self }
@@ -222,8 +223,8 @@ impl<S: Clone + Eq + Hash, N: Number> Exploration<S, N> {
     }
 }
 
-/// Number of states whose successors are generated before the first target is looked up, so that
-/// memory latencies overlap.
+/// Number of states that are expanded together. Their target states are looked up together, so that memory
+/// latencies overlap.
 const BATCH: usize = 32;
 /// Number of expanded states between two progress reports.
 const REPORT_INTERVAL: usize = 65_536;
@@ -299,7 +300,7 @@ impl<S: Clone + Eq + Hash, N: Number> Explored<S, N> {
 }
 
 impl<S: Clone> Exploration<S, Fraction> {
-    /// Converts all numbers to doubles. Returns `None` if a number is out of range.
+    /// Converts all numbers to doubles. Returns `None` if the magnitude of a number is too small or too large.
     pub fn rounded(&self) -> Option<Exploration<S, f64>> {
         Some(Exploration {
             explored: self.explored.rounded()?,
@@ -310,7 +311,7 @@ impl<S: Clone> Exploration<S, Fraction> {
 }
 
 impl<S: Clone> Explored<S, Fraction> {
-    /// Converts all numbers to doubles. Returns `None` if a number is out of range.
+    /// Converts all numbers to doubles. Returns `None` if the magnitude of a number is too small or too large.
     pub(crate) fn rounded(&self) -> Option<Explored<S, f64>> {
         let rewards = self.rewards.iter().map(|values| values.iter().map(Fraction::rounded).collect());
         Some(Explored {

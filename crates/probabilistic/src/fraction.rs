@@ -69,7 +69,8 @@ fn sum((a, b): (i64, NonZeroU64), (c, d): (i64, NonZeroU64), is_difference: bool
     let common = if b == d { b } else { divisor(b, d) };
     let (left, right) = (b / common, d / common);
     let sum = i128::from(a) * i128::from(right) + c * i128::from(left);
-    // Only factors of the denominators' common divisor can remain in numerator and denominator.
+    // The numerator and the denominator can only have common factors that divide the common divisor of the two
+    // denominators.
     let factor = if common == 1 { 1 } else { divisor(remainder(sum, common), common) };
     reduced(sum / i128::from(factor), u128::from(left) * u128::from(d / factor))
 }
@@ -85,7 +86,7 @@ const fn remainder(sum: i128, divisor: u64) -> u64 {
     if magnitude >> 64 == 0 { magnitude as u64 % divisor } else { (magnitude % divisor as u128) as u64 }
 }
 
-/// Returns the product of the short fraction `a / b` and the fraction `c / d`, which is negative if
+/// Returns the product of the fractions `a / b` and `c / d`. The sign of the second fraction is given by
 /// `is_negative`.
 #[expect(
     clippy::arithmetic_side_effects,
@@ -114,19 +115,18 @@ impl Fraction {
         Self::fitting(&rational).unwrap_or_else(|| Long(Box::new(rational)))
     }
 
-    /// Converts a rational to a short fraction. Returns `None` if a part does not fit into a signed
-    /// word.
+    /// Converts a rational to a short fraction. Returns `None` if the numerator or the denominator does not fit
+    /// into a signed 64-bit word.
     fn fitting(rational: &BigRational) -> Option<Self> {
         let denominator = rational.denom().to_i64()?.unsigned_abs();
         Some(Short(rational.numer().to_i64()?, NonZeroU64::new(denominator)?))
     }
 
-    /// Returns numerator divided by denominator, rounded once. Returns `None` if a part may not be an exact
-    /// double.
+    /// Returns the quotient of numerator and denominator, rounded once. Returns `None` for long fractions, and
+    /// if one of the two is above 2^53, because it may not be an exact double.
     ///
-    /// The quotient is an integer only if no rounding occurs. For the denominator d, the magnitude of the
-    /// quotient is at most 2^53 / d, so the rounding error is less than 1 / d. A fraction that is not an
-    /// integer differs from every integer by at least 1 / d.
+    /// A fraction that is not an integer is never rounded to an integer: it differs from every integer by at
+    /// least 1 / d, where d is the denominator, and the rounding error is less than 1 / d.
     #[expect(clippy::cast_precision_loss, reason = "both are at most 2^53")]
     fn quotient(&self) -> Option<f64> {
         match self {
@@ -139,8 +139,8 @@ impl Fraction {
         }
     }
 
-    /// Converts the fraction to a double. Returns `None` if its magnitude is too small or too large, see
-    /// [`rounded`].
+    /// Converts the fraction to a double. Returns `None` if its magnitude is so small or large that later
+    /// products could underflow or overflow (see [`rounded`]).
     pub fn rounded(&self) -> Option<f64> {
         self.quotient().or_else(|| rounded(&self.long()))
     }

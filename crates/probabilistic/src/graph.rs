@@ -10,8 +10,8 @@ const UNSEEN: u32 = 0;
 /// Number that marks a node whose component is complete.
 const DONE: u32 = u32::MAX;
 
-/// Number of nodes from which on a component is large: unused stack memory is released before the
-/// component is reported.
+/// Number of nodes from which on a component is large. Before a large component is reported, unused memory of
+/// the depth-first search is released.
 const SHRINK_THRESHOLD: usize = 100_000;
 
 struct Frame {
@@ -34,8 +34,8 @@ pub fn visit_components<'a, E>(
     successors: impl Fn(u32) -> &'a [u32],
     mut take: impl FnMut(&[u32]) -> Result<(), E>,
 ) -> Result<(), E> {
-    // For each node, the least visit number of a node with an incomplete component that is known to
-    // be reachable from it.
+    // For each node, the least visit number of the nodes that are known to be reachable from it and whose
+    // component is incomplete.
     let mut low = vec![UNSEEN; n];
     let mut stack: Vec<u32> = Vec::new();
     let mut frames: Vec<Frame> = Vec::new();

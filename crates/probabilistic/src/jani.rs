@@ -250,9 +250,9 @@ impl Writer<'_> {
         edge
     }
 
-    /// Returns the sum of the rewards of `items`, each under its guard. Conjuncts of the form
-    /// `variable = value` on a variable in `fixed` are evaluated statically. Returns `None` if no
-    /// item remains.
+    /// Returns the sum of the rewards of `items`, each under its guard. Conjuncts `variable = value` of guards
+    /// on a variable in `fixed` (the variables with a known value) are evaluated in advance. Returns `None` if
+    /// no item remains.
     fn sum<'a>(&self, items: impl Iterator<Item = &'a RewardItem>, fixed: &[(&str, i64)]) -> Option<Value> {
         items
             .filter_map(|item| {

@@ -1,12 +1,12 @@
 //! Probabilistic model checking of Markov decision processes, with bounds that are certified or exact.
 //!
-//! A model is PRISM-language text ([`prism`]) or an [`explore::Generator`] that computes successors
-//! natively. Exploration turns the model into a sparse process ([`mdp`]). [`solve`] computes least
-//! and greatest probabilities and expected rewards with bounds and policies. [`policy`] evaluates a
-//! given policy; [`pareto`] computes trade-offs between two objectives. [`check`] performs all
-//! these steps for a property in PRISM's syntax.
+//! A model is PRISM-language text ([`prism`]) or an [`explore::Generator`] that computes successors natively.
+//! Exploration turns the model into a sparse process ([`mdp`]). [`solve`] computes least and greatest
+//! probabilities and expected rewards with bounds and policies. [`policy`] evaluates a given policy; [`pareto`]
+//! computes trade-offs between two objectives. [`check`] performs all these steps for a property in PRISM's
+//! syntax.
 //!
-//! Absent: OWL, PDDL, file access and output.
+//! The crate contains no OWL, no PDDL, no file access and no output.
 
 #![warn(
     clippy::cast_possible_truncation,

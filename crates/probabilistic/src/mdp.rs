@@ -176,8 +176,8 @@ impl<N: Number> Mdp<N> {
 }
 
 impl Mdp<Fraction> {
-    /// Converts the probabilities to doubles. Returns `None` if a probability is too small for
-    /// doubles, see [`crate::number::rounded`].
+    /// Converts the probabilities to doubles. Returns `None` if a probability is so small that later products
+    /// could underflow (see [`crate::number::rounded`]).
     pub(crate) fn rounded(&self) -> Option<Mdp<f64>> {
         Some(Mdp {
             first_choice: self.first_choice.clone(),

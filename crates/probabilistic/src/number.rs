@@ -36,8 +36,9 @@ pub trait Number: Clone + Debug + PartialOrd + Send + Sync + 'static {
     fn zero() -> Self;
     /// One.
     fn one() -> Self;
-    /// Converts a rational to the nearest number of this type. A double with a magnitude below 4·10^15 is
-    /// integral only if it is exact: a value that would be rounded to an integer becomes the adjacent double.
+    /// Converts a rational to this type. The result is the nearest double, but a rational that is not an
+    /// integer never becomes an integral double below 4·10^15: instead of the integer, an adjacent double is
+    /// returned.
     fn from_rational(value: &BigRational) -> Self;
     /// Converts a double to this type; infinities and NaN become zero.
     fn from_f64(value: f64) -> Self;

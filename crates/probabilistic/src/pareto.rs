@@ -1,13 +1,11 @@
-//! Computes the Pareto front of two objectives, and the optimum of one objective under a bound on
-//! the other.
+//! Computes the Pareto front of two objectives, and the optimum of one objective under a bound on the other.
 //!
-//! Each objective is a loss to be minimised: an expected cost until a target is reached, or the
-//! probability of missing a target. Until the first target is reached, a weighted sum of both
-//! losses is minimised. Afterwards only one objective remains, and its optimal value is the
-//! terminal value of the state (Etessami et al., LMCS 4(4:8), 2008). The weights are normals of the
-//! segments between known vertices, so each minimum is a new vertex or proves the segment (Forejt,
-//! Kwiatkowska and Parker, ATVA 2012). Each vertex is attained by a policy whose memory is the set
-//! of reached targets.
+//! Each objective is a loss to be minimised: an expected cost until a target is reached, or the probability of
+//! missing a target. Until the first target is reached, a weighted sum of both losses is minimised. Afterwards
+//! only one objective remains, and its optimal value is the terminal value of the state (Etessami et al., LMCS
+//! 4(4:8), 2008). The weights are normals of the segments between known vertices. So each minimum is a new
+//! vertex, or proves that the segment belongs to the front (Forejt, Kwiatkowska and Parker, ATVA 2012). Each
+//! vertex is attained by a policy whose memory is the set of reached targets.
 
 use std::collections::VecDeque;
 
@@ -25,8 +23,8 @@ pub struct Exhausted;
 /// An objective of a multi-objective problem.
 #[derive(Debug, Clone)]
 pub struct Objective<N> {
-    /// The reward of each choice; the expected sum until the target is minimised. With `None`, the
-    /// probability of reaching the target is maximised instead.
+    /// The cost of each choice; the objective is the least expected sum of costs until the target is reached.
+    /// With `None`, the objective is the greatest probability of reaching the target.
     pub rewards: Option<Vec<N>>,
     /// The states in which the objective is reached.
     pub target: FixedBitSet,
@@ -75,8 +73,8 @@ const MAX_BRANCHES: usize = 3000;
 pub struct Pareto<'a, N> {
     mdp: &'a Mdp<N>,
     objectives: &'a [Objective<N>; 2],
-    /// For each objective, the optimal loss in each state if only this objective is optimised.
-    /// Unspecified in states of infinite cost.
+    /// For each objective, its least loss in each state if the other objective is ignored. Unspecified in
+    /// states of infinite cost.
     alone: [Vec<N>; 2],
     alone_errors: [f64; 2],
     /// The states in either target, without the blocked states.
@@ -107,7 +105,7 @@ impl<'a, N: Number> Pareto<'a, N> {
             alone_errors[number] = solution.errors.iter().fold(0.0, |most: f64, error| most.max(*error));
             blocked.union_with(&solution.infinite);
         }
-        // A state of infinite cost must be avoided only until the target of this cost is reached.
+        // A state in which one cost is infinite need not be avoided after the target of this cost is reached.
         let avoided: Vec<usize> = blocked.ones().collect();
         for state in avoided {
             let pending = objectives.iter().any(|o| o.rewards.is_some() && !o.target.contains(state));
@@ -117,7 +115,8 @@ impl<'a, N: Number> Pareto<'a, N> {
         Ok(Self { mdp, objectives, alone, alone_errors, terminal, blocked, has_costs })
     }
 
-    /// Returns the terminal value of each state for one objective: the loss from the state on.
+    /// Returns the value of each state as a terminal state, for one objective: its loss from this state on if
+    /// the other objective is ignored.
     fn worth(&self, objective: usize) -> Vec<N> {
         let target = &self.objectives[objective].target;
         let terminal_value = |state: usize| {
@@ -126,8 +125,8 @@ impl<'a, N: Number> Pareto<'a, N> {
         (0..self.mdp.states()).map(terminal_value).collect()
     }
 
-    /// Minimises the weighted sum of both losses over the allowed choices. Returns the solution and
-    /// all its optimal choices.
+    /// Minimises the weighted sum of both losses over the allowed choices. Returns the solution and the set of
+    /// all optimal choices.
     fn solve(
         &self,
         weights: &[N; 2],
@@ -185,8 +184,8 @@ impl<'a, N: Number> Pareto<'a, N> {
         Ok(Point { losses, errors, policy })
     }
 
-    /// Returns the lexicographic optimum whose primary objective is the one with the index `first`;
-    /// `None` if the loss in this objective is infinite.
+    /// Returns the lexicographic optimum whose primary objective has the index `first`. Returns `None` if no
+    /// policy makes both losses finite.
     fn extreme(&self, first: usize, allowed: Option<&FixedBitSet>) -> Result<Option<Point<N>>, Exhausted> {
         let unit = |number: usize| {
             let mut weights = [N::zero(), N::zero()];
@@ -203,9 +202,9 @@ impl<'a, N: Number> Pareto<'a, N> {
         self.point(policy.collect()).map(Some)
     }
 
-    /// Returns the vertices of the Pareto front, ordered by increasing first loss. Only the choices
-    /// in `allowed` are used. The list is empty if a cost is infinite under every policy. Vertices
-    /// are missing if there are more than 2,000, or in doubles if they hardly improve on their
+    /// Returns the vertices of the Pareto front, ordered by increasing first loss. Only the choices in
+    /// `allowed` are used; `None` allows all choices. The list is empty if no policy makes both losses finite.
+    /// Vertices are missing if there are more than 2,000, or in doubles if they hardly improve on their
     /// neighbours.
     ///
     /// # Errors
@@ -217,7 +216,8 @@ impl<'a, N: Number> Pareto<'a, N> {
         let mut open = vec![last];
         let mut at = first;
         while let Some(next) = open.last() {
-            // The normal of the segment between two vertices: a point beyond the segment has a smaller weighted loss.
+            // The weights are the normal of the segment between two vertices: a point beyond the segment has a
+            // smaller weighted loss.
             let weights = [at.losses[1].minus(&next.losses[1]), next.losses[0].minus(&at.losses[0])];
             let flat = weights.iter().any(|w| !clearly_positive(w));
             let between = if flat || done.len().saturating_add(open.len()) > MAX_VERTICES {
@@ -260,9 +260,9 @@ impl<'a, N: Number> Pareto<'a, N> {
         Ok(Some(Constrained { randomised, deterministic }))
     }
 
-    /// Lower bound on the first loss of every randomised policy within the limit. The bound follows
-    /// from the minimal weighted loss, with the normal of `segment` as weights. In exact
-    /// arithmetic, returns 0, which is not used.
+    /// Lower bound on the first loss of every randomised policy within the limit. The bound follows from the
+    /// least weighted loss; the weights are the normal of `segment`. Returns 0 in exact arithmetic, in which
+    /// the bound is not used.
     fn below(
         &self,
         vertices: &[Point<N>],
@@ -287,11 +287,11 @@ impl<'a, N: Number> Pareto<'a, N> {
         Ok(((least - spent - error - rounding) / first).next_down().max(0.0))
     }
 
-    /// Searches for the best deterministic policy within the limit, by branch and bound. A node
-    /// branches over the choices of a state in which two neighbouring vertices differ. Its lower
-    /// bound is the randomised optimum over its allowed choices. Returns the loss of the best
-    /// policy found, and `true` if it is proved optimal; `None` if no policy within the limit was
-    /// found. The search ends after [`MAX_BRANCHES`] nodes.
+    /// Searches for the best deterministic policy within the limit, by branch and bound. A node branches over
+    /// the choices of a state in which the policies of two neighbouring vertices differ. The lower bound of a
+    /// node is the optimum of randomised policies with its allowed choices. Returns the loss of the best policy
+    /// found, and `true` if it is proved optimal; `None` if no policy within the limit was found. The search
+    /// ends after [`MAX_BRANCHES`] nodes.
     fn deterministic(&self, limit: &N) -> Result<Option<(Bounded<N>, bool)>, Exhausted> {
         let mut best: Option<Bounded<N>> = None;
         // Lower bound on the first loss in all pruned nodes.
@@ -373,8 +373,9 @@ fn kept_limit(limit: f64) -> f64 {
     limit + 1e-12 * limit.max(1.0)
 }
 
-/// Upper bound on the first loss of a mixture of the two vertices of `segment` that satisfies the
-/// limit.
+/// Upper bound on the first loss of a mixture (randomisation) of the two vertices of `segment` that satisfies
+/// the limit. Without a segment, the bound of the first vertex. Infinite if rounding errors prevent a proof
+/// that the limit is satisfied.
 fn above<N: Number>(vertices: &[Point<N>], segment: Option<(usize, usize)>, limit: &N) -> f64 {
     let worst = |point: &Point<N>, number: usize| point.losses[number].to_f64() + point.errors[number];
     let limit = limit.to_f64();
@@ -392,9 +393,9 @@ fn above<N: Number>(vertices: &[Point<N>], segment: Option<(usize, usize)>, limi
     bound + 16.0 * f64::EPSILON * (worst(a, 0) + worst(b, 0))
 }
 
-/// Returns the least value of the first loss over the mixtures of vertices whose second loss is
-/// within the limit. Also returns the indices of the two mixed vertices, unless a single vertex is
-/// optimal. Returns `None` if no vertex satisfies the limit.
+/// Returns the least first loss of a mixture of vertices whose mixed second loss is within the limit. Also
+/// returns the indices of the two mixed vertices, unless the first vertex satisfies the limit. Returns `None`
+/// if no vertex satisfies the limit.
 fn lower_hull<N: Number>(vertices: &[Point<N>], limit: &N) -> Option<(N, Option<(usize, usize)>)> {
     // The vertices are ordered by increasing first and decreasing second loss.
     let right = vertices.iter().position(|vertex| keeps(&vertex.losses[1], limit))?;

@@ -15,18 +15,18 @@ pub fn choices_of<N: Number>(mdp: &Mdp<N>, policy: &[u32]) -> FixedBitSet {
     allowed
 }
 
-/// Evaluates a policy in a problem. In a state without a choice, the policy ends without success.
+/// Evaluates a policy in a problem. In a state in which the policy has no choice, a path ends without success.
 /// Returns `None` if exact arithmetic exceeds its budget.
 pub fn evaluate<N: Number>(problem: Problem<'_, N>, policy: &[u32]) -> Option<Solution<N>> {
     let allowed = choices_of(problem.mdp, policy);
     solve(Problem { allowed: Some(&allowed), ..problem }, None)
 }
 
-/// Returns the optimal choices with respect to a solution, in the states that have a finite value
-/// and are neither terminal nor blocked.
+/// Returns the optimal choices with respect to a solution, in the states that have a finite value and are
+/// neither terminal nor blocked.
 ///
-/// In doubles, choices within a tolerance of the optimum count as optimal. The choices of the
-/// solution's policy always count.
+/// In doubles, choices within a tolerance of the optimum count as optimal. The choices of the solution's policy
+/// count in any case.
 pub fn conserving<N: Number>(problem: &Problem<'_, N>, solution: &Solution<N>) -> FixedBitSet {
     let mdp = problem.mdp;
     let mut optimal = FixedBitSet::with_capacity(mdp.choice_count());
@@ -89,9 +89,9 @@ pub fn with_secondary<N: Number>(
     solve(second, None)
 }
 
-/// Returns the Markov chain of a policy, conditioned on reaching `end` (Doob's h-transform). Each
-/// transition is weighted with the probability `success` of its target. Also returns the original
-/// choice of each choice in the result.
+/// Returns the Markov chain of a policy, conditioned on reaching `end` (Doob's h-transform): each transition is
+/// weighted with `success`, the probability of reaching `end`, of its target. Also returns the original choice
+/// of each choice in the result.
 pub fn conditioned<N: Number>(
     mdp: &Mdp<N>,
     policy: &[u32],

@@ -90,8 +90,8 @@ const fn number_of(entry: u64, hash: u32) -> Option<u32> {
 }
 
 fn hash<S: Hash>(state: &S) -> u32 {
-    // The hasher rotates its best bits away from the top; the multiplication mixes all bits into
-    // the top again.
+    // The best bits of this hash are not the leading ones. The multiplication mixes all bits into the upper
+    // half, which is used.
     upper(FxBuildHasher.hash_one(state).wrapping_mul(0x9E37_79B9_7F4A_7C15))
 }
 
@@ -115,8 +115,8 @@ impl<S: Eq + Hash> States<S> {
         Self { list: Vec::new(), numbers }
     }
 
-    /// Looks a state up in its home slot only. Memory accesses dominate the time of a lookup; those
-    /// of several calls overlap.
+    /// Looks a state up in its home slot only. The time of a lookup is mostly that of a memory access, and the
+    /// memory accesses of successive calls overlap.
     pub(crate) fn probe(&self, state: &S, code: impl FnOnce(&S) -> usize) -> Probe {
         match &self.numbers {
             Numbers::Table(table) => {

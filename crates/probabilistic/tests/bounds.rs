@@ -103,6 +103,21 @@ fn values_below_the_least_double_are_enclosed() {
     assert_eq!(error_codes(&rare, "P=? [ F \"goal\" ]", Exactness::Never), ["Q303"]);
 }
 
+/// The probability of the second choice, 1e-400, is rounded to 0, like that of the first one.
+#[test]
+fn a_choice_with_a_value_below_the_least_double_is_enclosed() {
+    let model = "mdp
+        module m
+          s:[0..4] init 0;
+          [] s=0 -> (s'=4);
+          [] s=0 -> 1e-200:(s'=1) + 1-1e-200:(s'=4);
+          [] s=1 -> 1e-200:(s'=2) + 1-1e-200:(s'=4);
+        endmodule
+        label \"goal\" = s=2;";
+    assert_ne!(enclosed(model, "Pmax=? [ F \"goal\" ]"), BigRational::default());
+    assert_eq!(enclosed(model, "Pmin=? [ F \"goal\" ]"), BigRational::default());
+}
+
 #[test]
 fn nearly_integral_rewards_are_enclosed() {
     let model = "dtmc

@@ -99,8 +99,8 @@ impl Error {
         Self::Overflow { what: what.to_owned(), place: None }
     }
 
-    /// Appends a name to the description in an overflow error and, if it has no location yet, adds one.
-    /// Returns other errors unchanged.
+    /// Appends `name` to the description in an overflow error and, if the error has no location yet, sets it to
+    /// `place`. Returns other errors unchanged.
     #[must_use]
     pub fn within(self, name: &str, place: Option<Place>) -> Self {
         match self {
@@ -111,7 +111,7 @@ impl Error {
         }
     }
 
-    /// Returns `true` if the error is a numeric fluent that is read but has no initial value.
+    /// Returns `true` if the error reports a numeric fluent without an initial value ([`Error::NoValue`]).
     pub fn is_value_missing(&self) -> bool {
         matches!(self, Self::NoValue { .. })
     }

@@ -1,9 +1,10 @@
-//! Converts a PDDL task to a lifted task and further to a ground task: normalization, compilation of language
-//! features, grounding, and plans.
+//! Converts a PDDL task to a lifted task and further to a ground task: compilation of language features, normalization,
+//! and grounding. Also contains plans.
 //!
-//! Modules in the order of the pipeline: syntax tree (crate `pddl`) → `normalize` → `lifted` → `ground` → `task` → `plan`.
+//! Modules in the order of the pipeline: syntax tree (crate `pddl`) → `compile` → `normalize` → `lifted` → `ground` →
+//! `task` → `plan`.
 //!
-//! Absent: search, SAT and OWL. The availability of designs is part of the problem as facts.
+//! The crate contains neither search nor SAT nor OWL. Facts of the problem state which designs are available.
 
 #![allow(missing_docs, reason = "an interface of the workspace; names say what fields hold")]
 #![warn(

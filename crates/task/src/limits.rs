@@ -1,9 +1,9 @@
 //! Limits of a computation: a deadline, an interrupt flag, and the memory limit of a search.
 //!
-//! Ctrl-C sets the flag, and so does the memory limit of the process. Long loops iterate through
-//! [`Limits::watch`] or call [`LimitPoll::beat`]. Both check the deadline and the flag every few iterations,
-//! and return [`Interrupted`] at a limit. Callers usually propagate this error with `?`, so that an incomplete
-//! result is not taken for an answer. Searches compare their estimated memory with [`Limits::room`].
+//! Ctrl-C sets the flag, and so does the memory limit of the process. Long loops iterate through [`Limits::watch`] or
+//! call [`LimitPoll::beat`]. Both check the deadline and the flag from time to time, and return [`Interrupted`] at a
+//! limit. Callers usually propagate this error with `?`, so that an incomplete result is not taken for an answer.
+//! Searches compare their estimated memory with [`Limits::room`].
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -26,8 +26,8 @@ pub struct Limits {
     thresholds: Thresholds,
 }
 
-/// Time for completing an answer after the deadline, in addition to a tenth of the time limit. It is shorter
-/// than the 0.2 s tolerance of a command, because the process must also start and print.
+/// Time for completing an answer after the deadline, in addition to a tenth of the time limit. It is less than what
+/// tests tolerate for a whole command (0.2 s), because the process must also start and print.
 const GRACE: Duration = Duration::from_millis(120);
 
 const DEFAULT_MEMORY: usize = 1 << 31;

@@ -6,15 +6,15 @@
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Thresholds {
-    /// Number of stored states after which further components support A\*: LM-cut, stubborn sets and object
-    /// symmetries and, if no plan is known, a greedy search, which may store as many states. Applies only if no
-    /// satisficing search or SAT solver alternates with A\*. `Config::head_start` of the planner is the
-    /// corresponding number for the whole planner.
+    /// Number of states that A\* stores before further components support it: LM-cut, stubborn sets, object symmetries
+    /// and, if no plan is known, a greedy search that may store equally many states. Applies only if no satisficing
+    /// search or SAT solver alternates with A\*. For the whole planner, `Config::head_start` has the corresponding
+    /// role.
     pub states: usize,
     /// Number of stored states at which A\* first estimates whether its memory will suffice.
     pub progress: usize,
-    /// Work, in work units, after which the slower of two alternating A\* searches gets only half of its share,
-    /// if its lower bound lags behind.
+    /// Number of work units after which, of two alternating A\* searches, a search whose lower bound lags behind gets
+    /// only half of its share.
     pub behind: u64,
     /// Number of states after which stubborn sets are disabled if they have pruned too little.
     pub stubborn: u64,
@@ -28,8 +28,9 @@ pub struct Thresholds {
     /// Number of nodes after which the greedy search and the search for sequential plans alternate with the
     /// exact temporal search.
     pub concurrent: usize,
-    /// Upper limit on the number of bits of the temporal unit (common denominator of all times) with which
-    /// times are 128-bit integers. With a larger unit, or if 128 bits do not suffice, times are wider integers.
+    /// Maximum number of bits of the temporal unit (common denominator of all times) with which times are 128-bit
+    /// integers. With a larger unit, or if 128 bits do not suffice, times are wider integers. The maximum does not
+    /// apply if the planner chooses durations.
     pub narrow_times: u64,
     /// Number of nodes in the first turn of the greedy search. The turns of the other searches are
     /// proportional.
@@ -58,8 +59,8 @@ impl Default for Thresholds {
 }
 
 impl Thresholds {
-    /// Thresholds with which all optional parts of the search are used from the start, times are always the wider
-    /// integers, and stubborn sets are never disabled.
+    /// Thresholds with which all optional parts of the search are used from the start, times are the wider integers
+    /// (unless the planner chooses durations), and stubborn sets are never disabled.
     pub const NONE: Self = Self {
         states: 0,
         progress: 0,

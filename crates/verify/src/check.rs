@@ -92,13 +92,13 @@ impl<'a> Verifier<'a> {
         report
     }
 
-    /// Returns the optimality proof (argument) of the certificate as verification conditions in
-    /// SMT-LIB 2. The proof itself is not checked.
+    /// Returns the optimality proof (argument) of the certificate as verification conditions in SMT-LIB 2. The
+    /// proof itself is not checked.
     ///
     /// # Errors
-    /// M121: the certificate cannot be read, its ground task is not faithful to its PDDL files, its
-    /// plan is not as claimed, a limit is reached, or its task has derived variables, for which
-    /// there are no verification conditions.
+    /// M121 if the certificate cannot be read, its argument is malformed, or a limit is reached. Also M121 if
+    /// its ground task is not faithful to its PDDL files, its plan is not as claimed, or its task has derived
+    /// variables, for which there are no verification conditions.
     pub fn conditions(&self) -> Result<String, Errors> {
         conditions(self.directory, &|| self.is_over()).map_err(Errors::from)
     }
@@ -152,9 +152,8 @@ fn parts(
     }
     let (task_result, timed) = match same_task(&domain, &problem, (text(TASK), text(WITNESS)), stop) {
         Ok((summary, timed)) => (Ok(summary), timed),
-        // If the task is rejected, it is unknown whether plans are measured by time. The
-        // certificate is rejected in any case; the plan is still checked, as if plans were not
-        // measured by time.
+        // If the task is rejected, it is unknown whether plans are measured by time. The plan is then checked
+        // as if they were not; the certificate is rejected in any case.
         Err(reason) => (Err(reason), false),
     };
     parts.push(VerifiedPart { part: "task", result: task_result });

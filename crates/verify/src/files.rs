@@ -11,7 +11,7 @@ use crate::manifest::{
 };
 use crate::{derivations, knowledge};
 
-/// Returns the text of the file with this name, or the empty string without such a file.
+/// Returns the text of the file with this name, or the empty string if there is no such file.
 pub fn text<'t, N: AsRef<str>>(files: &'t [(N, String)], name: &str) -> &'t str {
     files.iter().find(|(file_name, _)| file_name.as_ref() == name).map_or("", |(_, text)| text.as_str())
 }

@@ -11,8 +11,7 @@ use mission::file;
 use mission::message::{ErrorAnswer, Errors, Message};
 use mission::visible::{pretty, visible, visible_json};
 
-/// Exit statuses, which are equal to those of `metaplan verify`: verified, unreadable input,
-/// rejected certificate, internal error.
+/// Exit status if the certificate is verified. All exit statuses are equal to those of `metaplan verify`.
 const VERIFIED: u8 = 0;
 const BAD_INPUT: u8 = 3;
 const INVALID: u8 = 30;
@@ -45,7 +44,8 @@ enum Format {
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    // The default panic hook would print a stack trace; the message is printed below instead.
+    // The default panic hook would also print the message, in any format. It is printed below instead, in the
+    // selected format.
     std::panic::set_hook(Box::new(|_| {}));
     let outcome = std::panic::catch_unwind(|| run(&arguments));
     ExitCode::from(match outcome {

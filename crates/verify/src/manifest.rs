@@ -169,10 +169,10 @@ pub struct VerifiedPart {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Verification {
-    /// The claim of the certificate; `None` if the files cannot be read.
+    /// The claim of the certificate; `None` if the files cannot be read or the verification was aborted at a
+    /// limit.
     pub claim: Option<Claim>,
-    /// The files or the mission for which the claim was checked; `None` if the files cannot be
-    /// read.
+    /// The files or the mission for which the claim was checked; `None` in the same cases as `claim`.
     pub subject: Option<Subject>,
     /// The results of the parts in the order of checking. Parts that depend on a failed part may be
     /// absent.

@@ -16,9 +16,8 @@ pub fn read_pddl(domain: &str, problem: &str) -> Result<(Domain, Problem), Strin
     parsed.map(|(domain, problem, _)| (domain, problem)).map_err(first)
 }
 
-/// Checks that a ground task is faithful to its PDDL files. Returns a summary, and `true` if plans
-/// are measured by time because there is no metric. The check is aborted when `stop` returns
-/// `true`.
+/// Checks that a ground task is faithful to its PDDL files. Returns a summary, and `true` if plans are measured
+/// by time, because there is no metric and actions take time. The check is aborted when `stop` returns `true`.
 ///
 /// # Errors
 /// The first difference, or the reason why the check is undecided.

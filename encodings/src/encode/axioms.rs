@@ -1,11 +1,11 @@
-//! Clauses for derived variables: the least fixpoint of their rules, by completion and level
-//! constraints.
+//! Clauses for derived variables: the least fixpoint of their rules, by completion and level constraints.
 //!
 //! - body: `b@t ↔ ⋀ l@t` for the body b of each rule, with the literals l, in the state before step t;
 //! - completion: `h@t ↔ ⋁ b@t` over the bodies b of the rules with head h \[1\];
-//! - levels: in a layer of variables that depend on each other, a true `h@t` needs a supporting rule s whose
-//!   body variables a from this layer are derived in earlier rounds: `h@t → ⋁ s@t`, `s@t → b@t`, and
-//!   `s@t ∧ r(h) ≤ k → r(a) ≤ k−1`, where r is the round in order encoding \[2\].
+//! - levels: variables that depend on each other are derived in rounds. A true `h@t` needs a supporting rule, whose
+//!   body variables from the same layer are derived in earlier rounds. With a variable `s@t` for each rule that may
+//!   support h: `h@t → ⋁ s@t`, `s@t → b@t`, and `s@t ∧ r(h) ≤ k → r(a) ≤ k−1` for each such body variable a and each
+//!   number k. Here r is the round in which a variable is derived, in order encoding \[2\].
 //!
 //! \[1\] K. Clark: Negation as failure, Logic and Data Bases, 1978.
 //! \[2\] T. Janhunen: Representing normal programs with clauses, ECAI 2004.
@@ -101,7 +101,7 @@ fn levels(
             let support = builder.formula.fresh(VariableMeaning::Ladder);
             builder.formula.add(Family::Axiom, [!support, *body]);
             for below in recursive_variables {
-                // In the first round no variable of the layer has been derived before.
+                // In the first round no variable of the layer has been derived before, so the rule supports nothing.
                 let first = later[variable].first().copied().unwrap_or(!Formula::truth());
                 builder.formula.add(Family::Axiom, [!support, first]);
                 for k in 1..=later[variable].len() {

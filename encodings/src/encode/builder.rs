@@ -27,7 +27,7 @@ pub(super) struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
-    /// Creates a formula with the variables of the task, but without clauses except that of the constant true.
+    /// Creates a formula with the variables of the task. Its only clause is the constant true.
     /// `allowed[step][operator]` is `true` if the operator may occur at the step.
     pub(super) fn new(
         context: Context<'a>,
@@ -45,9 +45,9 @@ impl<'a> Builder<'a> {
         if self.formula.clause_count() > self.most { Err(Interrupted) } else { self.limits.check() }
     }
 
-    /// Returns a literal that is true if an operator in `members` is executed at the step. If the group is
-    /// new, its defining clauses are added to `family`. Members that are impossible at the step are ignored;
-    /// if at most one or all possible operators of the step remain, an existing literal is returned.
+    /// Returns a literal that is true if an operator in `members` is executed at the step. If the group is new, its
+    /// defining clauses are added to `family`. Members that are impossible at the step are ignored; if none, one or all
+    /// possible operators of the step remain, no new variable is needed.
     pub(super) fn group(&mut self, step: usize, members: &[OperatorId], family: Family) -> Lit {
         let present: Vec<_> = {
             let candidates = &self.variables.operators[step];

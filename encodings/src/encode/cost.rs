@@ -23,14 +23,14 @@ use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::encode::interference::Interference;
 use crate::sat::Lit;
 
-/// Maximum number of different accumulated amounts in the order encoding. Beyond it, or if a source
-/// requires more than 50 times as many additions of amounts, the sum is encoded by binary addition.
+/// Maximum number of different accumulated amounts in the order encoding. With more amounts, or if one source of cost
+/// requires more than 50 times as many additions, the sum is encoded by binary addition.
 const AMOUNT_LIMIT: usize = 1_000;
 
-/// Cost limit of an encoding: only plans with a cost of at most `limit` are admitted. With
-/// `CostEncoding::Apart`, amounts are not summed, so only a single reduced cost above the gap between `limit`
-/// and the lower bound is excluded. Operator costs are reduced by the goal distances in the first projection
-/// of `bounds` (see the head of this file). Without a projection, neither costs nor the limit are encoded.
+/// Cost limit of an encoding: only plans with a cost of at most `limit` are admitted. With `CostEncoding::Apart`,
+/// amounts are not summed, and clauses exclude only an amount that alone exceeds the gap between `limit` and the lower
+/// bound. Operator costs are reduced by the goal distances in the first projection of `bounds` (see the head of this
+/// file). Without a projection, neither costs nor the limit are encoded.
 pub struct CostLimit<'a> {
     pub limit: Int,
     pub bounds: &'a Bounds,
@@ -51,8 +51,8 @@ pub enum CostEncoding {
 /// conjunction, holds.
 type Increments = Vec<(Vec<Lit>, Int)>;
 
-/// Source of cost at a step, which contributes at most one amount: operators that exclude each other, or the
-/// design tables of one set of slots.
+/// Source of cost at a step, which contributes at most one amount: an operator, several operators that exclude each
+/// other, or the design tables of one set of slots.
 struct Source {
     step: u32,
     stage: u32,
@@ -77,10 +77,10 @@ enum Spent {
 }
 
 impl Cost {
-    /// Encodes the costs of all steps. Excludes sums above the cost limit, or with `CostEncoding::Apart` only
-    /// single reduced costs above the gap between the limit and the lower bound. Without `interference` there
-    /// is one operator per step. Returns `None` if the deadline passes or the run is interrupted, or there are
-    /// too many clauses.
+    /// Encodes the costs of all steps. Excludes sums above the cost limit; with `CostEncoding::Apart`, excludes only
+    /// amounts that alone exceed the gap between the limit and the lower bound. Without `interference` there is one
+    /// operator per step. Returns `None` if the deadline passes or the run is interrupted, or there are too many
+    /// clauses.
     pub(super) fn new(
         builder: &mut Builder<'_>,
         cost: &CostLimit<'_>,
@@ -112,8 +112,8 @@ impl Cost {
         Some(Self { lower, spent })
     }
 
-    /// Returns a lower bound on the cost of every plan, and weighted literals for the cost beyond it. Without
-    /// the encoding `CostEncoding::Apart`, there are no weighted literals.
+    /// Returns a lower bound on the cost of every plan, and weighted literals for the cost beyond it. There are no
+    /// weighted literals unless the encoding is `CostEncoding::Apart`.
     pub(super) fn payments(&self) -> (Int, &[(Lit, Int)]) {
         match &self.spent {
             Spent::Apart(literals) => (self.lower, literals),
@@ -268,8 +268,8 @@ impl Sum<'_, '_> {
         Some(spent)
     }
 
-    /// Adds the amounts of a source to the order encoding: `spent ≥ v` and `increment ≥ w` imply
-    /// `spent' ≥ v + w`. Sums above the gap are conflicts.
+    /// Adds the amounts of a source to the order encoding: `spent ≥ v` and `increment ≥ w` imply `spent' ≥ v + w`,
+    /// where `spent'` is the sum including this source. Sums above the gap are excluded.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "amounts are at most the gap, which is at most GROWTH_LIMIT; steps are in memory"
@@ -305,8 +305,8 @@ impl Sum<'_, '_> {
         after
     }
 
-    /// Returns a literal for each positive amount of a source, implied by the premises of this
-    /// amount. Amounts above the gap are conflicts.
+    /// Returns a literal for each positive amount of a source, implied by the premises of this amount. Clauses exclude
+    /// the premises of amounts above the gap.
     fn amounts(&mut self, source: &Source) -> BTreeMap<Int, Lit> {
         let mut increments: BTreeMap<Int, Lit> = BTreeMap::new();
         for (premise, amount) in source.increments.iter().filter(|(_, amount)| *amount > 0) {

@@ -1,4 +1,5 @@
-//! Converts designs from the numbering of an operator to the numbering of the task.
+//! Converts the index of a design among the designs that are suitable for an operator to its index among all designs of
+//! the slot.
 
 use task::number::dense;
 use task::task::{Operator, SlotUse};

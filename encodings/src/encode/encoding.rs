@@ -24,7 +24,7 @@ use crate::encode::symmetry::Symmetry;
 use crate::encode::variables::Variables;
 use crate::sat::{Lit, Solver};
 
-/// The set of plans that a formula admits.
+/// Constraints on the plans that a formula admits.
 pub struct PlanConstraints<'a> {
     /// `allowed[step][operator]` is `true` if the operator may occur at the step. The number of
     /// steps is the horizon.
@@ -90,16 +90,16 @@ impl<'a> Encoding<'a> {
         self.variables.horizon()
     }
 
-    /// Returns the cost as a sum for core-guided search: a lower bound on the cost of every plan, and
-    /// literals whose weights are added to it if the literals are true. Without weighted literals, the slice
-    /// is empty. Without a cost limit, the lower bound is 0.
+    /// Returns the cost as a sum for core-guided search: a lower bound on the cost of every plan, and literals whose
+    /// weights are added to it if the literals are true. The slice is empty unless the encoding uses
+    /// `CostEncoding::Apart`. Without a cost limit, the lower bound is 0.
     pub fn payments(&self) -> (Int, &[(Lit, Int)]) {
         self.cost.as_ref().map_or((0, &[]), Cost::payments)
     }
 
-    /// Returns the literal for a choice of a plan at the step `at`: the operator if `slot` is `None`, otherwise
-    /// the design of this slot. Action number `at` of the plan must be at this step (sequential semantics).
-    /// Returns the constant false if the operator is impossible at the step.
+    /// Returns the literal for a choice that a plan makes at the step `at`: its operator if `slot` is `None`, otherwise
+    /// its design for this slot. The encoding must have sequential semantics, so that the step `at` has action number
+    /// `at` of the plan. For an operator that is impossible at the step, returns the constant false.
     pub fn choice(&self, plan: &[GroundStep], (at, slot): (usize, Option<u32>)) -> Lit {
         let step = &plan[at];
         match slot {

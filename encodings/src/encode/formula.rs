@@ -30,7 +30,8 @@ pub enum Family {
     Axiom,
     /// Clauses by which each function in use has exactly one suitable design.
     Selection,
-    /// Symmetry breaking: interchangeable designs and objects are used in a fixed order.
+    /// Symmetry breaking: of interchangeable designs of a slot only the first is used, and interchangeable
+    /// objects are first used in a fixed order.
     Symmetry,
     /// Clauses for exact integer arithmetic on numeric variables.
     Numeric,
@@ -95,11 +96,11 @@ pub enum VariableMeaning {
     Design { slot: u32, design: u32, step: u32 },
     /// An operator of the group is executed at the step.
     Group { group: u32, step: u32 },
-    /// The accumulated reduced cost (cost beyond the lower bound), after the source of cost `stage` of the
-    /// step `step` − 1, is at least the amount. The literal is implied by this condition, not equivalent.
+    /// The accumulated reduced cost (cost beyond the lower bound) is at least `amount`, after source of cost number
+    /// `stage` of the step before `step`. The condition implies the literal; the converse is not encoded.
     CostAtLeast { amount: Int, step: u32, stage: u32 },
-    /// A source of cost at the step adds this amount. The literal is implied by the choices that cause the
-    /// amount.
+    /// Source of cost number `stage` at the step adds this amount. The choices that cause the amount imply the literal;
+    /// the converse is not encoded.
     Increment { amount: Int, step: u32, stage: u32 },
     /// The conditional effect with this index of the operator takes place at the step.
     Fires { operator: u32, effect: u32, step: u32 },
@@ -194,8 +195,8 @@ impl Formula {
         }
     }
 
-    /// Returns a literal that is equivalent to the conjunction of the premises. Returns the constant true if
-    /// no premises remain without it, and the premise itself if one remains.
+    /// Returns a literal that is equivalent to the conjunction of the premises. Premises that are the constant true are
+    /// ignored. If no other premise remains, returns the constant true; if one remains, returns this premise.
     pub(crate) fn equivalent(&mut self, meaning: VariableMeaning, premises: &[Lit], family: Family) -> Lit {
         let premises: Vec<_> = premises.iter().copied().filter(|l| *l != Self::truth()).collect();
         match premises[..] {

@@ -14,8 +14,8 @@ use task::number::Int;
 use task::task::quantity::{Quantity, SlotSet};
 use task::task::{Operator, SlotId};
 
-/// Part of a task that may distinguish the designs of a slot. It has an entry for each design that
-/// one operator admits.
+/// Part of a task that may distinguish the designs of a slot, for example a cost table of an operator. It has an entry
+/// for each design that this operator admits.
 struct Witness<'t> {
     /// The admitted designs, as indices into the slot's designs, ascending.
     designs: &'t [u32],

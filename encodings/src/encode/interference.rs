@@ -4,19 +4,24 @@
 //! ∃-step semantics \[2\] they can be executed in at least one order; here this is the order of the ground
 //! task. In both semantics, all conditions hold before the step and all effects hold after the step.
 //!
-//! `o@t` means that operator o is executed at step t. For each fact, let R be the operators with the fact as a
-//! condition, and E the operators that set its variable to another value. For each variable that is also read
-//! otherwise (in a clause, by a conditional effect or through a derived variable), there is a second pair: these
-//! readers as R, and all writers of the variable as E.
+//! `o@t` means that operator o is executed at step t. The clauses are added for pairs (R, E) of sets of
+//! operators:
+//! - for each fact: R has the fact as a condition, and E sets its variable to another value (operators that
+//!   require another value of the variable are omitted, because they cannot share a step with R);
+//! - for each variable that is also read otherwise: R reads it in a clause, by a conditional effect or through
+//!   a derived variable, and E sets it.
 //!
+//! The clauses are:
 //! - ∃-step: `¬o@t ∨ ¬p@t` for o ∈ E before p ∈ R in the order. A ladder of auxiliary variables a ("an earlier
 //!   operator has changed the fact", one for each further operator of E) encodes this with few clauses:
 //!   `o@t → a@t`, `a@t → a'@t` for the next variable a', and `a@t → ¬p@t`;
 //! - ∀-step: these clauses, and again in the reverse order;
-//! - exclusion: at most one of the operators that use the same slot or the same numeric variable; at most one
-//!   that changes the abstract state in the projection by whose goal distances costs are reduced; and at most
-//!   one with a comparison of constants, which can depend on its designs. So numbers, designs and costs are
-//!   encoded as in sequential semantics.
+//! - exclusion, in both semantics: at most one operator of each of these groups, so that numbers, designs and
+//!   costs are encoded as in sequential semantics:
+//!   - the operators with the same slot (design parameter), or that read or change the same numeric variable;
+//!   - the operators with a comparison without numeric variables, which can depend on their designs;
+//!   - the operators that change the abstract state of the projection with which costs are reduced (by the
+//!     differences of its goal distances).
 //!
 //! Every sequential plan is also a plan in these semantics, so bounds on the length of sequential
 //! plans remain valid.
@@ -72,9 +77,10 @@ struct Conflict {
 
 #[derive(Default)]
 struct Uses {
-    /// Operators with a plain condition on the variable, by required value.
+    /// Operators whose condition contains a fact about the variable, by required value.
     require: BTreeMap<u32, Vec<OperatorId>>,
-    /// Operators that read the variable in another way than by a plain condition.
+    /// Operators that read the variable in a clause, in the condition of a conditional effect, or through a derived
+    /// variable.
     read: Vec<OperatorId>,
     write: Vec<(OperatorId, u32)>,
 }
@@ -146,8 +152,8 @@ impl Interference {
         Ok(Some(Self { both_orders: semantics == StepSemantics::ForAllStep, exclusions, conflicts, classes }))
     }
 
-    /// Returns the first exclusion group (operators of which at most one occurs at a step) that contains an
-    /// operator, or `None` if no group does. Operators with the same exclusion group never share a step.
+    /// Returns the index of the first exclusion group (operators of which at most one occurs at a step) that contains
+    /// an operator, or `None` if no group does. Operators with the same index never share a step.
     pub(super) fn class(&self, operator: OperatorId) -> Option<usize> {
         self.classes[operator.index()]
     }
@@ -253,7 +259,7 @@ impl Support {
         facts.chain(literals).filter_map(|variable| self.of.get(variable.index().checked_sub(self.basic)?))
     }
 
-    /// Returns the basic variables on which a condition depends other than by its plain facts.
+    /// Returns the basic variables that a condition reads in clauses or through derived variables.
     fn read_by(&self, condition: &Condition) -> Vec<usize> {
         let literals = condition.clauses.iter().flatten();
         let direct = literals.filter_map(|literal| self.if_basic(literal.fact.variable));

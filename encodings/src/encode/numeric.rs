@@ -299,8 +299,8 @@ pub(super) fn is_at_least_zero(
     let ranges: Vec<Range> = numbers
         .iter()
         .map(|bits| {
-            // A number with this many bits has at most this absolute value, and `next_ranges`
-            // admits no larger ones.
+            // A two's complement number of n bits has an absolute value of at most 2^(n−1). The exponent can
+            // be capped at 126, because `next_ranges` admits at most 2^124 (`GROWTH_LIMIT`).
             let limit: Int = 1 << bits.len().saturating_sub(1).min(126);
             Range { low: -limit, high: limit }
         })

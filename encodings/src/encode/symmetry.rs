@@ -10,8 +10,8 @@
 //!   states that `x_i` has been used, and `u_i@t ↔ ⋁ o@t` that it is used now. Renaming the objects of
 //!   a plan in the order of their first use yields a plan that satisfies this at the same cost.
 //!
-//! Objects are not considered interchangeable if they have different numeric variables, or if the
-//! task has derived variables.
+//! Objects are not considered interchangeable if their exchange would also exchange numeric variables, or if the task
+//! has derived variables.
 //!
 //! \[1\] J. Rintanen: Symmetry reduction for SAT representations of transition systems, ICAPS 2003.
 
@@ -29,8 +29,8 @@ use crate::sat::Lit;
 /// Interchangeable designs and objects of a task.
 pub struct Symmetry {
     designs: Vec<(SlotId, u32)>,
-    /// For each pair of neighbouring interchangeable objects: operators that use the first, and
-    /// operators that use only the second.
+    /// For each pair of consecutive interchangeable objects: operators that use the first, and operators that use only
+    /// the second.
     objects: Pairs,
 }
 
@@ -74,8 +74,8 @@ impl Symmetry {
 
 type Pairs = Vec<(Vec<OperatorId>, Vec<OperatorId>)>;
 
-/// Returns the pairs of neighbouring objects in each class of interchangeable objects, as lists of
-/// operators that use them.
+/// Returns the pairs of consecutive objects in each class of interchangeable objects, as lists of operators that use
+/// them.
 fn equal_objects(context: Context<'_>) -> Result<Pairs, Interrupted> {
     let task = context.task;
     let pairs = symmetry_generators(context, true)?.into_iter().map(

@@ -43,7 +43,7 @@ pub enum Backend {
     },
 }
 
-/// Error in a solver that the user has chosen by name.
+/// Reason why the solver that the user has named cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BackendError {

@@ -24,8 +24,9 @@ impl Totalizer {
     }
 
     /// Returns a literal that is implied if more than `count` of the input literals are true.
-    /// Returns `None` if there are at most `count` input literals. New variables are numbered from
-    /// `variables` on, which is increased; their defining clauses are passed to `add`.
+    /// Returns `None` if there are at most `count` input literals, or memory is lacking. New
+    /// variables are numbered from `variables` on, which is increased; their defining clauses are
+    /// passed to `add`.
     pub fn more_than(
         &mut self,
         count: usize,
@@ -37,8 +38,8 @@ impl Totalizer {
         }
         let mut manager = BasicVarManager::from_next_free(Var::new(*variables));
         let mut clauses = Cnf::new();
-        // The clause limit of the formula bounds the memory, so the totalizer's own limit is not
-        // used.
+        // The only error is that memory for the clauses could not be reserved. It is not expected,
+        // because the formula limits the number of clauses.
         self.tree.encode_ub_change(count..=count, &mut clauses, &mut manager).ok()?;
         *variables = manager.n_used();
         let translate = |literal: &TreeLit| Lit::new(literal.vidx32(), literal.is_pos());

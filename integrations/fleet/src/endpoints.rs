@@ -107,7 +107,7 @@ fn path(bytes: &[u8]) -> Option<Result<String, &'static str>> {
 fn page(path: &str, metrics: &PrometheusHandle, health: &Health) -> Response {
     match path {
         "/metrics" | "/" => ("200 OK", metrics.render()),
-        // `/health` is the former name.
+        // `/health` is the former name of `/live`.
         "/live" | "/health" if health.is_live() => ("200 OK", "OK\n".to_owned()),
         "/live" | "/health" => ("503 Service Unavailable", "the worker's main loop hangs\n".to_owned()),
         "/ready" => match health.is_ready() {

@@ -3,8 +3,8 @@
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Time without a round of its main loop after which a worker is no longer alive. Rounds also end if
-/// the servers are unreachable, because every request has a timeout.
+/// Time without a new round of its main loop after which a worker counts as hanging. Rounds also end if the servers
+/// are unreachable, because every request has a timeout.
 const MAX_SILENCE: Duration = Duration::from_secs(300);
 
 /// Health of a worker. The worker updates it; probes read it.
@@ -15,7 +15,8 @@ pub struct Health(Mutex<State>);
 struct State {
     /// Start of the last round of the main loop; `None` before the first one.
     round: Option<Instant>,
-    /// Last response of the log to the worker, and the time for which it counts.
+    /// Time of the last response of the log to the worker, and the duration for which the log then counts as
+    /// reachable.
     contact: Option<(Instant, Duration)>,
     is_draining: bool,
 }
@@ -44,7 +45,7 @@ impl Health {
         self.state(|state| (state.round, state.is_draining) = (Some(Instant::now()), is_draining));
     }
 
-    /// Records a response of the log, which counts for the duration `valid`.
+    /// Records a response of the log, which counts as reachable for the duration `valid`.
     pub(crate) fn reach(&self, valid: Duration) {
         self.state(|state| state.contact = Some((Instant::now(), valid)));
     }

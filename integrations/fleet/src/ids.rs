@@ -46,7 +46,7 @@ impl Ids {
         }
     }
 
-    /// Adds an id.
+    /// Adds an id, unless its text is longer than 128 bytes.
     pub fn insert(&mut self, id: &str) {
         let (text, number) = split(id);
         if text.len() > MAX_LENGTH {
@@ -65,8 +65,8 @@ impl Ids {
     }
 }
 
-/// Splits an id into a text and the number at its end, without leading zeros. The number of an id without
-/// digits at its end is [`u64::MAX`], which is greater than all others.
+/// Splits an id into a text and the number at its end (up to 19 digits). Leading zeros belong to the text. The number
+/// of an id without digits at its end is [`u64::MAX`], which is greater than all others.
 fn split(id: &str) -> (&str, u64) {
     let digits = id.len() - id.trim_end_matches(|c: char| c.is_ascii_digit()).len();
     // A number of 19 digits has 64 bits at most.

@@ -93,7 +93,8 @@ enum Command {
     },
 }
 
-/// Options of the missions and of the amount of work at a time.
+/// Options of a worker: its missions, the number of its threads, the robots that it keeps in memory, its snapshots, and
+/// the address of its metrics.
 #[derive(Debug, Args)]
 struct Work {
     /// Read missions from the manifests in this directory. The name of a mission is its file name without `.toml`.
@@ -243,7 +244,8 @@ fn has_colours() -> bool {
 async fn run(command: Command) -> Result<(), Errors> {
     match command {
         Command::Worker { server, work, name } => {
-            // Probes distinguish a worker that waits for its servers from one that hangs.
+            // The endpoints are opened first, so that probes can distinguish a worker that waits for its servers from
+            // one that hangs.
             let health = work.open_endpoints().await?;
             let store = server.open(60).await.map_err(|message| vec![message])?;
             let name = name.unwrap_or_else(own_name);

@@ -1,8 +1,8 @@
 //! Missions of a worker. The manifests of directories are read once; each mission has an initial
 //! loop, which is cloned for every robot.
 //!
-//! A mission can have several versions at the same time: the current one, with which robots are
-//! enrolled, and former ones, with which robots finish that were enrolled with them.
+//! A mission can have several versions at the same time: the current one, with which robots are enrolled, and former
+//! ones, which are kept for the robots that were enrolled with them.
 //!
 //! Cloned loops share their constant parts, e.g. knowledge base, domain and ground task.
 

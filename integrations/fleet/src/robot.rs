@@ -1,6 +1,6 @@
-//! State of a single robot, which turns an event into a decision. It has no network and takes the
-//! time from the events. So equal events at equal times lead to equal decisions, except for plans
-//! that a time limit has cut short.
+//! State of a single robot, which turns an event into a decision. It has no network and takes the time from the
+//! events. So equal events at equal times lead to equal decisions, except for plans whose search was ended by a time
+//! limit.
 
 use std::time::Duration;
 
@@ -121,7 +121,7 @@ pub enum Begun {
 pub struct Search {
     decided: Decided,
     answers: Vec<Answer>,
-    /// Text with the id of the event, to be stored with the decision.
+    /// Message id of the event, which is recorded when the decision is complete.
     id: Option<String>,
 }
 
@@ -256,7 +256,7 @@ impl Robot {
                 self.warm(missions)?;
                 search.decided.target.clone_from(&target);
                 self.migration = target.map(|target| Migration { at: safe_point, target });
-                // Without an observation nothing has to be deliberated.
+                // If the robot does not change its version now, nothing has to be planned.
                 !self.migrate(&name, missions, &mut search, before)?
                     || self.deliberate(&mut search.answers, before)
             }
@@ -311,8 +311,8 @@ impl Robot {
         Decided { retired: true, skips, ids, ..empty(event.sequence) }
     }
 
-    /// Deliberates without a search, or with the plans of `before`. Returns `false` if a search is
-    /// necessary; the loop is then unchanged.
+    /// Plans without a search, or replays the plans of `before`. Returns `false` if a search is necessary; the loop
+    /// is then unchanged.
     fn deliberate(&mut self, answers: &mut Vec<Answer>, before: Option<&Decided>) -> bool {
         let Control::Warm(control) = &mut self.control else { return true };
         let more = match before {
@@ -326,7 +326,7 @@ impl Robot {
 
     /// Changes to another version of the mission if this was requested, the version is available, and the loop is at
     /// the requested point. A recorded decision determines whether the robot changes. Returns `true` if the robot has
-    /// changed; the new loop then has to deliberate. If the version does not fit, an error becomes an answer, and the
+    /// changed; the new loop then has to plan. If the version does not fit, an error becomes an answer, and the
     /// request is dropped.
     fn migrate(
         &mut self,
@@ -422,7 +422,7 @@ fn empty(event: u64) -> Decided {
 
 /// Returns `true` if an event retires its robot.
 pub(crate) fn is_retirement(payload: &[u8]) -> bool {
-    // Most events are not parsed here.
+    // Most events do not contain this word, so they need not be parsed.
     let has_word = payload.windows(6).any(|part| part == b"retire");
     has_word && serde_json::from_slice(payload).is_ok_and(|head| matches!(request(&head), Request::Retire))
 }

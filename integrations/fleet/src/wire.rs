@@ -80,8 +80,8 @@ pub struct Decided {
     /// `true` if with this event the robot has changed to another version of its mission.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub migrated: bool,
-    /// Checksum of the version of the mission with which this event has enrolled the robot, or to
-    /// which the robot was to change.
+    /// Checksum of a version of the mission: the version with which this event has enrolled the robot, or the one to
+    /// which the robot has changed, or could not change, after this event.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub digest: Option<String>,
     /// Checksum of the version of the mission to which the robot changes at the next safe point, if this

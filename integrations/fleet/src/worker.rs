@@ -106,7 +106,8 @@ impl<S: Store> Worker<S> {
         let (store, name) = (&self.shared.store, &self.shared.worker);
         let outcome = store.put(Bucket::Workers, name, &value, self.presence).await;
         if !matches!(outcome, Err(Fault::Unreachable(_))) {
-            // A worker that reaches the log renews its leases at least as often.
+            // The status is published four times per lease time, so one lease time without a response means that the
+            // log is lost.
             self.shared.health.reach(self.lease);
         }
         self.presence = match outcome {

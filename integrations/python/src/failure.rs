@@ -4,7 +4,7 @@ use metaplan::answers::ErrorAnswer;
 use metaplan::message::Message;
 use pyo3::prelude::*;
 
-/// Creates the exception for messages, from the same JSON that the command line prints.
+/// Creates the Python exception for messages, from the JSON that the command line prints for them.
 pub(crate) fn raise(py: Python<'_>, messages: &[Message]) -> PyErr {
     let json = serde_json::to_string(&ErrorAnswer::new(messages)).unwrap_or_default();
     let exception = py

@@ -277,7 +277,7 @@ impl Mission {
         let (found, stopped) = detached(py, &interrupt, || planned(&setup, wanted, on_improvement.as_ref()));
         match (found, stopped) {
             (Ok(planned), None) => Ok(planned),
-            // After Ctrl-C, the best known plan is returned. A Pareto front has no text, so it is not.
+            // After Ctrl-C, the best known plan is returned. A Pareto front, which has no `text`, is not returned.
             (Ok(planned), Some(_)) if planned.text.is_some() => Ok(planned),
             (_, Some(error)) | (Err(Stop::Raised(error)), None) => Err(error),
             (Err(Stop::Wrong(messages)), None) => Err(raise(py, &messages)),

@@ -224,8 +224,8 @@ fn rust_type(field: &Field, interface: &Interface, all: &[Interface]) -> Result<
     })
 }
 
-/// Returns the path of a message that an interface refers to: that of the variant, or the common
-/// one.
+/// Returns the path of a message that an interface refers to: the message of the interface's variant if there is one,
+/// otherwise the common message.
 fn nested_type(full_name: &str, interface: &Interface, all: &[Interface]) -> Result<String, Box<dyn Error>> {
     let find = |variant: &Option<String>| {
         all.iter().find(|other| other.variant == *variant && other.full_name() == full_name)

@@ -33,7 +33,8 @@ use crate::planner::{
 
 const EXPERT_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Pause before the next planning attempt if no plan was found, unless the available designs change.
+/// Maximum pause before the next planning attempt if no plan was found. It ends early if the available designs
+/// change.
 const RETRY_PAUSE: Duration = Duration::from_secs(5);
 
 const FAILURE_PAUSE: Duration = Duration::from_secs(1);

@@ -1,5 +1,5 @@
-//! Translates `/diagnostics` to input lines of the loop: statuses of the monitors of MROS, ROSA and
-//! PLANTA, diagnostics of drivers by the rules of `ros.toml`, and signals.
+//! Converts diagnostics to input lines of the adaptation loop: statuses of the monitors of MROS, ROSA and PLANTA on
+//! `/diagnostics`, diagnostics of drivers there by the rules of `ros.toml`, and signals.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt;
@@ -19,8 +19,8 @@ use crate::signals::{self, Signal};
 /// Upper limit on the number of warnings about statuses that nothing uses.
 const MAX_UNUSED: usize = 20;
 
-/// Diagnostics and signals that are not handled yet. Only the latest status of each subject is kept, so that a
-/// slow loop does not fall behind.
+/// Diagnostics and signals that are not handled yet. Only the latest status of each subject (message and keys of the
+/// status) is kept, so that a slow loop does not fall behind.
 pub(crate) struct Diagnosed {
     queue: Arc<Queue>,
     /// Tasks that observe the signals. They end when this value is dropped.
@@ -42,8 +42,8 @@ pub(crate) struct Sources {
 }
 
 /// Returns the time after which an equal value must be reported again, for each attribute whose filter needs
-/// repetitions. The time is a quarter of the filter's period or debounce time, or zero if every sample
-/// counts. Without repetitions, the filter would treat a constant value as silence.
+/// repetitions. The time is a quarter of the filter's period or of its debounce time (the shorter one), or zero if
+/// every sample counts. Without repetitions, the filter would treat a constant value as silence.
 pub(crate) fn repeats(filters: &FilterSettings) -> BTreeMap<String, Duration> {
     let mut repeats = BTreeMap::new();
     for (attribute, measured) in &filters.measured {
@@ -154,8 +154,8 @@ impl Diagnosed {
     }
 }
 
-/// Translates a status to the loop's statuses: itself if it has a message of the monitors of MROS, and the
-/// results of matching rules.
+/// Translates a status to statuses that the loop can read: the results of matching rules, and the status itself if
+/// its message is one of MROS's monitors.
 fn translated(rules: &[DiagnosticRule], status: &DiagnosticStatus) -> Vec<DiagnosticStatus> {
     let mut statuses: Vec<DiagnosticStatus> =
         rules.iter().filter_map(|rule| rule.translate(status)).collect();

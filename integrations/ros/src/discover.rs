@@ -59,7 +59,8 @@ pub struct Options {
     pub duration: Duration,
     /// New file for the settings. Without one, they are written to standard output.
     pub output: Option<PathBuf>,
-    /// Manifest of a mission whose components and designs are used in the settings.
+    /// Manifest of a mission whose components and designs are used in the settings. Without one, the settings contain
+    /// placeholders.
     pub mission: Option<PathBuf>,
 }
 
@@ -76,7 +77,7 @@ struct Diagnostic {
     /// Most severe level so far, to which `message` belongs.
     level: u8,
     message: String,
-    /// Last value of each key whose first word is a number.
+    /// Last value that begins with a number, by key.
     numbers: BTreeMap<String, String>,
 }
 
@@ -84,9 +85,9 @@ struct Diagnostic {
 struct Robot {
     endpoints: Endpoints,
     diagnostics: BTreeMap<String, Diagnostic>,
-    /// Labels of the states of lifecycle nodes, by node.
+    /// Labels of the states of the lifecycle nodes that have replied, by node.
     states: BTreeMap<String, String>,
-    /// Messages per second, by topic.
+    /// Messages per second on topics of the types in [`RATED`], by topic.
     rates: BTreeMap<String, f64>,
 }
 

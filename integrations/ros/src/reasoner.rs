@@ -1,10 +1,10 @@
 //! Replacement of MROS's reasoner (`mros2_reasoner` \[1\]). Functions are requested as goals of the
 //! action `/mros/objective`, and receive the best available design.
 //!
-//! Designs are selected by [`metaplan::configure`], as in MROS, and requested by
-//! `/mros/request_configuration`, or by `/<function>/change_mode` if that service has no server.
-//! The status of an objective is published on changes and every `reasoning_period`. A goal is
-//! cancelled once its function has released its design.
+//! Designs are selected by [`metaplan::configure`], as in MROS, and requested by `/mros/request_configuration`. If
+//! only `/<function>/change_mode` has a server, that service is used. Steps in the settings replace both services.
+//! The status of an objective is published on changes and every `reasoning_period`. A cancelled goal ends once its
+//! function has released its design.
 //!
 //! \[1\] Bozhinoski et al., MROS: Runtime Adaptation For Robot Control Architectures, Advanced Robotics 36, 2022.
 

@@ -75,8 +75,8 @@ impl Prover {
         Ok(vec![with_facts(&copy, [fact])?])
     }
 
-    /// Assumes `count` pairwise different fresh values of a property, all of them in the class `filler`.
-    /// Returns one engine for each case.
+    /// Assumes that `individual` has `count` pairwise different fresh values of a property, all in the class
+    /// `filler`. Returns one engine for each case.
     fn witnesses(
         engine: &Engine,
         property: &ObjectPropertyExpression,

@@ -9,8 +9,8 @@ use crate::owl::{Axiom, Characteristic, ClassExpression, Iri, ObjectPropertyExpr
 use crate::vocab::owl;
 
 impl Prover {
-    /// Decides if the rules prove an axiom. The answer contains an explanation of the proof, or the
-    /// reason why the axiom is open.
+    /// Decides if the rules prove an axiom. The answer contains an explanation of the proof, or the reason why the
+    /// axiom was not proved.
     pub(super) fn axiom(&self, axiom: &Axiom) -> Result<Answer, Error> {
         if let Axiom::DatatypeDefinition(..) = axiom {
             return Ok(Answer::Open("definitions of datatypes are not decided"));

@@ -106,8 +106,8 @@ fn annotation_entailment(
     Entailment { statement: format!("AnnotationAssertion(<{property}> <{subject}> {value})"), answer }
 }
 
-/// Reports a statement of the conclusions that could not be read as not entailed. Returns `None` for
-/// other warnings, and for an unused class expression, which claims nothing.
+/// Reports a statement of the conclusions as not entailed, if the warning states that it could not be read. Returns
+/// `None` for other warnings, and for an unused class expression, which claims nothing.
 fn unread(warning: &Warning) -> Option<Entailment> {
     let statement = match warning {
         Warning::Unread { statement, .. } if statement.starts_with(UNUSED_CLASS) => return None,

@@ -23,8 +23,8 @@ pub struct SchemaEntity {
     pub empty: Option<String>,
 }
 
-/// Hierarchy of the classes, object properties and data properties of a knowledge base, each in the
-/// given order.
+/// Hierarchy of the classes, object properties and data properties of a knowledge base, each in the order in which
+/// they were given.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Schema {
     /// Classes.

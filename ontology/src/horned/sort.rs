@@ -54,8 +54,8 @@ fn arrange<T>(items: &mut [T], mut order: Vec<u32>) {
     }
 }
 
-/// Returns the sort key of an assertion of names without annotations; `None` for other axioms. The kinds
-/// are in the order of the variants of [`Axiom`].
+/// Returns the sort key of an assertion about a named class or property without annotations; `None` for other axioms.
+/// The kinds are in the order of the variants of [`Axiom`].
 fn key(annotated: &AnnotatedAxiom, rank: impl Fn(&Iri) -> Option<u32>) -> Option<Key> {
     if !annotated.annotations.is_empty() {
         return None;

@@ -222,8 +222,8 @@ impl AxiomLowering<'_, '_> {
         for body in &bodies {
             for (conditions, head) in &conclusions {
                 let mut body: Conjunction = body.iter().chain(conditions).cloned().collect();
-                // A contradiction without a condition (`Thing ⊑ Nothing`) needs no individual. Any other head
-                // has to bind `x`.
+                // A contradiction without a condition (`Thing ⊑ Nothing`) needs no individual. Any other conclusion
+                // is about `x`, which the body has to bind.
                 if body.is_empty() && !head.is_empty() {
                     body.push(self.context.thing(x));
                 }
@@ -232,8 +232,8 @@ impl AxiomLowering<'_, '_> {
         }
     }
 
-    /// Lowers an equivalence as a cycle of subclass axioms. A subclass axiom that no rule can express is
-    /// recorded as unsupported.
+    /// Lowers an equivalence as a cycle of subclass axioms. A subclass axiom that no rule can express is recorded as
+    /// a gap.
     fn equivalent_classes(&mut self, classes: &[ClassExpression]) {
         for (sub, sup) in classes.iter().zip(classes.iter().cycle().skip(1)) {
             self.sub_class(sub, sup);

@@ -18,8 +18,8 @@ use crate::error::Warning;
 use crate::owl::{AnnotatedAxiom, Axiom, Characteristic, ClassExpression, EntityKind};
 use crate::vocab::owl;
 
-/// Adds the rules of difference, if a rule depends on `differentFrom`, and rule eq-rep for entities that are
-/// individuals, too, if names can become equal. Returns `true` if a rule or fact can make two names equal.
+/// Adds the rules of difference if a rule depends on `differentFrom`. Returns `true` if a rule or fact can make two
+/// names equal; in this case also adds rule eq-rep for classes and properties that are individuals, too.
 pub(crate) fn lower(axioms: &[AnnotatedAxiom], context: &mut Context) -> bool {
     let (same_as, different) = (context.name(owl::SAME_AS), context.name(owl::DIFFERENT_FROM));
     let merges_names = |rule: &Rule| rule.head.iter().any(|atom| matches!(atom, Atom::Same(..)));

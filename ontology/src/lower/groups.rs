@@ -1,5 +1,9 @@
-//! Large sets of pairwise different individuals or pairwise disjoint classes, without a rule or fact for each
-//! pair: each member gets a number, and a constraint forbids that an individual has two numbers.
+//! Large sets of pairwise different individuals or pairwise disjoint classes, without a rule or a stated fact
+//! for each pair.
+//!
+//! Each individual or class of the set has a number, and the members of a class get the number of the class.
+//! A constraint forbids that an individual has two numbers. If a rule depends on `owl:differentFrom`, a
+//! further rule derives it for each pair of individuals with different numbers.
 
 use rules::{Atom, RuleIdentity, Symbol, Term};
 

@@ -8,7 +8,8 @@
 //! becomes a rule with an empty head, an integrity constraint.
 //!
 //! Axioms outside of OWL 2 RL are lowered in part if possible (for example one direction of an equivalence),
-//! and the remaining part is reported. Conclusions are therefore always sound and possibly incomplete.
+//! and the remaining part is reported. With the semantics of OWL ([`Equality::Owl`]), conclusions are
+//! therefore sound and possibly incomplete.
 //!
 //! - [1] OWL 2 Web Ontology Language Profiles, W3C 2012, section 4.3.
 
@@ -58,9 +59,9 @@ pub fn lower_with(ontology: &Ontology, equality: Equality, symbols: &mut Symbols
     lower_together(ontology, Vec::new(), equality, symbols)
 }
 
-/// Lowers an ontology like [`lower_with`], together with additional rules, whose names are in `symbols`.
-/// In the additional rules, `owl:Thing`, `owl:Nothing`, `sameAs` and `differentFrom` have the semantics
-/// of OWL. These rules come last in the program.
+/// Lowers an ontology like [`lower_with`], together with additional rules, whose names are in `symbols`. In the
+/// additional rules, `owl:Thing`, `owl:Nothing`, `sameAs` and `differentFrom` have the semantics of OWL (the last two
+/// only under [`Equality::Owl`]). These rules come last in the program.
 pub fn lower_together(
     ontology: &Ontology,
     additional: Vec<Rule>,
@@ -100,12 +101,9 @@ impl Context<'_> {
     /// Adds rules that come from no document. Under the semantics of OWL, two different names can denote
     /// the same individual, so a comparison of names becomes the relation `differentFrom`.
     fn add_rules(&mut self, additional: Vec<Rule>) {
-        let owl = self.equality == Equality::Owl;
         for mut rule in additional {
             for atom in &mut rule.body {
-                if let (true, Atom::Different(left, right)) = (owl, &*atom) {
-                    *atom = self.different(*left, *right);
-                }
+                atom.replace_different(&mut |left, right| self.different(left, right));
             }
             self.rules.push(rule);
         }

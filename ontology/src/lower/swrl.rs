@@ -125,9 +125,9 @@ fn lower_rule(rule: &Rule, identity: &RuleIdentity, context: &mut Context) -> Re
     Ok(())
 }
 
-/// Adds an `owl:Thing` atom for the variable of each `owl:Thing` atom (which is otherwise dropped), and for the first
-/// variable of each equality of two variables, unless a relation atom or an equality binds the variable. The variable
-/// then ranges over all individuals.
+/// Adds `owl:Thing` atoms for variables that the body otherwise leaves unbound, so that they range over all
+/// individuals. Considers the variable of each `owl:Thing` atom (which lowering drops), and the first variable of
+/// each equality of two variables.
 fn individuals(context: &mut Context, rule: &Rule, body: &mut Conjunction, variables: &mut Variables) {
     for atom in &rule.body {
         let argument = match atom {

@@ -15,9 +15,9 @@ use crate::vocab::{is_reserved, owl, rdf, rdfs};
 #[allow(clippy::struct_excessive_bools)] // independent observations
 struct NameUse {
     reserved: bool,
-    /// The name is a blank node, or may be part of an axiom, a list, a rule or a header.
+    /// Whether the name is a blank node, or may be part of an axiom, a list, a rule or a header.
     special: bool,
-    /// The name is a blank node or has a declaration.
+    /// Whether the name is a blank node or has a declaration.
     declared: bool,
     class: bool,
     object: bool,
@@ -84,7 +84,7 @@ impl Usage {
     pub(super) fn is_bulk(&self, triple: &Compact) -> bool {
         let uses = |number: u32| self.uses[number as usize];
         let subject = uses(triple.subject);
-        // Such a triple may be part of an axiom, or of a statement about a property.
+        // A triple with this property may be part of an axiom, or of a statement about a property.
         if subject.special || subject.reserved || triple.subject == triple.predicate {
             return false;
         }

@@ -1,9 +1,9 @@
-//! Adds a declaration for every class and property, because horned-owl drops assertions of properties whose kind is
-//! unknown.
+//! Adds declarations of undeclared classes and properties, because horned-owl drops assertions of properties whose kind
+//! is unknown.
 //!
-//! A class or property that the imports closure does not declare gets a kind from its use, with a warning: a property
-//! with literals as values is a data property, a property between individuals an object property, and a property that
-//! describes only classes, properties or ontologies an annotation property.
+//! A class or property that the imports closure does not declare gets a kind from its use, with a warning. In general,
+//! a property with literals as values is a data property, a property between individuals an object property, and a
+//! property that describes only classes, properties or ontologies an annotation property.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -205,8 +205,8 @@ impl Declared {
             || iri.starts_with(rdf::NS)
     }
 
-    /// Returns `true` if the node is an ontology, class or property and not an individual. Other blank
-    /// nodes count as classes.
+    /// Returns `true` for an ontology, for any other blank node (which counts as a class), and for a declared class or
+    /// property that is not also an individual.
     fn is_entity(&self, graph: &Graph, node: &NamedOrBlankNode) -> bool {
         // Statements about an ontology header are usually annotations.
         if graph.of(node).any(|(_, triple)| is_type(triple, owl::ONTOLOGY)) {

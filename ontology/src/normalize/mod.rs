@@ -1,4 +1,4 @@
-//! Normalises merged triples, so that horned-owl reads them without loss.
+//! Normalises merged triples, so that horned-owl skips as few of them as possible.
 //!
 //! horned-owl's RDF reader matches exact patterns and skips triples that deviate: rules and axioms whose node
 //! is an IRI instead of a blank node, atoms with an annotation, data atoms about an individual, empty bodies,
@@ -56,7 +56,8 @@ pub(crate) struct Merged {
     pub graph: Graph,
     /// Triples that are not in the graph, because no pass before `plain` has to process them.
     pub bulk: Vec<Compact>,
-    /// For each document, the index of its first triple in the graph, and its ontology.
+    /// For each document: the index of its first triple in the graph, and its ontology IRI, or its name if it
+    /// declares none.
     pub parts: Vec<(usize, Iri)>,
 }
 

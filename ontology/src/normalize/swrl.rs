@@ -88,7 +88,7 @@ struct Pass {
     described: HashSet<Term>,
     /// Properties that are declared as data properties, but not as object properties.
     data_properties: HashSet<Term>,
-    /// Indices of the triples that canonical triples replace.
+    /// Indices of the triples that are removed at the end of the pass.
     replaced: HashSet<usize>,
     rule: usize,
     /// Variables in the canonical forms of all rules.

@@ -5,9 +5,10 @@ use std::collections::HashMap;
 
 use super::syntax::Flattened;
 
-/// Factor of the limit on the expanded size: `MAX_GROWTH_FACTOR * size + EXTRA_BYTES`.
+/// Factor of the limit on the bytes that expansions add: `MAX_GROWTH_FACTOR * size + EXTRA_BYTES` for a document of
+/// `size` bytes.
 const MAX_GROWTH_FACTOR: usize = 16;
-/// Constant term of the limit on the expanded size, in bytes.
+/// Constant term, in bytes, of the limit on the bytes that expansions add.
 const EXTRA_BYTES: usize = 1 << 20;
 const MAX_ENTITY_DEPTH: usize = 16;
 

@@ -1,8 +1,7 @@
 //! Resolves imports to files on this machine. The network is never used.
 //!
-//! Real knowledge bases import a URL (`https://raw.githubusercontent.com/…/ros2/owl/tomasys.owl`) whose
-//! document declares another ontology IRI (`http://metacontrol.org/tomasys`). Therefore an import is searched
-//! in this order:
+//! Real knowledge bases import a URL (`https://raw.githubusercontent.com/…/ros2/owl/tomasys.owl`) whose document
+//! declares another ontology IRI (`http://metacontrol.org/tomasys`). Therefore an import is searched in this order:
 //!
 //! 1. as a file, if it is a `file:` IRI or was written relative to its document;
 //! 2. among the documents already read, by ontology or version IRI;
@@ -11,8 +10,9 @@
 //! 4. in the directory of the importing document, then in the given directories and their subdirectories: by ontology
 //!    IRI, then by the last segment of the URL; among several matching files, the one whose path has most segments of
 //!    the URL;
-//! 5. in a directory that is named like one of the first two segments of the URL's path and lies next to a
-//!    directory of the importing document, because repositories are often checked out side by side;
+//! 5. in a directory that is named like one of the first two segments of the URL's path and lies next to the
+//!    directory of the importing document or next to a near ancestor of it, because repositories are often checked
+//!    out side by side;
 //! 6. among the documents already read, by file name;
 //! 7. among the embedded knowledge bases ([`crate::kb`]), by IRI or by the URL of their publication.
 
@@ -72,8 +72,8 @@ impl Resolver {
         Ok(Self { catalogs, files: OnceCell::new(), directories: options.directories.clone() })
     }
 
-    /// Resolves an import of the document at `importer` (`None` if the document has no path). Returns
-    /// `None` if the import is not found.
+    /// Resolves an import of the document at `importer` (`None` if the document has no path). Returns `None` if the
+    /// import is not found, and an error if the catalog next to the importing document cannot be used.
     pub(crate) fn resolve(
         &self,
         import: &str,

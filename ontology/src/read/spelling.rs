@@ -4,8 +4,8 @@
 use super::text::Text;
 use crate::error::{Error, Position, Warning};
 
-/// Maximum number of warnings, counted from the first, that get a position. The number is limited because
-/// each search visits all documents.
+/// Number of warnings, counted from the first, for which a position is searched. The number is limited because each
+/// search visits all documents.
 const MAX_SEARCHES: usize = 100;
 
 /// Sets the position of each warning about an undeclared name to the first occurrence of the name in the
@@ -29,7 +29,7 @@ pub(super) fn locate(warnings: &mut [Warning], texts: &[(String, Text)]) {
     }
 }
 
-/// Adds a position to an error about too deep nesting (O112) without one, if its document contains the IRI that the
+/// Adds a position to an error about too deep nesting (O112) that has none, if its document contains the IRI that the
 /// expression describes.
 pub(super) fn placed(error: Error, texts: &[(String, Text)]) -> Error {
     match error {

@@ -144,7 +144,8 @@ impl Runtime {
         self.report(component, delta)
     }
 
-    /// Sets the status of a component in the reporter's spelling; see [`Runtime::report_component`].
+    /// Sets the status of a component to exactly the given literal, whether or not the knowledge base allows this
+    /// spelling; see [`Runtime::report_component`].
     ///
     /// # Errors
     /// Returns the errors of [`Runtime::report_component`].

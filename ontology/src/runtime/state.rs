@@ -51,11 +51,11 @@ impl Objective {
 pub struct Grounding {
     /// The grounding.
     pub individual: Individual,
-    /// The design.
+    /// The design, if one is stated.
     pub design: Option<Individual>,
-    /// Statuses that the rules conclude; empty if there is no problem.
+    /// Statuses that are stated or concluded; empty if there is no problem.
     pub statuses: Vec<String>,
-    /// Measurements linked to the grounding: the individual that holds the value, and the value.
+    /// Measurements linked to the grounding: the individual that holds the value, and the value, if there is one.
     pub measurements: Vec<(Individual, Option<Literal>)>,
 }
 
@@ -69,7 +69,8 @@ impl Runtime {
         objectives
     }
 
-    /// Returns one derivation for each status of an objective, and one if the objective is updatable.
+    /// Returns one derivation for each status of an objective and for each value of its `o_updatable`. If a
+    /// status or value was latched (kept as an assertion), the derivation is the one at that time.
     ///
     /// # Errors
     /// Returns [`Error::Unknown`] if there is no such objective.

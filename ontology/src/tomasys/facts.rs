@@ -72,7 +72,8 @@ impl<'a> Facts<'a> {
         self.literals(subject, property).contains(&&Literal::Boolean(false))
     }
 
-    /// Returns the numeric value of a property, if the property has exactly one literal as a value.
+    /// Returns the numeric value of a property; `None` unless the property has exactly one literal as a value, which
+    /// is a number.
     pub(crate) fn number(self, subject: Symbol, property: Term) -> Option<BigRational> {
         match self.literals(subject, property)[..] {
             [value] => value.as_rational(),

@@ -65,9 +65,9 @@ pub struct FunctionDesign {
 pub struct Requirement {
     /// Name of the attribute type (as in `Individual::name`).
     pub attribute: String,
-    /// Minimum, inclusive.
+    /// Minimum, inclusive; `None` without a minimum.
     pub minimum: Option<BigRational>,
-    /// Maximum, inclusive.
+    /// Maximum, inclusive; `None` without a maximum.
     pub maximum: Option<BigRational>,
 }
 

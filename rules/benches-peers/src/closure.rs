@@ -10,7 +10,7 @@ use crate::Random;
 type Edge = (u32, u32);
 type Run = fn(&[Edge]) -> usize;
 
-/// Implementations. Ratios refer to the first.
+/// Implementations with their names. Printed ratios refer to the first.
 pub const PEERS: [(&str, Run); 5] = [
     ("metaplan-rules", engine),
     ("hand-written worklist", worklist),

@@ -34,7 +34,7 @@ pub trait Definition: Send + Sync {
     }
 }
 
-/// A registered [`Definition`], compared by its IRI.
+/// A custom built-in, given by its [`Definition`]. Two are equal if their IRIs are equal.
 #[derive(Clone, Copy)]
 pub struct CustomBuiltIn(pub(super) &'static dyn Definition);
 

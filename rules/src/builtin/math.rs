@@ -19,8 +19,8 @@ enum Numbers {
     Double(Vec<f64>),
 }
 
-/// Returns the value of a numeric or boolean function; `None` for other functions and unsuitable
-/// arguments.
+/// Returns the value of a numeric or boolean function. `None` for other functions, for unsuitable arguments, and if
+/// there is no value, as for the division of a decimal by 0.
 pub(super) fn compute(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Literal> {
     if let (BuiltIn::BooleanNot, [Literal::Boolean(value)]) = (built_in, arguments) {
         return Some(Literal::Boolean(!value));
@@ -33,7 +33,8 @@ pub(super) fn compute(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Liter
 }
 
 fn promote(arguments: &[&Literal]) -> Option<Numbers> {
-    // Promotion of `XPath`: a double makes all numbers doubles, and otherwise a float makes all floats.
+    // Promotion of `XPath`: if there is a double, all numbers become doubles; otherwise, if there is a float, all
+    // become floats.
     if arguments.iter().all(|a| matches!(a, Literal::Decimal(_))) {
         return Some(Numbers::Exact(arguments.iter().map(|a| a.as_rational()).collect::<Option<_>>()?));
     }

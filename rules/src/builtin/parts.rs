@@ -1,16 +1,18 @@
 //! Inverse of the constructor built-ins of SWRL ([1], sections 8.5 and 8.6): splits a value into its parts.
 //!
-//! Without a time zone, the time zone part is the empty text. Parts of a negative duration are negative or
-//! zero, as in `XPath`. A value with several decompositions (`PT90M`) is split canonically, but the known
-//! parts may belong to any decomposition.
+//! Without a time zone, the time zone part is the empty text. Parts of a negative duration are negative or zero, as
+//! in `XPath`. A value with several decompositions is split canonically: `PT90M` into 1 hour and 30 minutes. There is
+//! no solution if the known parts do not fit the canonical values of the unknown parts.
+//!
+//! [1] W3C Member Submission: SWRL, 2004.
 
 use super::signature::BuiltIn;
 use super::uri;
 use crate::literal::{Decimal, Duration, Literal, Moment, MomentKind};
 
 impl BuiltIn {
-    /// Splits the value `whole` into its parts, and returns the values of the unknown parts. Returns
-    /// `None` if the value cannot be composed of these and the known parts.
+    /// Splits the value `whole` canonically, and returns the values of the unknown parts. Returns `None` if `whole`
+    /// has the wrong kind, or if these values and the known parts together do not compose `whole`.
     pub(super) fn parts(self, whole: &Literal, parts: &[Option<&Literal>]) -> Option<Vec<Literal>> {
         let canonical = match (self, whole) {
             (Self::AnyUri, Literal::Uri(text) | Literal::String(text)) => uri::parts(text)?,

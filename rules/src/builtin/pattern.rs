@@ -25,9 +25,8 @@ pub(super) fn matches(arguments: &[&Literal]) -> bool {
     }
 }
 
-/// Replaces each match of the second argument in the first by the third, in which `$1` refers to the first
-/// group. `None` for an invalid pattern, and for a pattern that matches the empty text, which `XPath`
-/// forbids.
+/// Replaces each match of the second argument in the first by the third, in which `$1` refers to the first group.
+/// `None` for invalid arguments, and for a pattern that matches the empty text, which `XPath` forbids.
 pub(super) fn replace(arguments: &[&Literal]) -> Option<Literal> {
     let texts = arguments.iter().map(|argument| as_text(argument)).collect::<Option<Vec<&str>>>()?;
     let (text, pattern, replacement, flags) = match texts.as_slice() {
@@ -39,9 +38,8 @@ pub(super) fn replace(arguments: &[&Literal]) -> Option<Literal> {
     Some(Literal::String(regex.replace_all(text, expand(replacement)?.as_str()).into()))
 }
 
-/// Returns the distinct parts of the first argument between matches of the second, in order of occurrence.
-/// Empty for the empty text, for an invalid pattern, and for a pattern that matches the empty text ([2],
-/// section 7.6.4).
+/// Returns the distinct parts of the first argument between matches of the second, in order of occurrence. Empty for
+/// the empty text, for invalid arguments, and for a pattern that matches the empty text ([2], section 7.6.4).
 pub(super) fn tokens(arguments: &[&Literal]) -> Vec<Literal> {
     let texts = arguments.iter().map(|argument| as_text(argument)).collect::<Option<Vec<&str>>>();
     let (text, pattern, flags) = match texts.as_deref() {
@@ -96,8 +94,8 @@ const NAME_START: &str = ":A-Z_a-z\\x{C0}-\\x{D6}\\x{D8}-\\x{F6}\\x{F8}-\\x{2FF}
 const NAME_CONTINUE: &str = "\\-.0-9\\x{B7}\\x{300}-\\x{36F}\\x{203F}-\\x{2040}";
 
 /// Translates a pattern of `XPath` to the syntax of the `regex` crate: `[a-z-[aeiou]]` (subtraction of classes)
-/// becomes `[a-z--[aeiou]]`, and `\i` and `\c` are expanded. Returns an error for a back reference, and for a class
-/// within a class that is not subtracted.
+/// becomes `[a-z--[aeiou]]`, and `\i` and `\c` are expanded. Returns an error for a back reference, for a backslash
+/// at the end, and for a class within a class that is not subtracted.
 fn translate(pattern: &str) -> Result<String, String> {
     let mut translated = String::new();
     // Nesting depth of classes, and a flag that is set while the innermost class has no members yet.

@@ -18,11 +18,11 @@ macro_rules! built_ins {
         }
 
         impl BuiltIn {
-            /// All built-ins of SWRL except those on lists, and the two data range tests. Custom built-ins are not
-            /// included.
+            /// The built-ins of SWRL except those on lists, and additionally the two data range tests
+            /// ([`BuiltIn::DataRange`], [`BuiltIn::OutsideDataRange`]). Custom built-ins are not included.
             pub const ALL: &'static [Self] = &[$(Self::$variant,)*];
 
-            /// Returns the local name in the `swrlb` namespace, or the IRI of a custom built-in.
+            /// Returns the local name of a built-in of SWRL or of a data range test, or the IRI of a custom built-in.
             pub fn name(self) -> &'static str {
                 match self {
                     $(Self::$variant => $name,)*
@@ -65,7 +65,7 @@ built_ins! {
     /// datatype. This is the complement of a data range, which exists in OWL but not in SWRL. Rule text:
     /// `not xsd:decimal(?x)`.
     OutsideDataRange "outsideDataRange" 2..=2 Test,
-    /// Tests that the two arguments are equal.
+    /// Tests that the two arguments compare equal. Numbers of different types are promoted: `1` equals `1e0`.
     Equal "equal" 2..=2 Test,
     /// Tests that the two arguments do not compare equal; incomparable arguments pass. False for ill-typed
     /// literals.
@@ -132,7 +132,7 @@ built_ins! {
     /// Second argument in lower case.
     LowerCase "lowerCase" 2..=2 Function,
     /// Second argument in which each character of the third argument is replaced by the character at the
-    /// corresponding position of the fourth argument, or removed without one.
+    /// corresponding position of the fourth argument, or removed if there is none.
     Translate "translate" 4..=4 Function,
     /// Tests that the first argument contains the second.
     Contains "contains" 2..=2 Test,

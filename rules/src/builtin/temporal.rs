@@ -94,7 +94,8 @@ fn durations(built_in: BuiltIn, left: &Duration, right: &Duration) -> Option<Lit
     Some(Literal::Duration(Duration::new(months, Decimal::from_rational(&sum))))
 }
 
-/// Returns the product or quotient of a duration and a number. Months are rounded, halves up.
+/// Returns the product or quotient of a duration and a number. Months are rounded, halves up. `None` for a division
+/// by 0, and if the built-in is for another kind of duration or does not scale.
 fn scaled(built_in: BuiltIn, duration: &Duration, factor: &BigRational) -> Option<Literal> {
     use BuiltIn as B;
     let divides = matches!(built_in, B::DivideYearMonthDuration | B::DivideDayTimeDuration);

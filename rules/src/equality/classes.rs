@@ -1,9 +1,8 @@
-//! Equality classes of names: a union-find structure with a representative per class, and the edges that
-//! connect the names.
+//! Equality classes of names, each with a representative, and the edges that connect the names.
 //!
-//! An edge is a pair of names that was stated or derived to denote one individual. It records its premises
-//! at the time of its derivation: stated facts and earlier edges. Therefore edges never support each other
-//! in a circle, and the effect of a deleted fact on a class can be read off its edges.
+//! An edge is a pair of names that was stated or derived to denote one individual. It records its premises at the
+//! time of its derivation: stated facts and earlier edges. Therefore edges never support each other in a circle, and
+//! the effect of a deleted fact on a class can be read off its edges.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -26,9 +25,9 @@ pub(super) type EdgeId = u32;
 pub(super) struct Edge {
     pub left: Symbol,
     pub right: Symbol,
-    /// Stated facts among the premises.
+    /// Stated facts among the premises of this edge.
     pub facts: Vec<Fact>,
-    /// Earlier edges among the premises.
+    /// Earlier edges (recorded equalities) among the premises of this edge.
     pub edges: Vec<EdgeId>,
     /// Derivation of the pair when the edge was created, down to stated facts and other pairs; the first
     /// step is the pair itself. Empty if the pair is stated.

@@ -37,13 +37,13 @@ use crate::vocabulary::{DIFFERENT_FROM, SAME_AS};
 use classes::Classes;
 
 impl Program {
-    /// Returns the program under OWL's semantics of names: `owl:sameAs` is equality, and `differentFrom` in
-    /// rule bodies matches stated and derived facts of `owl:differentFrom`. Without equality,
-    /// `differentFrom` compares names.
+    /// Returns the program under OWL's semantics of names: `owl:sameAs` is equality, and `differentFrom` in rule
+    /// bodies (outside of aggregates) matches stated and derived facts of `owl:differentFrom`. Without equality,
+    /// `differentFrom` compares names. Two rules are added: `owl:differentFrom` is symmetric and irreflexive.
     ///
-    /// `sameAs` in a body compares individuals if one of its terms is a variable that another atom binds. Otherwise (two
-    /// constants, or variables that no other atom binds) the atom matches pairs of names of individuals with several
-    /// names. An individual with one name then equals itself only if this pair is stated.
+    /// `sameAs` in a body compares individuals, unless its terms are two different constants, or two variables that
+    /// no other atom binds. Then the atom matches pairs of names of individuals with several names. An individual
+    /// with one name then equals itself only if this pair is stated.
     #[must_use]
     pub fn with_equality(&self, symbols: &mut Symbols) -> Self {
         let (same_as, different) = (symbols.name(SAME_AS), symbols.name(DIFFERENT_FROM));
@@ -53,13 +53,14 @@ impl Program {
             let bound = binding(rule).bound.0;
             let is_bound = |term: Term| term.as_variable().is_some_and(|v| bound[usize::from(v.0)]);
             for atom in &mut rule.body {
-                match *atom {
-                    Atom::Same(left, right) if left != right && !is_bound(left) && !is_bound(right) => {
-                        *atom = Atom::relation(same_as, [left, right]);
-                    }
-                    Atom::Different(left, right) => *atom = Atom::relation(different, [left, right]),
-                    _ => {}
+                if let Atom::Same(left, right) = *atom
+                    && left != right
+                    && !is_bound(left)
+                    && !is_bound(right)
+                {
+                    *atom = Atom::relation(same_as, [left, right]);
                 }
+                atom.replace_different(&mut |left, right| Atom::relation(different, [left, right]));
             }
         }
         let [x, y] = [0, 1].map(|number| Term::from(Variable(number)));
@@ -80,7 +81,8 @@ impl Program {
 pub(crate) struct Equality {
     same_as: Symbol,
     classes: Classes,
-    /// Maps each row to the stated facts that it represents, unless these are just the row itself.
+    /// Maps each row (fact about representatives) to the stated facts that it represents, unless these are just the
+    /// row itself.
     originals: FxHashMap<Fact, BTreeSet<Fact>>,
     /// Maps each name to the stated `owl:sameAs` pairs that contain it.
     pairs: FxHashMap<Symbol, BTreeSet<Fact>>,
@@ -151,6 +153,17 @@ fn constants(program: &Program) -> impl Iterator<Item = Symbol> {
 }
 
 impl Atom {
+    /// Replaces a comparison of names by the atom that `replacement` returns. Those inside an aggregate are replaced, too.
+    pub fn replace_different(&mut self, replacement: &mut impl FnMut(Term, Term) -> Self) {
+        match self {
+            Self::Different(left, right) => *self = replacement(*left, *right),
+            Self::Aggregate { body, .. } => {
+                body.iter_mut().for_each(|atom| atom.replace_different(replacement));
+            }
+            _ => {}
+        }
+    }
+
     fn map(&self, term: &impl Fn(Term) -> Term) -> Self {
         let map_terms = |terms: &[Term]| terms.iter().copied().map(term).collect();
         match self {

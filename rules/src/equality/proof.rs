@@ -301,10 +301,9 @@ impl<'a> Builder<'a> {
         })
     }
 
-    /// Returns the values of a rule's variables with the constants that the rule mentions. If the rule
-    /// compares a variable with a constant, the recorded value is the constant's representative. That
-    /// value is replaced by the constant, because no atom of the rule supports the equality between the
-    /// two.
+    /// Returns the recorded values `bound` of a rule's variables. If the rule compares a variable with a constant by
+    /// `sameAs`, the constant replaces the recorded value, which is its representative. The reason is that no atom of
+    /// the rule supports the equality between the two.
     fn as_written(&self, rule: &Rule, bound: &[Symbol]) -> Vec<Symbol> {
         let mut values = bound.to_vec();
         for atom in &rule.body {

@@ -511,7 +511,7 @@ impl<'e> Update<'e> {
     }
 }
 
-/// Merges the classes of the two names of a stated pair, unless they are already equal.
+/// Records a stated pair as an edge and merges the classes of its two names, unless they are already equal.
 fn connect_stated(classes: &mut Classes, pair: &Fact) {
     let (left, right) = (pair.arguments[0], pair.arguments[1]);
     if classes.find(left) != classes.find(right) {

@@ -16,7 +16,7 @@ const MAX_EXPONENT: i64 = 1000;
 /// Largest scale (number of fractional digits) of the small representation. `10^18` is the largest power of
 /// ten within 64 bits.
 const SMALL_SCALE: u32 = 18;
-/// Number of fractional digits of a rounded quotient.
+/// Number of fractional digits to which a rational number is rounded, such as an inexact quotient.
 const DIVISION_DIGITS: u32 = 34;
 
 /// A decimal number `unscaled / 10^scale`. The scale is the smallest possible, so that equal values are
@@ -31,7 +31,7 @@ enum Repr {
 }
 
 impl Decimal {
-    /// Returns the number of bytes of the digits; 0 for the small representation.
+    /// Returns the approximate number of bytes of the digits; 0 for the small representation.
     pub(super) fn size(&self) -> usize {
         match &self.0 {
             Repr::Small { .. } => 0,
@@ -91,7 +91,7 @@ impl Decimal {
         }
     }
 
-    /// Returns the unscaled value and the scale.
+    /// Returns `unscaled` and `scale` of the number `unscaled / 10^scale`.
     pub fn parts(&self) -> (BigInt, u32) {
         match &self.0 {
             Repr::Small { unscaled, scale } => (BigInt::from(*unscaled), *scale),

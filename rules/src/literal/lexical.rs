@@ -11,11 +11,11 @@ use super::value::Literal;
 use super::{binary, text};
 
 impl Literal {
-    /// Parses a literal. Never fails: an invalid form gives [`Literal::IllTyped`]. With a language, the
-    /// datatype is ignored.
+    /// Parses a literal. Never fails: an invalid form gives [`Literal::IllTyped`]. With a language, the datatype is
+    /// ignored. Without both, the literal is an `xsd:string`.
     ///
-    /// `"1e-05"^^xsd:decimal`, the output of Python programs, is accepted as a decimal, although XSD
-    /// forbids exponents.
+    /// `"1e-05"^^xsd:decimal`, the output of Python programs, is accepted as a decimal, although XSD forbids
+    /// exponents.
     pub fn parse(lexical: &str, datatype_iri: Option<&str>, language: Option<&str>) -> Self {
         if let Some(tag) = language.filter(|tag| !tag.is_empty()) {
             return Self::Language { text: lexical.into(), tag: tag.to_ascii_lowercase().into() };
@@ -42,7 +42,8 @@ pub(super) enum Parsed {
     Unknown,
 }
 
-/// Parses `text@tag` of `rdf:PlainLiteral`. The last at-sign separates the tag.
+/// Parses `text@tag` of `rdf:PlainLiteral`. The last at-sign separates the tag. Without a tag, the literal is a
+/// string.
 fn parse_plain_literal(lexical: &str) -> Literal {
     match lexical.rsplit_once('@') {
         Some((text, "")) => Literal::String(text.into()),

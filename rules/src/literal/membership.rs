@@ -50,8 +50,9 @@ impl Literal {
         }
     }
 
-    /// Returns `true` if the value certainly lies in the value space of a datatype. For example, `5` lies
-    /// in `xsd:byte` and `xsd:decimal`, `1.5` only in `xsd:decimal`, and no float in `xsd:decimal`.
+    /// Returns `true` if the value certainly lies in the value space of a datatype. For example, `5` lies in
+    /// `xsd:byte` and `xsd:decimal`, `1.5` lies in `xsd:decimal` but not in `xsd:byte`, and no float lies in
+    /// `xsd:decimal`.
     pub fn is_in(&self, datatype_iri: &str) -> bool {
         self.membership(datatype_iri) == Some(true)
     }

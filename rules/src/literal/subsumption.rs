@@ -1,5 +1,5 @@
-//! Subsumption of datatypes: decides if the intersection of several datatypes is contained in another
-//! datatype. Uses the type hierarchy of XML Schema ([1], section 3) and the bounds of its integer types.
+//! Subsumption of datatypes: decides if the intersection of several datatypes is contained in another datatype. Uses
+//! the type hierarchy of XML Schema 1.1 (part 2, section 3) and the bounds of its integer types.
 
 use super::datatype::{OWL_RATIONAL, OWL_REAL, RDF, RDFS_LITERAL, XSD, integer_range};
 
@@ -71,7 +71,7 @@ fn upwards(local: &str) -> Vec<&str> {
     ancestors
 }
 
-/// Returns the primitive datatype that contains a datatype; `None` for a datatype outside all of them.
+/// Returns the primitive datatype that contains a datatype; `None` if there is none, as for `owl:real`.
 fn primitive(local: &str) -> Option<&'static str> {
     let ancestors = upwards(local);
     let is_ancestor = |name: &&&str| ancestors.contains(name) && **name != "integer";

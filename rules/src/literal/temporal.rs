@@ -35,11 +35,11 @@ pub struct Moment {
     kind: MomentKind,
     /// Seconds since 1970-01-01T00:00:00, in UTC if there is a time zone, and otherwise in local time.
     seconds: Decimal,
-    /// Offset of the time zone in seconds east of UTC.
+    /// Offset of the time zone in seconds east of UTC; `None` without a time zone.
     zone: Option<i64>,
 }
 
-/// An `xsd:duration`. Months and seconds are not convertible into each other.
+/// An `xsd:duration`: a number of months and a number of seconds, which are not convertible into each other.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 pub struct Duration {
     months: i64,

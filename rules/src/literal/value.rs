@@ -100,7 +100,7 @@ impl Literal {
         Self::Float(if value.is_nan() { f32::NAN.to_bits() } else { value.to_bits() })
     }
 
-    /// Returns `true` if the lexical form is outside the datatype.
+    /// Returns `true` if the lexical form is invalid for the datatype.
     pub fn is_ill_typed(&self) -> bool {
         matches!(self, Self::IllTyped { .. })
     }

@@ -36,7 +36,7 @@ pub enum Fault {
     /// A rule, or an aggregate in it, has too many matches to enumerate.
     #[error("rule {0} has too many matches")]
     TooMany(RuleIdentity),
-    /// The facts are contradictory.
+    /// The facts are contradictory. The text is a fact with a contradiction, or the violated integrity constraint.
     #[error("the knowledge is inconsistent: {0}")]
     Inconsistent(String),
 }

@@ -73,8 +73,8 @@ fn uses(rule: &Rule, equality: bool, same_as: Symbol, different: Symbol) -> Uses
                 body.extend(inner.iter().filter_map(relation).map(|used| (used, 1)));
             }
             Atom::Same(..) if equality => body.push(((same_as, 2), 0)),
-            // These atoms depend on no relation. Under equality, `differentFrom` holds only for literals, which never
-            // equal anything else.
+            // These atoms depend on no relation. Under equality, `differentFrom` is decided only if one term is a
+            // literal, which never equals anything else.
             Atom::Same(..) | Atom::Different(..) | Atom::BuiltIn { .. } => {}
         }
     }

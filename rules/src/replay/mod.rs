@@ -45,7 +45,7 @@ const DIFFERENT_FROM: &str = "http://www.w3.org/2002/07/owl#differentFrom";
 pub struct Replayed {
     /// Number of facts in the derivation.
     pub facts: usize,
-    /// Number of these facts that a rule derives.
+    /// Number of these facts whose reason is a rule.
     pub derived: usize,
     /// Number of rule matches that the completeness check enumerated.
     pub matches: usize,

@@ -38,7 +38,7 @@ fn supports(reason: &Reason) -> Vec<usize> {
     }
 }
 
-/// Appends to `steps` those steps of a derivation that it does not contain yet, supports first.
+/// Appends the steps of a derivation to `steps`, supports first. Facts that already have a step are skipped.
 fn append(derivation: &Derivation, positions: &mut FxHashMap<Fact, usize>, steps: &mut Vec<DerivationStep>) {
     let mut stack = vec![(0, 0)];
     while let Some((position, visited_count)) = stack.pop() {

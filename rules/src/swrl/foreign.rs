@@ -1,5 +1,5 @@
-//! Atoms of rule texts that cannot belong to an ontology, because they denote neither a class nor a
-//! property. If no rule derives such an atom, its author probably meant a built-in that does not exist.
+//! Atoms of rule texts that cannot belong to an ontology: by its arguments, such an atom denotes neither a class nor
+//! a property. If no rule derives its relation, the author probably meant a built-in that does not exist.
 
 use crate::error::Error;
 use crate::rule::{Program, Term};
@@ -32,7 +32,7 @@ impl ForeignAtom {
     }
 }
 
-/// Returns an error for each atom that rule bodies use and no rule head derives.
+/// Returns an error for each of the foreign atoms whose relation is used in a rule body and derived by no rule.
 pub(super) fn unknown(atoms: Vec<(&str, ForeignAtom)>, program: &Program, symbols: &Symbols) -> Vec<Error> {
     let (queried, derived) = (program.queried(symbols), program.concluded(symbols));
     let is_unknown = |(_, atom): &(&str, ForeignAtom)| {

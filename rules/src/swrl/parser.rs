@@ -25,7 +25,7 @@ pub struct Syntax {
 }
 
 /// Parses rules. `source` names the text in rule identities and errors. Prefix declarations of the text
-/// supplement `prefixes`.
+/// supplement or override `prefixes`.
 ///
 /// ```
 /// use metaplan_rules::{Prefixes, Symbols, parse_rules};
@@ -49,7 +49,7 @@ pub fn parse_rules(
 /// Parses rules like [`parse_rules`], with syntax options.
 ///
 /// # Errors
-/// Returns the errors of [`parse_rules`], and R105.
+/// Returns the errors of [`parse_rules`], and R105 for an extension of SWRL if [`Syntax::swrl_only`] is set.
 pub fn parse_rules_as(
     text: &str,
     source: &str,
@@ -60,13 +60,13 @@ pub fn parse_rules_as(
     parse(text, source, symbols, prefixes, syntax).map(|(program, _)| program)
 }
 
-/// Parses several rule texts about one ontology; `texts` contains pairs of source name and text. A
-/// relation in a body that no rule of any text derives has to be a class or a property. An atom of such
-/// a relation that can be neither (three arguments, or a literal as its individual) is an unknown
-/// built-in.
+/// Parses several rule texts about one ontology; `texts` contains pairs of source name and text. A relation in a body
+/// that no rule of any text derives has to be a class or a property. An atom of such a relation that can be neither
+/// (because it has three arguments, or a literal as its first one) is an unknown built-in.
 ///
 /// # Errors
-/// Returns the errors of [`parse_rules_as`] for each text, and R104 for unknown built-ins of any namespace.
+/// Returns the errors of [`parse_rules_as`] for each text. If there are none, returns R104 for unknown
+/// built-ins of any namespace.
 pub fn parse_rules_together(
     texts: &[(&str, &str)],
     symbols: &mut Symbols,
@@ -298,8 +298,7 @@ impl Parser<'_> {
         })
     }
 
-    /// Inserts the names of the variables into the expression of a mathematical built-in, which is the
-    /// second argument.
+    /// Inserts the names of the variables into the expression of `swrlm:eval`, which is the second argument.
     fn name_expression(&mut self, built_in: BuiltIn, arguments: &mut [Term]) {
         let [_, Term::Constant(text), values @ ..] = arguments else { return };
         let Some(Literal::String(expression)) = self.symbols.value(*text).as_literal() else { return };

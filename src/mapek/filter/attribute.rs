@@ -1,11 +1,14 @@
 //! Filter for the samples of one attribute: plausibility, hysteresis, debounce and staleness.
 //!
 //! Bounds of designs divide the values of an attribute into *cells*: within a cell, each bound is either satisfied
-//! (kept) or violated (missed). A sample in the cell of the believed value is accepted at once. A bound counts as
-//! violated as soon as a sample violates it. It counts as satisfied again only after a sample that satisfies it by at
-//! least its band (a Schmitt trigger whose lower threshold is the bound \[1\]). A lower bound of one design and an
-//! upper bound of another can be within one band of each other, so that each crossing makes one of the designs
-//! unavailable. Then a sample changes the cell only if it lies beyond the band. Crossings are debounced.
+//! (kept) or violated (missed). A sample in the cell of the believed value is believed at once. A satisfied bound
+//! counts as violated as soon as a sample violates it. A violated bound counts as satisfied only after a sample that
+//! satisfies it by at least its band (a Schmitt trigger whose lower threshold is the bound \[1\]). A change of the cell
+//! (*crossing*) is debounced.
+//!
+//! There is an exception if a lower bound of one design and an upper bound of another design are within one band of
+//! each other. Each crossing then makes one of the designs unavailable. So a sample changes the cell only if it lies
+//! beyond the band.
 //!
 //! Times are in microseconds and monotonic. Additional calls of [`AttributeFilter::elapse`] do not change the accepted
 //! values.
@@ -298,7 +301,8 @@ impl AttributeFilter {
         if self.is_same_cell(&target, believed) { Cow::Borrowed(believed) } else { Cow::Owned(target) }
     }
 
-    /// Returns a value that violates `bound`, between the bound and the next bound on the violated side.
+    /// Returns a value that violates `bound`. It lies at most half a band from the bound, and not beyond the next
+    /// bound.
     fn beyond(&self, bound: &Bound) -> BigRational {
         let two = BigRational::from_integer(2.into());
         let values = self.bounds.iter().map(|neighbour| &neighbour.value);

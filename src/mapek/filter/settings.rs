@@ -52,7 +52,7 @@ pub struct MeasuredSettings {
     /// Additional bounds at which designs change, such as bounds in rules. The bounds of designs in the knowledge base
     /// are included automatically.
     pub bounds: Vec<BigRational>,
-    /// Number of the last `of` samples that must have crossed a bound; 0 disables the condition.
+    /// Number of the last `of` samples that must have crossed a bound; 0 and 1 disable the condition.
     pub agree: usize,
     /// Number of latest samples that `agree` considers.
     pub of: usize,
@@ -88,9 +88,9 @@ impl FilterSettings {
         Self { heal_time: Duration::ZERO, band: BigRational::default(), ..Self::default() }
     }
 
-    /// Returns an error for each attribute or component that the knowledge base does not have; without a knowledge
-    /// base, for all. Each error follows its key in the section `adaptation` (`measured` or `components`) and the
-    /// unknown name.
+    /// Returns the attributes and components that the knowledge base does not have (without a knowledge base, all). For
+    /// each one, returns the key in the section `adaptation` (`measured` or `components`), the unknown name, and an
+    /// error.
     pub(crate) fn mistakes(&self, knowledge: Option<&Knowledge>) -> Vec<(&'static str, String, Message)> {
         let view = knowledge.map(Knowledge::view);
         let attributes: Vec<String> = view

@@ -29,7 +29,7 @@ pub fn note_doubts(mission: &mut Mission) {
 pub fn doubts(mission: &Mission) -> Vec<Message> {
     let numbers = Numbers::new(mission);
     let (missing, negative) = numbers.check();
-    // Functions without any value have a separate warning (M206).
+    // Functions without any value (`is_silent`) have a separate warning (M206).
     let missing: Vec<MissingValue> =
         missing.into_iter().filter(|value| !value.is_silent && value.is_likely).collect();
     let estimations = missing.iter().filter_map(|value| Some((value, value.estimation.as_ref()?)));

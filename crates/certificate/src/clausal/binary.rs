@@ -36,8 +36,8 @@ impl Formula {
                 let sign =
                     |literal: Literal, place: u32| if signs >> place & 1 == 1 { literal } else { -literal };
                 let (a, b, c) = (sign(a, 0), sign(b, 1), sign(c, 2));
-                // All three literals are false under exactly one assignment of the inputs; `ones`
-                // is the number of true inputs in it.
+                // All three literals are false under exactly one assignment of the inputs, with `ones` true
+                // inputs. The clause then enforces the sum bit, which is true if `ones` is odd.
                 let ones = 3 - u32::count_ones(signs);
                 self.clause(&[a, b, c, if ones % 2 == 1 { s } else { -s }]);
             }

@@ -19,7 +19,7 @@ pub fn read<'l>(input: &mut dyn BufRead, line: &'l mut Vec<u8>) -> std::io::Resu
     Ok((!line.is_empty()).then(|| line.trim_ascii_end()))
 }
 
-/// Parses a line of literals in the DIMACS syntax to `literals`, without the final 0. Returns
+/// Parses a line in the DIMACS syntax and stores its literals, without the final 0, in `literals`. Returns
 /// `None` if the line is malformed or has a variable above `variables`.
 pub fn literals(line: &[u8], variables: usize, literals: &mut Vec<Literal>) -> Option<()> {
     literals.clear();

@@ -1,13 +1,12 @@
-//! An additional, independent optimality proof for small tasks. It has three parts: a formula "some
-//! plan of at most T steps is cheaper", a refutation of the formula, and a proof that no longer
-//! plan is cheaper.
+//! An additional, independent optimality proof for small tasks. It has three parts: a formula "some plan of at
+//! most T steps is cheaper", a refutation of the formula, and a proof that no plan of more than T steps is
+//! cheaper.
 //!
-//! [`encoding`] is deliberately simple: one operator per step, explicit states, sums in binary. It
-//! has no time windows, no reduced costs and no symmetry breaking, and shares no code with the
-//! planner's encoding. For the certificate, a SAT solver refutes this formula, not the formula that
-//! found the plan. [`proof`] checks the refutation clause by clause along its hints (linear RUP, as
-//! in LRAT [1]) without search. [`steps`] bounds the number of steps by arithmetic on a potential,
-//! i.e. a table of lower bounds on the remaining cost.
+//! [`encoding`] is deliberately simple: one operator per step, explicit states, sums in binary. It has no time
+//! windows, no reduced costs and no symmetry breaking, and shares no code with the planner's encoding. For the
+//! certificate, a SAT solver refutes this formula, not the formula that found the plan. [`proof`] checks the
+//! refutation clause by clause along its hints (linear RUP, as in LRAT [1]) without search. [`steps`] bounds
+//! the number of steps by arithmetic on a potential, i.e. a table of lower bounds on the remaining cost.
 //!
 //! The checker encodes the task again and compares the result with the written formula.
 //!
@@ -51,12 +50,12 @@ pub struct Inputs<'i> {
     pub hints: &'i mut dyn BufRead,
 }
 
-/// Encodes "some plan of at most T steps is cheaper than the claim" for a T such that no longer
-/// plan is cheaper. Returns the formula and T. The claim is interpreted as in [`crate::check`].
+/// Encodes "some plan of at most T steps is cheaper than the claim". T is chosen such that no plan of more than
+/// T steps is cheaper. Returns the formula and T. The claim is interpreted as in [`crate::check`].
 ///
 /// # Errors
-/// A malformed document, a missing claim, an unsupported construct, no provable bound on the number
-/// of steps, or an exceeded limit.
+/// A malformed document, a missing claim, an unsupported construct, no provable bound on the number of steps,
+/// or an exceeded limit.
 pub fn formula(
     (task, argument): (&str, &str),
     claim: Option<&BigRational>,
@@ -68,9 +67,9 @@ pub fn formula(
     Ok((encoding::encode(&model, &cost, steps, LITERAL_LIMIT)?, steps))
 }
 
-/// Checks the three parts of a refutation: the formula encodes the task, the proof refutes the
-/// formula, and no plan of more than `steps` steps is cheaper. Returns for each part its name, and
-/// a summary or the reason of failure.
+/// Checks the three parts of a refutation: the formula encodes the task, the proof refutes the formula, and no
+/// plan of more than `steps` steps is cheaper. Returns for each part its name with a summary, or with the
+/// reason of failure.
 pub fn check_refutation(
     (task, argument): (&str, &str),
     claim: Option<&BigRational>,

@@ -1,17 +1,16 @@
 //! Bounds the number of steps of a plan that is cheaper than the claim.
 //!
-//! Consider the first T + 1 steps of a plan. They lead to some values of the variables of a
-//! potential (a table of lower bounds on the remaining cost). They cost at least as much as the
-//! cheapest sequence of T + 1 operators that leads to these values. The remaining steps cost at
-//! least the potential (or, for [`StepBound::Spent`], at least 0). If the sum is at least the claim
-//! for all values, a cheaper plan has at most T steps.
+//! The first T + 1 steps of a plan lead to some values of the variables of a potential (a table of lower bounds
+//! on the remaining cost). They cost at least as much as the cheapest sequence of T + 1 operators that leads to
+//! these values. The remaining steps cost at least the potential (or, for [`StepBound::Spent`], at least 0). If
+//! the sum is at least the claim for all values, a cheaper plan has at most T steps.
 
 use crate::argument::Argument;
 use crate::integer::Integer;
 use crate::model::Model;
 use crate::table::Table;
 
-/// The lower bound on the cost of a plan with more than T steps.
+/// The lower bound on the cost of a plan with more than T steps, by which T is determined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StepBound {
     /// The cost of the first T + 1 steps alone. T then does not depend on the values of a potential
@@ -69,8 +68,8 @@ pub(super) fn check(
     position.ok_or_else(|| format!("a cheaper plan may have more than {steps} steps"))
 }
 
-/// For each row of a potential (table of lower bounds on the remaining cost), the minimal cost of
-/// reaching this row in exactly k steps (Bellman-Ford layers).
+/// The minimal cost of reaching each row of a potential (table of lower bounds on the remaining cost) in
+/// exactly k steps (Bellman-Ford layers). The number k is the number of calls of `advance`.
 struct Layers<'l> {
     table: &'l Table<'l>,
     /// The transitions between rows: (source row, target row, minimal cost).
@@ -84,8 +83,8 @@ impl<'l> Layers<'l> {
         let mut idle: Option<Integer> = None;
         for operator in &model.operators {
             let cost = model.least(&operator.cost);
-            // Operators that do not change the variables of the pattern are self-loops of every
-            // row.
+            // Operators whose condition and effects do not contain the pattern's variables are self-loops of
+            // every row.
             if !table.touches(operator) {
                 idle = Some(idle.map_or(cost.clone(), |cheapest| cheapest.min(cost)));
                 continue;
@@ -122,15 +121,14 @@ impl<'l> Layers<'l> {
         self.costs = next;
     }
 
-    /// Returns the minimal cost of the first k steps, or `None` if no row is reachable in exactly k
-    /// steps.
+    /// Returns the minimal cost of exactly k steps in the abstraction (k: number of calls of `advance`), or
+    /// `None` if no sequence of k steps exists.
     fn spent(&self) -> Option<Integer> {
         self.costs.iter().flatten().min().cloned()
     }
 
-    /// Returns the minimal sum, over all rows, of the cost of the first k steps and the potential
-    /// (lower bound on the remaining cost). Returns `None` if no row that is reachable in k steps
-    /// can reach the goal.
+    /// Returns the minimum over all rows of the cost of k steps plus the potential (lower bound on the
+    /// remaining cost). Returns `None` if no row that is reachable in k steps can reach the goal.
     fn least(&self) -> Option<Integer> {
         let rows = self.costs.iter().enumerate();
         rows.filter_map(|(row, cost)| Some(cost.as_ref()? + self.table.at_row(row)?)).min()

@@ -1,8 +1,8 @@
 //! Encodes the accumulated cost and the values of the numeric variables after each step, in binary.
 //!
-//! All numbers are in two's complement. An operator adds a constant, and one entry of each of its
-//! tables; the designs chosen at the step select the entries. An assignment adds these summands to
-//! 0 instead of the previous value. No sum overflows: the accumulated cost is limited after each
+//! All numbers are in two's complement. To the cost and to each number, an operator adds a constant and one
+//! entry of each of its tables; the designs chosen at the step select the entries. An assignment adds these
+//! summands to 0 instead of the previous value. No sum overflows: the accumulated cost is limited after each
 //! step, and each number is wide enough for its range after all steps of the formula.
 
 use std::collections::BTreeMap;
@@ -131,8 +131,8 @@ impl Sums {
                     return Err("a comparison of several numbers, or of none, is not covered".into());
                 };
                 if operator.changes.iter().any(|(changed, value)| changed == number && value == linear) {
-                    // The condition is equivalent to a nonnegative number after the step, so the
-                    // sign bit of this number is tested.
+                    // The operator changes the number to the expression that must be at least 0. So the
+                    // condition is that the number is not negative after the step, which its sign bit states.
                     let after = &self.numbers[*number as usize];
                     formula.clause(&[-*literal, -sign(after)]);
                 } else if linear.quantity.tables.is_empty() {
@@ -223,9 +223,9 @@ impl Adder<'_> {
         Ok(self.sum(formula, &base, &parts, &name))
     }
 
-    /// Encodes the operators' comparisons that contain tables, as sums that must not be negative. A
-    /// comparison that equals a change of its operator is omitted, because the sign bit of the
-    /// changed number is tested instead (see [`Sums::advance`]).
+    /// Encodes the operators' comparisons that contain tables, as sums that must not be negative. A comparison
+    /// is omitted if its expression is the new value of the number, because the sign bit of this value is
+    /// tested instead (see [`Sums::advance`]).
     fn tests(&mut self, formula: &mut Formula, before: &[Bits]) {
         let table_comparisons = |operator: &Operator, number: u32| -> Vec<Linear> {
             let linear_conditions = operator.condition.comparisons.iter().filter(|linear| {
@@ -325,8 +325,8 @@ impl Adder<'_> {
             }
             let uses = &self.model.uses[uses as usize];
             for (row, value) in self.model.tables[table as usize].iter().enumerate() {
-                // The row is the mixed-radix number of the designs; the last slot is the lowest
-                // digit.
+                // The row number has one digit per slot (mixed radix): the design of the slot. The last slot is
+                // the lowest digit.
                 let mut remaining_row = row;
                 let mut condition = vec![-chosen];
                 for slot in slots.iter().rev() {

@@ -17,8 +17,8 @@ pub(super) struct Timeline {
     values: Vec<Vec<Literal>>,
     pub(super) operators: Vec<Literal>,
     pub(super) idle: Option<Literal>,
-    /// For each slot (parameter that is a design) and each of its designs, the literal that this
-    /// design is chosen at the latest step.
+    /// For each slot (parameter that is a design) and each of its designs, the literal that the design is
+    /// chosen at the latest step.
     pub(super) chosen: Vec<Vec<Literal>>,
 }
 

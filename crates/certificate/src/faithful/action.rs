@@ -96,8 +96,8 @@ pub(super) fn cases<'r>(
     }
 }
 
-/// Returns the conjunction of a condition and two additional ones. Usually both additional
-/// conditions are true; the result then borrows `condition`.
+/// Returns the conjunction of a condition and two additional ones. If both additional conditions are true,
+/// which is frequent, the result borrows `condition`.
 fn all_of(condition: &Formula, additional: [Formula; 2]) -> Cow<'_, Formula> {
     if additional.iter().all(|extra| extra.is(true)) {
         return Cow::Borrowed(condition);
@@ -137,8 +137,8 @@ impl<'r> Durative<'r> {
         )
     }
 
-    /// Returns the cases (outcomes under a condition) of an action with duration 0: start and end
-    /// are one happening, and over-all conditions apply to no state.
+    /// Returns the cases (outcomes under a condition) of an action with duration 0. Start and end are one
+    /// happening, and there are no states to which over-all conditions apply.
     fn at_once(&self, mut reader: Reader<'r>, structure: &Structure) -> Result<Vec<Case>, Cause> {
         let mut ends = Vec::new();
         for (condition, effect) in
@@ -297,8 +297,8 @@ impl<'r> Reader<'r> {
 }
 
 impl Moment {
-    /// Returns the condition that no effect on an atom contradicts a simultaneous event; true if
-    /// there is no event.
+    /// Returns the condition that no active effect on an atom contradicts `event`, which happens
+    /// simultaneously. True if there is no event.
     fn leaves(&self, event: Option<&Event>) -> Formula {
         let Some(event) = event else { return Formula::truth(true) };
         let opposite = self.atoms.iter().filter(|(_, key, holds)| event.truths.get(key) == Some(&!holds));
@@ -320,8 +320,8 @@ impl Moment {
         truths
     }
 
-    /// Returns the cases (outcomes under a condition) of an action instance whose last happening has the effects
-    /// `self`. `applied` contains the changes by the start of the action and by events.
+    /// Returns the cases (outcomes under a condition) of an action instance. `self` contains the effects of its
+    /// last happening, and `applied` the changes by the start of the action and by events.
     fn last(
         &self,
         structure: &Structure,
@@ -373,9 +373,9 @@ impl Moment {
     }
 }
 
-/// Returns the value of a number after simultaneous effects, given the value `before`. Returns
-/// `None` if the effects contradict each other or divide by zero. If several values are assigned,
-/// their equality is appended to `equations`.
+/// Returns the value of a number after simultaneous effects, given the value `before`. Returns `None` if the
+/// effects contradict each other or divide by zero. If several values are assigned, their equality is appended
+/// to `equations`. Fails if a number is scaled by an expression that is not constant.
 fn together(
     before: Linear,
     effects: &[(Assignment, &Linear)],

@@ -20,15 +20,15 @@ use pddl::ast::{Atom, Condition, Derived, Name, Term, TypedName};
 /// Upper limit on the number of derived atoms, and on the number of partial bindings of one rule.
 const ATOM_LIMIT: usize = 50_000;
 
-/// Upper limit on the number of conjuncts around an atom that are used to restrict the candidate
-/// objects of variables.
+/// Upper limit on the number of conjuncts beside an atom that are used to restrict the candidate objects of
+/// variables.
 const CONJUNCT_LIMIT: usize = 64;
 
 struct Occurrence<'w> {
     rule: &'w Derived,
     atom: &'w Atom,
     variables: Rc<[&'w TypedName]>,
-    /// The conjuncts around the atom, which restrict the candidates of variables.
+    /// The conjuncts of the enclosing conjunctions, which restrict the candidate objects of variables.
     others: Rc<[&'w Condition]>,
     has_distinct_names: bool,
 }
@@ -161,7 +161,7 @@ impl Occurrence<'_> {
         if !self.unify(&mut reader, key) {
             return Ok(Vec::new());
         }
-        // Rows are partial bindings. Each round extends each row by the candidates of one unbound
+        // Each row is a partial binding. Each round extends every row by the candidates of one unbound
         // parameter.
         let mut rows: Vec<Vec<(&Name, u32)>> = vec![Vec::new()];
         let open =

@@ -44,8 +44,8 @@ impl Reader<'_> {
         parts: impl Iterator<Item = &'c Condition>,
         hidden: &[&Name],
     ) -> Option<BTreeSet<u32>> {
-        // Small conjuncts are visited first, because the rows of a large conjunct cost more time
-        // than the restriction saves.
+        // Small conjuncts are visited first, because visiting the rows of a large conjunct takes more time than
+        // its restriction saves.
         let mut parts: Vec<(usize, &Condition)> =
             parts.map(|part| (self.size(name, part, hidden), part)).collect();
         parts.sort_by_key(|(size, _)| *size);

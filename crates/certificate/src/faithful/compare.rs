@@ -42,7 +42,8 @@ pub(super) struct Comparison<'c> {
     /// length.
     metric: Option<Linear>,
     timed: bool,
-    /// If there are timed events, a common divisor of all their times and of all durations.
+    /// If there are timed events, a common divisor of all their times and of all durations. Otherwise 1, which
+    /// is not used.
     unit: BigRational,
 }
 
@@ -52,8 +53,8 @@ struct Instance<'i> {
 }
 
 impl<'c> Comparison<'c> {
-    /// Indexes the operators of the task. Without a metric, `timed` selects time instead of length
-    /// as the measure of plans. Times of events and durations are multiples of `unit`.
+    /// Indexes the operators of the task. `timed` states that plans are measured by time, or by length if it is
+    /// `false`; with a metric it has no effect. Times of events and durations are multiples of `unit`.
     pub(super) fn new(task: &'c Translation<'c>, timed: bool, unit: BigRational) -> Result<Self> {
         let model = task.model;
         let folded = |name: &String| name.to_ascii_lowercase();
@@ -322,13 +323,13 @@ impl<'c> Comparison<'c> {
         Ok(())
     }
 
-    /// Returns `true` if the clock of the task is a lower bound on the time after the case (outcome
-    /// of an action instance under a condition): the task has no clock, or the operator leaves it
-    /// unchanged, advances it by the duration of the case, or sets it to a value that represents
-    /// every possible end time.
+    /// Returns `true` if the clock of the task represents the time after the case (outcome of an action
+    /// instance under a condition). The task may have no clock, or the operator leaves it unchanged or advances
+    /// it by the duration of the case. Otherwise, the operator must set it to a value that represents every
+    /// possible end time (see `timeline`).
     fn keeps_time(&self, (operator, choice): (&Operator, &[u32]), case: &Case) -> bool {
         let Some(number) = self.task.names.numbers.get(&timeline::clock()) else { return true };
-        // Time never decreases, so an unchanged clock is a lower bound on the time.
+        // An unchanged clock value represents the later time, too.
         let Some((_, value)) = operator.changes.iter().find(|(changed, _)| changed == number) else {
             return true;
         };
@@ -371,8 +372,8 @@ impl<'c> Comparison<'c> {
         }
     }
 
-    /// Returns the operators that represent an action with these arguments, each with the choice of
-    /// designs for its slots by which it gets these arguments.
+    /// Returns the operators that represent an action with these arguments, each with the designs for its slots
+    /// that yield these arguments.
     fn candidates(&self, action: &Action, arguments: &[u32]) -> Vec<(&'c Operator, Vec<u32>)> {
         let name = action.identifier.name.as_str().to_ascii_lowercase();
         let world = self.task.world;
@@ -391,8 +392,8 @@ impl<'c> Comparison<'c> {
         candidates
     }
 
-    /// Returns the choice of designs for which an operator has these arguments. Returns `None` if
-    /// there is no such choice, or if it is excluded.
+    /// Returns the designs for the slots of an operator for which it has these arguments. Returns `None` if the
+    /// arguments do not determine suitable designs, or if their combination is excluded.
     fn choice(&self, operator: &Operator, objects: &[u32]) -> Option<Vec<u32>> {
         let model = self.task.model;
         let uses = &model.uses[operator.uses as usize];
@@ -418,8 +419,8 @@ impl<'c> Comparison<'c> {
     }
 }
 
-/// Returns the rank of a reason for rejecting an operator. The rank is higher if more of the
-/// operator matches.
+/// Returns the rank of a reason for rejecting an operator. The rank increases with the part of the operator
+/// that matches the action instance.
 fn rank(reason: &Obstacle) -> u8 {
     match reason {
         Obstacle::Differs(Difference::NoOperatorFor { .. }) => 0,

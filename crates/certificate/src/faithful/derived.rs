@@ -1,6 +1,6 @@
-//! Analyses the derived atoms: computes which of them hold in all states or in no state of the witness (the
-//! over-approximation of the reachable states), and which derived variables of the task lie on dependency cycles or
-//! between cycles.
+//! Analyses the derived atoms. Computes which of them hold in all states or in no state of the witness (the
+//! over-approximation of the reachable states). Also computes which derived variables of the task lie on
+//! dependency cycles or between cycles.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -14,9 +14,8 @@ use crate::faithful::verdict::Cause;
 use crate::faithful::world::World;
 use pddl::ast::{Condition, Expression};
 
-/// Computes the facts about derived atoms that hold in all states of the witness (the
-/// over-approximation of the reachable states). `linked` contains the derived atoms that are
-/// variables of the task.
+/// Computes which derived atoms hold in all states or in no state of the witness (the over-approximation of the
+/// reachable states). `linked` contains the derived atoms that are variables of the task.
 pub(super) fn axioms(
     world: &World<'_>,
     invariant: &Invariant,
@@ -121,9 +120,8 @@ fn atoms<'f>(formula: &'f Formula, keys: &mut FxHashSet<&'f Key>) {
     }
 }
 
-/// Computes the least set of atoms such that each atom is in the set if its body holds under the
-/// set. `holds` must be monotone in the set; so a body is evaluated again only when one of its
-/// atoms is added.
+/// Computes the least set of atoms that contains each atom whose body holds under the set. `holds` must be
+/// monotone in the set; so a body is evaluated again only when one of its atoms is added.
 fn fixpoint(bodies: &[(Key, Formula)], holds: impl Fn(&Formula, &FxHashSet<Key>) -> bool) -> FxHashSet<Key> {
     let mut readers: FxHashMap<&Key, Vec<usize>> = FxHashMap::default();
     for (place, (_, body)) in bodies.iter().enumerate() {

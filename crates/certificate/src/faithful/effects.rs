@@ -22,8 +22,8 @@ pub(super) struct Made<'m> {
 
 pub(super) enum Mismatch {
     Differs(String),
-    /// The atoms of this variable are not proved to be mutually exclusive after the case (outcome
-    /// of an action instance under a condition), or too many partial states have to be examined.
+    /// It is not proved that at most one of these atoms (the values of a variable) holds after the case
+    /// (outcome of an action instance under a condition). Or too many partial states would have to be examined.
     Unknown(String),
 }
 
@@ -57,7 +57,7 @@ pub(super) fn compare(
 
 fn numbers(task: &Translation<'_>, case: &Case, operator: Option<Made<'_>>) -> Result<(), Mismatch> {
     let fluents = (0..).zip(&task.names.fluents);
-    // The clock is compared by the passage of time, not by its value.
+    // The clock is not compared by its value: `keeps_time` in `compare` checks it.
     for (number, key) in fluents.filter(|(_, key)| key.0 != CLOCK) {
         let unchanged = || task.invariant.settled(&Linear::fluent(key.clone()));
         let expected = case.changes.get(key).map_or_else(unchanged, |after| task.invariant.settled(after));
@@ -113,9 +113,9 @@ impl<'v> Variable<'v> {
         Self { task, own: variable, case, effects, touched, certain, conditional }
     }
 
-    /// Returns `Some(true)` if the case and the operator agree in all states that satisfy `known`,
-    /// `Some(false)` if they differ in a partial state that extends `known`, and `None` if neither
-    /// is proved after [`SPLIT_LIMIT`] partial states.
+    /// Returns `Some(true)` if the case and the operator agree in all states that satisfy `known`, and
+    /// `Some(false)` if they differ in a partial state that extends `known`. Returns `None` if neither is
+    /// proved, for example within [`SPLIT_LIMIT`] partial states.
     fn agrees(&self, known: &Known) -> Option<bool> {
         let structure = &self.task.names.structure;
         let mut open = vec![known.clone()];

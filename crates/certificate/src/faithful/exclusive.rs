@@ -104,12 +104,12 @@ impl Move {
         !self.adds.is_empty()
     }
 
-    /// Checks that at most one atom of a mutex group holds after the case (outcome of an action
-    /// instance under a condition), given that at most one holds before the case.
+    /// Checks that at most one atom of a mutex group holds after the case (outcome of an action instance under
+    /// a condition), given that at most one holds before the case.
     ///
     /// # Errors
-    /// The atoms each of which, if added to the group, might make the check succeed: the case
-    /// requires and deletes them. Empty if there is no such atom.
+    /// The atoms that the case requires and deletes: if one of them is added to the group, the check may
+    /// succeed. Empty if there is no such atom.
     pub(super) fn keeps(&self, group: &Group, may_hold: &dyn Fn(&Key) -> bool) -> Result<(), Vec<Key>> {
         let mut added = self.adds.iter().filter(|key| group.contains(*key));
         let Some(key) = added.next() else { return Ok(()) };
@@ -126,9 +126,9 @@ impl Move {
     }
 }
 
-/// Searches for mutex groups that prove the exclusiveness of `variables`, the variables whose own
-/// atoms are not an inductive invariant. A variable gets no group if none is found within the
-/// limits or before `stop` returns `true`.
+/// Searches for mutex groups which prove that the values of each variable in `variables` exclude each other.
+/// The atoms of these variables alone are not an inductive invariant. A variable gets no group if none is found
+/// within the limits or before `stop` returns `true`.
 #[expect(clippy::arithmetic_side_effects, reason = "no more than the limit")]
 pub(super) fn search(
     world: &World<'_>,

@@ -260,7 +260,7 @@ fn limited(cases: usize) -> Result<(), Cause> {
 /// constants.
 fn implies(structure: &Structure, known: &(Linear, bool), wanted: &Linear, strict: bool) -> bool {
     let Some(ratio) = wanted.ratio_to(&known.0).filter(Signed::is_positive) else { return false };
-    // Lower bound on the variable part of `wanted` (without its constant term) that follows from `known`.
+    // Lower bound on `wanted` without its constant term, as it follows from `known`.
     let mut least = -(&known.0.constant * ratio);
     let mut is_strict = known.1;
     if let Some(unit) = unit(structure, wanted) {
@@ -273,12 +273,12 @@ fn implies(structure: &Structure, known: &(Linear, bool), wanted: &Linear, stric
     least.is_positive() || least.is_zero() && (is_strict || !strict)
 }
 
-/// Returns a common divisor of all values that the variable part of an expression (without its constant term) has in
-/// any state. Returns `None` if a fluent has no known factor that makes it an integer.
+/// Returns a common divisor of all values that an expression without its constant term has in any state.
+/// Returns `None` if a fluent has no known factor that makes it an integer.
 fn unit(structure: &Structure, linear: &Linear) -> Option<BigRational> {
     let mut unit: Option<BigRational> = None;
     for (key, factor) in &linear.factors {
-        // The fluent is a multiple of 1 / scale in every state.
+        // In every state, the fluent is a multiple of 1 divided by the factor that makes it an integer.
         let step = (factor / structure.integers.get(key)?).abs();
         unit = Some(match unit {
             None => step,

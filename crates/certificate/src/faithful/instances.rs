@@ -37,9 +37,9 @@ pub(super) fn of(
     let mut open: Vec<&Atom> = atoms.into_iter().filter(is_static).collect();
     let mut partial: Vec<Binding<'_>> = vec![Binding::default()];
     while !open.is_empty() {
-        // Among the atoms with a constant or a bound parameter, the atom with the fewest unbound
-        // arguments is joined next, so that the join does not become a Cartesian product. Ties are
-        // broken by the number of facts.
+        // Atoms with a constant or a bound parameter are joined first, so that the join does not become a
+        // Cartesian product. Among them, the atom with the fewest unbound arguments is next. Ties are broken by
+        // the number of facts.
         let join_cost = |atom: &Atom| {
             let names = partial.first();
             let unknown = |term: &&Term| match term {

@@ -244,12 +244,12 @@ impl Invariant {
     }
 }
 
-/// The state of computing a witness (the over-approximation of the reachable states) by fixpoint
-/// iteration with widening.
+/// A witness (the over-approximation of the reachable states) during its computation by fixpoint iteration with
+/// widening.
 pub(super) struct Widening {
     pub(super) invariant: Invariant,
-    /// For each fluent and end of its interval (`true` for the upper end), the number of times it
-    /// has moved.
+    /// For each fluent and each end of its interval (`true` for the upper end), the number of times that this
+    /// end has moved.
     moves: FxHashMap<(Key, bool), u32>,
 }
 

@@ -5,8 +5,8 @@ use num_traits::Signed;
 
 use crate::faithful::verdict::Cause;
 
-/// An interval of durations; `most` is `None` if it is unbounded. Either end may be excluded, which
-/// is not recorded.
+/// An interval of durations; `most` is `None` if it is unbounded. An end of the interval may be excluded, but
+/// this is not recorded.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Length {
     pub(super) least: BigRational,
@@ -18,7 +18,7 @@ impl Length {
         self.most.as_ref().filter(|most| **most == self.least)
     }
 
-    /// Returns the greatest lower bound on `factor` times the duration. Fails without a lower bound.
+    /// Returns the greatest lower bound on `factor` times the duration. Fails if there is no lower bound.
     pub(super) fn least_times(&self, factor: &BigRational) -> Result<BigRational, Cause> {
         if !factor.is_negative() {
             return Ok(&self.least * factor);

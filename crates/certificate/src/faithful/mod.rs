@@ -99,8 +99,8 @@ pub fn faithful(
 /// Computes the witness (an over-approximation of the reachable states) for a ground task, as JSON.
 ///
 /// # Errors
-/// The verdict that [`faithful`] would return: the task is malformed, a construct is not supported,
-/// a limit on sizes is exceeded, or the computation was stopped.
+/// A verdict as of [`faithful`]: the task is malformed, a construct is not supported, a limit on sizes is
+/// exceeded, or the computation was stopped.
 pub fn witness(
     domain: &Domain,
     problem: &Problem,
@@ -191,13 +191,13 @@ impl<'f> Files<'f> {
         let untimed = self.world.timeline.is_empty();
         let plain: Vec<bool> = self.domain.actions.iter().map(|action| untimed && is_plain(action)).collect();
         let waits = action::waits(&self.world.timeline, &self.names.structure)?;
-        // A plain action has constant effects, so its instances are visited only until they are
+        // The effects of a plain action are constant, so its instances are visited only until they are
         // reachable.
         let mut open: Vec<&Instance> = self.instances.iter().collect();
         for _ in 0..ROUND_LIMIT {
             let axioms = derived::axioms(&self.world, &widening.invariant, &self.names.linked, self.stop)?;
-            // The facts about derived atoms are computed for the invariant at the start of the
-            // round, so this invariant is used during the round.
+            // The facts about derived atoms refer to the invariant at the start of the round, so this invariant
+            // is used during the round.
             let frozen = (self.world.derived().next().is_some()).then(|| widening.invariant.clone());
             let (mut news, mut next) = (false, Vec::new());
             for case in &waits {
@@ -223,8 +223,8 @@ impl<'f> Files<'f> {
         Err(invariant::too_many_rounds(ROUND_LIMIT).into())
     }
 
-    /// Searches for additional mutex groups, for the variables whose own atoms are not preserved as
-    /// a group. Some of these variables may get no group, because the search is limited.
+    /// Searches for mutex groups for the variables whose own atoms are not preserved as a mutex group. Some of
+    /// these variables may get no group, because the search is limited.
     fn exclusive(&self, invariant: &Invariant, axioms: &Axioms) -> Result<Vec<Group>> {
         let atoms = |variable| self.names.atoms(variable).map(|(_, key)| key.clone()).collect();
         let variables: Vec<Group> = self.model.basic_variables().map(atoms).collect();

@@ -24,16 +24,16 @@ const SIZE_LIMIT: usize = 200_000;
 /// evaluations (see [`Reader::unfold`]).
 const WORK_LIMIT: usize = 16 * SIZE_LIMIT;
 const VARIABLE_LIMIT: usize = 10_000;
-/// Maximum nesting depth, counted from the outermost derived atom, at which a derived atom is
-/// replaced by its rules recursively. This bounds the call stack. Deeper atoms are evaluated
-/// separately, with an explicit stack (see [`Reader::unfold`]).
+/// Maximum nesting depth, counted from the outermost derived atom, at which derived atoms are replaced by their
+/// rules recursively. This bounds the call stack. Deeper atoms are evaluated separately, with an explicit stack
+/// (see [`Reader::unfold`]).
 const UNFOLDING_LIMIT: usize = 100;
 
 /// Key of the fluent `total-time`, which only metrics contain.
 pub(super) const TOTAL_TIME: Key = (u32::MAX, SmallVec::new_const());
 
-/// The new truth values of atoms and the new values of fluents that the start effects of a durative
-/// action, and events since its start, have changed.
+/// The changes by the start effects of a durative action and by events since its start: new truth values of
+/// atoms, and new values of fluents.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Applied {
     pub(super) truths: BTreeMap<Key, bool>,
@@ -311,7 +311,7 @@ impl<'r> Reader<'r> {
         }
         if self.depth.saturating_sub(self.unfolding.base) > UNFOLDING_LIMIT {
             self.unfolding.pending = Some(key.clone());
-            // This error aborts the evaluation, and `unfold_from` repeats it.
+            // This error aborts the evaluation. `unfold_from` then repeats the evaluation.
             return Err(Cause::Stopped);
         }
         let outer = std::mem::take(&mut self.binding);
@@ -326,7 +326,7 @@ impl<'r> Reader<'r> {
         self.unfolding.base = base;
         let mut open = vec![key.clone()];
         let formula = loop {
-            // `open` is an explicit stack; recursion would be as deep as the chain of rules.
+            // An explicit stack is used because recursion would be as deep as the chain of rules.
             let Some(own) = open.last().cloned() else { break Err(Cause::Stopped) };
             (self.depth, self.size) = (base, size);
             self.unfolding.path.clear();
@@ -425,9 +425,9 @@ impl<'r> Reader<'r> {
         Ok(Some(self.invariant.fluent(key)))
     }
 
-    /// Returns the value of an expression after the start effects, as a linear expression over the
-    /// fluents before them, or `None` if it is undefined. Fails if the value is not linear or
-    /// depends on a chosen duration.
+    /// Returns the value of an expression after the start effects, as a linear expression over the fluents
+    /// before them. Returns `None` if it is undefined. Fails for example if the value is not linear or depends
+    /// on a chosen duration.
     pub(super) fn expression(&mut self, expression: &'r Expression) -> Result<Option<Linear>, Cause> {
         Ok(match expression {
             Expression::Number(number, _) => Some(Linear::constant(number.clone())),

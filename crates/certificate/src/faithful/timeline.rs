@@ -1,15 +1,15 @@
 //! Timed initial literals when actions are executed one after another, by the definition in
 //! `validate/definition.md`.
 //!
-//! All literals of the same time form an event. Events divide time into phases: phase 0 begins with
-//! the plan, and phase i with event i (counted from 1). The effect of events on an action depends
-//! on its *passage*, i.e. on the phases of its start and end, and on whether start or end coincides
-//! with an event. The plan may start the action at any time within a passage.
+//! All literals of the same time form an event. Events divide time into phases: phase 0 begins with the plan,
+//! and phase i with event i (counted from 1). The effect of events on an action depends on its *passage*, i.e.
+//! on the phases of its start and end, and on whether start or end coincides with an event. The plan may start
+//! the action at any time that the passage permits.
 //!
-//! The task has its own clock. All times of events and all durations are multiples of a *unit*. The
-//! *mark* of a clock value is the value rounded down to a multiple of the unit. If the clock value
-//! equals its mark, it represents all plan times t ≥ mark, otherwise all t > mark. Hence the clock
-//! may be ahead of t, but by less than a unit, which no action can observe.
+//! The task has its own clock. All times of events and all durations are multiples of a *unit*. A clock value
+//! that is a multiple of the unit represents this time and all later times. Any other clock value is rounded
+//! down to a multiple of the unit, and represents all times after this multiple. Hence the clock may be ahead
+//! of the represented time, but by less than a unit, which no action can observe.
 
 use std::collections::BTreeMap;
 
@@ -160,8 +160,7 @@ struct Range {
 }
 
 impl Range {
-    /// Restricts the range to times from `time` on, excluding `time`; if `at`, restricts it to
-    /// `time` alone.
+    /// Restricts the range to times after `time` or, if `at`, to `time` alone.
     fn begin(&mut self, time: &BigRational, at: bool) {
         self.low = self.low.clone().max((time.clone(), !at));
         if at {
@@ -224,8 +223,8 @@ impl Passage {
         &timeline.events[self.from..self.to - usize::from(self.at_end && self.to > self.from)]
     }
 
-    /// Returns the event at the end of the action, if there is one and the start is in an earlier
-    /// phase.
+    /// Returns the event that coincides with the end of the action. `None` if there is no such event, or if the
+    /// start is in the same phase.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "phases are counted from 0, and each but the first one begins with an event"
@@ -246,7 +245,8 @@ impl Passage {
     }
 }
 
-/// Returns `true` if the clock value `set` represents every time from the given end on.
+/// Returns `true` if the clock value `set` represents every time in a range with this lower end (see the head
+/// of this file).
 pub(super) fn stands_for(set: &BigRational, (end, left_out): &End, unit: &BigRational) -> bool {
     let mark = (set / unit).floor() * unit;
     if set.is_negative() {

@@ -188,8 +188,8 @@ impl<'t> Translation<'t> {
             && !self.unfolded.contains_key(&variable)
     }
 
-    /// Computes the formula that replaces a derived variable, after those of the variables that its
-    /// rules read.
+    /// Computes the formula that replaces a derived variable. The formulas of the variables that its rules read
+    /// are computed first.
     fn unfold(&mut self, variable: u32, total: &mut usize) -> Result<()> {
         let mut above = FxHashSet::default();
         // The stack of a depth-first search: each variable, and `true` once its dependencies are

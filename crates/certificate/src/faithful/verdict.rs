@@ -13,7 +13,8 @@ pub enum Faithful {
         /// Number of those instances that need no operator, because they do not change the task
         /// state and their cost is not negative.
         idle: usize,
-        /// Whether plans are measured by duration, because the problem has no metric.
+        /// Whether plans are measured by their duration, because the problem has no metric and actions take
+        /// time.
         timed: bool,
     },
     /// The task is not faithful; the first difference found.
@@ -115,8 +116,8 @@ pub enum Cause {
         /// The upper limit on their number.
         limit: usize,
     },
-    /// It is not proved that at most one atom of a variable holds after an instance, or the
-    /// comparison of the instance's effects would have to examine too many partial states.
+    /// It is not proved that at most one atom of a variable holds after an instance. Or too many partial states
+    /// would have to be examined to compare the effects of the instance.
     #[error(
         "cannot tell whether the ground task represents the files: at most one of {atoms} has to hold, and neither \
          {instance} nor the witness alone proves that this is preserved; no difference was found"

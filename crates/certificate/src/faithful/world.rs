@@ -149,7 +149,8 @@ impl<'w> World<'w> {
         Ok(())
     }
 
-    /// Applies the events at time 0 to the initial state, and adds the initial phase and clock.
+    /// Applies the events at time 0 to the initial state, and adds the initial phase and clock. Does nothing
+    /// without timed events.
     fn begin(&mut self) {
         if self.timeline.is_empty() {
             return;

@@ -82,7 +82,9 @@ pub fn create(path: &Path) -> io::Result<(File, Pending)> {
     })
 }
 
-/// A written output file that is not yet visible at its final path.
+/// An output file that is being written. [`Pending::commit`] moves its content to the final path. An output
+/// that is not a regular file, such as standard output or a device, is written directly, and `commit` has no
+/// effect.
 #[derive(Debug)]
 #[must_use = "a regular file has its content once it is committed"]
 pub struct Pending(Option<(TempPath, PathBuf, Option<InPlace>)>);
@@ -96,7 +98,7 @@ struct InPlace {
 }
 
 impl Pending {
-    /// Creates an output that is already complete; [`Pending::commit`] then has no effect.
+    /// Creates the value for an output that is written directly; [`Pending::commit`] then has no effect.
     fn written() -> Self {
         Self(None)
     }

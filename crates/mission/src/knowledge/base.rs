@@ -29,7 +29,7 @@ const MANY_NAMES: usize = 32;
 #[derive(Debug, Clone)]
 pub struct Knowledge {
     pub(super) runtime: Runtime,
-    /// Cached queries of planning, kept consistent with `runtime`.
+    /// Cached results of the queries that planning makes, kept consistent with `runtime`.
     pub(super) catalogue: OnceLock<Arc<Catalogue>>,
     pub(super) waiting: Waiting,
     /// State after reading the documents. Shares all unchanged data with `runtime`.
@@ -232,8 +232,8 @@ impl Knowledge {
         &mut self.runtime
     }
 
-    /// Returns the designs, actions and measured values of the knowledge base for planning. They
-    /// are computed on first use and cached.
+    /// Returns the designs, actions and measured values of the knowledge base for planning. The result is computed
+    /// on first use and cached.
     pub fn catalogue(&self) -> &Catalogue {
         self.catalogue.get_or_init(|| Arc::new(Catalogue::new(&self.view())))
     }

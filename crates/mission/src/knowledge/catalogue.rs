@@ -1,8 +1,9 @@
 //! Cache of the knowledge-base queries that planning needs, kept across events.
 //!
-//! Most events change the availability of designs, a measured value or the status of an objective.
-//! These changes are applied incrementally. All other changes rebuild the cache. The cache always
-//! equals the results of [`View`].
+//! Changes of the availability of designs and of measured values, which most events cause, are applied
+//! incrementally. Changes that the cached results do not depend on, such as the status of a component or of
+//! an objective, are ignored. All other changes rebuild the cache. The cache always equals the results of
+//! [`View`].
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};

@@ -1,8 +1,8 @@
 //! Reports of the robot, including their handling when a rule exceeds its limits.
 //!
-//! An update that exceeds the limits leaves the engine unchanged. The failed report and all later
-//! reports are then kept as pending. Each new report retries all pending reports in a single
-//! update, which is equivalent to applying the last report on each subject.
+//! An update that exceeds the limits leaves the engine unchanged. The failed report is then kept as pending. Each
+//! new report retries all pending reports in a single update, until an update succeeds. This is equivalent to
+//! applying the last report on each subject.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,8 +13,8 @@ use crate::knowledge::waiting::{Fault, RobotReport, Waiting, fault};
 use crate::message::Message;
 
 impl Knowledge {
-    /// Returns the reason why the consequences of pending reports are unknown. `None` unless
-    /// inference has failed. After a failure no design counts as available.
+    /// Returns the reason why the consequences of pending reports are unknown. `None` unless inference has failed.
+    /// While they are unknown, no design counts as available.
     pub fn fault(&self) -> Option<&Fault> {
         self.waiting.fault.as_ref()
     }

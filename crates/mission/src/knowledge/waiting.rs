@@ -16,7 +16,7 @@ pub enum RobotReport {
     Measured(Literal),
     /// The value of an attribute is unknown.
     Unmeasured,
-    /// Realisability of a design, reported for the design itself and independent of its components.
+    /// Whether a design is realisable, reported for the design itself and independent of its components.
     Design(bool),
 }
 

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 
 use diagnostics::nearest;
 
-/// Minimum similarity of a matched pair, on the scale from 0 to 1 of [`likeness`]: half of the words are
-/// equal.
+/// Minimum similarity of a matched pair, on the scale from 0 to 1 of [`likeness`]. At this value, half of the words
+/// are equal.
 const ALIKE: f64 = 0.5;
 /// Maximum number of names in a list of a message; further names are only counted.
 const SHOWN: usize = 12;

@@ -34,9 +34,9 @@ pub(crate) struct Meeting {
     pub(crate) never_named: NeverNamed,
 }
 
-/// Warning about designs that the problem omits although it declares other designs: the IRI of the first omitted
-/// design, and the text. Set only if the knowledge base has all designs that the problem declares, and every required
-/// function has a design. Otherwise, another message lists the omitted designs, too.
+/// Warning about designs of the knowledge base that the problem does not declare although it declares others: the
+/// IRI of the first one, and the text. `None` if another message already lists these designs, because the problem
+/// also declares unknown designs or a required function has no design.
 pub(crate) type NeverNamed = Option<(String, String)>;
 
 pub(crate) fn meet(
@@ -80,8 +80,8 @@ struct Finding {
     help: Option<String>,
 }
 
-/// Names of a role (such as design or function) that occur only in the problem or only in the
-/// knowledge base.
+/// Names of a role (class of compared names, such as design or function) that occur only in the problem or only in
+/// the knowledge base.
 enum OneSided {
     /// Objects without individuals, and possibly individuals without objects.
     Objects(Finding),
@@ -99,7 +99,7 @@ struct Comparison<'a> {
 }
 
 impl Comparison<'_> {
-    /// Returns the facts of the problem that a design solves a function: design, function, and
+    /// Returns the facts of the problem which state that a design solves a function: design, function, and
     /// position.
     fn stated(&self) -> Vec<(&Name, &Name, Span)> {
         let solves = self.bindings.solves();

@@ -112,8 +112,8 @@ impl Roles {
         }
     }
 
-    /// Assigns to objects the roles that follow from facts, such as that a design solves a function. This is
-    /// done only for classes to which no type of the domain is bound.
+    /// Assigns to objects the roles that follow from facts, such as that a design solves a function. Considers only
+    /// classes to which no type of the domain is bound.
     fn place_by_facts(&mut self, domain: &Domain, problem: &Problem, bindings: &Bindings) {
         let constants = domain.constants.iter().map(|constant| (constant, true));
         let declared: Vec<_> =

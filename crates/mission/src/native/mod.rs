@@ -1,16 +1,18 @@
 //! Native co-adaptation: compiles a plain domain to the explicit form, using the requirements that
 //! the knowledge base has for its actions.
 //!
-//! A domain is plain if it declares no type of function designs. An action that the knowledge base has as
-//! well (`move` as `move` or `a_move`, or by a binding) gets a parameter for the design of each function that
-//! the action requires. It also gets conditions: the design solves the function, is available, and meets the
-//! quality bounds of the action (`t:requiresQuality`). A quality bound with a context, which is a predicate of the
-//! domain, applies only while this predicate holds for the action's parameters.
+//! A domain is plain if it declares no type of function designs. An action can correspond to an action of the
+//! knowledge base by its name (`move` to `move` or `a_move`) or by a binding. It then gets a parameter for the
+//! design of each function that the action requires. The action also gets conditions: the design solves the
+//! function, is available, and meets the quality bounds of the action (`t:requiresQuality`). A quality bound with a
+//! context, which is a predicate of the domain, applies only while this predicate holds for the action's
+//! parameters.
 //!
-//! A numeric function without parameters that is named like an estimated attribute, but is neither measured nor has an
-//! initial value, is replaced by the sum over the chosen designs. So is a function that is bound to `chosen:ATTRIBUTE`.
-//! A function that is bound to `reconfigured:ATTRIBUTE` is replaced by the sum over the newly chosen designs, i.e.
-//! those that replace another design of their function; the first design of a function is not counted.
+//! A numeric function without parameters that is named like an estimated attribute, but is neither measured nor has
+//! an initial value, is replaced by the sum over the chosen designs. A function that is bound to `chosen:ATTRIBUTE`
+//! is replaced in the same way. A function that is bound to `reconfigured:ATTRIBUTE` is replaced by the sum over
+//! the newly chosen designs, i.e. those that replace another design of their function; the first design of a
+//! function is not counted.
 //!
 //! As in an explicit domain, the planner chooses the designs for these parameters without grounding them into actions,
 //! unless reconfiguration costs make the designs part of the state.
@@ -54,8 +56,7 @@ pub struct CoAdaptation {
     changed: BTreeMap<Name, String>,
 }
 
-/// Required functions and quality bounds of an action, and the number of its parameters before those
-/// for designs are added.
+/// Required functions and quality bounds of an action, and the number of its parameters in the plain domain.
 #[derive(Debug, Clone)]
 struct Needs {
     functions: Vec<Needed>,
@@ -75,9 +76,9 @@ impl CoAdaptation {
     /// the knowledge base requires no function for the domain's actions.
     ///
     /// # Errors
-    /// Function names that PDDL does not admit, contexts that are not predicates of the domain,
-    /// reserved names that the domain declares, and uses of functions where newly chosen designs
-    /// cannot be counted.
+    /// Function names that PDDL does not admit. Contexts of quality bounds that are not predicates of the domain
+    /// with fitting parameters. Reserved names that the domain declares. Uses of functions where newly chosen
+    /// designs cannot be counted.
     pub(super) fn new(
         domain: &Domain,
         problem: &Problem,
@@ -161,7 +162,7 @@ impl CoAdaptation {
         errors
     }
 
-    /// Returns the functions bound to `reconfigured:ATTRIBUTE` that an action uses where changes of designs cannot be
+    /// Returns the functions bound to `reconfigured:ATTRIBUTE` that an action uses where reconfigurations cannot be
     /// counted, e.g. in a condition.
     fn not_counted(&self, action: &Action) -> BTreeSet<Name> {
         let uncounted = RefCell::new(BTreeSet::new());
@@ -227,9 +228,8 @@ impl CoAdaptation {
         explicit
     }
 
-    /// Adds to the problem a fact for each design that meets a quality bound. A design that lacks
-    /// an estimate still meets the bound if no design of its functions has an estimate of the
-    /// attribute.
+    /// For each quality bound, adds facts to the problem for the designs that meet it. A design that lacks an
+    /// estimate still meets the bound if no design of its functions has an estimate of the attribute.
     pub(super) fn fill(&self, problem: &mut Problem, designs: &[FunctionDesign]) {
         for quality in self.quality() {
             for design in designs {
@@ -345,8 +345,9 @@ impl CoAdaptation {
         }
     }
 
-    /// Appends to `out`, for each `increase` and `decrease` effect whose amount contains a sum over the newly chosen
-    /// designs, a conditional effect for each design. It adds the design's share if the design replaces another one.
+    /// Appends to `out`, for each `increase` and `decrease` effect whose amount contains a sum over the newly
+    /// chosen designs, a conditional effect for each design. This effect adds the design's share of the sum if the
+    /// design replaces another one.
     fn changes(&self, effect: &Effect, designs: &[(Identifier, &Needed)], out: &mut Vec<Effect>) {
         match effect {
             Effect::And(parts) => parts.iter().for_each(|part| self.changes(part, designs, out)),

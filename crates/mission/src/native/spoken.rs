@@ -12,7 +12,7 @@ impl CoAdaptation {
         self.chosen.contains_key(function) || self.changed.contains_key(function)
     }
 
-    /// Rewrites a condition for display: the predicate that a design meets a quality bound becomes `(meets
+    /// Rewrites a condition for display: an atom which states that a design meets a quality bound becomes `(meets
     /// DESIGN BOUND)`.
     pub(crate) fn spoken(&self, condition: &str) -> String {
         let mut text = condition.to_owned();
@@ -27,7 +27,7 @@ impl CoAdaptation {
         text
     }
 
-    /// Returns `true` if co-adaptation has added a predicate or function to the user's domain.
+    /// Returns `true` if `name` is a predicate or function that co-adaptation has added to the user's domain.
     pub(crate) fn is_added(&self, name: &Name) -> bool {
         self.predicates().into_iter().chain(self.functions()).any(|own| own.identifier.name == *name)
     }

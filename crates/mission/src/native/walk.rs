@@ -1,4 +1,4 @@
-//! Finds expressions of effects in which changes of designs cannot be counted.
+//! Finds expressions of effects in which reconfigurations cannot be counted.
 
 use pddl::ast::{Assignment, Effect, Expression, Name};
 
@@ -9,8 +9,8 @@ pub(super) fn mentions(expression: &Expression, wanted: &dyn Fn(&Name) -> bool) 
     is_mentioned
 }
 
-/// Visits the expressions of an effect in which changes of designs cannot be counted: all except the amounts of
-/// `increase` and `decrease` effects outside of `when` and `forall`.
+/// Calls `see` for the expressions of an effect in which reconfigurations cannot be counted: all except the amounts
+/// of `increase` and `decrease` effects outside of `when` and `forall`.
 pub(super) fn walk_uncounted(effect: Effect, see: &dyn Fn(&mut Expression)) {
     match effect {
         Effect::And(parts) => parts.into_iter().for_each(|part| walk_uncounted(part, see)),

@@ -13,8 +13,8 @@ pub(super) fn undeclared(domain: &Domain) -> BTreeSet<Name> {
     used
 }
 
-/// Returns the declared types and their supertypes, and the types of constants, objects and parameters (not
-/// those of quantified variables).
+/// Returns the declared types and their supertypes, and the types of constants, objects, and parameters of actions,
+/// axioms and predicates.
 pub(super) fn types(domain: &Domain, problem: &Problem) -> BTreeSet<Name> {
     let mut types = BTreeSet::new();
     let mut note = |r#type: &TypeExpression| {

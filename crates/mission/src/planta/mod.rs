@@ -105,8 +105,8 @@ impl Planta {
         errors.collect()
     }
 
-    /// Adds the asserted facts `stated`, their objects, and the comparisons of numbers to a problem. Removes
-    /// contradictory values of functional properties. Returns warnings.
+    /// Adds the asserted facts `stated`, their objects, and the comparisons of numbers to a problem. Removes values
+    /// of functional data properties that contradict them. Returns warnings.
     pub(crate) fn fill(
         &self,
         domain: &Domain,
@@ -188,8 +188,8 @@ impl Planta {
         Some((predicate, fact.arguments.iter().map(name).collect()))
     }
 
-    /// Removes the problem's values of functional properties for which the knowledge base has a
-    /// different value. Returns warnings.
+    /// Removes the problem's values of functional data properties for which the knowledge base has a different
+    /// value. Returns warnings.
     fn replace_values(&self, problem: &mut Problem, facts: &BTreeSet<PddlFact>) -> Vec<Message> {
         let mut warnings = Vec::new();
         problem.init.retain(|element| {

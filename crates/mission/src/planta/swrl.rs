@@ -1,8 +1,8 @@
 //! Translates SWRL rules to derived predicates.
 //!
-//! Variables keep their names. PDDL heads admit variables only, so a constant in a head becomes a
-//! parameter with an equality condition. Numeric comparisons become predicates over the objects of
-//! the numbers. `sameAs` and `differentFrom` become (in)equality, because PDDL has unique names.
+//! Variables keep their names. PDDL heads admit variables only, so a constant in a head becomes a parameter with an
+//! equality condition. Numeric comparisons become predicates over the objects that represent the numbers. `sameAs`
+//! and `differentFrom` become (in)equality, because PDDL has unique names.
 
 use std::collections::BTreeMap;
 

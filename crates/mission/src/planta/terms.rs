@@ -154,12 +154,12 @@ pub(super) fn is_annotation(iri: &str) -> bool {
     iri.starts_with(annotation::NS)
 }
 
-/// Returns `true` for `owl:Thing`, to which every individual belongs. It has no predicate.
+/// Returns `true` for `owl:Thing`, to which every individual belongs. The class has no predicate.
 pub(super) fn is_top(iri: &str) -> bool {
     iri == owl::THING
 }
 
-/// Returns `true` for `owl:Nothing`, to which no individual belongs. It has no predicate.
+/// Returns `true` for `owl:Nothing`, to which no individual belongs. The class has no predicate.
 pub(super) fn is_bottom(iri: &str) -> bool {
     iri == owl::NOTHING
 }

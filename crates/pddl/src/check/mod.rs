@@ -17,19 +17,21 @@ use symbols::Symbols;
 
 const UNDECLARED_CODES: [&str; 5] = ["P120", "P121", "P122", "P123", "P136"];
 
-/// Minimum number of undeclared `inferred-…` predicates for a domain to count as a template of PLANTA's
-/// `OWLToPDDL`.
+/// Minimum number of undeclared names `inferred-…` for a domain to count as a template of PLANTA's `OWLToPDDL`. A
+/// knowledge base provides these predicates.
 const MIN_TEMPLATE_PREDICATES: usize = 3;
 
-/// Checks a domain without a problem. Returns errors and warnings. For a template of PLANTA's `OWLToPDDL`,
-/// one error P134 replaces the messages about undeclared names.
+/// Checks a domain without a problem. Returns errors and warnings. For a template of PLANTA's `OWLToPDDL` (a domain
+/// with undeclared names `inferred-…`), one error P134 replaces the messages about undeclared types, predicates,
+/// functions and objects.
 pub fn check_domain(domain: &Domain, source: &Source) -> Vec<Diagnostic> {
     let symbols = Symbols::of(domain, None);
     check_domain_with(domain, source, &symbols).0
 }
 
-/// Checks a domain and a problem. Returns errors and warnings. Messages about the domain come first. For a
-/// template of PLANTA's `OWLToPDDL`, one error P134 replaces the messages about undeclared names.
+/// Checks a domain and a problem. Returns errors and warnings. Messages about the domain come first. For a template
+/// of PLANTA's `OWLToPDDL` (a domain with undeclared names `inferred-…`), one error P134 replaces the messages
+/// about undeclared types, predicates, functions and objects.
 pub fn check(
     domain: &Domain,
     domain_source: &Source,
@@ -104,7 +106,7 @@ fn template_message(domain: &Domain, source: &Source, inferred_count: usize) -> 
 struct Checker<'a> {
     symbols: &'a Symbols<'a>,
     sink: Sink<'a>,
-    /// Undeclared predicates `inferred-…`, which PLANTA's `OWLToPDDL` would declare.
+    /// Undeclared predicates and functions `inferred-…`; PLANTA's `OWLToPDDL` would declare such predicates.
     undeclared_inferred: FxHashSet<&'a Name>,
     /// Whether the checked file is the domain. A domain should use only its own constants, not objects of a
     /// problem.

@@ -89,8 +89,8 @@ impl Parser<'_> {
             ":durative-action" => return domain.actions.extend(self.durative_action(section)),
             _ => return self.other_section(section, "domain"),
         }
-        // Once the file has an error, warnings about this section count as well. A false alarm only
-        // suppresses later messages about names.
+        // If this section caused an error, declarations may be missing. In a file with an error, a warning about
+        // the section counts as well, which only suppresses later messages about names.
         if self.sink.len() > message_count && self.sink.has_errors() {
             self.declarations_intact = false;
         }

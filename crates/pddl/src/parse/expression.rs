@@ -145,8 +145,8 @@ impl Parser<'_> {
     }
 }
 
-/// Evaluates an expression. `None` if it contains a function, divides by zero, or has an intermediate result
-/// that exceeds [`MAX_BITS`].
+/// Evaluates an expression. `None` if it contains a function, `?duration` or `total-time`, divides by zero, or has
+/// an intermediate result that exceeds [`MAX_BITS`].
 fn evaluate(expression: &Expression) -> Option<BigRational> {
     match expression {
         Expression::Number(value, _) => Some(value.clone()),

@@ -2,8 +2,9 @@
 //!
 //! `(place-of ?x - tool) - place` becomes a predicate with one more argument: the value. The predicate holds
 //! for at most one value.
-//! - An object-fluent term in a condition becomes a variable below `exists`.
-//! - An object-fluent term in an effect becomes a variable below `forall` and `when`.
+//! - An object-fluent term in a condition becomes a variable that `exists` binds.
+//! - An object-fluent term in an effect becomes a variable that `forall` binds; `when` restricts the effect to the
+//!   value of the term.
 //! - An assignment adds the atom with the new value and deletes the atoms with all values. Additions override
 //!   deletions.
 //! - Conditions that an effect imposes on the state, such as the existence of a value, become conditions of
@@ -86,7 +87,7 @@ impl Parser<'_> {
         if self.objects.prefix.is_none() {
             let text = self.sink.source().text().to_ascii_lowercase();
             let mut prefix = "value".to_owned();
-            // A prefix that no variable of the file begins with makes all names with it unused.
+            // If no variable of the file begins with the prefix, all names with this prefix are unused.
             while text.contains(&format!("?{prefix}")) {
                 prefix.push('-');
             }
@@ -122,8 +123,8 @@ impl Parser<'_> {
         None
     }
 
-    /// Replaces an object-fluent term by a new variable for its value and records the atom that binds the
-    /// variable. Reports any other item, and a context that does not allow object fluents.
+    /// Replaces an object-fluent term by a new variable for its value and records the atom that binds the variable.
+    /// Reports an error for any other item, and if the context does not allow object fluents.
     pub(super) fn value_of(&mut self, item: Item<'_>) -> Option<Term> {
         if !self.is_object_fluent(item) {
             self.expected(item, "a variable or an object").help(
@@ -281,9 +282,8 @@ impl Parser<'_> {
         Mark { needs: self.objects.needs.len(), assigned: self.objects.assigned.len() }
     }
 
-    /// Quantifies universally over `variables` the needs of all effects parsed since `mark`. Needs are
-    /// conditions that effects impose on the state. Also adds the variables to the assignments recorded since
-    /// `mark`.
+    /// Adds an enclosing `forall` to all effects parsed since `mark`: quantifies their needs (conditions that they
+    /// impose on the state) over `variables`, and adds `variables` to the recorded assignments.
     pub(super) fn effects_below(&mut self, mark: Mark, variables: &[TypedName]) {
         for (_, need) in &mut self.objects.needs[mark.needs..] {
             let inner = std::mem::replace(need, Condition::And(Vec::new()));
@@ -294,8 +294,8 @@ impl Parser<'_> {
         }
     }
 
-    /// Makes the needs of all effects parsed since `mark` depend on `condition`. Needs are conditions that
-    /// effects impose on the state. Also adds the condition to the assignments recorded since `mark`.
+    /// Adds an enclosing `when` to all effects parsed since `mark`: makes their needs (conditions that they impose
+    /// on the state) depend on `condition`, and adds `condition` to the recorded assignments.
     pub(super) fn effects_when(&mut self, mark: Mark, condition: &Condition) {
         for (_, need) in &mut self.objects.needs[mark.needs..] {
             let inner = std::mem::replace(need, Condition::And(Vec::new()));

@@ -1,5 +1,5 @@
-//! Pretty printer for nested lists. A list that fits is printed on one line; otherwise each item after the
-//! first ones is on a separate line.
+//! Pretty printer for nested lists. A list that fits is printed on one line; otherwise its first items stay on one
+//! line, and each further item is on a separate line.
 
 /// Maximum width of a list that is printed on one line, in characters, including the indentation.
 const WIDTH: usize = 100;

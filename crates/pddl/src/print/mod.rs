@@ -1,5 +1,4 @@
-//! Prints syntax trees as text that other planners accept. Parsing the printed text and printing it again
-//! yields the same text.
+//! Prints syntax trees as PDDL. Parsing the printed text and printing it again yields the same text.
 //!
 //! Empty sections other than `:init` and `:goal`, and empty preconditions, are omitted, because several
 //! planners reject them.

@@ -47,8 +47,7 @@ pub struct ValueChange {
     pub before: Option<BigRational>,
     /// Value after the step.
     pub after: BigRational,
-    /// Whether the new value is independent of the old one, as with `assign`; `false` for increases,
-    /// decreases and scalings.
+    /// Whether an `assign` effect sets the value; `false` for increases, decreases and scalings.
     pub assigned: bool,
 }
 
@@ -56,7 +55,8 @@ pub struct ValueChange {
 ///
 /// # Errors
 /// Returns the violation that prevents the step. With `forced`, conditions and interference are not checked;
-/// unknown actions, invalid durations, and undefined or conflicting effects remain errors.
+/// unknown actions, durations that violate a constraint at start, and undefined or conflicting effects remain
+/// errors.
 pub fn advance(
     domain: &Domain,
     problem: &Problem,

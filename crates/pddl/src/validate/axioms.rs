@@ -11,7 +11,7 @@ use crate::strata::Strata;
 pub(super) struct Stratum<'p> {
     pub(super) predicates: FxHashSet<&'p Name>,
     pub(super) axioms: Vec<Axiom<'p>>,
-    /// Body atoms of each predicate of the stratum that new facts can be joined with.
+    /// For each predicate of the stratum: the atoms in bodies of axioms with which its new facts can be joined.
     pub(super) occurrences: FxHashMap<&'p Name, Vec<Occurrence<'p>>>,
 }
 
@@ -23,8 +23,8 @@ pub(super) struct Axiom<'p> {
     pub(super) opaque: FxHashSet<*const Condition>,
 }
 
-/// Body atom of an axiom that new facts can be joined with. Only conjunctions, disjunctions and existential
-/// quantifiers enclose the atom.
+/// Atom in the body of an axiom with which new facts can be joined, because only conjunctions, disjunctions and
+/// existential quantifiers enclose the atom.
 #[derive(Debug)]
 pub(super) struct Occurrence<'p> {
     pub(super) axiom: usize,

@@ -25,7 +25,7 @@ use super::world::{Symbol, World};
 /// Trace of all numeric functions that actions can change.
 #[derive(Debug, Clone, Default)]
 pub struct Course {
-    /// Values before the plan, sorted by function: `(battery)`.
+    /// Values of the functions before the plan, sorted by function. A function is written as in `(battery)`.
     pub initial: Vec<(String, BigRational)>,
     /// Starts and ends of actions, in chronological order.
     pub moments: Vec<CourseMoment>,
@@ -44,8 +44,8 @@ pub struct CourseMoment {
     pub is_end: bool,
     /// Changed functions with their new values, sorted.
     pub values: Vec<(String, BigRational)>,
-    /// Bounds on numeric functions that the action's conditions impose at this moment. At the start they
-    /// include the conditions over all.
+    /// Bounds on numeric functions that the action's conditions impose at this moment. The bounds at the start
+    /// include those of the over-all conditions.
     pub bounds: Vec<NumberBound>,
     /// Metric value if the plan ended now. `None` without a metric or if the value is undefined. For example,
     /// a metric that counts violated preferences is undefined before the end.

@@ -1,10 +1,10 @@
 //! Computes the derived facts of a state: the least fixpoint of the axioms, stratum by stratum, by semi-naive
 //! evaluation \[1\].
 //!
-//! A new fact is joined with the remaining conditions of each axiom that mentions its predicate. This is
-//! impossible if the axiom mentions a predicate of its own stratum below a negation, an implication or a
-//! universal quantifier (an *opaque* condition). The instances of such an axiom are re-evaluated when a fact
-//! arrives that was missing in their last evaluation.
+//! A new fact is joined with the remaining conditions of each axiom that mentions its predicate. Such a join is
+//! impossible if the axiom mentions a predicate of its own stratum below a negation, an implication or a universal
+//! quantifier (an *opaque* condition). The instances of such an axiom are re-evaluated when a fact arrives that was
+//! missing in their last evaluation.
 //!
 //! \[1\] F. Bancilhon, R. Ramakrishnan: An amateur's introduction to recursive query processing strategies, SIGMOD 1986.
 
@@ -30,12 +30,12 @@ pub(super) fn derive_facts(world: &World<'_>, state: &mut State) {
     }
 }
 
-/// An instance of an axiom with an opaque condition (one into which new facts cannot be joined). The instance
-/// is re-evaluated until its condition holds.
+/// An instance of an axiom with an opaque condition (one into which new facts cannot be joined). Until its
+/// condition holds, the instance is re-evaluated when a fact arrives that was missing.
 struct WaitingInstance {
     axiom: usize,
     arguments: Arguments,
-    /// Number of evaluations of the instance. Entries in [`Waiting`] with a smaller number are obsolete.
+    /// Number of evaluations so far. Entries of this instance in [`Waiting`] with a smaller number are obsolete.
     evaluations: u32,
 }
 

@@ -113,8 +113,8 @@ impl Changes {
         Ok(())
     }
 
-    /// Adds the changes of another part of the same happening, for example of a simultaneous action. Returns
-    /// an error if numeric changes do not commute, or if their combination is too large.
+    /// Adds further changes at the same time, for example those of a simultaneous action. Returns an error if
+    /// numeric changes do not commute, or if their combination is too large.
     pub(super) fn merge(&mut self, other: Self) -> Result<(), EffectError> {
         self.added.extend(other.added);
         self.deleted.extend(other.deleted);

@@ -1,7 +1,7 @@
 //! Evaluates conditions and expressions in a state, directly on the syntax tree.
 //!
-//! A comparison with an undefined value (a function without a value, or a division by zero) is neither true
-//! nor false (Kleene's three-valued logic). A compound condition is undefined only if its truth depends on
+//! A comparison with an undefined value (for example a function without a value, or a division by zero) is neither
+//! true nor false (Kleene's three-valued logic). A compound condition is undefined only if its truth depends on
 //! such a comparison.
 
 use num_rational::BigRational;

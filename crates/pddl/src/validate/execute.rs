@@ -188,8 +188,8 @@ impl<'e, 'p> Execution<'e, 'p> {
         Err(step.violation(time, ViolationKind::Duration, message))
     }
 
-    /// Checks the conditions of an action at its start, over all, or at its end; at the end, also the
-    /// duration constraints at end. An unsatisfied or undefined condition is a violation.
+    /// Checks the conditions of an action at its start, its over-all conditions, or its conditions at the end
+    /// together with the duration constraints at end. An unsatisfied or undefined condition is a violation.
     pub(super) fn check(
         &self,
         running: &Running<'e, 'p>,

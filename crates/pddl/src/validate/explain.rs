@@ -10,7 +10,7 @@ use super::evaluate::{Bindings, Evaluator, Undefined};
 use super::verdict::Unmet;
 use super::world::World;
 
-/// Returns the conjuncts of a condition that are false or undefined. Each has the values of the numeric
+/// Returns the conjuncts of a condition that are false or undefined. Each conjunct has the values of the numeric
 /// functions that it reads, except those that depend on quantified variables.
 pub(super) fn unmet<'p>(
     evaluator: Evaluator<'_, 'p>,

@@ -61,15 +61,16 @@ const MAX_READINGS: usize = 4096;
 /// Executes a plan and returns the verdict. Domain and problem must have passed [`check`](crate::check());
 /// atoms with undeclared names are false.
 ///
-/// A step whose name and objects fit several schemas can be an instance of any of them. A plan is valid if
-/// some reading of it is valid, and the best reading counts. If there are more than 4,096 readings, each
-/// ambiguous step is an instance of the first schema that can start.
+/// A step whose name and objects fit several schemas can be an instance of any of them. A plan is valid if some
+/// reading of it is valid. Of several valid readings, the best by the metric (or, without a metric, by the total
+/// time) counts. If there are more than 4,096 readings, each ambiguous step is an instance of the first schema that
+/// can start.
 pub fn validate(domain: &Domain, problem: &Problem, plan: &PlanText, options: &Options) -> Verdict {
     judge_readings(&World::new(domain, problem, &|| false), plan, options)
 }
 
-/// Executes a plan like [`validate`], but ends early once `stop` returns `true`. `stop` is called at the
-/// beginning, and then every few hundred steps of each loop.
+/// Executes a plan like [`validate`], but ends early once `stop` returns `true`. `stop` is called at the beginning,
+/// and then at least once in a few hundred steps of the loops.
 ///
 /// # Errors
 /// Returns [`Interrupted`] if `stop` has returned `true`.
@@ -88,17 +89,18 @@ pub fn validate_within(
     world.budget.check(verdict)
 }
 
-/// Returns the metric value of a plan, as [`validate`] computes it, but faster in a large initial state. Returns
-/// `None` if the plan is not valid, or if the metric is missing or undefined.
+/// Returns the metric value of a plan, as [`validate`] computes it with the default options, but faster in a large
+/// initial state. Returns `None` if the plan is not valid, or if the metric is missing or undefined.
 pub fn metric_of(domain: &Domain, problem: &Problem, plan: &PlanText) -> Option<BigRational> {
     let reduced = relevant(domain, problem, &plan.steps, Some(&problem.goal));
     let world = World::new(domain, reduced.as_ref().unwrap_or(problem), &|| false);
     judge_readings(&world, plan, &Options::default()).metric
 }
 
-/// Executes all readings of a plan, if there are several but not more than [`MAX_READINGS`], and returns the best verdict.
-/// If no reading is valid, or the readings are too many, executes the plan with the first schema that can start for each
-/// step. After an interruption, the verdict is meaningless.
+/// Executes all readings of a plan (choices of one schema for each step that fits several), if there are several
+/// but not more than [`MAX_READINGS`], and returns the best verdict. If no reading is valid, or the readings are
+/// too many, executes the plan with the first schema that can start for each step. After an interruption, the
+/// verdict is meaningless.
 #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
 fn judge_readings(world: &World<'_>, plan: &PlanText, options: &Options) -> Verdict {
     let steps: Vec<_> =

@@ -10,9 +10,9 @@ pub struct Options {
     /// Whether actions may overlap, by the rules of PDDL 2.1. Otherwise each action begins when the preceding
     /// one has ended, or later.
     pub concurrent: bool,
-    /// Tolerance, in the domain's time unit; not negative.
+    /// Tolerance, in the domain's time unit; not negative. The default is 0.001.
     ///
-    /// In sequential execution, the tolerance accommodates rounded plans. It limits the deviation of a stated
+    /// In sequential execution, the tolerance accommodates rounded plans: it limits the deviation of a stated
     /// duration from the exact one, and the overlap of a step with the next step.
     ///
     /// In concurrent execution, the tolerance is the separation (epsilon): the minimum distance of

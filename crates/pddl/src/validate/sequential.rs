@@ -54,8 +54,8 @@ pub(super) fn run<'e, 'p>(
     Ok(())
 }
 
-/// Applies the events (timed initial literals) before the end of an action, then executes the end. Checks the conditions
-/// over all in each state in between.
+/// Applies the events (timed initial literals) before the end of an action, then executes the end. Checks the
+/// over-all conditions in each state in between.
 fn finish<'e, 'p>(
     execution: &mut Execution<'e, 'p>,
     running: &Running<'e, 'p>,

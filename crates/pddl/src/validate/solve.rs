@@ -127,9 +127,9 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         Some((unsolved, undefined))
     }
 
-    /// Chooses the next branching point: an object that an equation determines, then the atom with the fewest
-    /// facts, then a disjunction, then the first unbound variable. Returns the options and the remaining
-    /// conditions, or `None` if all variables are bound.
+    /// Chooses what to branch on: an equation that determines an object if there is one, else the atom with the
+    /// fewest facts, else a disjunction, else the first unbound variable. Returns the remaining conditions and the
+    /// options, or `None` if all variables are bound.
     fn choice(
         &self,
         mut open: Vec<&'p Condition>,

@@ -50,8 +50,9 @@ impl Step<'_> {
     }
 }
 
-/// Finds all schemas that fit the name and the objects of a step. Of several, those whose condition at start equates
-/// different objects are omitted, unless all do. `instances` is empty if no schema fits.
+/// Finds all schemas that fit the name and the objects of a step. Of several schemas, those are omitted whose
+/// condition at start equates different objects, unless this holds for all of them. `instances` is empty if no
+/// schema fits.
 pub(super) fn resolve<'p>(world: &World<'p>, number: usize, text: &'p PlanStep) -> Step<'p> {
     let objects: Option<Vec<Symbol>> = text.arguments.iter().map(|name| world.object(name)).collect();
     let schemas = world.domain.actions.iter().filter(|action| action.identifier.name == text.action);

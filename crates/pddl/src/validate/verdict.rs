@@ -72,7 +72,7 @@ pub enum ViolationKind {
     Duration,
     /// A precondition or a condition at the start of an action does not hold.
     AtStart,
-    /// A condition over all of an action does not hold.
+    /// An over-all condition of an action does not hold.
     OverAll,
     /// A condition at the end of an action does not hold.
     AtEnd,

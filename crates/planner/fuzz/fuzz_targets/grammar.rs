@@ -1,6 +1,5 @@
-//! Fuzz target: generates domains and problems. The reader must accept them, printing and reading must yield
-//! equal trees, and grounding must succeed or return errors. Texts with some words deleted, doubled or
-//! exchanged must be read without a crash.
+//! Fuzz target: generates domains and problems. The reader must accept them, printing and reading must yield equal
+//! trees, and grounding must succeed or return errors. Texts with a few changed words must be read without a crash.
 
 #![no_main]
 
@@ -55,7 +54,8 @@ const WORDS: [&str; 28] = [
     "((((",
 ];
 
-/// Returns a copy of the text in which a few words are changed. The input bytes determine the changes.
+/// Returns a copy of the text with at most four changes: words are deleted, inserted, replaced, exchanged or
+/// repeated. The input bytes determine the changes.
 fn mutated(text: &str, bytes: &mut &[u8]) -> String {
     let spaced = text.replace('(', " ( ").replace(')', " ) ");
     let mut words: Vec<&str> = spaced.split_whitespace().collect();

@@ -1,6 +1,6 @@
-//! Fuzz target: reads arbitrary bytes as a domain, a problem and a plan. The reader must return errors, or
-//! trees that are equal after printing and reading. The three files are separated by a byte that occurs in no
-//! text.
+//! Fuzz target: reads arbitrary bytes as a domain, a problem and a plan. The reader must return errors, or trees
+//! that are equal after printing and reading. The byte 0xff, which does not occur in UTF-8, separates the three
+//! files.
 
 #![no_main]
 

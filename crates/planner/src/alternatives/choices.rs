@@ -15,25 +15,27 @@ use task::task::{Argument, Task};
 pub struct Alternatives {
     /// Cheapest plans other than the first plan, at most the requested number.
     pub plans: Vec<Plan>,
-    /// `true` if it is proved that there are no other cheapest plans, except by adding idle actions.
+    /// `true` if it is proved that every cheapest plan is the first plan or in `plans`, apart from idle actions.
     pub complete: bool,
-    /// For each step of the first plan: the choices that every cheapest plan without idle actions makes at
-    /// this step. `None` in any of these cases: a limit was reached, cheapest plans may have more steps than
-    /// were searched, the task has waits, or the result depends on an unverified external solver.
+    /// For each step of the first plan: the choices that every cheapest plan without idle actions makes at this
+    /// step. `None` if they are not determined: for example, a limit was reached, longer cheapest plans may exist,
+    /// the task has waits (steps that only advance the time), or an external solver was used, whose claims are not
+    /// verified.
     pub forced: Option<Vec<Forced>>,
 }
 
 /// Choices at one step that every cheapest plan makes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Forced {
-    /// `true` if every cheapest plan has the same action at this step, ignoring designs among its arguments.
+    /// `true` if every cheapest plan has the same action with the same arguments at this step. Designs among the
+    /// arguments are ignored if grounding leaves them open (slots).
     pub action: bool,
     /// Names of the functions for which every cheapest plan selects the same design at this step.
     pub functions: Vec<String>,
 }
 
-/// A choice of the first plan: the operator of a step (if `slot` is `None`), or the design of one of its
-/// slots (parameters whose designs are not grounded).
+/// A choice of the first plan: the operator of a step (if `slot` is `None`), or the design of a slot (parameter
+/// whose design is not grounded). `slot` is the position of the slot in the operator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Choice {
     pub(super) step: usize,
@@ -50,9 +52,9 @@ impl Choice {
     }
 }
 
-/// Without a slot (a parameter whose design is not grounded), returns `true` if both steps have the same
-/// operator. With a slot, returns `true` if `second` also uses the slot and design that `first` has at this
-/// position.
+/// Returns `true` if two steps agree in a choice. If `slot` is `None`, they must have the same operator. Otherwise,
+/// `slot` is the position of a slot (parameter whose design is not grounded) of `first`, and `second` must use the
+/// same slot of the task with the same design.
 pub(super) fn shares(task: &Task, first: &GroundStep, second: &GroundStep, slot: Option<u32>) -> bool {
     match slot {
         None => second.operator == first.operator,
@@ -63,13 +65,14 @@ pub(super) fn shares(task: &Task, first: &GroundStep, second: &GroundStep, slot:
     }
 }
 
-/// Returns the slot of the task and the index of the selected design, for a slot position of a step.
+/// Returns the index of a slot in the task, and the index of the design that the step selects for it. `position` is
+/// the position of the slot in the operator of the step.
 fn design(task: &Task, step: &GroundStep, position: usize) -> (usize, u32) {
     let usage = &task.operators[step.operator.index()].slots[position];
     (usage.slot.index(), usage.designs[step.choice[position] as usize])
 }
 
-/// Converts the choices that all cheapest plans share to names, for each step of the first plan.
+/// Converts the shared choices to names, for each step of the first plan.
 pub(super) fn forced(task: &Task, first: &[GroundStep], choices: &[Choice]) -> Vec<Forced> {
     let of_step = |(at, step): (usize, &GroundStep)| {
         let is_shared = |slot: Option<u32>| choices.contains(&Choice { step: at, slot });

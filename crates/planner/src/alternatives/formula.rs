@@ -1,8 +1,8 @@
 //! Enumerates further cheapest plans with the SAT solver.
 //!
-//! The formula describes the plans with at most the optimal cost. It has as many steps as such plans can
-//! have. If their number of steps is not bounded, it has as many as the configured horizon or the first plan.
-//! The formula is solved repeatedly; each time, the plans found before are excluded.
+//! The formula describes the plans with at most the optimal cost. The formula has as many steps as such plans can
+//! have, but at most the configured horizon. If neither a bound nor a horizon is known, it has as many steps as the
+//! first plan. The formula is solved repeatedly; each time, the plans found before are excluded.
 //!
 //! The choices that all cheapest plans share are the backbone of this formula \[1\]. Candidates are the
 //! choices of the first plan. The solver is queried for a plan that differs from the first plan in at least
@@ -78,7 +78,8 @@ pub(super) fn by_formula(
             _ => break,
         }
     }
-    // With waits, several operators represent one action, and actions can have different positions.
+    // If the task has waits (steps that only advance the time), several operators can represent one action, and an
+    // action can have different positions in equal plans. So plans cannot be compared step by step.
     let has_waits = task.operators.iter().any(|operator| operator.wait.is_some());
     let choices = if complete && !has_waits { run.forced(&first.steps, &sequences) } else { None };
     let forced = choices.map(|choices| forced(task, &first.steps, &choices));

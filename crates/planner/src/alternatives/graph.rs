@@ -5,10 +5,10 @@
 //! plan. K\* and related algorithms represent top-k plans in this way \[1\].
 //!
 //! If many states differ only in resources, expanding all of them is too much work. A label-setting search
-//! therefore comes first. Each of its labels represents all states that cost at least as much and have at
-//! most as much of each resource. If no path in the label graph leads from a label to the goal, no cheapest
-//! plan passes through a state that the label represents. The second search distinguishes all states and
-//! expands only those that the first search does not exclude.
+//! therefore comes first. Each of its labels (nodes) represents all states that differ from it only in resources,
+//! cost at least as much, and have at most as much of each resource. If no path in the label graph leads from a
+//! label to the goal, no cheapest plan passes through a state that the label represents. The second search
+//! distinguishes all states and expands only those that the first search does not exclude.
 //!
 //! \[1\] J. Lee, M. Katz, S. Sohrabi: On K* search for top-k planning, 2023; H. Aljazzar, S. Leue:
 //! K*: a heuristic search algorithm for finding the k shortest paths, Artificial Intelligence 175,
@@ -44,8 +44,8 @@ pub(super) struct Edge {
     pub(super) step: u32,
 }
 
-/// Graph of labels and the steps between them. A label (node) represents a state or, in the first search, a
-/// set of states.
+/// Graph of labels and the steps between them. A label (node) represents a state or, in the first of the two
+/// searches (see the head of this file), all states that are no better in resources and cost.
 pub(super) struct Graph {
     /// Edges in ascending order of [`Edge::from`], and then of their steps.
     pub(super) edges: Vec<Edge>,
@@ -79,7 +79,7 @@ pub(super) fn cheapest(
     let search = Search::new(context, bounds, cost)?;
     let guide = Labels::comparing(context.task);
     let (guide, graph) = search.explore(guide, None, &mut |_| false)?;
-    // The second search would reach the same limit as the first.
+    // The second search would probably reach the limit as well.
     if !graph.is_complete {
         return Some(graph);
     }
@@ -96,14 +96,13 @@ type Place = (Box<[u32]>, Box<[Int]>);
 struct Labels {
     all: Vec<(State, Int)>,
     places: FxHashMap<Place, Vec<u32>>,
-    /// Indices of the numeric variables that are compared, with their directions. All other numbers are part
-    /// of the [`Place`].
+    /// Numeric variables for which a label also represents worse values: their indices, and the directions in which
+    /// values are compared. All other numbers are part of the [`Place`].
     compared: Vec<(usize, Polarity)>,
     basic: usize,
 }
 
-/// Relation of a state, reached at some cost, to the existing labels (nodes) that agree with it except in
-/// compared numbers.
+/// Result of comparing a state and the cost of its path with the existing labels (nodes) at the same [`Place`].
 enum Known {
     /// Another label (node) costs less and is no worse in any compared number.
     Beaten,
@@ -141,8 +140,8 @@ impl Labels {
         })
     }
 
-    /// Returns the labels (nodes) at `place` that cost at most as much as a state and are no worse in any
-    /// compared number, each with `true` if its cost is lower.
+    /// Returns the labels (nodes) at `place` that cost at most `cost` and are no worse than `state` in any compared
+    /// number. Each label has the flag `true` if it costs less than `cost`.
     fn no_worse<'l>(
         &'l self,
         place: &Place,
@@ -209,8 +208,8 @@ struct Growth {
     steps: Vec<GroundStep>,
     numbers: FxHashMap<GroundStep, u32>,
     goals: Vec<bool>,
-    /// Open list. Keys are the estimated cost of the whole plan (0 in the second search) and then the highest
-    /// path cost; the last field is the index of the label (node).
+    /// Open list: estimated cost of the whole plan (0 in the second search), cost of the path, and index of the
+    /// label (node). The label with the least estimate is expanded first; of equal estimates, the greatest cost.
     open: BinaryHeap<Reverse<(Int, Reverse<Int>, u32)>>,
     is_complete: bool,
 }
@@ -277,10 +276,10 @@ impl<'a> Search<'a> {
     }
 
     /// Builds a graph from the initial state until it is complete, a time or memory limit is reached, or
-    /// `is_enough` returns `true`. Returns `None` if an operator has too many combinations of designs. The
-    /// optional `guide` holds the labels (nodes) of the first search, and whether a goal can be reached from
-    /// each of them. With a guide, every label represents a single state, and states that the guide excludes
-    /// are omitted. `is_enough` is called only with a guide.
+    /// `is_enough` returns `true`. Returns `None` if an operator has too many combinations of designs. The first
+    /// search has no `guide`. The second search has one: the labels (nodes) of the first search, and whether a goal
+    /// can be reached from each of them. In the second search, labels represent single states, and states that the
+    /// guide excludes are omitted. `is_enough` is called only with a guide.
     fn explore(
         &self,
         labels: Labels,

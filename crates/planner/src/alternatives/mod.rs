@@ -45,14 +45,15 @@ pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Conf
     by_graph.or_else(|| by_formula(context, &bounds, first, most, config)).or(Some(unknown))
 }
 
-/// Searches for at most `most` other cheapest plans in the graph of all cheapest plans. Returns `None` if
-/// graph search is not applicable to the task.
+/// Lists at most `most` other cheapest plans from the graph of all cheapest plans. Returns `None` if graph search
+/// is not applicable to the task.
 fn by_graph(context: Context<'_>, bounds: &Bounds, first: &GroundPlan, most: usize) -> Option<Alternatives> {
     let task = context.task;
     let mut is_enough = |graph: &Graph| List::new(context, first, most, graph).0.is_full();
     let graph = cheapest(context, bounds, first.cost, &mut is_enough)?;
     let (list, end) = List::new(context, first, most, &graph);
-    // With waits, several operators represent one action, and actions can have different positions.
+    // If the task has waits (steps that only advance the time), several operators can represent one action, and an
+    // action can have different positions in equal plans. So plans cannot be compared step by step.
     let has_waits = task.operators.iter().any(|operator| operator.wait.is_some());
     let is_known = graph.is_complete && graph.is_exact && !has_waits;
     let forced = is_known.then(|| forced(task, &first.steps, &shared(task, &first.steps, &graph)));
@@ -67,13 +68,12 @@ struct List {
 }
 
 impl List {
-    /// Lists the plans of a graph. Also returns whether there may be further plans.
+    /// Lists the plans of a graph. Also returns whether the list is exhaustive or the enumeration stopped early.
     fn new(context: Context<'_>, first: &GroundPlan, most: usize, graph: &Graph) -> (Self, End) {
         let mut list = Self { plans: Vec::new(), most };
         let first_plan = decode(context, first);
         let end = Paths::new(graph).each(&mut |steps| {
-            // If a label represents several states, some paths are not plans, because a resource does not
-            // suffice.
+            // If a label represents several states, a path need not be a plan: a resource may not suffice.
             if !graph.is_exact && replay(context.task, &steps).is_none_or(|(_, cost)| cost != first.cost) {
                 return true;
             }

@@ -21,7 +21,8 @@ pub(super) struct Paths<'g> {
     graph: &'g Graph,
     /// Index of the first edge of each label (node), followed by the number of edges.
     first: Vec<usize>,
-    /// Pairs of a label (node) and a length, such that no path of this length leads from the label to a goal.
+    /// Pairs of a label (node) and a number of steps, such that no path with this number of steps leads from the
+    /// label to a goal.
     dead: FxHashSet<(u32, usize)>,
     work: usize,
 }
@@ -73,7 +74,7 @@ impl<'g> Paths<'g> {
     fn each_of(&mut self, length: usize, visit: &mut dyn FnMut(Vec<GroundStep>) -> bool) -> End {
         let mut path: Vec<u32> = Vec::new();
         let mut branches = vec![Branch { label: ROOT, next: self.first[ROOT as usize] }];
-        // For each branch: whether a goal was reached through it.
+        // For each label on the path: whether a goal was reached through it.
         let mut fruitful = vec![false];
         while let Some(branch) = branches.last_mut() {
             let steps_left = length.saturating_sub(path.len());
@@ -149,9 +150,8 @@ impl<'g> Paths<'g> {
         (unsorted == 0).then(|| ends.map(|(depth, _)| *depth).max().unwrap_or(0))
     }
 
-    /// For each of the first `length` positions, returns the distinct steps that cheapest plans have at this
-    /// position. From the first position at which some cheapest plan has already ended, all entries are
-    /// `None`.
+    /// Returns the distinct steps that cheapest plans have at each of the first `length` positions. Entries are
+    /// `None` from the first position at which some cheapest plan has already ended.
     pub(super) fn layers(&self, length: usize) -> Vec<Option<Vec<&'g GroundStep>>> {
         let mut layer: Vec<u32> = vec![ROOT];
         let mut layers = Vec::new();

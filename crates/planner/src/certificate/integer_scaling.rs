@@ -14,12 +14,12 @@ use task::task::quantity::Linear;
 /// Maximum number of bits of a common denominator.
 const MOST_BITS: u64 = 1 << 20;
 
-/// Factor for each kind of number that makes all numbers of this kind integers.
+/// Factors that convert the numbers, costs and times of a task to integers.
 pub(super) struct Scales {
     pub(super) numbers: Integer,
     pub(super) costs: Integer,
     pub(super) times: Integer,
-    /// Factor by which a cost bound, counted in its unit, is multiplied to obtain a scaled cost.
+    /// Factor that converts cost bounds to scaled costs. The bounds are counted in multiples of a unit.
     pub(super) bounds: Integer,
 }
 
@@ -29,8 +29,8 @@ impl Scales {
         Self { numbers: unit(), costs: unit(), times: unit(), bounds: unit() }
     }
 
-    /// Computes the scales of a task in rationals; cost bounds are multiples of `unit`. Returns `None` if an
-    /// effect multiplies a number by a fraction (its values then have no common denominator), or a
+    /// Computes the scales of a task in rationals. Cost bounds are counted in multiples of `unit`. Returns `None`
+    /// if an effect multiplies a number by a fraction (its values then have no common denominator), or a
     /// denominator has too many bits.
     pub(super) fn of(task: &Task<Rational>, unit: &Rational) -> Option<Self> {
         let mut numbers = CommonDenominator::of_at_most(MOST_BITS);

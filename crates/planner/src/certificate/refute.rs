@@ -1,4 +1,5 @@
-//! Refutes the checker's formula with a SAT solver and writes the refutation.
+//! Refutes a formula of the crate `certificate`, "some plan is cheaper than the claim", with a SAT solver, and
+//! writes the refutation.
 
 use std::io::{BufRead, Write};
 
@@ -23,7 +24,7 @@ pub struct Outputs<'o> {
     pub legend: &'o mut dyn Write,
     /// Untrimmed refutation as the solver writes it.
     pub draft: Box<dyn Write>,
-    /// Opens the untrimmed refutation for reading, after the solver has written it.
+    /// Function that opens the untrimmed refutation for reading, after the solver has written it.
     pub written_draft: &'o dyn Fn() -> std::io::Result<Box<dyn BufRead>>,
     /// Trimmed refutation in DRAT format: clauses that follow by unit propagation, without deletions.
     pub proof: &'o mut dyn Write,
@@ -36,8 +37,8 @@ pub struct Outputs<'o> {
 /// its refutation. Returns the step bound. The claim is as in [`certificate::check`].
 ///
 /// # Errors
-/// The formula does not support a construct of the task, there is no step bound, the formula is satisfiable,
-/// a limit is reached, or an output cannot be written or read again.
+/// The documents are invalid, the formula does not support a construct of the task, there is no step bound, the
+/// formula is satisfiable, a limit is reached, or an output cannot be written or read again.
 #[expect(clippy::arithmetic_side_effects, reason = "two constants, divided by a number that is not 0")]
 pub fn refute(
     documents: (&str, &str),

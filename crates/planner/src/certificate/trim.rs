@@ -1,7 +1,7 @@
 //! Trims the DRAT proof of a SAT solver to a short proof with hints.
 //!
-//! Each clause of the solver's proof follows from earlier clauses by unit propagation \[1\]. The clauses used
-//! in this propagation become the hints of the clause. Literals that are permanently implied become unit
+//! Each clause of the solver's proof follows from earlier clauses by unit propagation \[1\]. The clauses used in
+//! this propagation become the hints of the derived clause. Literals that are permanently implied become unit
 //! clauses, which keeps hints short. Only clauses on which the empty clause depends are written.
 //!
 //! The result is checked again by the crate `certificate`, which shares no code with this file.

@@ -31,10 +31,9 @@ pub struct Certificate {
     pub argument: String,
 }
 
-/// Creates the certificate of a solution. Returns `None` in any of these cases: the solution is not proved
-/// for plans of any length, the task has several objectives, its numbers have different scales, the metric is
-/// partly evaluated in the last state, operators can reduce the cost, or the search does not end within the
-/// limits.
+/// Creates the certificate of a solution. Returns `None` in any of these cases: the solution is not proved for
+/// plans of any length, the task has several objectives, its numeric variables have different scales, the metric is
+/// partly evaluated in the last state, operators can reduce the cost, or the search does not end within the limits.
 pub fn certify(task: &Task, solution: &Solution, limits: &Limits) -> Option<Certificate> {
     // The format has a single scale for all numbers, and does not support metrics that are partly evaluated
     // in the last state.
@@ -64,8 +63,9 @@ pub fn certify_exact(task: &ExactTask, solution: &Solution, limits: &Limits) -> 
     certified(context, (solution, cost), &scales, bounds, |rounded| &rounded.bounds)
 }
 
-/// Creates a certificate from heuristic bounds and scales. `plain` returns the bounds in integers. Returns
-/// `None` in the cases that [`certify`] lists.
+/// Creates a certificate. `bounds` computes a heuristic and the scales of its numbers, and `plain` returns the
+/// integer bounds in this heuristic. `scales` is used if grounding already proves that the task is unsolvable.
+/// Returns `None` in the cases that [`certify`] lists.
 fn certified<N: TaskNumber, E: Heuristic<N>>(
     context: Context<'_, N>,
     (solution, cost): (&Solution, Option<N>),

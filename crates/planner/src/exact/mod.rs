@@ -50,8 +50,8 @@ pub fn ground_exact(domain: &Domain, problem: &Problem, config: &GroundConfig) -
 }
 
 impl ExactTask {
-    /// Returns `true` if the costs of a problem without metric are durations, and `false` if they count
-    /// actions.
+    /// Returns `true` if the costs are durations, and `false` if they count actions. Only meaningful for a problem
+    /// without metric.
     pub fn is_timed(&self) -> bool {
         self.0.is_measured_by_time(&Rational::one())
     }
@@ -291,7 +291,7 @@ impl Heuristic<Rational> for RoundedBounds {
     }
 }
 
-/// Returns a scaling factor for costs. It is the least common denominator if the scaled costs have at most
+/// Returns a scaling factor for costs. The factor is the least common denominator if the scaled costs have at most
 /// `COST_BITS` bits. Otherwise, it is a power of two for which the greatest cost has about `COST_BITS` bits.
 #[expect(
     clippy::arithmetic_side_effects,

@@ -1,10 +1,10 @@
 //! Branch and bound for metrics that depend on the state, by A\* with exact costs of paths.
 //!
 //! The portfolio for constant costs finds a first plan. Then a satisficing search for the task with lower bounds as
-//! costs runs in turns with A\*, and its plans are upper bounds. A path dominates another one if it costs no more and
-//! reaches a state that is as good: less (or more) of a number is no worse if no condition, cost or other number
-//! depends on it in the other direction. With a horizon, longer paths are pruned, and a path dominates only paths that
-//! are at least as long.
+//! costs runs in turns with A\*, and its plans are upper bounds. A path dominates another one if it costs no more
+//! and its state has the same facts and no worse numbers. Less of a number is never worse if no condition, cost or
+//! other number needs more of it (and vice versa). With a horizon, longer paths are pruned, and a path dominates
+//! only paths that are at least as long.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -35,16 +35,18 @@ use crate::optimize::state_dependent_costs::StateDependentCosts;
 const MAX_NODES: usize = 2_000_000;
 /// Maximum number of combinations of designs, over all operators.
 const MAX_COMBINATIONS: usize = 200_000;
-/// Nodes that A\* expands in its first turn.
+/// Maximum number of nodes that A\* takes from the open list in its first turn. The number doubles in each further
+/// turn.
 const TURN: usize = 5_000;
-/// Work units of the satisficing search per expanded node.
+/// Work units of a turn of the satisficing search, for each node of the preceding turn of A\*.
 const WORK: u64 = 1_000;
-/// Approximate memory use of a node, without its state.
+/// Approximate memory use of a node in bytes, without its state.
 const OVERHEAD: usize = size_of::<Node>() + 80;
 
 /// Minimises a metric that depends on the state. Returns `None` if the method is not applicable, e.g. with the SAT
 /// solver only, if an operator may improve the metric, or if operators have too many combinations of designs. Also
-/// returns `None` if no plan within the horizon was found, or if a limit is reached before the search begins.
+/// returns `None` if a limit is reached before the search begins. With a horizon, also returns `None` if no plan
+/// within it was found, unless it is proved that there is no plan at all.
 pub(super) fn minimise(
     task: &Task,
     config: &Config,
@@ -108,7 +110,7 @@ pub(super) fn minimise(
     (is_found || horizon.is_none()).then(|| progress.solution(search, end, limits))
 }
 
-/// Searches for a first plan by the portfolio for the part of the metric that operator costs represent. Returns
+/// Searches for a first plan with the portfolio, for the part of the metric that operator costs represent. Returns
 /// `None` if an operator may reduce this part.
 fn first_plan(task: &Task, config: &Config) -> Option<Solution> {
     if task.operators.iter().any(|operator| operator.cost.minimum() < 0) {
@@ -187,7 +189,7 @@ impl Progress<'_> {
 /// Reason why A\* has ended.
 #[derive(Clone, Copy)]
 enum End {
-    /// No open node can be better than the best plan.
+    /// All nodes are expanded, except those that cannot lead to a plan better than the best one.
     Exhausted,
     /// A limit was reached, or nodes were dropped because their numbers overflow.
     Stopped,
@@ -197,7 +199,7 @@ struct Node {
     state: State,
     /// Sum of the operator costs of the path.
     paid: Int,
-    /// Cost of the path, including the measured fluents.
+    /// Cost of the path, including the weighted values of the measured fluents in its last state.
     total: Int,
     steps: usize,
     /// Parent node and step; `None` for the initial state.
@@ -220,7 +222,8 @@ struct Path<'n> {
     steps: usize,
 }
 
-/// Sort key of an open node: lower bound on the cost of plans, estimate, and node.
+/// Sort key of an open node: lower bound on the cost of plans through the node, estimate of the remaining cost, and
+/// index of the node.
 type Priority = (Int, Int, Reverse<u32>);
 
 struct Search<'a> {
@@ -237,7 +240,7 @@ struct Search<'a> {
     open: BinaryHeap<Reverse<Priority>>,
     /// Best plan and its cost.
     best: Option<(Int, GroundPlan)>,
-    /// Lower bound on the cost of plans below nodes that were dropped because numbers overflow.
+    /// Lower bound on the cost of plans through nodes that were dropped because numbers overflow.
     left_out: Option<Int>,
     bytes: usize,
 }
@@ -296,7 +299,7 @@ impl<'a> Search<'a> {
             for operator in self.generator.applicable(self.task, &state) {
                 for position in 0..self.choices[operator.index()].len() {
                     if pulse.beat().is_err() || self.is_full(limits) {
-                        // The next run expands the node again; known successors are duplicates.
+                        // The node is not completely expanded, so it stays open and counts for the lower bound.
                         self.open.push(Reverse(priority));
                         return Some(End::Stopped);
                     }
@@ -403,7 +406,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Numbers of which neither less nor more is known to be no worse.
+    /// Values of the numbers that must be equal for dominance, because neither less nor more of them is known to be
+    /// no worse.
     fn key_numbers<'s>(&self, state: &'s State) -> impl Iterator<Item = Int> + use<'s, '_> {
         let numbers = state.numbers.iter().zip(&self.costs.preferences);
         numbers.filter(|(_, preference)| !preference.less && !preference.more).map(|(number, _)| *number)
@@ -414,8 +418,8 @@ impl<'a> Search<'a> {
         FxBuildHasher.hash_one((&state.values, numbers))
     }
 
-    /// Returns `true` if every continuation of the path `other` that is within the horizon is possible after `path`,
-    /// also within the horizon and at no higher cost.
+    /// Returns `true` if it is certain that every continuation of the path `other` within the horizon is also
+    /// possible after `path`, within the horizon and at no higher cost.
     fn dominates(&self, path: Path<'_>, other: Path<'_>) -> bool {
         let numbers = path.state.numbers.iter().zip(&other.state.numbers);
         let mut numbers = numbers.zip(&self.costs.preferences);

@@ -14,9 +14,9 @@ pub enum Strategy {
     Auto,
     /// Linear search: finds cheaper and cheaper plans until the formula is unsatisfiable.
     Tighten,
-    /// Core-guided search: unsatisfiable cores raise the lower bound until a plan with this cost exists.
-    /// Without an upper bound on the number of steps of a cheapest plan, this strategy equals `Tighten`. The
-    /// same holds while the SAT solver has a budget, because other components of the planner take turns with it.
+    /// Core-guided search: unsatisfiable cores raise the lower bound until a plan with this cost exists. Without an
+    /// upper bound on the number of steps of a cheapest plan, this strategy equals `Tighten`. The same holds while
+    /// the SAT solver has a budget because it takes turns with other components of the planner.
     Cores,
 }
 
@@ -46,12 +46,12 @@ pub struct Config {
     pub horizon: Option<usize>,
     /// Algorithms that find plans and prove optimality.
     pub engine: Engine,
-    /// Number of states that A\* stores before the other components of the planner (satisficing search and
-    /// SAT solver) start. Also scales the work of each component in the first round.
+    /// Number of states that A\* stores before satisficing search and SAT solver start. Also scales the work of
+    /// each component in the first round.
     pub head_start: usize,
-    /// Whether the SAT solver confirms proofs of heuristic search without a budget. If `false`, confirmation is
-    /// attempted for small tasks only, with a small budget. A proof that is not confirmed remains valid. With
-    /// [`Engine::Search`], nothing is confirmed.
+    /// Whether the SAT solver confirms plans that heuristic search proves optimal, where a formula exists, without
+    /// a limit on its work. If `false`, it tries this for small tasks only, with a small budget. A proof that is
+    /// not confirmed remains valid. With [`Engine::Search`], nothing is confirmed.
     pub confirm: bool,
     /// Step semantics of the SAT formulas. With a horizon, which counts actions, the semantics is always
     /// sequential. The default (`None`) is parallel for a first plan and sequential for the optimality proof.
@@ -92,15 +92,14 @@ impl Config {
         Self { engine, ..self }
     }
 
-    /// Sets the number of states that A\* stores before the other components of the planner (satisficing
-    /// search and SAT solver) start.
+    /// Sets the number of states that A\* stores before satisficing search and SAT solver start.
     #[must_use]
     pub fn with_head_start(self, head_start: usize) -> Self {
         Self { head_start, ..self }
     }
 
-    /// Sets whether the SAT solver confirms proofs of other engines without a budget; see
-    /// [`Config::confirm`].
+    /// Sets whether the SAT solver confirms the plans that heuristic search proves optimal, also if this takes
+    /// long; see [`Config::confirm`].
     #[must_use]
     pub fn with_confirmation(self, confirm: bool) -> Self {
         Self { confirm, ..self }

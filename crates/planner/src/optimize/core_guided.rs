@@ -1,14 +1,13 @@
 //! Core-guided optimisation: unsatisfiable cores raise the lower bound until a plan with this cost exists
 //! (OLL \[1, 2\]).
 //!
-//! The cost of a plan above the lower bound is a weighted sum of soft literals, all of which are assumed to
-//! be false. The solver returns either a plan, which is then a cheapest plan, or a core: a set of soft
-//! literals at least one of which is true in every plan. The lower bound then rises by the minimum weight in
-//! the core, and this weight is subtracted from all weights in the core. Plans in which several literals of
-//! the core are true cost more; the outputs of a totalizer represent this and are added one by one as soft
-//! literals of the same weight. Literals with high weight are assumed first (stratification \[3\]), so that
-//! plans are found early. A literal whose weight alone reaches the cost of the best known plan is fixed to
-//! false (hardening \[3\]).
+//! The cost of a plan above the lower bound is a weighted sum of soft literals, all of which are assumed to be
+//! false. The solver returns either a plan, which is then a cheapest plan, or a core: a set of soft literals at
+//! least one of which is true in every plan. The lower bound then rises by the minimum weight in the core, and this
+//! weight is subtracted from all weights in the core. Plans in which several literals of the core are true cost
+//! more; the outputs of a totalizer represent this and are added one by one as soft literals of the same weight.
+//! Literals with high weight are assumed first (stratification \[3\]), so that plans are found early. A literal
+//! whose weight would raise the lower bound to the cost of the best known plan is fixed to false (hardening \[3\]).
 //!
 //! \[1\] B. Andres, B. Kaufmann, O. Matheis, T. Schaub: Unsatisfiability-based optimization in
 //! clasp, ICLP 2012.
@@ -33,7 +32,7 @@ const CORE_TRIM_ROUNDS: usize = 4;
 struct Search {
     /// Lower bound on the cost of every plan that the formula admits.
     lower: Int,
-    /// Weight of each soft literal. It is at least 1, and is added to the cost if the literal is true.
+    /// Weight of each soft literal, at least 1. The weight is added to the cost if the literal is true.
     weights: BTreeMap<Lit, Int>,
     totalizers: Vec<Totalizer>,
     /// Soft literals that are totalizer outputs: the index of the totalizer, and the number n such that the
@@ -117,7 +116,7 @@ impl Search {
         self.outputs.insert(literal, (totalizer, count));
     }
 
-    /// Fixes a soft literal to false if its weight alone would make the cost exceed the limit (hardening).
+    /// Fixes each soft literal to false whose weight, added to the lower bound, exceeds the limit (hardening).
     fn harden(&mut self, limit: Int, formula: &mut Formula) {
         let lower = self.lower;
         let heavy: Vec<Lit> = self
@@ -133,8 +132,8 @@ impl Search {
     }
 }
 
-/// Raises the lower bound on the cost of the formula's plans until it exceeds `limit`, a plan with this cost
-/// is found, or a resource limit is reached. Cheaper plans are stored in `best`.
+/// Raises the lower bound on the cost of the formula's plans until it exceeds `limit`, it equals the cost of a
+/// plan, or a resource limit is reached. Stores cheaper plans and the raised bound in `best`.
 pub(super) fn raise(
     run: &mut Run<'_>,
     mut encoding: Encoding<'_>,

@@ -12,7 +12,7 @@ use task::task::Task;
 use crate::optimize::optimizer_run::Run;
 use crate::optimize::sat_budget::{FORMULA_LIMIT, SatBudget};
 
-/// Formulas with increasing horizons and without a cost limit. Several formulas are solved alternately \[1\].
+/// Formulas with increasing horizons and without a cost limit. Several formulas are solved in turns \[1\].
 ///
 /// \[1\] J. Rintanen, K. Heljanko, I. Niemelä: Planning as satisfiability: parallel plans and
 /// algorithms for plan search, Artificial Intelligence 170, 2006, section 6.
@@ -64,7 +64,7 @@ impl HorizonSchedule {
             match decide(run, bounds, horizon, allowance) {
                 (_, Some(plan)) => return FirstPlanOutcome::Plan(plan),
                 (Answer::Unsatisfiable, None) => self.refuted = self.refuted.max(horizon),
-                // A plan whose cost overflows cannot be used, and longer plans cost no less.
+                // A plan whose cost overflows cannot be used. Other plans are not tried.
                 (Answer::Satisfiable, None) => return FirstPlanOutcome::Over,
                 (Answer::Interrupted, None) => {
                     // With an unlimited budget, an interruption means that the numbers are too large for a
@@ -96,8 +96,8 @@ impl HorizonSchedule {
     }
 }
 
-/// Finds a first plan with increasing horizons and without a budget. Returns the solution without a plan if
-/// there is no plan, a limit is reached, or the formulas become too large.
+/// Finds a first plan with increasing horizons and without a budget. If there is no plan, a limit is reached, or
+/// the formulas become too large, returns a solution without a plan as an error.
 pub(super) fn first_plan(run: &mut Run<'_>, bounds: &Bounds) -> Result<GroundPlan, Box<Solution>> {
     let mut first = HorizonSchedule::new(run);
     loop {
@@ -130,8 +130,8 @@ fn decide(
     })
 }
 
-/// Returns the number of states of the task. Returns `None` if the task has numeric variables or the number
-/// overflows. A shortest plan visits no state twice, so it has fewer steps.
+/// Returns the number of states of the task, or `None` if the task has numeric variables or the number overflows. A
+/// shortest plan has fewer steps than there are states, because it visits no state twice.
 fn states(task: &Task) -> Option<usize> {
     if !task.initial.numbers.is_empty() {
         return None;

@@ -1,11 +1,12 @@
 //! Finds a cheapest plan of a ground task, and a proof that no plan is cheaper.
 //!
-//! By default, heuristic search and a SAT solver take turns; each of them can find plans and prove optimality.
-//! Once a plan is known, the solver receives formulas of the form "a plan with at most B steps and a cost of at
-//! most L". B is a step bound for L: dynamic programming over projections proves that every plan of this cost
-//! has at most B steps. L starts near the lower bound, where formulas are small. An unsatisfiable formula raises
-//! the lower bound. A satisfiable formula is optimised by linear or core-guided search. If there is no step
-//! bound, because of cycles without cost, only heuristic search can prove optimality.
+//! By default, heuristic search and a SAT solver take turns; each of them can find plans and prove optimality. Once a
+//! plan is known, the solver receives formulas of the form "a plan with at most B steps and a cost of at most L". B is
+//! a step bound for L: dynamic programming over projections proves that every plan of this cost has at most B steps. L
+//! starts near the lower bound, where formulas are small. An unsatisfiable formula raises the lower bound. A
+//! satisfiable formula is optimised by linear or core-guided search. If there is no step bound, because of cycles
+//! without cost, formulas prove nothing. Optimality then follows only from heuristic search, or from a lower bound that
+//! equals the cost of a plan.
 
 mod branch_and_bound;
 mod cheapest;

@@ -36,8 +36,8 @@ pub struct Front {
     /// Points in order, from the best by the first objective to the best by the second. If no plan is found, a
     /// single point without a plan.
     pub points: Vec<Point>,
-    /// `Optimal` if the front is proved complete; `Unsolvable` if it is proved that there is no plan;
-    /// `Feasible` if there may be further points. Without a plan, the status of the first query.
+    /// `Optimal` if the front is proved complete; `Unsolvable` if it is proved that there is no plan; `Feasible` if
+    /// there may be further points. If no plan was found for other reasons, the status of the first query.
     pub status: Status,
 }
 
@@ -216,7 +216,7 @@ fn exact_cost_by(task: &Task, objective: usize, plan: &GroundPlan) -> Rational {
     costs_by(task, objective, plan).map(Rational::from_integer).sum()
 }
 
-/// Adds a numeric variable to the task that limits the cost of plans under an objective to `budget`.
+/// Limits the cost of plans under an objective to `budget`, by an additional numeric variable.
 fn limit(task: &mut Task, objective: usize, budget: Int) {
     let variable = NumericId::of(task.initial.numbers.len());
     task.initial.numbers.push(budget);

@@ -30,7 +30,7 @@ pub(super) struct Run<'a> {
     started: Instant,
     /// Cost of the best plan (`None` without a plan) and lower bound, as recorded last.
     noted: Option<(Option<Int>, Int)>,
-    /// Symmetries of the task for formulas, computed at first use.
+    /// Symmetries of the task, which formulas break; computed at first use.
     symmetry: OnceCell<Symmetry>,
 }
 
@@ -135,8 +135,8 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Encodes the plans that satisfy the constraints as a formula. Returns `None` if a limit is reached or
-    /// the formula needs more than `max_clauses` clauses.
+    /// Encodes the plans that satisfy the constraints as a formula. Returns `None` if the formula cannot be built
+    /// within the limits, for example with at most `max_clauses` clauses.
     pub(super) fn encoding(
         &self,
         allowed: &[Vec<bool>],
@@ -152,9 +152,9 @@ impl<'a> Run<'a> {
         Some(encoding)
     }
 
-    /// Returns the scope of a formula for plans with a cost of at most `limit`. Without a proved bound on
-    /// their number of steps, the formula has the configured horizon, or about twice the number of steps of
-    /// the best plan.
+    /// Returns the scope of a formula for plans with a cost of at most `limit`. If their number of steps has no
+    /// proved bound, the formula has as many steps as the configured horizon or, without a horizon, about twice as
+    /// many as the best plan.
     pub(super) fn extent(
         &self,
         bounds: &Bounds,
@@ -177,7 +177,7 @@ impl<'a> Run<'a> {
         Ok(FormulaScope { limit, allowed, step_bound })
     }
 
-    /// Creates a SAT solver without clauses. It stops at a limit or after `budget` conflicts.
+    /// Creates a SAT solver without clauses. The solver stops at a limit or after `budget` conflicts.
     pub(super) fn live(&self, budget: u64) -> IncrementalSolver {
         IncrementalSolver {
             solver: self.config.backend.start(&self.config.limits, budget),
@@ -219,8 +219,8 @@ impl<'a> Run<'a> {
         if let Some(reason) = live.solver.failure() {
             self.statistics.failure = Some(reason.to_owned());
         }
-        // A model of an external program is verified by executing the plan. Its claim of unsatisfiability is
-        // not verified.
+        // A model of an external program is verified by executing the plan. The program's claim of unsatisfiability
+        // is not verified.
         if let (Answer::Unsatisfiable, Backend::Program { command, arguments }) =
             (answer, &self.config.backend)
         {

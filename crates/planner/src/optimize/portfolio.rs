@@ -1,8 +1,9 @@
 //! Portfolio of exact search, satisficing search and SAT, which take turns.
 //!
-//! The work of a round is twice that of the previous round. Each component gets a share of it; the shares of
-//! satisficing search and SAT shrink while they are unsuccessful. Work is counted in units instead of time, so
-//! results without a time limit are deterministic. The plans and bounds of a component limit the others.
+//! The work of a round is twice that of the previous round. Each component gets a share of the work; the shares of
+//! satisficing search and SAT shrink while they are unsuccessful. Work is counted in units instead of time, so results
+//! without a time limit are deterministic, except with an external SAT solver: its conflicts are limited by time. The
+//! plans and bounds of a component limit the others.
 
 use std::time::Instant;
 
@@ -22,9 +23,9 @@ use crate::optimize::prover::{Prover, ProverOutcome};
 use crate::optimize::sat_budget::SatBudget;
 use crate::optimize::sat_confirmation::{into_solution, proved_by_bound, proved_by_search};
 
-/// Work units of the satisficing search for each state that A\* stores in a round.
+/// Work units of the satisficing search in a round, for each state that A\* may store in this round.
 const RELAXATION_WORK_PER_STATE: usize = 200;
-/// Maximum number of clauses of a formula for each state that A\* stores in a round.
+/// Maximum number of clauses of a formula in a round, for each state that A\* may store in this round.
 const CLAUSES_PER_STATE: usize = 50;
 /// Number of stored states that correspond to one conflict of the SAT solver.
 const STATES_PER_CONFLICT: u64 = 4;
@@ -32,11 +33,10 @@ const STATES_PER_CONFLICT: u64 = 4;
 const MAX_BACKOFF: u32 = 3;
 /// Maximum number of times that the budget of a successful component is doubled.
 const MAX_BOOST: u32 = 3;
-/// Minimum number of times that the budget of the improvement of the best plan is doubled while a proof is not
-/// within reach.
-const MIN_BOOST: i32 = 2;
-/// Maximum number of times that the budget of the improvement of the best plan is doubled while a proof is within
+/// Minimum number of times that the budget for improving the best plan is doubled while a proof is not within
 /// reach.
+const MIN_BOOST: i32 = 2;
+/// Maximum number of times that the budget for improving the best plan is doubled while a proof is within reach.
 const NEAR_BOOST: i32 = 1;
 /// Numerator and denominator of a ratio. If the cost of a plan divided by the lower bound exceeds this ratio,
 /// a better plan is probably easier to find than a proof.
@@ -57,8 +57,8 @@ struct Portfolio<'r, 'a> {
     share: u32,
     /// Number of times that the budget of the satisficing search is halved, at most [`MAX_BACKOFF`].
     satisficer_share: u32,
-    /// Number of times that the budget of the improvement of the best plan is doubled, at most [`MAX_BOOST`], minus
-    /// the number of times that it is halved.
+    /// Exponent of the power of two by which the budget for improving the best plan is multiplied, from
+    /// -[`MAX_BACKOFF`] to [`MAX_BOOST`].
     improvement_share: i32,
 }
 
@@ -227,8 +227,8 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         })
     }
 
-    /// Replaces parts of the best plan by cheaper ones. The budget is doubled or halved after each turn, by
-    /// whether the turn has succeeded.
+    /// Replaces parts of the best plan by cheaper ones. After a success, the next turn gets the greatest budget for
+    /// its round; after a failure, half of the current share, but at least a minimum.
     fn improve_best_plan(&mut self, work: usize, _: usize) -> Turn {
         let has_hope = self.exact.as_ref().is_some_and(InterleavedSearch::may_finish);
         let (least, most) = if has_hope && self.is_near() {
@@ -309,8 +309,8 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         }
     }
 
-    /// Replaces and reports the best known plan if `plan` is cheaper. Ends the run if the cost of the best
-    /// plan then equals the lower bound.
+    /// If `plan` is cheaper than the best known plan, reports it and makes it the best known plan. Ends the run if
+    /// the cost of the best plan then equals the lower bound.
     fn improve(&mut self, plan: GroundPlan, part: PlannerPart) -> Turn {
         if self.best.as_ref().is_none_or(|best| plan.cost < best.cost) {
             self.run.statistics.found_by = Some(part);

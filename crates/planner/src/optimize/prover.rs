@@ -1,5 +1,8 @@
-//! Proves optimality with formulas, one for each stage. A stage limits the cost to a part of the gap between the lower
-//! bound and the cost of the best plan; the parts grow.
+//! Proves optimality in stages. Each stage has a formula for the plans whose cost is at most a limit between the lower
+//! bound and the cost of the best plan. The limit rises from stage to stage.
+//!
+//! This requires a step bound. Without one, there is a single formula for all cheaper plans within a number of steps.
+//! It can yield better plans, but proves nothing.
 
 use std::time::Instant;
 

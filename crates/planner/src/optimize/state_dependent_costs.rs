@@ -1,12 +1,13 @@
 //! Exact costs of paths, and lower bounds on them, for a metric whose fluents change by amounts that depend on the
-//! state \[1\]. `branch_and_bound` minimises such a metric.
+//! state \[1\], here without a decomposition of the costs. `branch_and_bound` minimises such a metric.
 //!
-//! The cost of a path is the sum of its operator costs plus the weighted values of the measured fluents in its
-//! last state. A lower bound on the increase of this cost by each operator, over the reachable intervals of all
-//! numbers, gives a task with constant costs. Its heuristics are admissible if no bound is negative.
+//! The cost of a path is the sum of its operator costs plus the weighted values of the measured fluents (fluents of the
+//! metric) in its last state. Each operator has a lower bound on the increase of this cost, over the intervals of all
+//! numbers in reachable states \[2\]. With these bounds as constant costs, the heuristics of the task are admissible if
+//! no bound is negative.
 //!
-//! \[1\] Without the decomposition of costs of F. Geißer, T. Keller, R. Mattmüller: Delete relaxations for planning
-//! with state-dependent action costs, IJCAI 2015.
+//! \[1\] F. Geißer, T. Keller, R. Mattmüller: Delete relaxations for planning with state-dependent action costs,
+//! IJCAI 2015.
 //! \[2\] P. Cousot, R. Cousot: Abstract interpretation, POPL 1977.
 
 use num_bigint::BigInt;
@@ -20,8 +21,7 @@ use task::task::number::TaskNumber as _;
 use task::task::quantity::{Linear, Quantity};
 use task::task::{Condition, NumericId, Objective, Operator, State, Task};
 
-/// Number of rounds before bounds that still change are set to infinity, and number of later rounds that reduce
-/// the intervals again.
+/// Number of rounds of the interval analysis before widening, and also the number of narrowing rounds.
 const ROUNDS: usize = 3;
 
 /// Range of a number. `None` represents an infinite bound.
@@ -32,33 +32,35 @@ struct Interval {
 }
 
 impl Interval {
-    /// Smallest interval that contains both.
+    /// Smallest interval that contains both intervals.
     fn hull(self, other: Self) -> Self {
         // `zip` keeps an infinite bound (`None`) infinite.
         let low = self.low.zip(other.low).map(|(a, b)| a.min(b));
         Self { low, high: self.high.zip(other.high).map(|(a, b)| a.max(b)) }
     }
 
-    /// The larger interval `other`, with infinite bounds where it differs from this one.
+    /// Widening: the larger interval `other`, but with an infinite bound where its bound differs from that of
+    /// `self`.
     fn widened(self, other: Self) -> Self {
         let low = other.low.filter(|low| self.low == Some(*low));
         Self { low, high: other.high.filter(|high| self.high == Some(*high)) }
     }
 }
 
-/// Exact costs of paths, in integers. One unit of the task's operator costs is `factor` units.
+/// Exact costs of paths, in integers. A cost of 1 of an operator of the task is `factor` here.
 pub(super) struct StateDependentCosts {
     factor: Int,
     /// Measured fluents with their cost per unit of the stored number.
     weights: Vec<(NumericId, Int)>,
-    /// Preference of each number.
+    /// For each number: whether less or more of it is never worse.
     pub(super) preferences: Vec<Preference>,
-    /// The task with lower bounds on the increase of the cost as operator costs.
+    /// The task with constant operator costs: lower bounds on the increase of the exact cost.
     pub(super) priced: Task,
 }
 
 impl StateDependentCosts {
-    /// Returns `None` if an operator may reduce the cost, or numbers overflow.
+    /// Computes the bounds. Returns `None` if the cost of an operator has no bound of at least 0, or if numbers
+    /// overflow.
     ///
     /// # Errors
     /// Fails if the deadline has passed or the interrupt flag is set.
@@ -106,7 +108,8 @@ impl StateDependentCosts {
     }
 }
 
-/// Common factor that makes all weights of measured fluents integers, and these weights.
+/// Common factor that makes all weights of measured fluents integers, and these weights. `None` if they are too
+/// large.
 fn weights(task: &Task) -> Option<(Int, Vec<(NumericId, Int)>)> {
     let unit = Rational::from_integer(task.objective.scale) / Rational::from_integer(task.number_scale);
     let measured = &task.objective.rest;
@@ -118,8 +121,8 @@ fn weights(task: &Task) -> Option<(Int, Vec<(NumericId, Int)>)> {
     Some((factor, pairs.collect::<Option<_>>()?))
 }
 
-/// Whether less, or more, of a number is never worse: with the changed number, every continuation stays possible, and
-/// its steps increase the cost by no more.
+/// Preferences about a number: whether less of it is never worse, and whether more is never worse. With the changed
+/// number, every continuation stays possible, and its steps increase the cost by no more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Preference {
     pub(super) less: bool,
@@ -146,7 +149,8 @@ fn preferences(task: &Task, weights: &[(NumericId, Int)]) -> Vec<Preference> {
     {
         preferences[variable.index()].restrict(*coefficient > 0, compared);
     }
-    // Rules can be read positively and negatively.
+    // Derived facts can be required to be true or false, so for a number in a rule, neither less nor more is known
+    // to be no worse.
     let bodies = task.axioms.iter().flat_map(|layer| &layer.rules).map(|rule| &rule.body);
     for (variable, _) in bodies.flat_map(Condition::linears).flat_map(|linear| &linear.coefficients) {
         preferences[variable.index()] = Preference { less: false, more: false };
@@ -251,8 +255,8 @@ impl<'i> Guarded<'i> {
         restricted.map_or(self.intervals[variable.index()], |(_, interval)| *interval)
     }
 
-    /// Lower bound (if `is_low`) or upper bound on a weighted sum of numbers. `None` if no bound is known. Conditions
-    /// of the operator on the same sum, up to a factor, restrict it.
+    /// Lower bound (if `is_low`) or upper bound on a weighted sum of numbers. `None` if no bound is known. A
+    /// condition of the operator on a multiple of the sum also gives a bound.
     fn extreme(&self, coefficients: &[(NumericId, Int)], is_low: bool) -> Option<Int> {
         let mut sums = coefficients.iter();
         let by_intervals = sums.try_fold(0, |sum: Int, (variable, coefficient)| {
@@ -270,7 +274,7 @@ impl<'i> Guarded<'i> {
         if is_low { bounds.max() } else { bounds.min() }
     }
 
-    /// Bounds for the value of an expression. A bound that overflows is infinite.
+    /// Bounds on the value of an expression. A bound that overflows is infinite.
     fn range(&self, linear: &Linear<Int>) -> Interval {
         let Linear { coefficients, quantity } = linear;
         let low = self.extreme(coefficients, true).and_then(|sum| sum.checked_add(quantity.minimum()));
@@ -279,7 +283,8 @@ impl<'i> Guarded<'i> {
     }
 }
 
-/// Factor by which the second list must be multiplied to yield the first one, if it is an integer other than 0.
+/// Integer factor by which the second weighted sum must be multiplied to yield the first one; `None` if there is
+/// none.
 fn multiple(first: &[(NumericId, Int)], second: &[(NumericId, Int)]) -> Option<Int> {
     let ((_, a), (_, b)) = (first.first()?, second.first()?);
     let factor = a.checked_div(*b).filter(|factor| *factor != 0 && first.len() == second.len())?;
@@ -297,7 +302,7 @@ fn reachable(task: &Task, limits: &Limits) -> Result<Vec<Interval>, Interrupted>
     let initial: Vec<Interval> = initial.collect();
     let changing: Vec<&Operator> =
         task.operators.iter().filter(|operator| !operator.numeric_effects.is_empty()).collect();
-    // Initial values and the values that operators set if the numbers before are within `intervals`.
+    // Initial values, and the values that operators set if the previous values are within `intervals`.
     let step = |intervals: &[Interval]| {
         let mut next = initial.clone();
         for operator in limits.watch(&changing) {

@@ -30,8 +30,7 @@ pub(super) fn shortest_then_best(original: Run<'_>) -> Solution {
     // Waits count as steps, although they are not part of decoded plans.
     let steps = match (&shortest.ground, shortest.status) {
         (Some(plan), Status::Optimal) => plan.steps.len(),
-        // A plan that was already found would minimise the number of steps but not the metric, so it is not
-        // returned.
+        // The plan need not have the fewest steps, and its metric was not minimised, so it is not returned.
         (Some(_), _) => return unknown(shortest),
         (None, _) => return Solution { lower_bound: None, ..shortest },
     };

@@ -1,11 +1,11 @@
 //! Incremental replanning for one mission, as needed in an adaptation loop.
 //!
 //! State and availability are inputs of each query, like assumptions in incremental SAT \[1\]. The mission is
-//! grounded once, with all designs available and without conclusions from initial numbers. A query then gives
-//! a state of this task (see [`state_mapping`]) and a set of available objects, which restricts the operators
-//! (see [`restrict_designs`]). Data that depend only on this set (operators, pattern databases, non-dominated
-//! designs) are cached for recent sets, because failed components often recover. For each query, only the
-//! search and the tie-breaking remain. An optimal plan has the same metric as after grounding and optimising
+//! grounded once, with all designs available and without conclusions from the initial values of numbers. A query
+//! then gives a state of this task (see [`state_mapping`]) and a set of available objects, which restricts the
+//! operators (see [`restrict_designs`]). Data that depend only on this set (operators, pattern databases,
+//! non-dominated designs) are cached for recent sets, because failed components often recover. For each query, only
+//! the search and the tie-breaking remain. An optimal plan has the same metric as after grounding and optimising
 //! from scratch, but the SAT solver does not confirm it.
 //!
 //! If the previous plan is still valid, its cost is an upper bound for the search. At the time limit, a valid
@@ -42,7 +42,7 @@ pub use query::{FirstStep, Progress, Query, ReplanOutcome};
 
 /// Precision of numbers in the initial state: each number must be a multiple of 1/`PRECISION`.
 const PRECISION: Int = 1_000_000;
-/// Number of sets of available objects for which derived data are cached.
+/// Maximum number of sets of available objects for which derived data are cached.
 const MAX_CACHED_SETS: usize = 8;
 
 /// Maximum number of states of each search of [`Replanner::blocking`], which tests whether unavailable

@@ -7,8 +7,8 @@ use pddl::validate::Advance;
 use task::limits::Limits;
 use task::plan::Step;
 
-/// A possible first step of a plan that is not an operator of the task: the remaining part of a running
-/// action, with a configuration in which it can continue.
+/// One of the alternative first steps of a query: the remaining part of a running action, with a configuration in which
+/// it can continue. Every plan begins with one of the alternatives. The step is not an operator of the task.
 #[derive(Debug, Clone)]
 pub struct FirstStep {
     /// Functions of the action, with the designs selected for them.
@@ -25,7 +25,7 @@ pub struct FirstStep {
 /// A replanning query: the current situation and preferences for the plan.
 #[derive(Debug)]
 pub struct Query<'a> {
-    /// Problem with the current state and availability. It must belong to the domain of the replanner and
+    /// Problem with the current state and availability. The problem must belong to the domain of the replanner and
     /// have passed the checks.
     pub problem: &'a Problem,
     /// Alternative first steps. If there are any, every plan must begin with one of them.
@@ -64,8 +64,8 @@ pub enum ReplanOutcome {
         /// Metric of the whole mission.
         metric: BigRational,
     },
-    /// It is proved that no plan of any length begins with one of the first steps of the query (if it has
-    /// any).
+    /// It is proved that there is no plan. If the query has first steps, there is no plan that begins with one of
+    /// them.
     Unsolvable,
     /// The problem differs from the grounded problem in more than state and availability.
     Misfit,

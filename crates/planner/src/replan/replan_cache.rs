@@ -29,8 +29,8 @@ pub(super) struct AvailabilityContext {
 }
 
 impl GroundBase {
-    /// Returns the ground task restricted to the available objects: for each availability predicate, those in
-    /// the list `available[predicate]`, which is in ascending order.
+    /// Returns the ground task restricted to available objects. `available` has a list of these objects, in
+    /// ascending order, for each availability predicate.
     pub(super) fn masked(&self, available: &[Vec<ObjectId>], limits: &Limits) -> Result<Task, Interrupted> {
         let is_allowed = |schema: u32, position: usize, object: ObjectId| {
             let mut predicates_needed =

@@ -137,8 +137,8 @@ pub(super) fn reuse_previous_plan(
     least.map_or(ReplanOutcome::Unknown, |least| least.feasible(Context::new(task, query.limits)))
 }
 
-/// Returns the current plan if it is valid in the given state. `old` holds its steps; a step is `None` if it
-/// no longer exists.
+/// Returns the current plan if there is one and it is valid in the given state. `old` holds its steps; a step is
+/// `None` if the task does not contain it.
 fn old_plan(task: &Task, state: &State, query: &Query<'_>, old: &[Option<GroundStep>]) -> Option<GroundPlan> {
     query.old?;
     let steps: Vec<GroundStep> = old.iter().cloned().collect::<Option<_>>()?;
@@ -149,7 +149,7 @@ fn old_plan(task: &Task, state: &State, query: &Query<'_>, old: &[Option<GroundS
 #[derive(Clone)]
 struct Candidate {
     first: Option<usize>,
-    /// Metric of the mission (lower is better), and number of steps of the plan.
+    /// Metric of the mission, negated if it is maximised, and number of steps of the plan.
     value: (BigRational, usize),
     plan: GroundPlan,
 }
@@ -190,8 +190,8 @@ fn starts(base: &GroundBase, situation: &ReplanState, query: &Query<'_>) -> Opti
     query.first.iter().enumerate().map(start).collect()
 }
 
-/// Selects one of several optimal plans by the tie-breaking rules of this file. Also returns the index of its
-/// first step.
+/// Selects one of several optimal plans by the tie-breaking rules of this file. Also returns the index in `query.first`
+/// of the step that precedes the plan; `None` if the query has no first steps.
 fn choose(
     set: &AvailabilityContext,
     query: &Query<'_>,

@@ -93,7 +93,8 @@ impl Layout {
             && (!self.usage.is_changed(predicate) || self.usage.is_read(predicate, key))
     }
 
-    /// Returns `true` if a numeric value that has no variable in the task must be equal in every problem.
+    /// Returns `true` if a problem is supported only if it states the same value of this function as the
+    /// grounded problem. The function has no variable in the task.
     fn value_matters(&self, function: &Atom) -> bool {
         let name = &function.predicate.name;
         !self.usage.is_changed(name) || self.usage.is_function_read(name)

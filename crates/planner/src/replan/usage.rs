@@ -11,7 +11,7 @@ use pddl::visit::Node;
 
 #[derive(Debug, Default)]
 pub(super) struct Usage {
-    /// Predicates that are read by conditions of actions and effects, by axioms, or below quantifiers of the
+    /// Predicates that are read by conditions of actions and effects, by axioms, or by quantified parts of the
     /// goal.
     read: FxHashSet<Name>,
     /// Keys of the atoms of the goal, see [`key`].

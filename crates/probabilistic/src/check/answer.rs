@@ -27,13 +27,13 @@ pub enum Precision {
 }
 
 impl Precision {
-    /// Returns `true` if the bounds of `quantity` satisfy this precision, or if its value is exact.
-    /// A width of a few units in the last place of a double always suffices.
+    /// Returns `true` if the bounds of `quantity` satisfy this precision, or if its value is exact. A width of
+    /// 4 machine epsilons, relative to the value, always suffices.
     pub fn holds(self, quantity: &Quantity) -> bool {
         let width = quantity.upper - quantity.lower;
         match self {
             _ if quantity.exact.is_some() => true,
-            // The ends are rounded to doubles, so a smaller width cannot be reached.
+            // The bounds are rounded to doubles, so a smaller width may be impossible.
             Self::Relative(most) => width <= (most.max(4.0 * f64::EPSILON)) * quantity.value.abs(),
             Self::Absolute(most) => width <= most.max(4.0 * f64::EPSILON * quantity.value.abs()),
         }
@@ -56,13 +56,13 @@ pub enum Answer {
 pub enum Outcome {
     /// The value of a numeric property.
     Value(Answer),
-    /// The truth value of a Boolean property, with the value compared with its bound if there is a
-    /// single one.
+    /// The truth value of a Boolean property. For a comparison like `P>=0.9 [ F "goal" ]` in a model with one
+    /// initial state, also the compared value.
     Truth(bool, Option<Answer>),
-    /// The bounds on the value enclose the threshold of the comparison, so the truth value is
-    /// unknown.
+    /// The lower and the upper bound on the value lie on different sides of the threshold of the comparison, so
+    /// the truth value is unknown.
     Undecided(Answer),
-    /// The least and the greatest value, over several initial states or by a filter.
+    /// The least and the greatest value, over several initial states or over the states of a filter.
     Range(Answer, Answer),
     /// The states selected by a filter, with their values.
     States(Vec<Listed>),
@@ -80,8 +80,8 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// Returns `true` if the bounds on all numeric values of this outcome satisfy `precision`;
-    /// `true` for a truth value.
+    /// Returns `true` if the bounds on all numeric values of this outcome satisfy `precision`. Always `true`
+    /// for a truth value.
     pub fn is_within(&self, precision: Precision) -> bool {
         let fits = |answer: &Answer| answer.quantity().is_none_or(|quantity| precision.holds(quantity));
         match self {
@@ -108,7 +108,7 @@ pub struct Listed {
 }
 
 impl Answer {
-    /// Creates an answer from an exact number, or from a nonnegative rounded number and its
+    /// Creates an answer from an exact number, or from a nonnegative rounded number and an upper limit on its
     /// absolute error. The lower bound on a rounded number is at least 0.
     pub fn from_number<N: Number>(value: &N, error: f64) -> Self {
         if let Some(exact) = value.to_rational() {

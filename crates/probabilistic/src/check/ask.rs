@@ -7,7 +7,7 @@ use crate::error::{Diagnostic, Error, Place};
 pub enum Stop {
     /// The input is invalid, or a limit is exceeded.
     Wrong(Error),
-    /// Exact arithmetic exceeds its budget, so the caller continues in floating-point arithmetic.
+    /// Exact arithmetic exceeds its budget, so the caller solves the property in floating-point arithmetic.
     TooMuchWork,
 }
 
@@ -17,7 +17,7 @@ impl From<Error> for Stop {
     }
 }
 
-/// The result of a step of a check; an error is the reason for stopping.
+/// The result of a step of a check. The error is the reason for ending the check without a result.
 pub type Checked<T> = Result<T, Stop>;
 
 /// Converts `None`, which reports an exceeded budget of exact arithmetic, to [`Stop::TooMuchWork`].

@@ -20,16 +20,16 @@ use crate::number::{Number, count};
 use crate::prism::ast::Steps;
 use crate::solve::{Direction, Problem, Work, solve_within};
 
-/// Upper limit (exclusive) on the bound of an accumulated reward.
+/// Upper limit (exclusive) on the bound of an accumulated reward, as a whole number.
 const MAX_BUDGET: usize = 100_000;
 
 impl<N: Number> Query<'_, N> {
-    /// Computes for each state the minimal or maximal probability of reaching a terminal state of `problem`
-    /// while the reward structure `name` accumulates at most the bound in `steps`.
+    /// Computes for each state the minimal or maximal probability of reaching a terminal state of `problem`.
+    /// Until then, the reward structure `name` must accumulate at most the bound in `steps`.
     ///
-    /// Returns an error if a policy is given, for a lower bound on the reward, for a bound below 0 or from
-    /// [`MAX_BUDGET`] on, and for rewards that are not whole numbers. Without any bound, solves `problem`
-    /// itself.
+    /// Returns an error if a policy is given, or if there is a lower bound on the reward. An upper bound must
+    /// be nonnegative (for `<`: positive) and below [`MAX_BUDGET`], and all rewards must be nonnegative whole
+    /// numbers. Without any bound, solves `problem` itself.
     pub fn until_within_reward(
         &self,
         problem: Problem<'_, N>,
@@ -147,8 +147,8 @@ struct Sweep<'a, N> {
 }
 
 impl<'a, N: Number> Sweep<'a, N> {
-    /// Sorts the states topologically. Returns `None` if choices without reward form a cycle (other
-    /// than pure self-loops).
+    /// Sorts the states topologically. Returns `None` if choices without reward form a cycle. Choices that only
+    /// loop in their state do not count as cycles.
     fn new(layers: &Layers<N>, problem: Problem<'a, N>, earned: &'a [usize]) -> Option<Self> {
         let mdp = problem.mdp;
         let n = mdp.states();

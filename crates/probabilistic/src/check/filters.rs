@@ -30,9 +30,9 @@ enum Values<N> {
 }
 
 impl<N: Number> Query<'_, N> {
-    /// Evaluates `filter` for the property `inner` over the states that satisfy `states`, or over all states
-    /// if `states` is `None`. Fails if there is no such state, if the filter `state` applies to several
-    /// states, or if the filter does not fit the type of `inner`.
+    /// Evaluates `filter` for the property `inner` over the states that satisfy `states`, or over all states if
+    /// `states` is `None`. Fails if no state is selected, if the filter `state` applies to several states, or
+    /// if the filter does not fit the type of `inner`.
     pub fn filtered(&self, filter: Filter, inner: &Expr, states: Option<&Expr>) -> Checked<Filtered> {
         let chosen = states.map_or_else(|| Ok(self.every()), |states| self.truth(states))?;
         let values = match self.kind_of(inner)? {
@@ -129,8 +129,8 @@ fn only(chosen: &FixedBitSet) -> Checked<usize> {
     }
 }
 
-/// Returns the least value over the states in `chosen`, or the greatest if `greatest`; infinite for
-/// an empty set. The bounds enclose the true extreme even if the bounds of several states overlap.
+/// Returns the least value over the states in `chosen`, or the greatest one if `greatest`. Infinite for an
+/// empty set. The bounds enclose the true extreme even if the bounds of several states overlap.
 pub fn extreme<N: Number>(vector: &Vector<N>, chosen: &FixedBitSet, greatest: bool) -> Answer {
     let mut best: Option<Quantity> = None;
     for state in chosen.ones() {
@@ -158,7 +158,8 @@ pub fn extreme<N: Number>(vector: &Vector<N>, chosen: &FixedBitSet, greatest: bo
     best.map_or(Answer::Infinite, Answer::Finite)
 }
 
-/// Returns `true` if the bounds on `answer` permit that it equals the extreme value `best`.
+/// Returns `true` if `answer` can equal the extreme value `best`, because both are exact and equal, or their
+/// bounds overlap.
 fn can_be(answer: &Answer, best: &Answer) -> bool {
     match (answer, best) {
         (Answer::Finite(a), Answer::Finite(b)) => match (&a.exact, &b.exact) {

@@ -66,8 +66,8 @@ impl<N: Number> Query<'_, N> {
     pub fn total(&self, direction: Direction, rewards: &[N]) -> Checked<Valued<N>> {
         self.no_given_policy()?;
         if direction == Direction::Min || self.program.kind == ModelKind::Dtmc {
-            // A total is finite only if rewards are eventually 0 forever. The goal is to reach the
-            // states from which a policy can achieve this.
+            // A total is finite only if the path is eventually without rewards forever. So the goal is to reach
+            // a state from which a policy avoids all further rewards.
             let free = self.free_forever(rewards);
             return self.solved(self.problem(Direction::Min, Some(rewards), &free)).map(without_policy);
         }
@@ -78,7 +78,7 @@ impl<N: Number> Query<'_, N> {
             let pays = mdp.choices(state).any(|c| ends.alive.contains(c) && !rewards[c].is_zero());
             infinite.set(state, pays);
         }
-        // A state that can reach a state of infinite value has an infinite value, too.
+        // From a state that can reach a state of infinite value, the value is infinite, too.
         reach_back(mdp, &mut infinite);
         let merged = EcQuotient::new(mdp, &ends, rewards, &infinite)?;
         let problem = Problem::new(&merged.mdp, Direction::Max, Some(&merged.rewards), &merged.end);
@@ -119,10 +119,10 @@ impl<N: Number> Query<'_, N> {
 
     /// Computes for each state of a Markov chain the long-run average reward per step.
     ///
-    /// In each bottom strongly connected component, one state is chosen. The average in a component
-    /// is the expected reward between two visits of the chosen state, divided by the expected
-    /// number of steps between these visits (renewal theorem). A state's value is the average of
-    /// the components, weighted by the probability of reaching each one.
+    /// In each bottom strongly connected component, one state is chosen. The average in a component is the
+    /// expected reward between two visits of the chosen state, divided by the expected number of steps between
+    /// these visits (renewal theorem). The value of a state is the mean of the components' averages, weighted
+    /// by the probabilities of reaching them.
     pub fn long_run(&self, rewards: &[N]) -> Checked<Valued<N>> {
         self.no_given_policy()?;
         let mdp = self.mdp();

@@ -39,7 +39,7 @@ pub use answer::{Answer, Listed, Outcome, Precision, Quantity};
 pub use options::{Exactness, Options};
 pub use table::{PolicyTable, Row};
 
-/// Number of transitions from which on a model is explored in doubles instead of rationals by default.
+/// Number of transitions from which on a model is explored in doubles instead of rationals, by default.
 const MAX_EXACT_TRANSITIONS: usize = 150_000;
 
 /// Returns the default budget of exact arithmetic for one property of a model with this number of
@@ -127,8 +127,8 @@ pub fn check_all<'p>(
     }
     required.sort_unstable();
     required.dedup();
-    // With several properties, one property may need states beyond the point where another is
-    // decided.
+    // One of several properties may need states that are reached only through states at which another property
+    // is decided.
     let end = match &properties[..] {
         [Ok(only)] => end_of(only, &program.names, options),
         _ => None,
@@ -158,9 +158,9 @@ pub fn check_all<'p>(
     Ok(reports)
 }
 
-/// Returns a state condition at which the property is decided, so that exploration can stop there.
-/// Returns `None` if a state does not decide the property. Also returns `None` if a policy is
-/// requested or given, or a secondary reward is set, because a policy continues after such a state.
+/// Returns a condition on states at which the property is decided, so that exploration can stop there. Returns
+/// `None` if no such condition is known. Also returns `None` if a policy is requested or given, or a secondary
+/// reward is set, because a policy continues after such a state.
 fn end_of(property: &Property, names: &Names, options: &Options<'_>) -> Option<Expr> {
     if options.policy || options.evaluate.is_some() || options.secondary.is_some() {
         return None;

@@ -10,8 +10,8 @@ use crate::prism::ast::{BinaryOp, Expr, ExprKind, Path, Property, RewardPath};
 use crate::solve::Direction;
 
 impl<N: Number> Query<'_, N> {
-    /// Computes the Pareto front of two objectives, or the optimum of the unbounded objective if
-    /// the other has a bound.
+    /// Computes the Pareto front of two objectives. If one of them has a bound, computes the optimum of the
+    /// other one instead.
     pub fn multi(&self, parts: &[Property]) -> Checked<Outcome> {
         let place = Place { line: 1, column: 1 };
         let [first, second] = parts else {

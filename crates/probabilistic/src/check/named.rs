@@ -12,8 +12,7 @@ const MAX_REFERENCES: usize = 1000;
 /// Returns the property with each reference to a named property replaced by its definition.
 ///
 /// # Errors
-/// A circular reference, a reference to a property that is not supported, or more than [`MAX_REFERENCES`]
-/// references.
+/// A circular reference, a reference to an unsupported property, or more than [`MAX_REFERENCES`] references.
 pub fn expand_references<'p>(
     property: &'p Property,
     model: &Model,

@@ -9,7 +9,8 @@ use crate::property::Declarations;
 /// Choice between exact and floating-point arithmetic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Exactness {
-    /// Exact arithmetic within a budget; beyond the budget, doubles with guaranteed bounds.
+    /// Exact arithmetic within a budget, for models with up to about 150,000 transitions. Otherwise, doubles
+    /// with guaranteed bounds.
     #[default]
     Auto,
     /// Exact arithmetic without a budget.
@@ -46,7 +47,7 @@ pub struct Options<'a> {
 }
 
 impl<'a> Options<'a> {
-    /// Sets the values of constants: of all undefined ones, and of defined ones that are to be
+    /// Sets the values of constants: of all undefined constants, and of defined constants whose value is
     /// overridden.
     #[must_use]
     pub fn with_settings(self, settings: Settings) -> Self {

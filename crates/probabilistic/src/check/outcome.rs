@@ -16,7 +16,8 @@ use crate::number::Number;
 use crate::prism::ast::{BinaryOp, Filter, ModelKind, Property, Question, Type};
 use crate::solve::Direction;
 
-/// An outcome, and for each state the choice of a policy that attains it, if a policy exists.
+/// An outcome, and for each state the choice of a policy that attains the outcome. The policy is `None` if none
+/// was computed.
 pub type Attained = (Outcome, Option<Vec<u32>>);
 
 impl<N: Number> Query<'_, N> {
@@ -147,9 +148,9 @@ impl<N: Number> Query<'_, N> {
         }
     }
 
-    /// Returns the optimisation direction: the requested one, or for a bound the direction of the
-    /// worst case, since the bound must hold for all policies. Fails for a decision process without
-    /// either; for a Markov chain, the direction does not matter.
+    /// Returns the requested optimisation direction (`min` or `max`). For a bound without a direction, like
+    /// `P>=0.9`, returns the worst case, because the bound must hold for all policies. Fails for a decision
+    /// process with neither; for a Markov chain, the direction does not matter.
     fn direction(&self, question: &Question) -> Checked<Direction> {
         match (question.direction, &question.bound) {
             (Some(direction), _) => Ok(direction),

@@ -76,7 +76,7 @@ impl<N: Number> Query<'_, N> {
             }
             Path::Repeatedly(goal) => self.repeatedly(direction, &self.truth(goal)?),
             Path::Persistently(goal) => {
-                // The complement: bad states are visited infinitely often.
+                // The complement: states outside `goal` are visited infinitely often.
                 let bad = inverse(self.truth(goal)?);
                 Ok(complement(self.repeatedly(opposite(direction), &bad)?))
             }
@@ -112,7 +112,7 @@ impl<N: Number> Query<'_, N> {
         if least == 0 {
             return Ok(then.into());
         }
-        // Until the lower bound on the number of steps, `left` must hold, regardless of `right`.
+        // Before the lower bound on the number of steps is reached, `left` must hold, regardless of `right`.
         let (no_states, outside) = (FixedBitSet::with_capacity(left.len()), inverse(left.clone()));
         let before = Problem { blocked: Some(&outside), ..self.problem(direction, None, &no_states) };
         let errors = then.errors;
@@ -124,7 +124,7 @@ impl<N: Number> Query<'_, N> {
         let mut vector = Vector::stepped(stepped, Span::Probability);
         let first = errors.iter().fold(0.0_f64, |most, error| most.max(*error));
         for (error, value) in vector.errors.iter_mut().zip(&vector.values) {
-            // The first step, whose error is not yet counted, rounds, too.
+            // The step that was computed separately rounds, too. Its error is not yet counted.
             *error += first + 64.0 * f64::EPSILON * value.to_f64();
         }
         Ok(vector.into())
@@ -148,7 +148,8 @@ impl<N: Number> Query<'_, N> {
         self.limit(bound, 0_i8.saturating_sub(i8::from(bound.strict)))
     }
 
-    /// Evaluates a step bound and adds `offset`, which is 1 or -1 for a strict bound.
+    /// Evaluates a step bound and adds `offset`: 1 or -1 for a strict bound, otherwise 0. Fails unless the
+    /// result is at least 0 and below [`MAX_STEPS`].
     fn limit(&self, bound: &StepBound, offset: i8) -> Checked<u32> {
         // `validate` has checked that the bound is an integer.
         let limit = self.constant(&bound.limit)?.to_integer() + offset;
@@ -187,8 +188,8 @@ impl<N: Number> Query<'_, N> {
         }
     }
 
-    /// Returns the optimal values after exactly `steps` steps, starting from `values`. If a policy
-    /// is given, only its choices are considered.
+    /// Applies the Bellman operator `steps` times to `values`, the values after the last step. If a policy is
+    /// given, only its choices are considered.
     fn stepped(&self, problem: Problem<'_, N>, values: Vec<N>, steps: u32) -> Checked<steps::Stepped<N>> {
         let problem = Problem { allowed: self.evaluated.as_ref(), ..problem };
         within_budget(steps::apply(problem, values, steps, &mut self.work.borrow_mut()))
@@ -203,9 +204,9 @@ impl<N: Number> Query<'_, N> {
         Problem::new(self.mdp(), direction, rewards, terminal)
     }
 
-    /// Computes the optimal values, or the values of the given policy if there is one. If the optimal
-    /// policy is reported, ties between optimal choices are broken by the secondary reward or, without
-    /// one, by the number of steps.
+    /// Computes the optimal values, or the values of the given policy if there is one. If an optimal policy is
+    /// reported, ties between optimal choices are broken by the secondary reward (by default, the number of
+    /// steps), where [`with_secondary`] permits this.
     pub fn solved(&self, problem: Problem<'_, N>) -> Checked<Valued<N>> {
         let span = if problem.rewards.is_none() { Span::Probability } else { Span::Positive };
         let problem = Problem { allowed: self.evaluated.as_ref(), ..problem };

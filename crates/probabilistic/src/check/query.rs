@@ -22,12 +22,12 @@ pub struct Query<'a, N> {
     pub options: &'a Options<'a>,
     /// The indices of the reward structures for which rewards were computed during exploration.
     pub computed_rewards: &'a [usize],
-    /// The process in doubles, from which an initial policy for exact policy iteration is
-    /// computed.
+    /// The process in doubles, from which an initial policy for exact policy iteration is computed. `None` if
+    /// the arithmetic is not exact.
     pub doubles: Option<Mdp<f64>>,
     /// The remaining work budget of exact arithmetic.
     pub work: RefCell<Work>,
-    /// The choices of a given policy, if a policy is evaluated instead of optimised.
+    /// The choices of the given policy; `None` if no policy is given.
     pub evaluated: Option<FixedBitSet>,
 }
 

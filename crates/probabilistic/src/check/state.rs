@@ -16,7 +16,8 @@ use crate::prism::{Code, Names};
 /// character.
 const PREFIX: &str = "#";
 
-/// Returns `true` if the value of a property is a number, not a truth value.
+/// Returns `true` if a property is numeric. An expression counts as numeric only if it contains a numeric
+/// property.
 pub fn is_number(property: &Property) -> bool {
     use crate::prism::ast::Filter;
     match property {
@@ -139,8 +140,8 @@ impl<N: Number> Query<'_, N> {
         Ok(satisfying)
     }
 
-    /// Compiles an expression. Nested properties become additional Boolean variables; also returns
-    /// the set of states in which each of these variables is true.
+    /// Compiles an expression. Nested properties, predefined labels and comparisons of property values become
+    /// additional Boolean variables. Also returns, for each of these variables, the states in which it is true.
     fn prepared(&self, expression: &Expr, kind: Type) -> Checked<(Code, Vec<FixedBitSet>)> {
         let mut sets = Vec::new();
         let mut stopped = None;
@@ -218,8 +219,8 @@ impl<N: Number> Query<'_, N> {
             let order = |a: &BigRational, b: &BigRational| compare(op, a.cmp(b));
             let holds = match (left.ends(state), right.ends(state)) {
                 (Some((a, b)), Some((c, d))) => {
-                    // A comparison is decided if all corners of the two intervals agree. For
-                    // equality, the intervals must also be points or disjoint.
+                    // A comparison is decided if it has the same result for all four pairs of ends of the two
+                    // intervals. For equality, the intervals must also be points or disjoint.
                     let corners = [order(&a, &c), order(&a, &d), order(&b, &c), order(&b, &d)];
                     let equal = matches!(op, BinaryOp::Equal | BinaryOp::NotEqual) && (a != b || c != d);
                     let apart = b < c || d < a;
@@ -304,9 +305,9 @@ pub fn compare(op: BinaryOp, order: std::cmp::Ordering) -> bool {
     }
 }
 
-/// Combines two vectors state by state with an arithmetic operator. The resulting errors include the errors
-/// of the operands and the rounding of the operation. Fails for a division by zero and for an operation whose
-/// result with an infinite operand is undefined.
+/// Combines two vectors state by state with an arithmetic operator. The resulting errors include the errors of
+/// the operands and the rounding of the operation. Fails for a division by zero. Infinite operands are
+/// permitted only in sums, as the first operand of a difference, and as a divisor.
 fn joined<N: Number>(op: BinaryOp, left: &Vector<N>, right: &Vector<N>, at: &Expr) -> Checked<Vector<N>> {
     let fault = |text: &str| Stop::Wrong(property_error("Q303", at.place, text));
     let mut vector = Vector::exactly(Vec::with_capacity(left.values.len()), Span::Any);

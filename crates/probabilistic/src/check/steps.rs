@@ -3,8 +3,8 @@
 use crate::number::{Number, count};
 use crate::solve::{Direction, Problem, Work};
 
-/// Underflow threshold: positive products below this value lose relative precision. The threshold
-/// also bounds the absolute error that such a loss causes.
+/// Underflow threshold: positive products below this value lose relative precision. The absolute error caused
+/// by such a loss is also less than the threshold.
 const UNDERFLOW_THRESHOLD: f64 = 1e-280;
 
 /// Values after a bounded number of steps, with bounds on their rounding errors.
@@ -70,7 +70,7 @@ pub fn apply<N: Number>(
             break;
         }
     }
-    // Values may become stationary only by rounding, so the error bound counts all steps.
+    // Values may only seem stationary because of rounding, so the error bound counts all steps.
     let relative = if N::EXACT { 0.0 } else { f64::from(steps) * (count(widest) + 4.0) * f64::EPSILON };
     Some(Stepped { values, relative, lost })
 }

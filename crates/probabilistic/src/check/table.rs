@@ -26,7 +26,7 @@ pub struct Row {
     pub values: Vec<i64>,
     /// The action of the choice; empty for a command without an action.
     pub action: String,
-    /// Position of the choice among the choices of the state, from 0, in the order of the commands.
+    /// Position of the choice among the choices of the state, from 0.
     pub choice: usize,
 }
 
@@ -87,8 +87,8 @@ impl PolicyTable {
         Ok(table)
     }
 
-    /// Returns for each state of an explored model the index of the policy's choice, or [`NONE`] for a state
-    /// without a row.
+    /// Returns for each state of an explored model the number of the policy's choice in the process, or
+    /// [`NONE`] for a state without a row.
     ///
     /// # Errors
     /// The table does not match the model: a missing variable, an unreached state, a missing choice, or a

@@ -21,11 +21,11 @@ pub enum ExprKind {
     Bool(bool),
     /// An integer literal.
     Int(i64),
-    /// A number literal with a decimal point or an exponent.
+    /// A rational number. In a text, a literal with a decimal point or an exponent.
     Number(BigRational),
     /// The name of a constant, formula or variable.
     Name(String),
-    /// The name of a label; in properties only.
+    /// The name of a label; in quotation marks in the text.
     Label(String),
     /// `!`: negation.
     Not(Box<Expr>),
@@ -94,8 +94,8 @@ pub enum Filter {
 /// The query of an operator: either for its value, or for the comparison of the value with a bound.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Question {
-    /// The queried optimum: minimum or maximum over all policies. `None` if the model has only one policy, or if the
-    /// bound determines the direction.
+    /// The requested optimum: minimum or maximum over all policies. `None` if it is not given: the model is
+    /// then a Markov chain, or the bound determines the direction.
     pub direction: Option<Direction>,
     /// Comparison operator and bound; `None` to query the value.
     pub bound: Option<(BinaryOp, Expr)>,
@@ -115,9 +115,10 @@ pub enum Path {
     Until(Expr, Expr, Option<Box<Steps>>),
     /// `G`: the expression always holds, or within the bounds if there are any.
     Globally(Expr, Option<Box<Steps>>),
-    /// `W`: `U` holds, or the left operand always holds.
+    /// `W`: `U` holds, or the left operand always holds (or within the bounds if there are any).
     WeakUntil(Expr, Expr, Option<Box<Steps>>),
-    /// `R`: the right operand always holds, or up to and including the first state in which the left operand holds.
+    /// `R`: the right operand holds always (or within the bounds if there are any), or up to and including the
+    /// first state in which the left operand holds.
     Release(Expr, Expr, Option<Box<Steps>>),
     /// `G F`: the expression holds infinitely often.
     Repeatedly(Expr),
@@ -128,12 +129,12 @@ pub enum Path {
 /// Bounds of a temporal operator, on the number of steps or on an accumulated reward.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Steps {
-    /// The lower bound.
+    /// The lower bound, if there is one.
     pub least: Option<StepBound>,
-    /// The upper bound.
+    /// The upper bound, if there is one.
     pub most: Option<StepBound>,
-    /// The reward structure if a reward is bounded, with its name if it is given; `None` if the number of steps is
-    /// bounded.
+    /// `None` if the number of steps is bounded. If a reward is bounded, the name of its reward structure; the
+    /// inner `None` selects the first structure.
     pub reward: Option<Option<String>>,
 }
 
@@ -146,16 +147,16 @@ pub struct StepBound {
     pub strict: bool,
 }
 
-/// The accumulation of rewards along a path.
+/// The aggregate of the rewards along a path. Its expected value is computed.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RewardPath {
-    /// `F`: summed until a state that satisfies the expression is reached.
+    /// `F`: the sum until a state that satisfies the expression is reached.
     Reach(Expr),
-    /// `C<=k`: summed over the first k steps.
+    /// `C<=k`: the sum over the first k steps.
     Steps(StepBound),
-    /// `C`: summed over the infinite path.
+    /// `C`: the sum over the infinite path.
     Total,
-    /// `I=k`: the state reward after exactly k steps.
+    /// `I=k`: the state reward of the state after exactly k steps.
     Instant(Expr),
     /// `S`: the long-run average reward per step.
     LongRun,

@@ -1,8 +1,9 @@
-//! Caches the enabled commands of a module by the values of the variables that these commands read.
+//! Caches the evaluated commands of a module for each of its local states. A local state consists of the values
+//! of the variables that the commands of the module read.
 //!
-//! A module has few local states, and each occurs in many states of the model. The commands of a local state are
-//! evaluated once. Their effects are stored as edits of the words of a packed state. The evaluated commands of a
-//! local state are its behaviour.
+//! A module has few local states, and each occurs in many states of the model. The commands of a local state
+//! are evaluated once. Their effects are stored as edits of the words of a packed state. The evaluated commands
+//! of a local state are called its behaviour.
 
 use std::collections::BTreeSet;
 
@@ -89,7 +90,8 @@ impl<N: Number> Module<N> {
         }
         // An uncached behaviour of the previous call lies behind the cached ones.
         self.discard_uncached();
-        // With a full cache, the behaviour is written but not registered, so the next call discards it.
+        // With a full cache, the behaviour is stored behind the cached ones but not registered, so a later call
+        // discards it.
         let is_full = self.numbers.is_none()
             || self.cached_lengths[0] >= CACHE_LIMITS[0]
             || self.cached_lengths[3] >= CACHE_LIMITS[1];
@@ -199,7 +201,7 @@ impl<N: Number> Module<N> {
     /// Iterates over the updates of a command: probability and edits of the state.
     pub fn updates(&self, command: Chosen) -> impl ExactSizeIterator<Item = (&N, &[Edit])> {
         let range = self.range(command);
-        // Only ends are stored: a command begins at the end of its predecessor.
+        // Only ends are stored: the edits of an update begin at the end of the previous update's edits.
         let mut begin = range.start.checked_sub(1).map_or(0, |before| self.updates[before].1);
         self.updates[range].iter().map(move |(probability, end)| {
             let edits = &self.edits[begin as usize..*end as usize];
@@ -208,8 +210,7 @@ impl<N: Number> Module<N> {
         })
     }
 
-    /// Returns the total number of updates of consecutive commands, without updates of probability
-    /// 0.
+    /// Returns the total number of updates of consecutive commands. Updates of probability 0 do not count.
     pub fn count(&self, commands: std::ops::Range<Chosen>) -> usize {
         commands.map(|command| self.range(command).len()).sum()
     }

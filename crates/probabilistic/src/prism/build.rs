@@ -1,4 +1,4 @@
-//! Compiles declarations, commands and rewards of the syntax tree to programs.
+//! Compiles declarations, commands and rewards of the syntax tree to parts of a program.
 
 use num_traits::Signed;
 
@@ -99,7 +99,7 @@ pub fn reward_item<N: Number>(
 ) -> Result<RewardItem<N>, Diagnostic> {
     let guard = Guard::new(names.typed(&item.guard, Type::Bool)?);
     let reward = names.typed(&item.reward, Type::Double)?;
-    // An invalid constant is reported when the item is evaluated.
+    // A constant that is negative or cannot be evaluated is reported when the item is evaluated in a state.
     let value = reward.is_constant().then(|| reward.number(&[]));
     let value = value.and_then(Result::ok).filter(|value| !value.is_negative());
     let certain = value.and_then(|value| rounded(&value).ok());

@@ -13,9 +13,9 @@ use crate::prism::ast::{BinaryOp, Function, Type};
 /// A compiled expression over the values of the variables. Truth values are represented as 0 and 1.
 #[derive(Debug, Clone)]
 pub enum Code {
-    /// An integer literal or a truth value.
+    /// An integer or a truth value.
     Whole(i64),
-    /// A number literal that is not an integer literal.
+    /// A number of type `double`.
     Number(BigRational),
     /// A variable, given by its index.
     Variable(u32),

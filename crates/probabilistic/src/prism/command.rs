@@ -36,7 +36,7 @@ pub struct Update {
 pub struct Command<N> {
     pub guard: Guard,
     pub updates: Vec<Update>,
-    /// The probabilities of the updates, if all of them are constants that sum to 1.
+    /// The probabilities of the updates, if all of them are constants and valid.
     pub certain: Option<Vec<N>>,
     pub place: Place,
 }
@@ -64,7 +64,7 @@ impl<N: Number> Command<N> {
 pub struct RewardItem<N> {
     pub guard: Guard,
     pub reward: Code,
-    /// The reward, if it is a constant and not negative.
+    /// The reward, if it is a constant and valid.
     pub certain: Option<N>,
     pub place: Place,
 }

@@ -44,8 +44,8 @@ impl Names {
     /// Declares the constants, formulas and labels of a model. Variables are added with [`Names::variable`].
     ///
     /// # Errors
-    /// A constant without a value, a value of another type, a value for an unknown constant, a circular
-    /// definition, or a name declared twice.
+    /// A constant without a value, a value of another type, a value for an unknown constant, constants that
+    /// depend on each other, or a name declared twice.
     pub fn new(model: &Model, settings: &Settings) -> Result<Self, Error> {
         let mut names = Self {
             meanings: FxHashMap::default(),

@@ -7,10 +7,10 @@ use crate::prism::lexer::{Kind, Token};
 use crate::prism::reserved::is_keyword;
 
 const MAX_DEPTH: usize = 200;
-/// Upper limits on the number of operators in an expression: of arithmetic operators and implications, and of all
-/// others.
+/// Upper limits on the number of binary operators in a top-level expression: of arithmetic operators and
+/// implications, and of all others.
 const MAX_OPERATORS: [usize; 2] = [500, 20_000];
-/// Additional upper limit on the number of operators of each kind in an expression of a property.
+/// Additional upper limit on each of the two numbers in [`MAX_OPERATORS`], in an expression of a property.
 const MAX_PROPERTY_OPERATORS: usize = 2_000;
 
 /// A parser state: a position in a list of tokens, with counters for the size limits.

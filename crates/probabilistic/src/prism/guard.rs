@@ -7,7 +7,8 @@ use crate::prism::code::{Code, Fault};
 /// A condition as a conjunction of tests and other expressions.
 #[derive(Debug, Clone)]
 pub struct Guard {
-    /// The longest prefix of conjuncts that are range tests. Evaluating a test cannot fail.
+    /// The leading conjuncts that test whether a single variable is inside or outside of a range. Evaluating
+    /// them cannot fail.
     tests: Vec<Test>,
     /// The conjuncts after the tests, in the order of the text. A false conjunct prevents the evaluation of later
     /// conjuncts, which might fail.

@@ -33,7 +33,7 @@ pub(super) struct Group<N> {
     pub index: Option<(u32, i64, Vec<Vec<u32>>)>,
 }
 
-/// For each value of a variable from `least` on, the actions that may be enabled, as a bit set.
+/// For each value of a variable from `least` on, the actions that may be enabled with this value, as a bit set.
 #[derive(Debug, Clone)]
 pub(super) struct Mask {
     pub variable: u32,
@@ -270,7 +270,7 @@ impl<N: Number> Program<N> {
                     .filter(|fixed| fixed.iter().any(|(fixed_variable, _)| *fixed_variable == variable))
                     .count()
             };
-            // Among equally frequent variables, the first is chosen, for reproducible results.
+            // If several variables are fixed equally often, the first one is chosen, for reproducible results.
             let best =
                 (0..dense(variables.len())).max_by_key(|variable| (count(*variable), Reverse(*variable)));
             let Some(best) = best.filter(|best| count(*best) > 0) else { continue };

@@ -1,7 +1,9 @@
-//! Generates successors from cached behaviours, i.e. from the evaluated commands of the local states of modules.
+//! Generates successors from cached behaviours, i.e. from the evaluated commands of the local states of
+//! modules.
 //!
-//! The choices and their order are the same as those of [`Program`]. If an evaluation fails in a state, or modules have
-//! too many joint steps, the state is delegated to the program, which reports the error.
+//! The choices and their order are the same as those of [`Program`]. If an evaluation fails in a state, or the
+//! commands of synchronising modules have too many combinations, the state is delegated to the program, which
+//! reports the error.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -67,7 +69,7 @@ type Parts = SmallVec<[Part; 8]>;
 impl<'a, N: Number> Remembered<'a, N> {
     /// Creates a generator with an empty cache.
     pub fn new(program: &'a Program<N>) -> Self {
-        // A model with a single module has as many local states as states, so caching saves nothing.
+        // A model with a single module has about as many local states as states, so caching saves nothing.
         let pays = program.free.len() > 1 && program.actions.len() <= MAX_ACTIONS;
         Self { program, memory: pays.then(|| RefCell::new(Memory::new(program))) }
     }
@@ -126,8 +128,8 @@ impl<N: Number> Memory<N> {
         }
     }
 
-    /// Adds the choices of a state. Returns `None` if an evaluation fails, or modules have too many joint steps; some
-    /// choices may have been added.
+    /// Adds the choices of a state. Returns `None` if an evaluation fails or there are too many combinations of
+    /// commands; some choices may have been added.
     fn successors(
         &mut self,
         program: &Program<N>,
@@ -169,8 +171,8 @@ impl<N: Number> Memory<N> {
     }
 
     /// Adds the only choice of a state of a Markov chain: a uniform distribution over the combinations of
-    /// enabled commands. A state without enabled commands gets no choice. Returns `None` if an evaluation
-    /// fails, or modules have too many joint steps.
+    /// enabled commands. A state without enabled commands gets no choice. Returns `None` if an evaluation fails
+    /// or there are too many combinations.
     fn step(&mut self, program: &Program<N>, state: &Packed, choices: &mut Choices<Packed, N>) -> Option<()> {
         let Self { team, state_sums, action_sums_cache, combiner, .. } = self;
         let (mut combinations, mut last_action) = (0_usize, UNNAMED);
@@ -260,8 +262,8 @@ impl<N: Number> Team<N> {
         Some(())
     }
 
-    /// Calls `visit` with each combination of one command per module. The command of the first
-    /// module varies fastest. Returns `None` if the combinations of several modules have more than
+    /// Calls `visit` with each combination of one command per module. The command of the first module varies
+    /// fastest. Returns `None` if several modules participate and their combinations have more than
     /// [`MAX_COMBINED`] successors.
     fn each_combination(&self, parts: &[Part], mut visit: impl FnMut(&[Chosen])) -> Option<()> {
         if let [(_, commands)] = parts {
@@ -289,8 +291,8 @@ impl<N: Number> Team<N> {
 }
 
 impl<N: Number> Combiner<N> {
-    /// Calls `to` with each successor of one command per module, and its probability. The update of the last module
-    /// varies fastest.
+    /// Calls `to` with each successor (and its probability) of one command per module. The update of the last
+    /// module varies fastest.
     fn combine(
         &mut self,
         team: &Team<N>,

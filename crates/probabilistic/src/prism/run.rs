@@ -22,8 +22,8 @@ pub(super) type Values = SmallVec<[i64; 16]>;
 /// The rewards of a state or choice: one for each reward structure whose rewards are computed.
 pub(super) type Sums<N> = SmallVec<[N; 4]>;
 
-/// Upper limit on the number of successors of the synchronised commands of an action in one state,
-/// if several modules synchronise on the action.
+/// Upper limit on the number of successors of an action in one state, if several modules synchronise on the
+/// action.
 pub(super) const MAX_COMBINED: usize = 1_000_000;
 
 /// The enabled commands of the modules that synchronise on an action. A joint step executes one command of each
@@ -114,7 +114,7 @@ impl<N: Number> Program<N> {
         Err(Diagnostic::new("Q305", place, text).into())
     }
 
-    /// Calls `to` with each successor of the commands `chosen` (one per module), and its probability.
+    /// Calls `to` with each successor (and its probability) of the commands `chosen`, one per module.
     fn expand(&self, state: &Packed, joint: &JointStep<N>, chosen: &[usize], mut to: impl FnMut(Packed, N)) {
         let updates = |module: usize| joint.updates_of(chosen[module]);
         let mut at: SmallVec<[usize; 8]> = (0..chosen.len()).map(|module| updates(module).start).collect();
@@ -244,7 +244,7 @@ impl<N: Number> Program<N> {
         self.computed_rewards.iter().map(|structure| sum(items(structure), values)).collect()
     }
 
-    /// Returns the actions that are not excluded by the value of any single variable.
+    /// Returns the actions that may be enabled according to the values of single variables.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "words hold 64 actions, and there are as many words as the actions need; bits is not 0 where its last one is taken"
@@ -393,7 +393,7 @@ impl<N: Number> Generator<N> for Program<N> {
 
     fn successors(&self, state: &Packed, choices: &mut Choices<Packed, N>) -> Result<(), Error> {
         let values = self.values_of(state);
-        // A state in which the condition cannot be evaluated is expanded.
+        // If the condition cannot be evaluated in a state, the state is expanded.
         if self.stop.as_ref().is_some_and(|stop| stop.holds(&values).unwrap_or(false)) {
             choices.to(state.clone(), N::one());
             choices.end(UNNAMED, self.computed_rewards.iter().map(|_| N::zero()));

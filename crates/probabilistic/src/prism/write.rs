@@ -149,8 +149,9 @@ pub(crate) fn decimal(value: &BigRational) -> (String, u8) {
     (format!("{}/{}", value.numer(), value.denom()), 10)
 }
 
-/// Converts any name to an identifier that PRISM accepts: invalid characters become `_`, `_` is inserted before a
-/// leading digit, and `_` is appended to reserved words. Different names can yield the same identifier.
+/// Converts any name to an identifier that PRISM accepts: invalid characters become `_`, `_` is inserted into
+/// an empty name and before a leading digit, and `_` is appended to reserved words. Different names can yield
+/// the same identifier.
 pub fn identifier(name: &str) -> String {
     let mut text: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
     if text.is_empty() || text.starts_with(|c: char| c.is_ascii_digit()) {

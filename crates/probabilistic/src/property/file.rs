@@ -22,7 +22,7 @@ pub struct File {
 pub struct Declarations {
     /// The constants; the user must set the values of undefined constants.
     pub constants: Vec<Constant>,
-    /// Labels.
+    /// The labels.
     pub labels: Vec<Named>,
     /// The named properties, which other properties can refer to by name, as in `1 - "hit"`. A
     /// label with the same name takes precedence.
@@ -105,7 +105,7 @@ fn entry(cursor: &mut Cursor<'_>, text: &str, file: &mut File) -> Read<()> {
     Ok(())
 }
 
-/// Skips an unsupported property, up to `;` or to a closing bracket that a new property follows.
+/// Skips an unsupported property: up to `;`, or past a closing bracket after which a new property begins.
 fn skip_property(cursor: &mut Cursor<'_>) {
     let mut open = 0_usize;
     loop {

@@ -13,7 +13,7 @@ const PROPERTY: &str = "a property (`Pmax=? [ F â€¦ ]`, `R{\"name\"}min=? [ F â€
 /// The parsers that extend expressions by the syntax of properties.
 pub const PROPERTY_SYNTAX: PropertySyntax = PropertySyntax { parse_prefix, parse_infix };
 
-/// The names of the filters; the last entry is an alias.
+/// The names of the filters. The last entry is another name for `avg`.
 const FILTERS: [(&str, Filter); 15] = [
     ("min", Filter::Min),
     ("max", Filter::Max),
@@ -110,8 +110,8 @@ fn parse_prefix(cursor: &mut Cursor<'_>) -> Read<Option<ExprKind>> {
     Ok(Some(ExprKind::Property(Box::new(property))))
 }
 
-/// Parses a binary temporal operator (`U`, `W` or `R`) after its left operand. Returns the operand
-/// unchanged if none follows.
+/// Parses a binary temporal operator (`U`, `W` or `R`) and its right operand, after the left operand. Returns
+/// `left` unchanged if no such operator follows.
 fn parse_infix(cursor: &mut Cursor<'_>, left: Expr) -> Read<Expr> {
     let letter = match cursor.peek() {
         Kind::Name(word) if word == "U" => 'U',

@@ -1,13 +1,11 @@
-//! Bounds the error of the values computed by policy iteration, for components of an MDP in
-//! doubles.
+//! Bounds the error of the values computed by policy iteration, for components of an MDP in doubles.
 //!
-//! Let v be the computed values, w the greatest expected numbers of steps under almost optimal
-//! policies, and δ a small number. For maximisation, v + δw is an upper bound on the true values if
-//! no equation increases it, because repeated application then only decreases it. For minimisation,
-//! v − δw is a lower bound if no equation decreases it. This is the inductive argument of Hartmanns
-//! and Kaminski, Optimistic Value Iteration, CAV 2020. The computed policy itself proves the bound
-//! on the other side, and its error is also at most δw. All checks include rounding errors. If a
-//! check fails, the error is infinite.
+//! Let v be the computed values, w the greatest expected numbers of steps under almost optimal policies, and δ
+//! a small number. For maximisation, v + δw is an upper bound on the true values if applying the equations to v
+//! + δw does not increase it. For minimisation, v − δw is a lower bound if applying the equations does not
+//! decrease it. This is the inductive argument of Hartmanns and Kaminski, Optimistic Value Iteration, CAV 2020.
+//! The computed policy itself proves the bound on the other side, and its error is also at most δw. All checks
+//! include rounding errors. If the checks fail, the error is infinite.
 
 use crate::mdp::dense;
 use crate::number::{Number, count};
@@ -18,17 +16,18 @@ use crate::solve::work::Work;
 
 const MAX_ROUNDS: usize = 200;
 
-/// Upper limit on the number of sweeps that improve the policy in each round.
+/// Maximum number of sweeps that improve the policy before its chain is solved again.
 const SWEEPS: usize = 10;
 
-/// Upper limit on the relative rounding error of evaluating a row that was built from at most
-/// `widest` transitions.
+/// Upper limit on the relative rounding error of evaluating a row (the equation of a choice) that was built
+/// from at most `widest` transitions.
 pub fn rounding(widest: usize) -> f64 {
     (64.0 + 3.0 * count(widest)) * f64::EPSILON
 }
 
 /// Returns an upper bound on the absolute error of the value of each block (merged end component). The bounds
-/// are infinite if a check fails. Errors in the values of successors outside the component are not included.
+/// are infinite if they cannot be proved. Errors in the values of successors outside the component are not
+/// included.
 pub fn certify<N: Number>(
     quotient: &Quotient<N>,
     policy: &[u32],
@@ -48,16 +47,16 @@ pub fn certify<N: Number>(
         Direction::Max => v[block] - rows[row],
     };
     if blocks == 1 {
-        // With a single block, each row has its own value. Policy iteration may have ignored a row
-        // that is better by less than rounding.
+        // With a single block, the value of a row does not depend on other rows. Policy iteration may have
+        // ignored a row that is better by less than its tolerance.
         let (better, rounding) = (0..rows.len()).fold((0.0_f64, 0.0_f64), |(better, rounding), row| {
             let near = loss(0, row) <= v[0];
             (better.max(-loss(0, row)), if near { rounding.max(row_error(row)) } else { rounding })
         });
         return vec![better + rounding];
     }
-    // A smaller threshold gives a smaller w (see the head of this file), but leaves less slack for
-    // the rows whose loss exceeds the threshold.
+    // A smaller threshold gives a smaller w (see the head of this file), but leaves less slack for the other
+    // rows, whose loss exceeds the threshold.
     for threshold in [1e-8, 1e-12] {
         let is_near = |block: usize, row: usize| {
             loss(block, row) <= threshold * v[block].max(1e-12) || policy[block] as usize == row
@@ -76,7 +75,7 @@ pub fn certify<N: Number>(
                 }
             }
         }
-        // The check needs a margin above the least δ that covers the rounding errors.
+        // The check needs a δ that is greater than the least one that covers the rounding errors.
         delta *= 2.0;
         let holds = (0..blocks).all(|block| {
             quotient.range(block).all(|row| {
@@ -128,8 +127,8 @@ fn greatest_steps<N: Number>(quotient: &Quotient<N>, policy: &[u32], near: &[boo
     None
 }
 
-/// Switches each block to a row of `near` with a greater expected number of steps if there is one,
-/// and updates `steps`. Returns `true` if a row was switched.
+/// Switches each block to a row of `near` with a clearly greater expected number of steps if there is one, and
+/// updates `steps`. Returns `true` if a row was switched.
 fn lengthen<N: Number>(quotient: &Quotient<N>, near: &[bool], policy: &mut [u32], steps: &mut [f64]) -> bool {
     let mut changed = false;
     for (block, chosen) in policy.iter_mut().enumerate() {

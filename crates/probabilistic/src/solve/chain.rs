@@ -1,18 +1,14 @@
 //! Solves a Markov chain with costs directly: computes the expected cost from each state.
 //!
-//! The equations are x(i) = c(i) + Σ p(i,j) x(j). Strongly connected components are solved in
-//! reverse topological order. Inside a component, states are eliminated one after another. The
-//! pivot 1 − p(i,i) is computed as the sum of the probabilities of leaving the state (Grassmann,
-//! Taksar and Heyman, Operations Research 33(5), 1985). Hence nothing is subtracted, and each
-//! result in doubles has a small *relative* error, however small the probability of leaving the
-//! chain.
+//! The equations are x(i) = c(i) + Σ p(i,j) x(j). Strongly connected components are solved in reverse
+//! topological order. Inside a component, states are eliminated one after another. The pivot 1 − p(i,i) is
+//! computed as the sum of the probabilities of leaving the state (Grassmann, Taksar and Heyman, Operations
+//! Research 33(5), 1985). Hence nothing is subtracted, and each result in doubles has a small *relative* error,
+//! however small the probability of leaving the chain.
 //!
-//! The bound on this error follows from two facts. First, an elimination step computes each
-//! remaining entry by a few sums, products and quotients of positive numbers. It therefore equals
-//! the exact step from entries that are perturbed by a factor near 1. Second, a value is a quotient
-//! of two polynomials with positive coefficients, whose degree is the number of remaining states
-//! (the matrix-tree theorem; O'Cinneide, Numerische Mathematik 73, 1996). Each perturbation
-//! therefore occurs at most once per state in the numerator, and once in the denominator.
+//! The bound on this error counts the rounding errors that can occur in a value. A value is a quotient of two
+//! polynomials with positive coefficients in the entries (the matrix-tree theorem; O'Cinneide, Numerische
+//! Mathematik 73, 1996), so the relative error of an entry changes it only by a small factor.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -25,8 +21,9 @@ use crate::solve::work::Work;
 /// Marker for the absence of a row, choice or state.
 pub const NONE: u32 = u32::MAX;
 
-/// The equations of a strongly connected component as sparse rows, one for each choice: transitions
-/// inside the component, cost, and probability of leaving the component.
+/// The equations of a set of states as sparse rows, one for each choice: transitions inside the set, cost, and
+/// probability of leaving the set. The set is usually a strongly connected component; merged states count as
+/// one.
 #[derive(Debug, Clone, Default)]
 pub struct Rows<N> {
     /// Start of each row in `columns`, followed by the length of `columns`.
@@ -35,9 +32,9 @@ pub struct Rows<N> {
     pub columns: Vec<u32>,
     /// Probabilities of the transitions, parallel to `columns`.
     pub probabilities: Vec<N>,
-    /// Cost of each row, plus the expected value of its successors outside the component.
+    /// Cost of each row, plus the expected value of its successors outside the set.
     pub constants: Vec<N>,
-    /// Probability of leaving the component, for each row.
+    /// Probability of leaving the set, for each row.
     pub leaving: Vec<N>,
 }
 
@@ -70,17 +67,17 @@ impl<N: Number> Rows<N> {
         self.first[row] as usize..self.first[row + 1] as usize
     }
 
-    /// Ends the current row and sets its constant and its probability of leaving the component.
+    /// Ends the current row and sets its constant and its probability of leaving the set.
     pub fn end(&mut self, constant: N, leaving: N) {
         self.first.push(dense(self.columns.len()));
         self.constants.push(constant);
         self.leaving.push(leaving);
     }
 
-    /// Moves a row to position `to`, which is not after `row`, and eliminates its self-loop.
-    /// Entries in column `loop_column` are the loop; the other entries are divided by the
-    /// probability of not looping. Returns `false` without an effect if that probability is 0.
-    /// Later rows keep their ends, but not their starts.
+    /// Moves the row `row`, with its entries at the positions `entries`, to the row index `to`, which is not
+    /// after `row`. Also eliminates its self-loop: entries in column `loop_column` are dropped, and the
+    /// remaining parts of the row are divided by the probability of not looping. Returns `false` if this
+    /// probability is 0; the row `to` is then not valid.
     pub fn move_without_loop(
         &mut self,
         row: usize,
@@ -133,16 +130,16 @@ impl<N: Number> Rows<N> {
     }
 }
 
-/// Upper limit on the number of entries that elimination in doubles visits for one component.
-/// Chains with a two-dimensional structure have much fill-in and are solved faster by iteration.
+/// Upper limit on the number of entries that elimination in doubles visits for one component. Elimination adds
+/// many entries in chains like grids, which iteration solves faster.
 const MAX_ELIMINATION: u64 = 300_000_000;
 
 /// The solution of a Markov chain.
 pub struct Solved<N> {
     /// Value (expected cost) of each state.
     pub values: Vec<N>,
-    /// Upper bound on the relative error of each value, if the entries of the rows were rounded at
-    /// most twice. Infinite if a product has underflowed; 0 in exact arithmetic.
+    /// Upper bound on the relative error of each value, if the entries of the rows were rounded at most twice.
+    /// Infinite if a product of probabilities may have underflowed; 0 in exact arithmetic.
     pub relative: Vec<f64>,
 }
 
@@ -228,14 +225,13 @@ impl<N: Number> Chain<'_, N> {
     }
 }
 
-/// Upper bound on the relative error of the values of a component that is solved by eliminating
-/// `states` states, if no row has more than `widest` entries.
+/// Upper bound on the relative error of the values of a component that is solved by eliminating `states`
+/// states, if no row has more than `widest` entries. 0 in exact arithmetic.
 ///
-/// Let n be the number of states, w the number of entries, and u the unit roundoff. Eliminating a
-/// state while m states remain multiplies each entry by rounding factors within 1 ± (w + 4)u. Each
-/// value of a state depends on at most 2m of these factors. Summed over m = 1, …, n, this is n(n +
-/// 1)(w + 4)u. The rounding of the initial entries and the back substitution add less than 4n(w +
-/// 4)u. The result uses the machine epsilon, which is 2u, and is thus twice as large as required.
+/// Eliminating a state while m states remain changes each entry by a relative rounding error of at most (w +
+/// 4)u, where w is `widest` and u is the unit roundoff. A value depends on at most 2m of these errors. The sum
+/// over all m, with the errors of the initial entries and of the back substitution, is at most half of the
+/// result.
 fn rounding<N: Number>(states: usize, widest: usize) -> f64 {
     let n = count(states) + 4.0;
     if N::EXACT { 0.0 } else { n * n * (count(widest) + 8.0) * f64::EPSILON }
@@ -250,7 +246,7 @@ struct Row<N> {
 
 struct Precision {
     widest: usize,
-    /// Whether a product has underflowed.
+    /// Whether a product of probabilities may have underflowed.
     lost: bool,
 }
 
@@ -293,8 +289,8 @@ fn eliminate<N: Number>(
         (0..dense(rows.len())).map(|state| Reverse((fill(&rows, &users, state), state))).collect();
     while let Some(Reverse((cost, pivot))) = queue.pop() {
         let p = pivot as usize;
-        // The queued cost is outdated if other eliminations have changed the row or the rows that
-        // use it.
+        // The queued cost is outdated if an elimination has changed the row of this state or the rows that use
+        // this state.
         users[p].retain(|user| !done[*user as usize]);
         let current_cost = fill(&rows, &users, pivot);
         if current_cost > cost {
@@ -338,8 +334,9 @@ fn eliminate<N: Number>(
     Some(Precision { widest, lost })
 }
 
-/// Returns the number of entries that the elimination of a state visits (Markowitz, Management
-/// Science 3(3), 1957). States with the fewest entries are eliminated first.
+/// Returns the estimated work of eliminating a state: the number of entries of its row, multiplied by the
+/// number of rows that use the state (Markowitz, Management Science 3(3), 1957). States with the least work are
+/// eliminated first.
 fn fill<N>(rows: &[Row<N>], users: &[Vec<u32>], state: u32) -> usize {
     rows[state as usize].entries.len().saturating_mul(users[state as usize].len())
 }
@@ -364,8 +361,8 @@ fn normalise<N: Number>(row: &mut Row<N>, diagonal: u32, budget: &mut Work) -> O
     Some(())
 }
 
-/// Substitutes the row of an eliminated state `pivot` into `target`, the row of state `user`.
-/// Returns `true` if a product has underflowed, and `None` if exact arithmetic exceeds its budget.
+/// Substitutes the row of an eliminated state `pivot` into `target`, the row of state `user`. Returns `true` if
+/// a product may have underflowed, and `None` if exact arithmetic exceeds its budget.
 fn substitute<N: Number>(
     target: &mut Row<N>,
     pivot: u32,

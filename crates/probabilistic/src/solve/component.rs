@@ -26,8 +26,8 @@ impl<N: Number> Run<'_, N> {
     }
 
     fn solve_component(&mut self, component: &[u32], local: &mut Local<N>) -> Option<()> {
-        // The exploration numbers neighbouring states similarly. States discovered last, which
-        // usually are near an exit, come first.
+        // States are numbered locally from the last discovered one to the first: states discovered last are
+        // usually near an exit, and neighbouring states have close numbers.
         let mut component = component.to_vec();
         component.sort_unstable_by_key(|state| Reverse(*state));
         self.cut(&component, local, |_, _| true);
@@ -57,7 +57,7 @@ impl<N: Number> Run<'_, N> {
             return Some(());
         }
         let must_be_sure = self.problem.rewards.is_some() && self.problem.direction == Direction::Min;
-        // If no choices and states are excluded, the component that was extracted above is reused.
+        // If no choices and no states are excluded, the equations extracted above are reused.
         if must_be_sure || unsolved.len() < states {
             self.cut(&unsolved, local, |run, choice| {
                 let targets = run.problem.mdp.targets(choice);
@@ -68,8 +68,8 @@ impl<N: Number> Run<'_, N> {
         self.values(local)
     }
 
-    /// Returns for each state of the component whether it is sure, i.e. reaches a terminal state
-    /// with probability 1 (under some or all policies, see `sure_by_choice`).
+    /// Returns for each state of the component whether it is sure, i.e. reaches a terminal state with
+    /// probability 1 (under some or under all policies, see `sure_by_choice`).
     fn sure_members(&mut self, local: &Local<N>) -> Vec<bool> {
         let outside_sure = |choice: usize| {
             self.problem.mdp.targets(local.choices[choice] as usize).iter().all(|target| {
@@ -79,9 +79,8 @@ impl<N: Number> Run<'_, N> {
         if self.sure_by_choice() {
             return attractor(local, outside_sure).0;
         }
-        // Sure under all policies: no policy can stay in the component forever (in an end
-        // component), and none can leave it to a state that is not sure. All other states are
-        // marked here.
+        // A state is sure under all policies if no policy can stay in the component forever (in an end
+        // component) and none can leave it to an unsure state. All other states are marked as unsure.
         let ends = end_components(local, |_| true);
         let mut unsure = ends.inside;
         let owners = local.owners();
@@ -119,8 +118,8 @@ impl<N: Number> Run<'_, N> {
         }
     }
 
-    /// Extracts states with the choices that `keep` accepts from the process to `local`.
-    /// Afterwards, `position` contains the local numbers of these states.
+    /// Copies `states` with their equations from the process to `local`. Only the choices that the problem
+    /// allows and `keep` accepts are copied. Afterwards, `position` contains the local numbers of these states.
     fn cut(&mut self, states: &[u32], local: &mut Local<N>, keep: impl Fn(&Self, usize) -> bool) {
         for state in &local.states {
             self.position[*state as usize] = NONE;
@@ -304,9 +303,8 @@ fn route_to_exits<N: Number>(
     }
 }
 
-/// Selects states by whether they are sure, i.e. reach a terminal state with probability 1
-/// (`members`). Returns the sure states if `only_sure`; otherwise all states if `include_sure`, or
-/// else the states that are not sure.
+/// Selects the sure states (those marked in `members`; they reach a terminal state with probability 1) if
+/// `only_sure`, otherwise all states if `include_sure`, otherwise the states that are not sure.
 fn component_part(states: &[u32], members: &[bool], include_sure: bool, only_sure: bool) -> Vec<u32> {
     let is_selected = |sure: bool| if only_sure { sure } else { include_sure || !sure };
     states.iter().zip(members).filter(|(_, sure)| is_selected(**sure)).map(|(state, _)| *state).collect()
@@ -318,8 +316,8 @@ fn stay<N: Number>(local: &Local<N>, ends: &EndComponents, state: usize) -> u32 
     choices.find(|choice| ends.alive[*choice]).map_or(NONE, |choice| local.choices[choice])
 }
 
-/// Builds the equations of a component without end components: each state is its own block. The
-/// rows are moved out of `local`, and their self-loops are eliminated.
+/// Builds the equations of a component without end components: each state is its own block. The rows are moved
+/// out of `local`, and their self-loops are eliminated. Choices that only loop get no row.
 fn unmerged<N: Number>(local: &mut Local<N>) -> Quotient<N> {
     let mut rows = std::mem::replace(&mut local.rows, Rows::new());
     let (mut first, mut choices, mut begin) = (vec![0], Vec::with_capacity(local.choices.len()), 0);
@@ -337,8 +335,8 @@ fn unmerged<N: Number>(local: &mut Local<N>) -> Quotient<N> {
     Quotient { first, rows, choices, widest: local.widest }
 }
 
-/// Sorts the states by block (merged end component). Returns the start of each block in the sorted
-/// list, followed by the length of the list, and the list.
+/// Sorts the states by block (merged end component). Returns the start of each block in the sorted list
+/// (followed by the length of the list), and the list.
 fn members(ends: &EndComponents) -> (Vec<u32>, Vec<u32>) {
     let mut starts = vec![0_u32; ends.blocks.saturating_add(1)];
     for block in &ends.block {

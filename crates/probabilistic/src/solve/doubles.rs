@@ -15,16 +15,16 @@ use crate::solve::work::{TIGHT, Work};
 /// Limits for solving in rationals if the bounds in doubles are insufficient: work units, and
 /// number of blocks (merged end components).
 const RATIONAL_LIMITS: (u64, usize) = (1_000_000_000, 3000);
-/// Work limit for solving in rationals if the bounds in doubles are finite, and bounds narrower
-/// than [`TIGHT`] are not required.
+/// Work limit for solving in rationals if the bounds in doubles are finite, and no bounds narrower than
+/// [`TIGHT`] were requested.
 const IMPROVEMENT_LIMIT: u64 = 100_000_000;
 
-/// Computes bounds on the values of all blocks (merged end components). Returns `None` if there are no values
-/// of policy iteration and interval iteration finds no bounds. If no method tightens the bounds on values of
-/// policy iteration, their errors may be large or infinite.
+/// Computes bounds on the values of all blocks (merged end components). Returns `None` if policy iteration
+/// found no values and interval iteration finds no bounds. Otherwise, the bounds may still be wide or infinite
+/// if no method improves them.
 ///
-/// For a Markov chain, elimination has a small relative error. With choices, a certificate bounds the error.
-/// If the probability of leaving a component is tiny, no certificate exists in doubles, and the component is
+/// For a Markov chain, elimination has a small relative error. With choices, a certificate bounds the error. If
+/// a component is left with a tiny probability, no certificate may exist in doubles; small components are then
 /// solved in rationals. If elimination is too expensive, interval iteration computes bounds from both sides.
 pub fn enclosed<N: Number>(
     quotient: &Quotient<N>,
@@ -36,7 +36,8 @@ pub fn enclosed<N: Number>(
     let Some(mut iterated) = iterated else { return interval::enclose(quotient, direction, tight) };
     let is_chain = (0..quotient.blocks()).all(|block| quotient.range(block).len() <= 1);
     if !is_chain {
-        // These errors refer to the values of the computed policy, which may not be optimal.
+        // These errors refer to the values of the computed policy, which may not be optimal if there are
+        // choices.
         iterated.relative = Vec::new();
     }
     if quotient.blocks() > RATIONAL_LIMITS.1 && !is_level(quotient, &iterated.values, tight) {
@@ -82,8 +83,9 @@ pub fn enclosed<N: Number>(
         .or(Some(rounded))
 }
 
-/// Returns `true` if a uniform error of all blocks (merged end components), as in a certificate,
-/// can be tight even for the least positive value.
+/// Returns `true` if the rounding error of the greatest value is within the error that the least positive value
+/// permits. Otherwise a certificate, which bounds the errors of all blocks together, is hardly tight for small
+/// values.
 fn is_level<N: Number>(quotient: &Quotient<N>, values: &[N], tight: f64) -> bool {
     let values = values.iter().map(Number::to_f64).filter(|value| *value > 0.0);
     let (least, greatest) = values
@@ -95,10 +97,9 @@ fn is_tight<N: Number>(values: &[N], errors: &[f64], tight: f64) -> bool {
     values.iter().zip(errors).all(|(value, error)| value.is_zero() || *error <= tight * 0.5 * value.to_f64())
 }
 
-/// Solves the rounded equations exactly in rationals. The error bound accounts for the earlier
-/// rounding of the entries: a value contains a few rounding errors per block, in its numerator and
-/// in its denominator (see `chain`). This holds under every policy and therefore under the optimal
-/// one. Returns `None` if the budget is exceeded.
+/// Solves the equations exactly in rationals, although their entries are rounded. The error bound accounts for
+/// this rounding: a value contains a few rounding errors per block (merged end component), in its numerator and
+/// in its denominator (see `chain`). Returns `None` if the budget is exceeded or an entry is not finite.
 fn in_rationals<N: Number>(
     quotient: &Quotient<N>,
     policy: &[u32],

@@ -1,14 +1,12 @@
-//! Interval iteration: bounds the values of components that are too large for elimination.
+//! Interval iteration: bounds the values of components, for example if they are too large for elimination.
 //!
-//! The lower bound is iterated from zero. Its values are then increased a little. If no equation
-//! raises these values further, they are upper bounds, because end components are merged
-//! (optimistic value iteration: Hartmanns and Kaminski, CAV 2020; see also Haddad and Monmege, TCS
-//! 735, 2018).
+//! The lower bound is iterated from zero. Its values are then increased a little. If no equation raises these
+//! values further, they are upper bounds, because end components are merged (optimistic value iteration:
+//! Hartmanns and Kaminski, CAV 2020; see also Haddad and Monmege, TCS 735, 2018).
 //!
-//! Each evaluation of an equation is rounded down for the lower and up for the upper bound.
-//! Therefore the values of the lower bound are valid at any time, in any order of the equations.
-//! Each sweep uses the values that it has already updated (Gauss-Seidel), and starts with the
-//! blocks nearest to an exit.
+//! Each evaluation of an equation is rounded down for the lower bound and up for the upper bound. Therefore the
+//! values of the lower bound are valid at any time, in any order of the equations. Each sweep uses the values
+//! that it has already updated (Gauss-Seidel), and starts with blocks that are near an exit.
 
 use std::collections::VecDeque;
 
@@ -31,15 +29,15 @@ pub struct Enclosed<N> {
 /// Upper limit on the work for one strongly connected component: the number of evaluated
 /// transitions and equations.
 const MAX_WORK: u64 = 30_000_000_000;
-/// Maximum number of sweeps in which the equations have to confirm a candidate bound.
+/// Maximum number of sweeps within which a candidate bound has to be confirmed by the equations.
 const UPPER_SWEEPS: usize = 40;
 /// Distance of the initial bounds from approximate values, as a fraction of the required width.
 const INITIAL_SHARE: f64 = 0.45;
-/// Maximum number of sweeps with the rows of a fixed policy between two sweeps over all rows.
+/// Maximum number of sweeps over the rows of a fixed policy between two sweeps over all rows.
 const POLICY_SWEEPS: usize = 25;
 
-/// Computes bounds on the values of all blocks (merged end components) with a width of at most
-/// `width` times the value. Returns `None` if the work limit is exceeded.
+/// Computes bounds on the values of all blocks (merged end components) with a width of about `width` times the
+/// value. Returns `None` if the work limit is exceeded.
 pub fn enclose<N: Number>(quotient: &Quotient<N>, direction: Direction, width: f64) -> Option<Enclosed<N>> {
     let sorted = Sorted::new(quotient);
     let rows = sorted.rows(quotient, direction);
@@ -47,9 +45,8 @@ pub fn enclose<N: Number>(quotient: &Quotient<N>, direction: Direction, width: f
     Some(rows.enclosed(quotient, &lower, &upper))
 }
 
-/// Computes bounds on the values of all blocks (merged end components) around approximate values
-/// `near`. Returns `None` if the approximate values are not close enough to prove bounds with a
-/// width of at most `width` times the value.
+/// Computes bounds on the values of all blocks (merged end components) around approximate values `near`.
+/// Returns `None` if this does not prove bounds with a width of at most `width` times the value.
 pub fn around<N: Number>(
     quotient: &Quotient<N>,
     near: &[N],
@@ -65,8 +62,8 @@ pub fn around<N: Number>(
 /// evaluate them. A *position* is an index of a block (merged end component) in this order.
 struct Rows<'a, N> {
     direction: Direction,
-    /// For each position in the order, the block; and for each row, its number in the quotient (the
-    /// unsorted equations). `None` if the equations are not sorted.
+    /// The block at each position, and the number of each row in the quotient (the unsorted equations). `None`
+    /// if the equations are not sorted.
     sorted: Option<(&'a [u32], &'a [u32])>,
     /// The first row of each position, followed by the number of rows.
     blocks: &'a [u32],
@@ -141,8 +138,8 @@ fn rounding<N: Number>(quotient: &Quotient<N>) -> f64 {
 }
 
 impl<'a, N: Number> Rows<'a, N> {
-    /// Uses the equations without sorting them. In this order, states discovered last come first;
-    /// they are usually closest to an exit.
+    /// Uses the equations without sorting them. Blocks of states that were discovered last come first; they are
+    /// usually closest to an exit.
     fn of(quotient: &'a Quotient<N>, direction: Direction) -> Self {
         Self {
             direction,
@@ -195,9 +192,8 @@ impl<'a, N: Number> Rows<'a, N> {
         best
     }
 
-    /// Computes lower and upper bounds around approximate values `near`. Returns `None` if the
-    /// equations still move the bounds after [`UPPER_SWEEPS`] sweeps, or if their distance exceeds
-    /// `width` times the value.
+    /// Computes lower and upper bounds around approximate values `near`. Returns `None` if the bounds are not
+    /// confirmed within [`UPPER_SWEEPS`] sweeps, or if their distance exceeds `width` times the value.
     fn around(&self, near: &[N], width: f64) -> Option<(Vec<f64>, Vec<f64>)> {
         let scaled = |scale: f64| -> Vec<f64> {
             (0..self.positions()).map(|position| near[self.block(position)].to_f64() * scale).collect()
@@ -213,7 +209,7 @@ impl<'a, N: Number> Rows<'a, N> {
         (holds && within).then_some((lower, upper))
     }
 
-    /// Computes lower bounds by iteration from zero, and upper bounds by increasing these slightly
+    /// Computes lower bounds by iteration from zero, and upper bounds by increasing the lower bounds slightly
     /// until no equation raises the result. Returns `None` if the work limit is exceeded.
     fn iterated(&self, width: f64) -> Option<(Vec<f64>, Vec<f64>)> {
         let (down, up) = (1.0 - self.rounding, 1.0 + self.rounding);
@@ -250,8 +246,8 @@ impl<'a, N: Number> Rows<'a, N> {
                     return Some((lower, upper));
                 }
             }
-            // The lower bound was not close enough to the value for its increase to be an upper
-            // bound.
+            // The increased lower bound was no upper bound, because the lower bound was not yet close enough to
+            // the value.
             threshold *= 0.1;
         }
         None
@@ -283,10 +279,9 @@ impl<'a, N: Number> Rows<'a, N> {
         (change, work)
     }
 
-    /// Updates all values of a candidate upper bound in place. Results are multiplied by `scale` to
-    /// account for rounding. Returns `true` if a value was raised. If none was raised, the values
-    /// are upper bounds: each was computed from values that are at least those at the end of the
-    /// sweep.
+    /// Updates all values of a candidate upper bound in place. Results are multiplied by `scale` to account for
+    /// rounding. Returns `true` if a value was raised. If none was raised, the values are upper bounds, because
+    /// further updates would only lower them.
     fn raises(&self, values: &mut [f64], scale: f64) -> bool {
         let mut raised = false;
         for position in 0..values.len() {
@@ -297,10 +292,9 @@ impl<'a, N: Number> Rows<'a, N> {
         raised
     }
 
-    /// Updates all values of a candidate lower bound in place. Results are multiplied by `scale` to
-    /// account for rounding. Returns `true` if a value was lowered. If no value was lowered, the
-    /// values are lower bounds. The selected rows leave the component with probability 1, and under
-    /// these rows the values only grow towards the values of the policy.
+    /// Updates all values of a candidate lower bound in place. Results are multiplied by `scale` to account for
+    /// rounding. Returns `true` if a value was lowered. If none was lowered, the values are lower bounds,
+    /// because further updates with the same rows would only raise them.
     fn lowers(&self, values: &mut [f64], scale: f64) -> bool {
         let mut lowered = false;
         for position in 0..values.len() {
@@ -312,8 +306,8 @@ impl<'a, N: Number> Rows<'a, N> {
     }
 
     fn enclosed(&self, quotient: &Quotient<N>, lower: &[f64], upper: &[f64]) -> Enclosed<N> {
-        // The choices that maintain the upper bound (for a minimum) or the lower bound (for a
-        // maximum) form a policy whose values are within both bounds.
+        // The best rows for the upper bound (minimum) or for the lower bound (maximum) form a policy whose
+        // values are within both bounds.
         let maintained = if self.direction == Direction::Min { upper } else { lower };
         let blocks = quotient.blocks();
         let mut result = Enclosed {

@@ -12,13 +12,13 @@ use crate::solve::quotient::Quotient;
 use crate::solve::users::{Users, owners};
 use crate::solve::work::Work;
 
-/// Upper limit on the number of rounds of policy iteration. If it is reached, the last policy may
-/// not be optimal; in doubles, the certificate bounds its error.
+/// Upper limit on the number of rounds of policy iteration. If it is reached, the last policy may not be
+/// optimal. In doubles, its error is bounded afterwards.
 const MAX_ROUNDS: usize = 1000;
-/// Least and greatest number of improvement sweeps before the chain is solved again, in large
-/// components in doubles. Otherwise there is one sweep.
+/// Least and greatest number of sweeps that improve the policy before its chain is solved again. Only for large
+/// components in doubles; otherwise there is one sweep.
 const SWEEPS: (u64, u64) = (2, 40);
-/// Number of entries that a sweep evaluates in the time in which elimination processes one entry.
+/// Number of entries that a sweep evaluates in the time that elimination needs for one entry.
 const SWEEP_SPEED: u64 = 4;
 /// Number of blocks (merged end components) from which on several sweeps per round save time, in
 /// doubles.
@@ -49,8 +49,8 @@ pub fn iterate<N: Number>(
     let large = !N::EXACT && quotient.blocks() >= SWEEP_MIN_BLOCKS;
     for _ in 0..MAX_ROUNDS {
         let mut improved = false;
-        // Sweeps save time while they take no longer than elimination. Without fill-in, elimination
-        // is fast.
+        // The sweeps may take about as long as the last elimination. Without fill-in, elimination is fast, so
+        // there are few sweeps.
         let eliminated = work.touched().saturating_sub(touched).saturating_mul(SWEEP_SPEED);
         let sweeps =
             eliminated.checked_div(quotient.rows.columns.len() as u64).unwrap_or(0).clamp(SWEEPS.0, SWEEPS.1);
@@ -74,10 +74,9 @@ fn chain<N: Number>(quotient: &Quotient<N>, policy: &[u32], work: &mut Work) -> 
     Chain { rows: &quotient.rows, policy, costs: None }.solve(work)
 }
 
-/// Switches each block (merged end component) to its best row (choice) if this row is clearly
-/// better than the current one. With `sweep`, rows are evaluated with the updated values, otherwise
-/// with the values before the call. Returns `true` if a row was switched, and `None` if exact
-/// arithmetic exceeds its budget.
+/// Switches each block (merged end component) to a row (choice) that is clearly better than the current one, if
+/// there is one. With `sweep`, rows are evaluated with the updated values, otherwise with the values before the
+/// call. Returns `true` if a row was switched, and `None` if exact arithmetic exceeds its budget.
 fn improve<N: Number>(
     quotient: &Quotient<N>,
     policy: &mut [u32],
@@ -95,7 +94,7 @@ fn improve<N: Number>(
             }
             let value = quotient.rows.apply(row, old.as_deref().unwrap_or(values));
             work.spend(&value, quotient.rows.range(row).len())?;
-            // Only clear improvements count, so rounding cannot cause a cycle of policies.
+            // Only clear improvements count, so that rounding causes no endless alternation between policies.
             let better = match direction {
                 Direction::Min => value.clearly_less(&values[block]),
                 Direction::Max => values[block].clearly_less(&value),

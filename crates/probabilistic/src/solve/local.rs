@@ -27,7 +27,8 @@ pub struct Local<N> {
     pub paid: Vec<bool>,
     /// Greatest number of transitions of a choice, including those that leave the set.
     pub widest: usize,
-    /// Whether a product was so small that doubles lose digits.
+    /// Whether the product of a probability and the value of a successor outside the set was so small that
+    /// doubles lose digits.
     pub tiny: bool,
 }
 
@@ -94,11 +95,10 @@ pub struct EndComponents {
     pub alive: Vec<bool>,
 }
 
-/// Computes the maximal end components (de Alfaro 1997) that consist of choices that `eligible`
-/// accepts. Only closed choices count, i.e. those whose targets are all in `local`. The graph of
-/// these choices is decomposed into strongly connected components, and choices that leave their
-/// component are removed, until no choice is removed. Before that, choices into states without
-/// remaining choices are removed; if there are no end components, this removes all choices.
+/// Computes the maximal end components (de Alfaro 1997) that consist of choices that `eligible` accepts. Only
+/// closed choices count, i.e. those whose targets are all in `local`. The graph of these choices is decomposed
+/// into strongly connected components, and choices that leave their component are removed, until no choice is
+/// removed.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "the start of the next one is there, because the end is listed, too"
@@ -209,11 +209,10 @@ fn whole<N: Number>(local: &Local<N>, alive: &[bool]) -> Option<EndComponents> {
     })
 }
 
-/// Computes the states from which the component can be left with probability 1, and a policy that
-/// does so. The result is the greatest set with two properties: each of its states has a choice
-/// that stays in the set or leaves the component, and by such choices an exit is reachable.
+/// Computes the states from which some policy leaves the component with probability 1, and such a policy.
 ///
-/// `fits` returns `true` for a choice whose successors outside the component are acceptable.
+/// Only choices that `fits` accepts are used; it rejects choices with unacceptable successors outside the
+/// component.
 pub fn attractor<N: Number>(local: &Local<N>, fits: impl Fn(usize) -> bool) -> (Vec<bool>, Vec<u32>) {
     let n = local.states.len();
     let owners = local.owners();

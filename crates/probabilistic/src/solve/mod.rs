@@ -1,9 +1,9 @@
 //! Solves a problem on a Markov decision process: computes the value of each state with bounds, and an optimal
 //! policy.
 //!
-//! The strongly connected components of the graph are solved in reverse topological order. The
-//! values of an acyclic part (e.g. a battery that is never recharged) therefore result from a
-//! single sweep. Inside a component:
+//! The strongly connected components of the graph are solved in reverse topological order. The values of an
+//! acyclic part (e.g. a battery that is never recharged) therefore result from a single sweep. Inside a
+//! component:
 //!
 //! 1. Values 0, 1 and ∞ follow from the graph alone (Forejt et al., "Automated Verification
 //!    Techniques for Probabilistic Systems", SFM 2011, section 4).
@@ -11,7 +11,7 @@
 //!    TCS 735, 2018; for zero-reward end components: Bertsekas and Tsitsiklis, Math. OR 16(3),
 //!    1991).
 //! 3. Policy iteration solves the Markov chain of each policy directly.
-//! 4. In doubles, a certificate bounds the error of the result (`certify`), or another method (`doubles`).
+//! 4. In doubles, a certificate (`certify`) or another method (`doubles`) bounds the error of the result.
 //!
 //! Small components of a simple form are solved by shortest paths instead (`ways`).
 
@@ -169,18 +169,19 @@ impl<N: Number> Run<'_, N> {
         }
         if let Some((value, choice, spread)) = best {
             if !N::EXACT {
-                // Values are never negative. If the value is 0, only the error of the selected
-                // choice counts.
-                self.solution.errors[state] = if value.is_zero() { spread } else { error };
+                // Values are never negative. So a least value of 0 has only the error of the selected choice. A greatest
+                // value of 0 may hide a choice whose value underflowed.
+                let is_least = self.problem.direction == Direction::Min && value.is_zero();
+                self.solution.errors[state] = if is_least { spread } else { error };
             }
             self.solution.values[state] = value;
             self.solution.policy[state] = choice;
         }
     }
 
-    /// Returns the value and the error of a choice of a component with a single state. With
-    /// `must_be_sure`, returns `None` for a choice that does not surely lead to a terminal state;
-    /// with rewards, also for a choice that never leaves the state.
+    /// Returns the value of a choice in a state that is a component by itself, and an upper limit on the error
+    /// of the value. With `must_be_sure`, returns `None` for a choice after which a terminal state is not
+    /// reached with probability 1. With rewards, also returns `None` for a choice that never leaves the state.
     fn single_choice(&mut self, state: usize, choice: usize, must_be_sure: bool) -> Option<(N, f64)> {
         let mdp = self.problem.mdp;
         let (mut sum, mut leaving, mut looping) = (self.problem.reward(choice), N::zero(), false);
@@ -204,7 +205,7 @@ impl<N: Number> Run<'_, N> {
                 tiny |= !value.is_zero();
                 whole &= is_whole(value.to_f64());
             }
-            // An exceeded budget is detected after the state.
+            // If the budget is exceeded, `solve_components` notices this after the state.
             let _ = self.work.spend(&sum, 2);
         }
         if leaving.is_zero() {
@@ -219,8 +220,7 @@ impl<N: Number> Run<'_, N> {
         error *= 1.0 + terms * f64::EPSILON;
         error += if error > 0.0 || unsure { f64::MIN_POSITIVE } else { 0.0 };
         let size = sum.to_f64();
-        // A deterministic choice with an integral reward and an integral value causes no rounding
-        // error.
+        // A choice with one successor, whose reward and value are integers, causes no rounding error.
         if whole && error == 0.0 && terms < 7.0 && !looping && is_whole(size) {
             return Some((sum, 0.0));
         }

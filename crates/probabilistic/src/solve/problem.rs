@@ -95,7 +95,8 @@ pub struct Solution<N> {
     /// The states from which a terminal state is reached with probability 1. For the greatest
     /// probability and the least reward, some policy reaches it; otherwise, all policies do.
     pub sure: FixedBitSet,
-    /// The choice of each state, or [`NONE`](crate::solve::NONE) if the state needs no choice.
+    /// The choice of each state. [`NONE`](crate::solve::NONE) if no choice was computed, for example in
+    /// terminal states.
     pub policy: Vec<u32>,
 }
 
@@ -115,8 +116,8 @@ impl<N: Number> Solution<N> {
     }
 }
 
-/// Products of positive doubles below this limit lose digits. The limit is added to the error of
-/// values that depend on such products.
+/// Products of positive doubles below this limit may have lost digits by underflow. The limit is added to the
+/// error of values that depend on such products.
 pub(super) const UNDERFLOW_BOUND: f64 = 1e-280;
 
 pub(crate) struct Run<'a, N> {

@@ -1,18 +1,19 @@
-//! Solves components by shortest paths if each choice either leaves the component or leads to a
-//! single other state. In both cases, the choice may also loop.
+//! Solves components of at most 64 states by shortest paths if each choice leads either out of the component
+//! or to a single other state of it. In both cases, the choice may also loop.
 //!
-//! Reconfigurations that succeed, or that are repeated until they succeed, have this form. Nearly
-//! all components of a co-adaptation process consist of them. The best values are propagated from
-//! the choices that leave the component (Dijkstra 1959). No system of equations is solved, and the
-//! only rounding errors are those of a few sums.
+//! Reconfigurations that succeed, or that are repeated until they succeed, have this form. Nearly all
+//! components of a co-adaptation process consist of them. The best values are propagated from the choices
+//! that leave the component (Dijkstra 1959). Only least rewards and greatest probabilities need this; the
+//! other values are 0 or infinite. No system of equations is solved, and the only rounding errors are those
+//! of a few sums and quotients.
 
 use crate::mdp::dense;
 use crate::number::{Number, count, is_whole};
 use crate::solve::local::NONE;
 use crate::solve::problem::{Direction, Run};
 
-/// Upper limit on the number of states of a component that is solved by shortest paths, because the
-/// best open state is found by linear search.
+/// Upper limit on the number of states of a component that is solved by shortest paths, because the next state
+/// is found by linear search.
 const MAX_STATES: usize = 64;
 
 /// The working memory of the shortest-path algorithm, reused for all components.
@@ -82,8 +83,8 @@ impl<N: Number> Run<'_, N> {
         match (self.problem.rewards.is_some(), by_choice) {
             (false, true) => self.greatest_probability(component, buffers),
             (true, true) => self.least_reward(component, buffers),
-            // The component is strongly connected, so from each state some policy never leaves it.
-            // The greatest expected reward is infinite then.
+            // The component is strongly connected, so from each state some policy never leaves it. The greatest
+            // expected reward is therefore infinite.
             (true, false) => component.iter().for_each(|state| {
                 self.solution.infinite.insert(*state as usize);
             }),
@@ -198,9 +199,9 @@ impl<N: Number> Run<'_, N> {
         self.write(component, buffers);
     }
 
-    /// Evaluates the choices that leave the component, and stores the best such choice of each
-    /// state in `buffers`. With `must_be_sure`, only choices that surely lead to a terminal state
-    /// count.
+    /// Evaluates the choices that leave the component, and stores the best such choice of each state in
+    /// `buffers`. With `must_be_sure`, only choices count after which a terminal state is reached with
+    /// probability 1.
     fn leave(&mut self, component: &[u32], buffers: &mut PathBuffers<N>, must_be_sure: bool) {
         for (from, choice, _) in &buffers.exits {
             let state = component[*from as usize] as usize;
@@ -255,8 +256,8 @@ impl<N: Number> PathBuffers<N> {
         self.whole = !N::EXACT && self.steps.iter().all(whole);
     }
 
-    /// Propagates the best values backwards along the steps, from the state with the best value on
-    /// (Dijkstra).
+    /// Propagates the best values backwards along the steps (choices that lead to another state of the
+    /// component), starting from the state with the best value (Dijkstra).
     fn spread(&mut self, direction: Direction) {
         loop {
             let mut next: Option<(usize, &N)> = None;

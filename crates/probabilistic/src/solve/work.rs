@@ -13,7 +13,7 @@ pub const TIGHT: f64 = 1e-7;
 #[derive(Debug, Clone, Copy)]
 pub struct Work {
     remaining: u64,
-    /// Required width of bounds, relative to the value. Narrower bounds are not computed.
+    /// Required width of bounds, relative to the value. A method stops as soon as its bounds are narrower.
     pub tight: f64,
     spare: u64,
     touched: u64,
@@ -32,11 +32,11 @@ impl Work {
         Self { remaining, tight: TIGHT, spare: SPARE_BUDGET, touched: 0 }
     }
 
-    /// Subtracts the cost of operations whose results are about as long as `result`. Returns `None`
-    /// if the budget is exhausted. Operations in doubles cost nothing and always yield `Some(())`.
+    /// Subtracts the cost of `operations` operations whose results are about as long as `result`. Returns
+    /// `None` if the budget is exhausted. Operations in doubles cost nothing and always yield `Some(())`.
     ///
-    /// The cost is quadratic in the length because fractions are reduced. The constant part is the
-    /// cost of allocating long fractions.
+    /// The cost is quadratic in the length because fractions are reduced. Long fractions also have a constant
+    /// cost, for allocating memory.
     pub fn spend<N: Number>(&mut self, result: &N, operations: usize) -> Option<()> {
         if !N::EXACT {
             return Some(());

@@ -63,8 +63,10 @@ impl CostPartitioning {
 }
 
 /// Returns at most `MAX_PARTITIONINGS` saturated cost partitionings, sorted by decreasing heuristic value of
-/// the initial state. The list is empty if none of them is better for the initial state than the best single
-/// projection, if fewer than two projections are useful, or if these have too many transitions.
+/// the initial state. A projection is useful if its value for the initial state is positive and no projection
+/// to fewer variables has equal goal distances. The list is empty if fewer than two projections are useful,
+/// if these have too many transitions, or if no cost partitioning is better for the initial state than the
+/// best single projection.
 pub(super) fn saturated_cost_partitionings(
     context: Context<'_>,
     projections: &[Projection],

@@ -57,9 +57,10 @@ impl Lists {
 }
 
 pub(super) struct DeleteRelaxation {
-    /// Cost of each payer. Payers are the operators, followed by one payer without cost.
+    /// Cost of each payer. The payer of a rule is the operator that the rule belongs to. The last payer has
+    /// no cost and pays for rules without an operator.
     pub(super) costs: Vec<u64>,
-    /// For each rule: the index in `costs` of its payer, which is an operator or the payer without cost.
+    /// For each rule: the index of its payer in `costs`.
     pub(super) payers: Vec<u32>,
     /// For each rule: the facts of its condition, which is never empty.
     pub(super) required: Lists,

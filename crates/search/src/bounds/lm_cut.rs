@@ -26,9 +26,9 @@ const WORK_PER_VISIT: u64 = 8;
 const UNREACHABLE: u64 = u64::MAX;
 const NONE: u32 = u32::MAX;
 
-/// Returns the LM-cut value of the initial state, or `None` if an operator costs too much or the goal is
-/// unreachable. If a limit is reached, returns the sum over the landmarks that were found, which is
-/// also a lower bound.
+/// Returns the LM-cut value of the initial state. Returns `None` if an operator costs more than 2^40 or the
+/// goal is unreachable in the delete relaxation. If a limit is reached, returns the sum over the landmarks
+/// that were found, which is also a lower bound.
 pub fn landmark_cut_bound(task: &Task, limits: &Limits) -> Option<u64> {
     let mut cut = LandmarkCut::new(task)?;
     let stops = |work| work > MAX_WORK || limits.reached();

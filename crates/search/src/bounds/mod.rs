@@ -1,4 +1,4 @@
-//! Admissible heuristics, and upper bounds on the number of steps of cheaper plans.
+//! Admissible heuristics, and upper bounds on the number of steps of plans within a cost limit.
 //!
 //! A projection to a few finite-domain variables is solved exactly. Dijkstra's algorithm from the abstract
 //! goal states yields an admissible and consistent heuristic: a pattern database \[1\]. Dynamic programming
@@ -30,7 +30,7 @@ use task::number::Int;
 use task::task::quantity::NumericId;
 use task::task::{State, VariableId};
 
-/// Maximum number of steps up to which step bounds are computed.
+/// Upper bounds on the number of steps are computed only if they are below this number.
 const STEP_LIMIT: usize = 4_000;
 /// Maximum number of abstract states of a projection to two variables.
 const STATE_LIMIT: usize = 20_000;
@@ -45,7 +45,7 @@ const MAX_PROJECTIONS: usize = 12;
 pub struct Bounds {
     pub projections: Vec<Projection>,
     resources: Vec<Resource>,
-    /// Cost partitionings; empty if they do not improve the heuristic.
+    /// Cost partitionings; empty if they were not computed or do not improve the heuristic.
     partitions: Vec<CostPartitioning>,
     /// Further projections, which are evaluated only if there are cost partitionings.
     further: Vec<Projection>,
@@ -54,10 +54,10 @@ pub struct Bounds {
 /// The plans within a limit on cost and steps: their maximum length, and the operators of each step.
 pub struct ReachableWindow {
     /// Upper bound on the number of steps of plans within the cost limit. `None` if there is no cost limit,
-    /// or no projection yields a bound of at most `STEP_LIMIT`.
+    /// or no projection proves a bound below `STEP_LIMIT`.
     pub steps: Option<usize>,
-    /// For each step and each operator: whether the operator can occur at the step. The number of steps is the
-    /// lesser of `steps` and the horizon of the query; 0 if there is neither.
+    /// For each step and each operator: whether the operator can occur at the step. The number of steps is
+    /// the lesser of `steps` and the horizon given to [`Bounds::window`]; 0 if there is neither.
     pub allowed: Vec<Vec<bool>>,
 }
 
@@ -155,9 +155,9 @@ impl Bounds {
         Some(best)
     }
 
-    /// Returns lower bounds on the resources that a state must have to reach the goal or a replenishment.
-    /// Each item is a numeric variable, a projection, and the required amount for each abstract state of the
-    /// projection; `None` means that no amount suffices.
+    /// Returns lower bounds on the resources that a state must have to reach the goal or an operator that may
+    /// replenish the resource. Each item is a numeric variable, a projection, and the required amount for
+    /// each abstract state of the projection; `None` means that no amount suffices.
     pub fn needs(&self) -> impl Iterator<Item = (NumericId, &Projection, &[Option<Int>])> {
         let projection = |position: &usize| &self.projections[*position];
         self.resources.iter().flat_map(move |resource| {

@@ -22,8 +22,8 @@ pub struct Projection {
     sizes: Vec<usize>,
     initial: u32,
     goals: Vec<u32>,
-    /// For each operator: its cost with the cheapest designs, and its transitions. There are no transitions
-    /// if the operator neither reads nor changes the pattern.
+    /// For each operator: its cost with the cheapest designs (0 if it is negative), and its transitions.
+    /// There are no transitions if the operator neither reads nor changes the pattern.
     operators: Vec<(Int, Vec<Transition>)>,
     /// Minimum cost of an operator that neither reads nor changes the pattern; `None` if there is no such
     /// operator.
@@ -57,8 +57,9 @@ impl Projection {
         projection.goals = projection.matching(&goal);
         for operator in limits.watch(&task.operators) {
             let operator = operator?;
-            // Dijkstra's algorithm requires non-negative costs. Counting a negative cost as 0 keeps the
-            // transitions.
+            // Dijkstra's algorithm requires non-negative costs. An operator of negative cost is kept with
+            // cost 0. The distances are then no lower bounds, but still show from where the goal is
+            // reachable.
             let cost = operator.cost.minimum().max(0);
             let before = projection.required(&operator.condition.facts);
             let after = projection.required(&operator.effects);
@@ -336,7 +337,7 @@ impl Projection {
     }
 
     /// Returns an upper bound on the number of steps of a plan with cost at most `limit`. Returns `None` if
-    /// there is no bound of at most `max_steps`.
+    /// the projection proves no bound below `max_steps`.
     pub(crate) fn step_bound(
         &self,
         limit: Int,
@@ -358,7 +359,7 @@ impl Projection {
             }
             bound = step;
             let next = self.advance(&costs);
-            // At a fixpoint, the number of steps is not bounded.
+            // At a fixpoint, the projection proves no bound.
             if next == costs {
                 return Ok(None);
             }

@@ -1,9 +1,9 @@
 //! Lower bounds on the consumption of a resource until it is replenished or the goal is reached.
 //!
-//! A numeric variable is a resource if every operator that can only lower the variable requires that the new
-//! value is at least 0. The minimum consumption in a projection, on the way to the goal or to a replenishing
-//! operator, is a lower bound on the amount that a state must have. This is the resource-to-go of constrained
-//! shortest paths \[1\].
+//! A numeric variable is a resource if each operator that changes it either may raise it (replenish it) or
+//! requires that the new value is at least 0. The minimum consumption in a projection, on the way to the goal
+//! or to a replenishing operator, is a lower bound on the amount that a state must have. This is the
+//! resource-to-go of constrained shortest paths \[1\].
 //!
 //! \[1\] I. Dumitrescu, N. Boland: Improved preprocessing, labeling and scaling algorithms for the
 //! weight-constrained shortest path problem, Networks 42(3), 2003.
@@ -25,7 +25,7 @@ pub(super) struct Resource {
 
 impl Resource {
     /// Returns `false` if a projection proves that the state has too little of the resource to reach the goal
-    /// or a replenishment. A value below 0 is harmless if nothing is required.
+    /// or to replenish the resource. A value below 0 is harmless if nothing is required.
     pub(super) fn has_enough_resources(&self, state: &State, projections: &[Projection]) -> bool {
         let amount = state.numbers[self.variable.index()];
         self.needs.iter().all(|(projection, needs)| {

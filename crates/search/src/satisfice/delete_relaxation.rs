@@ -51,7 +51,7 @@ pub(super) struct Achiever {
 #[derive(Debug, Clone)]
 pub(super) enum Gain {
     Constant(f64),
-    /// A linear expression over the state before the operator: constant and terms.
+    /// A linear expression over the numbers of the state before the operator: constant and terms.
     Linear(f64, Vec<(NumericId, f64)>),
     /// A single application is assumed to suffice.
     Unlimited,
@@ -361,9 +361,9 @@ impl<'a, N: TaskNumber> Builder<'a, N> {
     }
 }
 
-/// Returns the maximum increase of an expression by one application of the operator. Returns `None` if the
-/// increase is never positive. The sign of a constant is decided with exact arithmetic, because a comparison that no
-/// operator increases counts as unreachable.
+/// Returns the increase of an expression by one application of the operator with the most favourable designs.
+/// Returns `None` if the increase is a constant that is not positive. Its sign is decided with exact
+/// arithmetic, because a comparison that no operator increases counts as unreachable.
 fn gain<N: TaskNumber>(operator: &Operator<N>, sum: &[(NumericId, N)]) -> Option<Gain> {
     let mut gain = N::zero();
     let mut terms: Vec<(NumericId, f64)> = Vec::new();

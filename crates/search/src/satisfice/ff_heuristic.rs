@@ -70,10 +70,10 @@ impl FfHeuristic {
         }
     }
 
-    /// Returns the cost of a relaxed plan that achieves all `targets` under the operator costs `prices`, each at
-    /// least 1. The cost is capped at `MAX_COST`. Returns `None` if there is no relaxed plan. Afterwards `applicable` contains the
-    /// operators that may be applicable in the state, and `preferred` contains those of them that belong to
-    /// the relaxed plan.
+    /// Returns the cost of a relaxed plan that achieves all `targets`, capped at `MAX_COST`. `prices` are the
+    /// operator costs, each at least 1. Returns `None` if there is no relaxed plan. Afterwards `applicable`
+    /// contains the operators that may be applicable in the state, and `preferred` contains those of them
+    /// that belong to the relaxed plan.
     pub(super) fn estimate<N: TaskNumber>(
         &mut self,
         relaxation: &Relaxation<N>,

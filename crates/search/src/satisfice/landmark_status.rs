@@ -17,7 +17,7 @@ pub(super) struct LandmarkStatus {
     landmarks: Landmarks,
     /// For each landmark: the facts among its propositions, and the other propositions.
     facts: Vec<(Vec<Fact>, Vec<Proposition>)>,
-    /// For each proposition: `true` if it achieves an unreached landmark whose predecessors are reached.
+    /// For each proposition: `true` if it belongs to an unreached landmark whose predecessors are reached.
     wanted: Vec<bool>,
     marks: Vec<Proposition>,
     holds: Vec<bool>,

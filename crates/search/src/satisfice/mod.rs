@@ -3,13 +3,13 @@
 //!
 //! `delete_relaxation` builds the delete relaxation, `ff_heuristic` computes relaxed plans, `landmarks` finds
 //! landmarks, and `landmark_status` tracks which landmarks a path has reached. `search` implements the search
-//! with an `alternating_open_list` over the states in a `store`.
+//! with an `alternating_open_list` over the states in a `store`. `plan_improvement` makes a plan cheaper.
 //!
-//! The heuristic guides the search, but proves no plan optimal. Unsolvability is reported only if a search has
-//! exhausted the state space, except for proved dead ends.
+//! The heuristic guides the search, but proves no plan optimal. Unsolvability is reported only if a search
+//! has visited all reachable states except those behind proved dead ends.
 //!
-//! \[1\] S. Richter, M. Westphal: The LAMA planner: guiding cost-based anytime planning with
-//! landmarks, JAIR 39, 2010.
+//! \[1\] S. Richter, M. Westphal: The LAMA planner: guiding cost-based anytime planning with landmarks, JAIR
+//! 39, 2010.
 
 pub mod alternating_open_list;
 pub mod bucket_queue;
@@ -130,8 +130,10 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
             }
         };
         let is_last = self.phase.saturating_add(1) == SEARCH_SEQUENCE.len();
-        // A search that finds a worse plan than other components ends early, and the next search, which is less
-        // greedy, may find a better one. It would take long to search for a plan below the limit.
+        // Except in the last search, the limit is the cost of the plan that these searches found last, even
+        // if another component knows a cheaper plan. A search may then find a worse plan than the known one,
+        // but it ends early, and the next search is less greedy. Finding a plan below `limit` would take
+        // long.
         let own_limit = if is_last { limit } else { self.cost.as_ref() };
         let outcome = search.run(&mut self.known, own_limit, work, self.limits, &mut self.figures);
         let is_large = search.size() > self.limits.room() / MEMORY_SHARE;
@@ -159,8 +161,9 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
         }
     }
 
-    /// Searches for a plan that is cheaper than `plan`, with about `work` work units, by replacing parts of the
-    /// plan. Subtracts the work done from `work`.
+    /// Searches for a plan that is cheaper than `plan`, with about `work` work units, by replacing parts of
+    /// the plan. If `plan` is not cheaper than the last plan of an earlier call, the search of that call is
+    /// resumed. Returns `None` if no cheaper plan was found. Subtracts the work done from `work`.
     ///
     /// # Errors
     /// Fails if the deadline has passed or the interrupt flag is set.

@@ -4,11 +4,12 @@
 //! the previous one by half. A lazy weighted A\* search looks for cheaper steps from the state before the
 //! segment to the goal of the segment ([`SegmentGoal`]), with a limited number of evaluated states. A pass
 //! without a success is followed by a pass with longer segments. After the longest segments, the limit on
-//! evaluated states doubles. Before most passes, steps that do not interfere are exchanged at random, so that
-//! related steps meet in a segment.
+//! evaluated states doubles, and the segments are short again. Between passes, steps that do not interfere
+//! are exchanged at random, so that related steps meet in a segment. The steps of very long plans, and of all
+//! plans of tasks with derived variables, keep their order.
 //!
-//! As in \[1\], which calls segments windows, but with random linear extensions of the plan instead of blocks of
-//! a partial order.
+//! As in \[1\], which calls segments windows, but with random linear extensions of the plan instead of blocks
+//! of a partial order.
 //!
 //! \[1\] F. H. Siddiqui, P. Haslum: Continuing plan quality optimisation, JAIR 54, 2015.
 
@@ -36,7 +37,7 @@ const MIN_EVALUATIONS: u64 = 100;
 const MAX_DOUBLINGS: u32 = 8;
 /// Weight of the heuristic in every second pass; in the others it is 1.
 const GREEDY_WEIGHT: u64 = 2;
-/// Maximum number of remembered segments.
+/// Maximum number of segments whose unsuccessful search is remembered.
 const MAX_FAILURES: usize = 1 << 18;
 
 /// A resumable search for segments of a plan that can be replaced by cheaper steps.
@@ -54,9 +55,10 @@ pub(super) struct PlanImprovement<N> {
     /// `true` if the current pass uses [`GREEDY_WEIGHT`].
     is_greedy: bool,
     has_improved: bool,
-    /// Search of the current segment, with its remaining work units, its end, and its key in `failures`.
+    /// Current segment and its search; `None` before the next segment begins.
     current: Option<SegmentSearch<N>>,
-    /// For each segment without success, by the hash of its state and goal: the doublings of its search.
+    /// Unsuccessful searches, by the hash of first state, goal facts and weight: the number of times that the
+    /// limit on evaluated states was doubled.
     failures: FxHashMap<u64, u32>,
 }
 
@@ -97,14 +99,14 @@ impl<N: TaskNumber> PlanImprovement<N> {
         self.doublings > MAX_DOUBLINGS
     }
 
-    /// Replaces the plan by a cheaper one. The current pass continues.
+    /// Replaces the plan, and discards the search of the current segment.
     fn replace(&mut self, context: &SearchContext<'_, N>, plan: GroundPlan<N>, states: Vec<State<N>>) {
         self.order = StepOrder::new(context.task, &plan.steps);
         (self.plan, self.states, self.current) = (plan, states, None);
     }
 
     /// Searches with about `work` work units, and returns the first cheaper plan. Returns `Ok(None)` if the
-    /// work is used up. Subtracts the work done from `work`.
+    /// work is used up or the search has ended. Subtracts the work done from `work`.
     pub(super) fn run(
         &mut self,
         context: &mut SearchContext<'_, N>,
@@ -140,7 +142,8 @@ impl<N: TaskNumber> PlanImprovement<N> {
         Ok(None)
     }
 
-    /// Replaces the steps of the current segment by cheaper ones.
+    /// Replaces the steps of the current segment by the steps `part`. Returns the new plan, or `None` if it
+    /// would not be a cheaper plan.
     fn adopt(&mut self, context: &SearchContext<'_, N>, part: &[GroundStep]) -> Option<GroundPlan<N>> {
         let segment = self.current.take()?;
         let (before, after) = (&self.plan.steps[..self.next], &self.plan.steps[segment.end..]);
@@ -162,11 +165,11 @@ impl<N: TaskNumber> PlanImprovement<N> {
         }
     }
 
-    /// Starts the search of the next segment that was not yet searched with the current limit. Ends the pass
-    /// after the last segment.
+    /// Starts the search of the next segment. Skips the segment if it costs nothing, or was already searched
+    /// with at least the current limit. Ends the pass after the last segment.
     fn begin_segment(&mut self, context: &mut SearchContext<'_, N>) {
         let count = self.plan.steps.len();
-        // The segments that reach the end of the plan are the same.
+        // The segment before has already reached the end of the plan.
         let is_last = self.next > 0 && self.next.saturating_add(self.segment / 2) >= count;
         if is_last || self.next >= count {
             self.end_pass(context);

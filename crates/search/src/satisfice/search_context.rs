@@ -16,8 +16,8 @@ use crate::satisfice::landmarks::Landmarks;
 use crate::search::design_combinations::pareto_optimal_combinations;
 use crate::search::{MutexPairs, SearchStatistics, is_monotone};
 
-/// The next search begins if the search needs more 64-bit words than the memory limit in bytes, divided by this
-/// number. So a search may use half of the available memory.
+/// Divisor of the memory limit in bytes. A search ends if it needs more 64-bit words than the quotient, i.e.
+/// more than half of the available memory.
 pub(super) const MEMORY_SHARE: usize = 16;
 /// Work units charged for generating a successor and looking it up in the store.
 pub(super) const GENERATION_COST: u64 = 200;
@@ -37,7 +37,8 @@ pub(super) struct SearchContext<'a, N> {
     pub(super) status: LandmarkStatus,
     /// The h² mutexes; `None` if they are not computed yet, or their computation exceeded its limits.
     pub(super) pairs: Option<MutexPairs>,
-    /// Operator costs of the searches: all 1, and scaled ([`SearchContext::operator_costs`]).
+    /// Operator costs of the searches (all 1, and scaled as by [`SearchContext::operator_costs`]), once
+    /// computed.
     prices: [Option<Arc<[u32]>>; 2],
     steps: Vec<Step<N>>,
     /// Index of the first step of each operator, followed by the total number of steps.
@@ -91,7 +92,7 @@ impl<'a, N: TaskNumber> SearchContext<'a, N> {
         self.relaxation.propositions.saturating_add(self.relaxation.operators.len()) as u64
     }
 
-    /// Returns the number of work units between two states of the counters of a search.
+    /// Returns the number of work units done between two readings of the counters of a search.
     pub(super) fn work(&self, before: SearchStatistics, after: SearchStatistics) -> u64 {
         let evaluated = after.evaluated.saturating_sub(before.evaluated);
         let generated = after.generated.saturating_sub(before.generated);

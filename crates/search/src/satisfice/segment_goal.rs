@@ -1,9 +1,10 @@
-//! Goal of a search: the goal of the task, or the goal of a segment of a plan.
+//! Goal of a segment of a plan.
 //!
-//! A segment is a sequence of consecutive steps of a plan. Steps that replace a segment must lead to a state in
-//! which the steps after the segment, its *suffix*, are still a plan. The facts that the suffix needs are
-//! computed by regression [1, section 3]. If the facts do not describe what the suffix needs (with derived
-//! variables, conditional effects, disjunctions or numbers), executing the suffix decides.
+//! A segment is a sequence of consecutive steps of a plan. Steps that replace a segment must lead to a state
+//! in which the steps after the segment, its *suffix*, are still a plan. The facts that the suffix needs are
+//! computed by regression \[1, section 3\]. With disjunctions or numbers, these facts may not suffice. A
+//! state is then also tested by executing the suffix. With derived variables or conditional effects, nothing
+//! is regressed: the state must have all basic facts of the state in which the replaced segment ended.
 //!
 //! \[1\] J. Rintanen: Regression for classical and nondeterministic planning, ECAI 2008.
 
@@ -12,7 +13,8 @@ use task::task::number::TaskNumber;
 use task::task::{Fact, State, Task};
 
 pub(super) struct SegmentGoal {
-    /// Facts that every goal state of the segment has, in ascending order.
+    /// Facts that a goal state of the segment must have, in ascending order: the regressed facts or, without
+    /// regression, all basic facts of the state in which the replaced segment ended.
     pub(super) facts: Vec<Fact>,
     suffix: Vec<GroundStep>,
     /// `true` if the facts suffice: the suffix is executable in every state that has them.

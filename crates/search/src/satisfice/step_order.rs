@@ -1,7 +1,8 @@
 //! Order of the steps of a plan: which steps interfere, and random linear extensions of this partial order.
 //!
-//! Two steps interfere if one of them assigns a variable that the other reads or assigns [1]. Exchanging
-//! neighbours that do not interfere changes neither the result nor the applicability.
+//! Two steps interfere if one of them assigns a variable that the other reads or assigns \[1\]. Exchanging
+//! neighbours that do not interfere changes neither the result nor the applicability. With derived variables,
+//! or with more than `MAX_STEPS` steps, all steps count as interfering.
 //!
 //! \[1\] C. Bäckström: Computational aspects of reordering plans, JAIR 9, 1998.
 
@@ -18,15 +19,17 @@ use crate::random::Random;
 const MAX_STEPS: usize = 1_000;
 
 pub(super) struct StepOrder {
-    /// For each step: the earlier steps that must stay before it, in ascending order.
+    /// For each step: earlier steps that must stay before it, in ascending order. By transitivity, this
+    /// orders all interfering steps. Empty if all steps keep their order.
     before: Vec<Vec<u32>>,
 }
 
-/// A variable of a task: finite-domain or numeric.
+/// A variable of a task: whether it is numeric, and its index.
 type VariableKey = (bool, u32);
 
 impl StepOrder {
-    /// Computes which steps of a plan interfere. With derived variables, and in long plans, all steps do.
+    /// Computes which steps of a plan interfere. With derived variables, and in long plans, all steps count
+    /// as interfering.
     pub(super) fn new<N: TaskNumber>(task: &Task<N>, steps: &[GroundStep]) -> Self {
         let count = steps.len();
         if !task.axioms.is_empty() || count > MAX_STEPS {

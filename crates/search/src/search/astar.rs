@@ -3,12 +3,13 @@
 //!
 //! States with equal finite-domain variables are compared by cost and by numeric variables. If a higher value
 //! of a numeric variable is never worse (for example battery charge), a state dominates another state that
-//! costs at least as much and has at most the same values. This is label setting for resource-constrained
-//! shortest paths \[1\]. The result is exact if the search ends before its limits and no number overflows.
+//! costs at least as much and has no higher values. This is label setting for resource-constrained shortest
+//! paths \[1\]. The result is exact if the search ends before its limits and no number overflows.
 //!
 //! The open list of A\* is sorted by path cost plus heuristic value. Ties are broken by a lower bound on the
-//! number of steps, then by depth. A plan is optimal once no open node can lead to a cheaper plan, or to a
-//! plan of equal cost with fewer steps.
+//! number of steps, then by depth. A plan is optimal once no open node can lead to a cheaper plan. With the
+//! order `Fewest`, the search continues until no open node can lead to a plan of equal cost with fewer steps
+//! either.
 //!
 //! \[1\] M. Desrochers, F. Soumis: A generalized permanent labelling algorithm for the shortest path problem
 //! with time windows, INFOR 26(3), 1988.
@@ -38,17 +39,18 @@ const GENERATION_COST: u64 = 600;
 /// Work units charged for each operator that the stubborn-set computation visits.
 const STUBBORN_SET_COST: u64 = 10;
 
-/// Outcome of an optimal search.
+/// Outcome of a search for an optimal plan.
 #[derive(Debug)]
 pub enum SearchOutcome<N = Int> {
-    /// A cheapest plan. With the order `OpenListOrder::Fewest`, also the shortest among the cheapest plans.
+    /// A cheapest plan. If a single A\* search with the order `OpenListOrder::Fewest` found it, also the
+    /// shortest among the cheapest plans.
     Optimal(GroundPlan<N>),
     /// Proof that no plan exists (within the cost limit of the search, if it has one): no open node remains,
     /// and pruning never removes all cheapest plans.
     None,
-    /// No proof. Contains the best plan found if a limit on time, memory or states was reached, a number
-    /// overflowed, or the search was greedy. Contains `None` if no plan was found, or if the search proved that
-    /// no plan is cheaper than an external incumbent.
+    /// No proof, for example because a limit on time, memory or states was reached, a number overflowed, or
+    /// the search was greedy. Contains the best plan found. Contains `None` if no plan was found, or if the
+    /// search proved that no plan is cheaper than a plan of another component.
     Unknown(Option<GroundPlan<N>>),
 }
 
@@ -85,8 +87,8 @@ pub(super) enum OutOfMemoryPolicy {
     Needed,
 }
 
-/// Sort key of an open node: f value (heuristic value in greedy search), lower bound on steps, and a
-/// tie-breaker that prefers deep nodes.
+/// Sort key of an open node: f value (heuristic value in greedy search), lower bound on steps (of the plan or
+/// to the goal, see `OpenListOrder`; 0 in greedy search), and a tie-breaker that prefers deep nodes.
 type NodeKey<N> = (N, u32, u32);
 
 fn later(steps: u32) -> u32 {
@@ -132,8 +134,8 @@ pub struct AStar<'a, N, E> {
     next: State<N>,
 }
 
-/// Progress callback. Receives the cost of the incumbent, if any, and the lower bound on the cost of every
-/// plan.
+/// Progress callback. Receives the upper bound on the plan cost, if any (the cost of the best known plan, or
+/// a limit set by the caller), and the lower bound on the cost of every plan.
 pub type ProgressCallback<'a, N> = &'a mut dyn FnMut(Option<&N>, &N);
 
 impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
@@ -291,8 +293,9 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         self.own_work.saturating_add(self.lazy_heuristic.as_ref().map_or(0, |sharper| sharper.work()))
     }
 
-    /// Returns `true` if neither a node with this cost and number of steps nor any later node can improve the
-    /// incumbent. A greedy search stops at its first plan.
+    /// Returns `true` if neither a node with the f value `cost` and the lower bound `steps` on the number of
+    /// steps nor any later node can improve the plan that this search has found. A greedy search stops at its
+    /// first plan.
     fn can_stop_at(&self, cost: &N, steps: u32) -> bool {
         if self.order == OpenListOrder::Greedy {
             return self.best.is_some();
@@ -343,7 +346,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
 
     /// Returns the expected lower bound after `times` further doublings of the number of states. Assumes that
     /// each doubling raises the bound as much as the last doubling did. Returns `None` before the second
-    /// sample.
+    /// sample, or if a sum overflows.
     #[expect(clippy::arithmetic_side_effects, reason = "sums of costs that fit")]
     pub(super) fn forecast_lower_bound(&self, times: u32) -> Option<N> {
         let [.., before, now] = &self.progress[..] else { return None };
@@ -359,10 +362,10 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         self.store.bytes().saturating_add(self.open.bytes()) <= self.room()
     }
 
-    /// Returns `true` if the lower bound is expected to reach the cost of the incumbent before the memory
-    /// limit is reached. Assumes that each doubling of the number of states raises the bound as much as the
-    /// last doubling did. Also returns `true` if there is nothing to forecast from: no incumbent, fewer than
-    /// two samples, or a bound that does not rise.
+    /// Returns `true` if the lower bound is expected to reach the upper bound on the plan cost before the
+    /// memory limit is reached. Assumes that each doubling of the number of states raises the lower bound as
+    /// much as the last doubling did. Also returns `true` if there is nothing to forecast from: no upper
+    /// bound, fewer than two samples, or a lower bound that does not rise.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "sums of costs that fit, and less than what is limited by memory"
@@ -445,8 +448,9 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         Ok(())
     }
 
-    /// Stores the successor in `self.next`, unless it is dominated, too expensive or a dead end, or its f value
-    /// overflows. Its derived variables are not evaluated yet. `through` is the f value of the parent.
+    /// Stores the successor in `self.next`, unless it is dominated, too expensive or a dead end, or its f
+    /// value overflows. A goal state becomes the incumbent. The derived variables of the successor are not
+    /// evaluated yet. `through` is the f value of the parent.
     fn push(&mut self, cost: N, through: &N, origin: ParentLink) {
         self.statistics.generated = self.statistics.generated.saturating_add(1);
         if self.exceeds_upper_bound(&cost) {
@@ -485,8 +489,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         self.limit.as_ref().is_some_and(|limit| cost > limit)
     }
 
-    /// Returns `true` if this search found the incumbent, and it is at least as good as every plan with this
-    /// cost and this number of steps.
+    /// Returns `true` if this search found the incumbent, and no plan with at least this cost and number of
+    /// steps is better.
     fn is_dominated_by_incumbent(&self, cost: &N, steps: u32) -> bool {
         let (Some(limit), Some(fewest)) = (&self.limit, self.fewest) else { return false };
         (limit, fewest) <= (cost, steps)

@@ -1,4 +1,5 @@
-//! Pareto-optimal combinations of the designs of an operator.
+//! Pareto-optimal combinations of the designs of an operator. A combination contains one design for each slot
+//! (design parameter) of the operator.
 
 use std::collections::hash_map::Entry;
 
@@ -10,10 +11,11 @@ use task::task::Operator;
 use task::task::number::TaskNumber;
 use task::task::quantity::{Quantity, SlotSet};
 
-/// Maximum number of combinations of designs that are enumerated for one group of slots.
+/// Maximum number of combinations of designs that are enumerated for one group of slots, i.e. slots that
+/// tables or forbidden combinations connect.
 const COMBINATION_LIMIT: usize = 2_000_000;
-/// Maximum number of combinations of one operator, after dominated combinations have been removed within each
-/// group of slots.
+/// Maximum number of non-dominated combinations for one group of slots, and of pairs when the combinations of
+/// another group are added.
 const CHOICE_LIMIT: usize = 100_000;
 
 /// A combination of designs for some slots. `cost` is its contribution to the operator's cost, and `profile`
@@ -24,17 +26,19 @@ struct Partial<N> {
     profile: Vec<N>,
 }
 
-/// Combinations of designs, each with the cost of the operator.
+/// Combinations of designs (an index for each slot), each with the operator's cost for it.
 pub type CostedCombinations<N> = Vec<(Vec<u32>, N)>;
 
 /// Returns the combinations of an operator's designs that no other combination dominates, with their costs. A
 /// combination dominates another if it costs no more and contributes at least as much to every numeric
-/// condition and effect; if `monotone` is `false`, the contributions must be equal. Of equal combinations,
-/// only one is kept unless `all` is `true`. Returns `None` if there are too many combinations.
+/// condition and effect; if `monotone` is `false`, the contributions must be equal. Of combinations with
+/// equal cost and contributions, only one is kept unless `all` is `true`. Returns `None` if there are too
+/// many combinations.
 ///
-/// Slots that no table and no forbidden combination connects contribute independently. A combination that is
-/// dominated within a group of connected slots is dominated in every extension. For k independent functions
-/// with m designs each, this avoids the enumeration of m^k combinations.
+/// Slots contribute independently unless a table (of the cost, a condition or an effect) or a forbidden
+/// combination connects them. A combination that is dominated within a group of connected slots is dominated
+/// in every extension. For k independent functions with m designs each, this avoids the enumeration of m^k
+/// combinations.
 ///
 /// # Errors
 /// Fails if the deadline has passed or the interrupt flag is set.
@@ -178,7 +182,7 @@ fn best<N: TaskNumber>(
     Ok(front)
 }
 
-/// Returns the slots of an operator in groups, such that no table and no forbidden combination connects two
+/// Divides the slots of an operator into groups, such that no table and no forbidden combination connects two
 /// groups.
 fn independent<N>(operator: &Operator<N>, quantities: &[&Quantity<N>]) -> Vec<Vec<u32>> {
     let tables = quantities.iter().copied().chain([&operator.cost]).flat_map(|quantity| &quantity.tables);
@@ -312,8 +316,8 @@ mod tests {
             let operator = operator(&costs, &uses, &excluded, &numbers);
             let limits = Limits::none();
             prop_assert_eq!(pareto_optimal_combinations(&operator, monotone, true, &limits), Ok(Some(expected(&operator, monotone, true))));
-            // Of several combinations with equal cost and quantity, any one may be kept. So the test compares
-            // costs and quantities, not designs.
+            // With `all = false`, any one of several combinations with equal cost and equal numeric effect may be kept.
+            // So costs and effects are compared, not designs.
             let values = |choices: Vec<(Vec<u32>, Int)>| {
                 let sizes = operator.sizes();
                 let remaining = |choice: &[u32]| operator.numeric_effects[0].value.quantity.at(choice, &sizes);

@@ -1,6 +1,6 @@
 //! Optimal search in the state space: A\*, its open list, state registry, heuristic interface and pruning
-//! methods. Also selects a canonical plan among plans of equal cost (`plan_tiebreak`), and computes the h² mutexes
-//! ([`MutexPairs`]) with which the satisficing search prunes.
+//! methods. Also selects a canonical plan among plans of equal cost and length (`plan_tiebreak`), and
+//! computes the h² mutexes ([`MutexPairs`]) with which the satisficing search prunes.
 
 mod astar;
 pub mod design_combinations;

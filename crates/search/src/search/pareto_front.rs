@@ -13,11 +13,12 @@ use task::number::dense;
 /// Comparison of labels (search nodes) by several criteria. A label has one number for each criterion. Labels
 /// and numbers are given by their indices.
 pub(super) trait Criteria {
-    /// Returns `true` if the number with index `one` is at least as good as the number with index `other`.
+    /// Returns `true` if, by the criterion, the number with index `one` is at least as good as the number
+    /// with index `other`.
     fn is_as_good(&self, criterion: usize, one: u32, other: u32) -> bool;
 
-    /// Returns `true` if label `one` is at least as good as label `other` by every criterion. It may use
-    /// further tie-breakers.
+    /// Returns `true` if label `one` is at least as good as label `other` by every criterion. Implementations
+    /// may break ties by further criteria.
     fn dominates(&self, one: u32, other: u32) -> bool;
 
     /// Replaces the contents of `to` by the indices of the numbers of a label, one for each criterion.
@@ -215,8 +216,8 @@ fn middle(labels: &[u32], criteria: &impl Criteria) -> Option<(usize, u32)> {
     best.map(|(_, criterion, number)| (criterion, number))
 }
 
-/// Returns the median of a column. If the median equals the worst number, returns the worst of the better
-/// numbers, or `None` if all numbers are equal.
+/// Returns the median of the labels' numbers for one criterion. If the median equals the worst number,
+/// returns the worst of the better numbers, or `None` if all numbers are equal.
 fn median(criterion: usize, mut column: Vec<u32>, criteria: &impl Criteria) -> Option<u32> {
     column.sort_by(|one, other| {
         match (criteria.is_as_good(criterion, *one, *other), criteria.is_as_good(criterion, *other, *one)) {

@@ -1,16 +1,18 @@
-//! Tie-breaking among plans of equal cost: selects a canonical plan.
+//! Tie-breaking among the plans that have the cost and the number of steps of a known plan: selects a
+//! canonical plan.
 //!
-//! The canonical plan has the fewest steps, and among these plans the fewest reconfigurations, i.e. changes
-//! of a function's design. A step at which two functions change their designs counts twice. If there is a
-//! reference plan, the number of steps that are not in it is minimised before the reconfigurations. Remaining
-//! ties are broken by model order: step by step, it compares the position of the action in the domain, the
-//! positions of its arguments in the problem, and its designs. Names are not compared. Unless the reference
-//! plan contains it, a design is not selected if a strictly better design exists (cheaper, or with less
-//! consumption).
+//! The number of steps is not minimised here: the canonical plan has the fewest steps only if the known plan
+//! has. It has the fewest reconfigurations, i.e. changes of a function's design. A step at which two
+//! functions change their designs counts twice. If there is a reference plan, the number of steps that are
+//! not in it is minimised before the reconfigurations. Remaining ties are broken by model order: step by
+//! step, it compares the position of the action in the domain, the positions of its arguments in the problem,
+//! and its designs. Names are not compared. Unless the reference plan contains it, a design is not selected
+//! if a strictly better design exists (cheaper, or with less consumption).
 //!
 //! The cost and length of the known plan bound two searches: the first minimises reconfigurations, and the
 //! second is a depth-first search in model order that stops at the first plan. If these searches exceed their
-//! limits, the known plan is returned, which need not be canonical.
+//! limits or the second one ends with a shorter plan, the known plan is returned, which need not be
+//! canonical.
 
 use std::cell::{Cell, RefCell};
 use std::cmp::Reverse;
@@ -225,7 +227,8 @@ struct Ties<'a> {
 }
 
 /// Returns the canonical plan among all plans with the cost and the number of steps of `plan`. Returns `plan`
-/// if a limit on labels, comparisons or time is reached, or if operator costs are only a part of the metric.
+/// if a limit on labels, comparisons, combinations of designs or time is reached, or if operator costs are
+/// only a part of the metric.
 pub fn select_canonical_plan(context: Context<'_>, bounds: &Bounds, plan: GroundPlan) -> GroundPlan {
     let _span = info_span!("canonical plan").entered();
     if !context.task.objective.rest.is_empty() {
@@ -288,7 +291,7 @@ struct Branch<'a> {
 
 impl Ties<'_> {
     /// Returns the canonical plan and its changes, or `None` if more than `max_changes` are necessary or a
-    /// limit on labels, comparisons or time is reached.
+    /// limit on labels, comparisons, combinations of designs or time is reached.
     fn first(&self, start: Label, max_changes: Changes) -> Option<(Vec<GroundStep>, Changes)> {
         let (changes, first_labels) = self.fewest_changes(start.clone(), max_changes)?;
         let steps = self.first_in_order(start, changes, &first_labels)?;
@@ -310,8 +313,8 @@ impl Ties<'_> {
         choices.get()?.as_deref()
     }
 
-    /// Returns a lower bound on the cost from the states after an operator to the goal, whatever its designs.
-    /// Returns `None` if the goal is unreachable within the number of steps of the known plan.
+    /// Returns a lower bound on the cost from the states after an operator to the goal, for any of its
+    /// designs. Returns `None` if the goal is unreachable within the number of steps of the known plan.
     ///
     /// The finite-domain variables of all these states are equal unless the operator has conditional effects,
     /// in which case the bound is 0.
@@ -377,7 +380,7 @@ impl Ties<'_> {
     /// Returns the fewest [`Changes`] of a plan that begins with the partial plan `from` and has at most the
     /// cost and the number of steps of the known plan. Also returns all labels (partial plans) that were
     /// stored. Returns `None` if there is no such plan with at most `max_changes`, or if a limit on labels,
-    /// comparisons or time is reached.
+    /// comparisons, combinations of designs or time is reached.
     fn fewest_changes(&self, from: Label, max_changes: Changes) -> Option<(Changes, Labels)> {
         let mut open = BinaryHeap::from([Reverse((from.changes, Reverse(from.steps), 0))]);
         let mut labels = Labels { all: vec![from], ..Labels::default() };
@@ -405,7 +408,8 @@ impl Ties<'_> {
     }
 
     /// Returns the first plan in model order with at most `changes`, which must be the minimum. Uses
-    /// depth-first search. Returns `None` if a limit on labels, comparisons or time is reached.
+    /// depth-first search. Returns `None` if a limit on labels, comparisons, combinations of designs or time
+    /// is reached.
     ///
     /// A label (partial plan) is pruned if a visited label is at least as good. If the visited label has led
     /// to no plan, the new label leads to none either. If the visited label is an ancestor of the new label,
@@ -489,7 +493,7 @@ impl Ties<'_> {
         label.write_front_key(self.task, monotone, &mut key);
         match labels.fronts.get_mut(key.as_slice()) {
             Some(front) => {
-                // Whatever a removed label beats, the new label beats, too.
+                // All labels that a removed label dominates are also dominated by the new label.
                 front.retain(|other| !merits.is_no_worse(other, monotone));
                 front.push(merits);
             }

@@ -1,14 +1,14 @@
 //! Scheduling of searches: a first plan, an optimal plan, and the closed states that prove its optimality.
 //!
-//! `search` alternates several searches; `search_states` and `search_from` run a single A\* search. If it
-//! finds no plan soon and has no cost limit, a greedy search provides an upper bound.
+//! `search` alternates several searches. `search_states` and `search_from` run a single A\* search; if this
+//! search finds no plan soon and has no cost limit, a greedy search provides an upper bound.
 //!
 //! In `search`, A\* with pattern databases runs first. If it finds no plan soon, a greedy best-first search
 //! looks for some plan. Then two A\* searches alternate: one uses only pattern databases, the other also
-//! LM-cut. The LM-cut search first gets a quarter of the other's work, and later the same work. A search gets
-//! only half of its work if its lower bound lags behind that of the other, or if its memory may not suffice.
-//! The result of the search that finishes first is returned. Work is counted in units instead of time, so the
-//! result is deterministic.
+//! LM-cut. The LM-cut search first gets a quarter of the other's work, and later the same work. A search then
+//! gets only half of its work if its lower bound lags behind that of the other, or if its memory may not
+//! suffice. The result of the search that finishes first is returned. Work is counted in units instead of
+//! time, so the result without a time limit is deterministic.
 
 use std::sync::Arc;
 
@@ -39,8 +39,8 @@ const WORK_PER_STATE: u64 = 2_500;
 /// Number of work units of a search after which a lagging search is abandoned.
 const ABANDON_WORK: u64 = 100_000_000_000;
 
-/// Searches for an optimal plan. All operators must have non-negative costs. Ends without a proof if a
-/// forecast shows that memory will not suffice, if the deadline passes or the run is interrupted, or if an
+/// Searches for an optimal plan. All operators must have non-negative costs. Ends without a proof if memory
+/// does not suffice (by a forecast or in fact), if the deadline passes or the run is interrupted, or if an
 /// operator has too many combinations of designs.
 pub fn search(context: Context<'_>, bounds: &Bounds) -> SearchOutcome {
     let Ok(Some(prepared)) = SearchTask::new(context) else { return SearchOutcome::Unknown(None) };
@@ -134,7 +134,7 @@ fn search_within<N: TaskNumber, E: Heuristic<N>>(
 }
 
 /// Runs a greedy best-first search from `initial` and returns the plan that it finds, if any. The number of
-/// stored states is limited to a threshold and to `max_states`.
+/// stored states is limited to the threshold `states` (but at least [`LEAST`]) and to `max_states`.
 fn greedy_best_first<N: TaskNumber, E: Heuristic<N>>(
     space: &SearchProblem<'_, N, E>,
     initial: &State<N>,
@@ -146,8 +146,8 @@ fn greedy_best_first<N: TaskNumber, E: Heuristic<N>>(
     greedy.best_plan()
 }
 
-/// Two A\* searches of a task that alternate. The first uses pattern databases only; the second, which is
-/// added if the first call of `run` does not finish, also evaluates LM-cut lazily.
+/// Two A\* searches of a task that alternate. The first uses pattern databases only. The second also
+/// evaluates LM-cut lazily; it is added if the first call of `run` does not finish and LM-cut is available.
 pub struct InterleavedSearch<'a, N, E> {
     space: SearchProblem<'a, N, E>,
     initial: State<N>,
@@ -201,16 +201,16 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
     }
 
     /// Returns the best plan of all searches, including abandoned searches. Returns `None` if no plan was
-    /// found, or only plans that are not better than one set from outside.
+    /// found, or only plans that cost more than a plan set from outside.
     pub fn best_plan(&self) -> Option<GroundPlan<N>> {
         let plans = self.searches.iter().filter_map(AStar::best_plan);
         plans.fold(self.best.clone(), |best, plan| cheaper(best, Some(plan)))
     }
 
     /// Resumes all searches until each has done the work of `max_states` states. The first call runs a single
-    /// search until it has stored `max_states` states. While `max_states` is at most `STATE_LIMIT`, the LM-cut
-    /// search gets a quarter of the work. A search that lags behind or is forecast to run out of memory gets
-    /// half.
+    /// search until it has stored `max_states` states. While `max_states` is at most `STATE_LIMIT`, the
+    /// LM-cut search gets a quarter of the work. Otherwise, a search gets half if it lags behind or is
+    /// forecast to run out of memory.
     ///
     /// Returns `None` if the searches are not finished. `SearchOutcome::Unknown(None)` also means that no
     /// plan is cheaper than the cost set by `set_upper_bound`.
@@ -306,9 +306,9 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
     }
 }
 
-/// Returns the index of a search that lags behind: its lower bound, extrapolated over two doublings of its
-/// states, stays below the current lower bound of the other search. Returns `None` unless there are two
-/// searches.
+/// Returns the index of the search that lags behind: its lower bound, extrapolated over two doublings of its
+/// states, stays below the current lower bound of the other search. Returns `None` if neither does, or unless
+/// there are two searches.
 fn lagging_search<N: TaskNumber, E: Heuristic<N>>(searches: &[AStar<'_, N, E>]) -> Option<usize> {
     let [first, second] = searches else { return None };
     let is_behind = |search: &AStar<'_, N, E>, other: &AStar<'_, N, E>| {

@@ -2,8 +2,9 @@
 //!
 //! Finite-domain values are packed into as few bits as they need. Equal numbers are stored once, and states
 //! refer to them by index. A *place* is the combination of the finite-domain values and the numbers that must
-//! be equal for dominance. A hash table finds the place of a state. The states of a place differ only in cost
-//! and in comparable numbers. Those that no other state of the place dominates form its Pareto front.
+//! be equal for dominance. A hash table finds the place of a state. The states of a place differ only in
+//! cost, in comparable numbers, and in numbers that are ignored. Those that no other state of the place
+//! dominates form its Pareto front.
 
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
@@ -49,7 +50,7 @@ struct Numbers<N> {
 #[derive(Clone, Copy)]
 pub(super) struct ParentLink {
     pub(super) parent: u32,
-    /// Index of the operator with its combination of designs, see `SearchTask::step`.
+    /// Index of an operator with one of its combinations of designs, see `SearchTask::step`.
     pub(super) step: u32,
     pub(super) steps: u32,
 }
@@ -89,7 +90,8 @@ pub(super) struct StateRegistry<N> {
     tree_bytes: usize,
     table: HashTable<u32>,
     nodes: Vec<Node>,
-    /// For each node: the indices of the values of its compared variables, which are not part of the key.
+    /// For each node: the indices (in `numbers`) of the values of its compared variables, which are not part
+    /// of the key.
     others: Vec<u32>,
     numbers: Numbers<N>,
     key: Vec<u32>,

@@ -23,7 +23,8 @@
 //! those that require the same value, those that may set the variable without requiring a value of it, and
 //! those that read it in a clause or in the condition of a conditional effect.
 //!
-//! Pruning is disabled if it removes too few operators to justify its time.
+//! Tasks with numeric or derived variables are not pruned. Pruning is disabled if it removes too few
+//! operators to justify its time.
 //!
 //! - \[1\] M. Wehrle, M. Helmert: Efficient stubborn sets: generalized algorithms and selection
 //!   strategies, ICAPS 2014.

@@ -10,7 +10,7 @@ use super::syntax_edits::{declare, hidden};
 /// must hold within a given time.
 #[derive(Debug, Clone)]
 pub struct Deadline {
-    /// Longest time between a state with the first condition and a state with the second condition.
+    /// Maximum time from a state with the first condition until the second condition holds.
     pub within: BigRational,
     /// `true` for a constraint, which every plan must satisfy; `false` for a preference.
     pub is_hard: bool,
@@ -22,9 +22,9 @@ impl Deadline {
         Self { within, is_hard, number }
     }
 
-    /// Returns the names of two auxiliary actions, one for each condition of the deadline. The condition is
-    /// the precondition of its action. Neither action is ever executed; the effect of the second action
-    /// records that a soft deadline is satisfied.
+    /// Returns the names of two auxiliary actions, one for each condition of the deadline. The condition is the
+    /// precondition of its action. The actions are never part of a plan; the temporal planner only evaluates their
+    /// preconditions and effects.
     pub fn actions(&self) -> [String; 2] {
         ["begins", "ends"].map(|what| format!("deadline {} {what}", self.number))
     }

@@ -69,8 +69,9 @@ impl<'t> Initial<'t> {
         }
     }
 
-    /// Returns a numeric function in the condition that may have no value, or `None` if all values are defined.
-    /// A function with a free variable needs a value for all arguments of its declared types.
+    /// Returns a numeric function in the condition that may have no value, or `None` if all values are defined. A
+    /// function with a free variable among its arguments must have a value for every tuple of objects of its declared
+    /// types.
     fn undefined<'c>(&self, condition: &'c Condition, binding: &mut Binding) -> Option<&'c Name> {
         match condition {
             Condition::Exists(variables, body) | Condition::ForAll(variables, body) => {

@@ -47,7 +47,7 @@ pub struct CompiledTask<'t> {
     pub objectives: Cow<'t, [Metric]>,
     /// Deadlines (`always-within`), which are checked once the times of a plan are known.
     pub deadlines: Vec<Deadline>,
-    /// `false` if the compilation may constrain the times of happenings beyond the original task. Irrelevant
+    /// `false` if the compiled task may restrict the times of happenings more than the original task does. Irrelevant
     /// for sequential plans.
     pub is_exact: bool,
 }
@@ -69,10 +69,11 @@ pub fn is_violation(action: &str) -> bool {
     is_hidden(action) && action.ends_with(preferences::VIOLATION)
 }
 
-/// Compiles preferences and trajectory constraints away. Preferences that no objective mentions are dropped.
+/// Compiles preferences and trajectory constraints away. Preferences that do not occur in `objectives` (if this is
+/// empty: in the metric of the problem) are dropped.
 ///
 /// # Errors
-/// Returns the unsupported constraints and preferences with their source locations, or an error if the deadline passes
+/// Returns the unsupported constraints and preferences with their source locations, or an error if a limit is reached
 /// or the run is interrupted.
 pub fn compile<'t>(
     domain: &'t Domain,
@@ -128,8 +129,9 @@ pub fn compile<'t>(
         name_violations(&mut metric.expression);
     }
     if !used_preferences.is_empty() {
-        // Conditions of action preferences keep happenings apart like all other conditions, although the
-        // original task does not require this.
+        // Preferences in preconditions are compiled to effects that read the conditions of the preferences. Happenings
+        // that change such a condition are then separated from the action, although the original task does not require
+        // this.
         let mut preferences = task.0.actions.iter().flat_map(|action| &action.preferences);
         is_exact &= !preferences.any(|preference| used_preferences.contains(&preference.name.name));
         preferences::install(&mut task.0, &mut task.1, (wanted, &used_preferences), course);

@@ -40,9 +40,9 @@ fn violate(preference: &Name) -> Effect {
     Effect::Assign(Assignment::Increase, count(preference), unit, Span::default())
 }
 
-/// Adds the hidden actions, violation counts and counting effects of preferences to the task, for the
-/// preferences `used_preferences` that the objectives mention. `wanted` are their instances with conditions
-/// on the last state.
+/// Adds hidden actions, violation counts and counting effects to the task, for the preferences `used_preferences` that
+/// the objectives mention. `wanted` holds the instances of preferences on the goal and on trajectories, with their
+/// conditions on the last state.
 pub(super) fn install(
     domain: &mut Domain,
     problem: &mut Problem,

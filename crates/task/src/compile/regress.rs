@@ -85,8 +85,9 @@ impl Happening {
         }
     }
 
-    /// Adds to `found` the conditions under which an effect may change the atom or function. Conditions of
-    /// the effect are ignored. The variables in `inner` may have any value.
+    /// Adds to `found` the conditions under which the arguments of an effect equal those of the atom or function.
+    /// Conditions of the effect are ignored. A variable in `inner` (quantified in the examined condition) equals any
+    /// argument.
     fn touched(&self, atom: &Atom, is_function: bool, inner: &[TypedName], found: &mut Vec<Condition>) {
         for change in &self.changes {
             let (target, numeric) = target(&change.effect);
@@ -145,7 +146,7 @@ impl Happening {
         })
     }
 
-    /// Returns the condition under which an effect for which `is_kind` returns `true` changes the atom.
+    /// Returns the condition under which an effect of the kind that `is_kind` selects changes the atom.
     fn occurs(&self, atom: &Atom, is_kind: impl Fn(&Effect) -> bool) -> Condition {
         let changes = self.changes.iter().filter(|change| is_kind(&change.effect));
         any(changes.map(|change| {
@@ -158,9 +159,9 @@ impl Happening {
         }))
     }
 
-    /// Returns all cases of a case distinction over the effects on the functions. Each case gives a new value
-    /// for every function. Fails if a quantified effect may change one of the functions, or there are more than
-    /// `MAX_CASES` cases.
+    /// Returns all cases of a case distinction over the effects on the functions. In each case, every function has one
+    /// new value. Fails if a quantified effect may change one of the functions, or there are more than `MAX_CASES`
+    /// cases.
     fn ways(&self, functions: &[Atom]) -> Result<Vec<Way>, NotRegressable> {
         let mut ways = vec![(super::simplify::truth(), Vec::new())];
         for function in functions {

@@ -84,8 +84,8 @@ pub(super) fn ways(condition: Condition) -> Vec<Condition> {
     if let Condition::Or(parts) = condition { parts } else { vec![condition] }
 }
 
-/// Simplifies `condition` under the assumption that `known` holds: parts that are syntactically equal to
-/// `known` become true. Parts below quantifiers and implications are not changed.
+/// Simplifies `condition` under the assumption that `known` holds: parts that are equal to `known`, including source
+/// positions, become true. Parts below quantifiers and implications are not changed.
 pub(super) fn assume(condition: &Condition, known: &Condition) -> Condition {
     if format!("{condition:?}") == format!("{known:?}") {
         return truth();

@@ -18,8 +18,8 @@ pub(super) fn hidden(name: &str, body: ActionBody, span: Span) -> Action {
     Action { identifier: identifier(name), parameters: Vec::new(), body, preferences: Vec::new(), span }
 }
 
-/// Adds a condition to an action. The condition must hold in the state before the start or the end of a
-/// durative action, and before an instantaneous action.
+/// Adds a condition to an action. For a durative action, it must hold before the start or before the end, depending on
+/// `time`. For an instantaneous action, it is a precondition.
 pub(super) fn require(action: &mut Action, time: EffectTime, condition: Condition) {
     match &mut action.body {
         ActionBody::Instantaneous { precondition, .. } => {

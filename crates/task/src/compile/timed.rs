@@ -33,8 +33,8 @@ impl Monitors<'_> {
         }
     }
 
-    /// Returns the condition that `time`, which is above 0, has come: an auxiliary atom that a timed initial
-    /// literal adds at this time.
+    /// Returns an auxiliary atom that is true from `time` on. A timed initial literal adds it, so `time` must be above
+    /// 0.
     fn moment(&mut self, time: BigRational) -> Condition {
         let name = format!("time {time} has come");
         let is_declared = self.moments.iter().any(|(is_declared, _)| *is_declared == name);
@@ -76,8 +76,8 @@ impl Monitors<'_> {
         if from.is_negative() && !is_asked(&zero) {
             return Ok(decided(true));
         }
-        // The initial state has time 0 and counts, even if a happening at time 0 leads to another state of this
-        // time.
+        // If time 0 is in the interval, the initial state must satisfy the condition, even if a happening at time 0
+        // leads to another state of this time.
         let at_first = from.is_positive() || !is_asked(&zero) || self.initial.holds(what);
         let broken = if hard { None } else { Some(self.remember("is broken", !at_first)) };
         let looked_at = self.remember("was looked at", false);

@@ -38,7 +38,7 @@ pub(super) struct Monitors<'t> {
     pub(super) moments: Vec<(String, BigRational)>,
     pub(super) course: PlanSemantics<'t>,
     pub(super) deadlines: Vec<(Deadline, [Condition; 2], Effect)>,
-    /// `true` if an action gets a condition that its duration is positive, although the PDDL files allow 0.
+    /// `true` if an action gets a condition that its duration is positive, because the PDDL files may allow 0.
     narrows: bool,
     instances: usize,
     fresh: u64,
@@ -174,14 +174,14 @@ impl<'t> Monitors<'t> {
         name
     }
 
-    /// Calls `make` for each start or end of an action that may change one of the conditions, and adds the
-    /// result to the action. The arguments of `make` are a condition under which the change may occur, and
-    /// `conditions` regressed to the state before the change. If the first argument would be a disjunction,
-    /// `make` is called for each disjunct instead. If start and end may coincide and both may change the
-    /// conditions, the action also gets the condition that its duration is positive.
+    /// Calls `make` for each start or end of an action that may change one of the conditions, and adds the result to
+    /// the action. The arguments of `make` are a condition under which the change may occur, and `conditions` regressed
+    /// to the state before the change. If the first argument would be a disjunction, `make` is called for each disjunct
+    /// instead. If start and end may coincide and both may change the conditions, the action also gets the condition
+    /// that its duration is positive.
     ///
-    /// Fails if the duration cannot be restricted so, if a condition cannot be regressed, or if derived
-    /// predicates or timed initial literals occur in the conditions.
+    /// Fails if this condition is not possible (for example in sequential plans), if a condition cannot be regressed,
+    /// or if the conditions contain derived predicates or atoms that timed initial literals change.
     pub(super) fn after_each(
         &mut self,
         conditions: &[&Condition],
@@ -237,8 +237,8 @@ impl<'t> Monitors<'t> {
         Ok(())
     }
 
-    /// Returns `true` if the monitors neither add preconditions nor make two actions interfere, so that they
-    /// do not restrict the times of actions.
+    /// Returns `true` if the monitors do not restrict the times of actions: there are no deadlines, and the monitors
+    /// neither add preconditions nor make two actions interfere.
     pub(super) fn keeps_apart_nothing(&self) -> bool {
         let is_plain = |addition: &Addition| {
             addition.conditions.is_empty()

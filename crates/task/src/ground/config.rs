@@ -20,7 +20,8 @@ pub struct GroundConfig {
 }
 
 impl Default for GroundConfig {
-    /// Uses the predicate names of the Metaplan paper and of the PDDL files of kas-lab.
+    /// Returns the predicate names of the Metaplan paper and of the PDDL files of kas-lab, without objectives and
+    /// without limits.
     fn default() -> Self {
         Self {
             solves: ["fd_solve_f", "fd_solves_f", "inferred-SolvesF", "solvesF"].map(Name::new).to_vec(),
@@ -57,13 +58,14 @@ pub struct Generality {
     /// If set to n, each initial number may be replaced by any multiple of 1/n. Grounding then infers nothing
     /// from the initial numbers of the problem.
     pub numbers: Option<Int>,
-    /// If set to n, the scale makes all multiples of 1/n integers, in addition to the numbers of the problem.
+    /// If set to n, numeric fluents are scaled such that all multiples of 1/n become integers, in addition to the
+    /// numbers of the problem.
     pub precision: Option<Int>,
     /// If set, the metric may contain fluents that effects change by state-dependent amounts. Optimality is
     /// then not provable.
     pub measures_ends: bool,
-    /// If set, fluents that actions change so as to improve the metric are treated like fluents with
-    /// state-dependent changes: their final values are added to the cost at the end of the plan.
+    /// If set, fluents with changes that improve the metric are treated like fluents with state-dependent changes:
+    /// their final values are added to the cost at the end of the plan.
     pub measures_rewards: bool,
     /// If set, the durations of all operators are 0 in the ground task, because the caller evaluates
     /// them. Their common denominator then does not matter.

@@ -18,9 +18,9 @@ use crate::ground::vocabulary::task::GroundTask;
 use crate::limits::{Interrupted, Limits};
 use crate::number::dense;
 
-/// Replaces constant derived atoms by their truth values and, where possible, derived atoms with a single rule
-/// by the rule's body. Removes duplicate rules, and rules, conditional effects and operators whose conditions
-/// become false. A goal that becomes false is replaced by `None`.
+/// Replaces constant derived atoms by their truth values and, where possible, derived atoms with a single rule by the
+/// rule's body. Removes duplicate rules, and rules, conditional effects and operators whose conditions are found to be
+/// false. A goal that is found to be false is replaced by `None`.
 pub fn simplify(task: &mut GroundTask<'_>) -> Result<(), Interrupted> {
     let limits = task.world.limits;
     let mut axioms = std::mem::take(&mut task.axioms);
@@ -58,7 +58,6 @@ fn retain<T>(
     let (mut pulse, mut outcome) = (limits.pulse(), Ok(()));
     items.retain_mut(|item| {
         outcome = outcome.and_then(|()| pulse.beat());
-        // After an interruption, the remaining items are kept unchanged.
         outcome.is_err() || keep(item)
     });
     outcome

@@ -1,10 +1,10 @@
 //! Compiles metrics to operator costs, which are minimised.
 //!
 //! A metric is a linear expression over fluents and total time. A fluent whose changes are state-independent
-//! becomes a constant offset plus a sum of operator costs. The final values of other fluents are added to the
-//! cost of a plan at its end; optimality is not claimed for such a metric. A metric to be maximised is
-//! negated. Without a metric, the cost is the total duration if an operator of the task has a duration, and
-//! the number of actions otherwise.
+//! becomes a constant offset plus a sum of operator costs. The other fluents remain in the objective, and
+//! their final values are added to the cost of a plan at its end. A planner that minimises operator costs
+//! alone does not minimise such a metric. A metric to be maximised is negated. Without a metric, the cost is
+//! the total duration if an operator of the task has a duration, and the number of actions otherwise.
 use std::collections::BTreeMap;
 use std::convert::Infallible;
 

@@ -1,11 +1,10 @@
-//! Separable design parameters: parameters of action schemas that are function designs and need not be
-//! grounded. Also contains general queries on conditions and expressions, e.g. for their terms.
+//! Separable design parameters: parameters of action schemas that are function designs and need not be grounded. Also
+//! contains general queries on conditions and expressions, e.g. for their terms.
 //!
 //! In the explicit form (Metaplan paper, Listings 1 and 2), a schema has parameters `?fd` with a condition
-//! `(fd_solve_f ?fd ?f)`. Such a parameter is *separable* and becomes a slot if no fluent has it as an
-//! argument, and it occurs neither in conditions of effects, nor in conditions that mix static atoms and
-//! fluents, nor in factors of fluents. The number of designs then does not multiply the number of ground
-//! operators.
+//! `(fd_solve_f ?fd ?f)`. Such a parameter is *separable* and becomes a slot if no fluent has it as an argument, and it
+//! does not occur in conditions of effects, in conditions that mix static atoms and fluents, or in products and
+//! quotients with fluents. The number of designs then does not multiply the number of ground operators.
 
 use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
@@ -22,10 +21,10 @@ pub struct SlotParameter {
     pub(crate) function: Term,
 }
 
-/// Returns the design parameters of a schema with their functions, in ascending order. `solves` lists the
-/// predicates `(p DESIGN FUNCTION)` which state that a design solves a function. The conjuncts of the
-/// conditions at the start, over all and at the end are read in order. A conjunct is ignored if its design is
-/// already known as a design or function, or if its function is already known as a design.
+/// Returns the design parameters of a schema, in ascending order, each with its function. They occur in conjuncts
+/// `(p DESIGN FUNCTION)` of the conditions at the start, over all and at the end, for the predicates p in `solves`. The
+/// conjuncts are read in order; a conjunct is ignored if its design already has a role (design or function), or if its
+/// function is already a design.
 pub fn design_parameters(lifted: &Lifted, schema: &Schema, solves: &[Name]) -> Vec<SlotParameter> {
     let conjuncts = conjuncts(&schema.start_condition).into_iter().chain(conjuncts(&schema.middle_condition));
     let mut designs: Vec<SlotParameter> = Vec::new();
@@ -84,8 +83,8 @@ fn is_separable(lifted: &Lifted, schema: &Schema, parameter: u32) -> bool {
     }) && schema.duration.as_ref().is_none_or(|duration| expression_separable(lifted, duration, parameter))
 }
 
-/// Returns `true` if the parameter occurs only as an argument of static functions, and not in a factor of a
-/// fluent.
+/// Returns `true` if the parameter occurs only as an argument of static functions, and in no product or quotient that
+/// contains a fluent.
 fn expression_separable(lifted: &Lifted, expression: &Expression, parameter: u32) -> bool {
     match expression {
         Expression::Sum(parts) => parts.iter().all(|part| expression_separable(lifted, part, parameter)),
@@ -156,8 +155,8 @@ fn insert(set: &mut SlotSet, term: Term, slots: &[SlotParameter]) {
     }
 }
 
-/// Returns `true` if a condition of a durative action on its middle or end, or of an end effect, contains a
-/// derived predicate whose truth the action's start effects or timed events may change.
+/// Returns `true` if an over-all or at-end condition of the action, or the condition of an end effect, contains a
+/// derived predicate whose truth value may be changed by start effects of the action or by timed events.
 pub fn depends_on_own_start(lifted: &Lifted, schema: &Schema) -> bool {
     let (mut open, mut seen, mut numbers) = (Vec::new(), FxHashSet::default(), false);
     let conditions =

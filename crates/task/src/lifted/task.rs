@@ -1,9 +1,8 @@
 //! The lifted task: a PDDL task whose names are resolved to ids and whose conditions are in negation normal
 //! form.
 //!
-//! Objects, predicates, functions and parameters have dense ids in declaration order, so later stages do not
-//! use names. A durative action keeps separate conditions and effects for start and end. `ground` composes
-//! them into a single operator, because execution is sequential.
+//! Objects, predicates, functions and parameters have dense ids in declaration order. A durative action keeps separate
+//! conditions and effects for start and end; for sequential execution, `ground` composes them into a single operator.
 
 use std::sync::Arc;
 
@@ -131,9 +130,9 @@ pub struct Joint {
 pub struct Time {
     pub(crate) clock: FunctionId,
     pub(crate) moment: FunctionId,
-    /// Predicate `(phase NUMBER)`: the number of past events.
+    /// Predicate of the current phase. Its argument is an object that represents the number of past events.
     pub phase: PredicateId,
-    /// Object that represents phase 0; the objects of later phases follow it.
+    /// Object for 0 past events; the objects for 1, 2, … past events have the next ids.
     pub first_phase: ObjectId,
     /// True if the last step was a wait.
     pub waited: PredicateId,
@@ -163,8 +162,8 @@ pub struct Parameter {
     pub(crate) candidates: Arc<[ObjectId]>,
 }
 
-/// A quantified variable with its number and the objects of its type in ascending order. Numbers continue
-/// after the parameters.
+/// A quantified variable with its number and the objects of its type in ascending order. Quantified variables are
+/// numbered after the parameters.
 #[derive(Debug, Clone)]
 pub struct Bound {
     pub(crate) variable: u32,

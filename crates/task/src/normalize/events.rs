@@ -2,7 +2,8 @@
 
 use crate::lifted::{Arguments, Lifted, ObjectId};
 
-/// Applies the events at or before time 0 to the initial facts, and advances the phase accordingly.
+/// Applies the events at or before time 0 to the initial facts, and advances the phase (the atom that states how many
+/// events have occurred).
 #[expect(clippy::arithmetic_side_effects, reason = "phases are objects, which are held in memory")]
 pub fn begin(lifted: &mut Lifted) {
     let phases = (lifted.time.first_phase.0..).map(ObjectId);

@@ -20,9 +20,9 @@ pub(super) fn mark_fluents(lifted: &mut Lifted) {
     for (predicate, ..) in lifted.events.iter().flat_map(|event| &event.changes) {
         lifted.predicates[predicate.index()].fluent = true;
     }
-    // The Datalog engine requires stratified negation. Derived predicates that depend on themselves through a
-    // universal quantifier are therefore treated as fluents. The same applies to derived predicates with
-    // comparisons below a universal quantifier: if a value is undefined, neither the comparison nor its
+    // The Datalog engine evaluates a universal quantifier by negation, which must be stratified. Derived predicates
+    // that depend on themselves through a universal quantifier are therefore treated as fluents. So are derived
+    // predicates with comparisons below a universal quantifier: if a value is undefined, neither the comparison nor its
     // negation is true.
     let compares = lifted.axioms.iter().filter(|axiom| compares_for_all(&axiom.condition, false));
     let compares: Vec<_> = compares.map(|axiom| axiom.predicate).collect();

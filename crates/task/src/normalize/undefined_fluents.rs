@@ -1,12 +1,12 @@
-//! Numeric functions without an initial value, which are undefined until an action assigns a value. An action
-//! is inapplicable if an effect that occurs reads an undefined function.
+//! Numeric functions without an initial value, which are undefined until an action assigns a value. An action is
+//! inapplicable if an effect that occurs reads an undefined function.
 //!
-//! If a task has such functions, numeric fluents get a guard predicate, which is true where the function has a
-//! value (for exceptions, see `guard`). A comparison becomes the conjunction of itself and the guards of its
-//! functions. For example, `(> (level) 3)` becomes "`(level)` has a value, and `(> (level) 3)`". A formula in
-//! negation normal form is then true exactly if it is true in Kleene's three-valued logic. An effect adds a
-//! condition to its action: the condition of the effect must be defined, and if it is true, all functions that
-//! the effect reads must have values (`validate`, "One happening").
+//! If a task has such functions, numeric fluents get a guard predicate, which is true where the function has a value
+//! (for exceptions, see `guard`). A comparison becomes the conjunction of itself and the guards of its functions. For
+//! example, `(> (level) 3)` becomes "`(level)` has a value, and `(> (level) 3)`". A formula in negation normal form is
+//! then true exactly if it is true in Kleene's three-valued logic. An effect adds a condition to its action: the
+//! condition of the effect must be defined, and if it is true, all functions that the effect reads must have values.
+//! This is the definition that the validator in `pddl` uses.
 
 use rustc_hash::FxHashMap;
 
@@ -32,8 +32,7 @@ pub fn guard(lifted: &mut Lifted) {
     super::fluents::mark_fluents(lifted);
 }
 
-/// Declares the guard predicates and their initial facts. Returns the guard predicate of each function that
-/// may be undefined.
+/// Declares the guard predicates and their initial facts. Returns the guard predicate of each guarded function.
 fn declare(lifted: &mut Lifted) -> Guards {
     let mut measured = Vec::new();
     for metric in &lifted.metrics {
@@ -101,7 +100,8 @@ fn add(condition: &mut Formula, more: Vec<Formula>) {
     }
 }
 
-/// Returns the effect that makes the guard true if the effect assigns a value, and `None` otherwise.
+/// Returns an effect that makes the guard true under the condition of `effect`, or `None` unless `effect` is an
+/// `assign` to a function with a guard.
 fn gives_value(effect: &Effect, guards: &Guards) -> Option<Effect> {
     let Change::Assign { assignment: Assignment::Assign, function, terms, .. } = &effect.change else {
         return None;
@@ -114,8 +114,8 @@ fn needs_of_all(effects: &[Effect], guards: &Guards) -> Vec<Formula> {
     effects.iter().filter_map(|effect| needs(effect, guards)).collect()
 }
 
-/// Returns the condition that the effect's condition is defined and, if it is true, every value that the
-/// effect reads is defined. Returns `None` if the condition is always true.
+/// Returns the condition that the effect's condition is defined and, if it is true, every value that the effect reads
+/// is defined. Returns `None` if there is nothing to check.
 fn needs(effect: &Effect, guards: &Guards) -> Option<Formula> {
     let mut values = Vec::new();
     if let Change::Assign { assignment, function, terms, expression, .. } = &effect.change {

@@ -1,9 +1,8 @@
 //! Durative actions whose duration may be 0, so that start and end are simultaneous.
 //!
-//! If the duration is 0, the conditions of start and end must hold in the state before both, and all effects
-//! are simultaneous. `over all` conditions are void, because the interval is empty (`validate`, clauses 1 and
-//! 4 of the definition). Each such schema gets a copy for duration 0; the original keeps the positive
-//! durations.
+//! If the duration is 0, the conditions of start and end must hold in the state before both, and all effects are
+//! simultaneous. `over all` conditions are void, because the interval is empty. A schema whose duration may be 0 gets a
+//! copy for duration 0; the original keeps the positive durations.
 use num_traits::Zero;
 use rustc_hash::FxHashMap;
 
@@ -14,12 +13,12 @@ use pddl::ast::Comparison;
 /// Lower and upper bound on the value of an expression, or `None` if they are unknown.
 type Range = Option<(Rational, Rational)>;
 
-/// Splits every schema whose duration may be 0 into two schemas. The schemas for duration 0 are appended. A
-/// schema whose duration is always 0 is converted instead.
+/// Splits every schema whose duration may be 0 into two schemas. The schemas for duration 0 are appended. A schema
+/// whose duration is always 0 is converted instead.
 ///
 /// # Errors
-/// The duration is variable, the planner takes the shortest admissible value, and this value may be 0 or
-/// less. The conditions for duration 0 differ from those for slightly longer durations.
+/// Returns an error for each schema with a variable duration of which the planner takes the shortest admissible value,
+/// if this value may be 0 or less. The conditions for duration 0 differ from those for slightly longer durations.
 pub fn split(lifted: &mut Lifted) -> Result<(), Errors> {
     let mut ranges: FxHashMap<FunctionId, (Rational, Rational)> = FxHashMap::default();
     for (function, _, value) in &lifted.values {
@@ -50,7 +49,7 @@ pub fn split(lifted: &mut Lifted) -> Result<(), Errors> {
                 };
                 let (is_zero, is_positive) = (compare(Comparison::Equal), compare(Comparison::Greater));
                 let mut copy = instant(schema);
-                // The condition on the duration belongs to the start, which thus reads the functions of the
+                // `is_zero` belongs to the condition at the start, so the start also reads the functions in the
                 // duration.
                 if let Some(joint) = &mut copy.joint {
                     joint.start = Formula::And(vec![is_zero.clone(), schema.start_condition.clone()]);

@@ -18,9 +18,9 @@ use decimal::Decimal;
 
 /// A number of a ground task, scaled to an integer.
 ///
-/// Constants stay below [`LIMIT`] in magnitude. Values that may exceed the type (products with fluents,
-/// growing fluents, sums of costs) are computed by checked operations. `overflow-checks` is enabled in every
-/// profile.
+/// Constants stay below [`LIMIT`] in magnitude. Values that may exceed the type (products with fluents, growing
+/// fluents, sums of costs) are computed by checked operations. `overflow-checks` is enabled for the crates of this
+/// workspace in every profile.
 pub type Int = i128;
 
 /// Limit on the magnitude of scaled constants.
@@ -176,7 +176,7 @@ impl Rational {
 /// Converts an index (of an operator, atom, value, design or step) to 32 bits.
 ///
 /// # Panics
-/// The index is at least 2^32, which exceeds the memory.
+/// Panics if the index is 2^32 or greater; so many items do not fit into memory.
 pub fn dense(index: usize) -> u32 {
     u32::try_from(index).expect("invariant: fewer than 2^32 of anything are held in memory")
 }

@@ -23,8 +23,8 @@ use pddl::to_decimal;
 pub struct Exact(Rational);
 
 impl Exact {
-    /// Converts a number of a ground task to the unit of the PDDL files. `scale` is the factor between both
-    /// units.
+    /// Converts a number of a ground task to the unit of the PDDL files. `scale` is the number in the task that
+    /// represents 1 in the PDDL files.
     pub fn scaled<N: TaskNumber>(value: &N, scale: Int) -> Self {
         Self(value.to_rational() / Rational::from_integer(scale))
     }
@@ -188,9 +188,9 @@ pub fn rest<N: TaskNumber>(task: &Task<N>, state: &State<N>) -> Rational {
     terms.fold(Rational::zero(), |sum, term| sum + term) * &unit
 }
 
-/// Executes the steps and returns their contributions to the state-dependent part of the metric, and its final
-/// value. All values are in the task's cost unit and negated if the metric is maximised. They are 0 if the
-/// metric has no such part.
+/// Executes the steps from the initial state. Returns by how much each step changes the state-dependent part of the
+/// metric, and the final value of this part. All numbers are in the task's cost unit and negated if the metric is
+/// maximised. They are 0 if the metric has no such part.
 pub fn measured<'s, N: TaskNumber>(
     task: &Task<N>,
     steps: impl Iterator<Item = (OperatorId, &'s [u32])>,

@@ -1,4 +1,4 @@
-//! Rescheduling: starts the actions of a plan with timed events as early as possible.
+//! Rescheduling: moves actions of a plan with timed events to earlier starts, one action at a time.
 //!
 //! Waiting is free, so an optimal plan may delay an action until an event that only a later action needs. For
 //! each action, the operators for its other timeline windows are therefore tried, with the necessary waits. A
@@ -41,8 +41,8 @@ pub fn earliest<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) ->
     plan
 }
 
-/// Returns the other operators that represent the same action with the same arguments, for other windows or
-/// cases.
+/// Returns the other operators that represent the same action with the same arguments, for other timeline windows
+/// (positions relative to the events) or other truth values of effect conditions.
 fn same_action<N: TaskNumber>(task: &Task<N>, id: OperatorId) -> impl Iterator<Item = OperatorId> + '_ {
     let operator = &task.operators[id.index()];
     let is_same_action = move |other: &Operator<N>| {

@@ -17,7 +17,7 @@ pub enum Status {
     Unsolvable,
     /// It is proved that no plan exists within the requested number of steps.
     UnsolvableWithinHorizon,
-    /// A limit was reached before a plan or a proof was found.
+    /// No plan was found and nothing was proved, usually because a limit was reached.
     Unknown,
 }
 
@@ -36,14 +36,15 @@ pub enum Proof {
     /// The formula for plans of up to `step_bound` steps (cheaper than the known plan, if there is one) is
     /// unsatisfiable, and longer plans need not be considered.
     Sat {
-        /// Number of steps above which no plan can be cheaper, or no shortest plan exists.
+        /// Upper bound on the number of steps of a plan that is cheaper than the known plan or, if there is no plan, of
+        /// a shortest plan.
         step_bound: usize,
     },
     /// The cost of the plan equals a lower bound on the cost of all plans, for example the goal distance in a
     /// projection.
     Bound,
-    /// A\* with an admissible heuristic has terminated. Its pruning preserves at least one optimal plan, if
-    /// there is a plan.
+    /// An exact search has terminated, for example A\* with an admissible heuristic. Its pruning preserves at least one
+    /// optimal plan, if there is a plan.
     Search,
     /// The goal is unreachable in a relaxation or projection of the task. The text describes the reason.
     Relaxation(String),
@@ -56,7 +57,7 @@ pub struct Improvement {
     pub cost: Exact,
     /// Bound on the metric: no plan has a better value.
     pub lower_bound: Exact,
-    /// Number of steps of the current SAT formula.
+    /// Number of steps of the current SAT formula, or of the plan if a search reports the progress.
     pub horizon: usize,
 }
 
@@ -124,7 +125,7 @@ pub struct Statistics {
     /// Contradiction between the results of two components. This is a bug of the planner, and no proof is
     /// claimed.
     pub contradiction: Option<String>,
-    /// Name of an external program that reported a formula as unsatisfiable without a checked proof.
+    /// Command line of an external program that reported a formula as unsatisfiable without a checked proof.
     pub unchecked: Option<String>,
     /// Component that found the plan.
     pub found_by: Option<PlannerPart>,
@@ -158,7 +159,8 @@ pub struct Solution {
     /// Bound on the metric: no plan has a better value. `None` if the metric may be unbounded or no bound is
     /// known.
     pub lower_bound: Option<Exact>,
-    /// Number of steps up to which all plans were considered.
+    /// Number of steps up to which all plans were considered; for a proof by search, the number of steps of the plan,
+    /// or 0.
     pub horizon: usize,
     /// Justification of the status.
     pub proof: Option<Proof>,

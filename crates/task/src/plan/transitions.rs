@@ -45,10 +45,11 @@ impl Task {
         TaskState { state: self.initial.clone(), cost: 0 }
     }
 
-    /// Returns the fluent atoms that are values of the task's variables, in PDDL, as `(predicate objects)`.
+    /// Returns the fluent atoms that are values of the task's variables, in PDDL, as `(predicate objects)`. The
+    /// auxiliary atoms of timed events and of trajectory constraints are included.
     pub fn atoms(&self) -> impl Iterator<Item = &str> {
-        // The last value of each variable represents "none of its atoms". Names of auxiliary atoms have no
-        // parentheses.
+        // The last value of each variable represents "none of its atoms". Atoms that represent subconditions are named
+        // without parentheses.
         self.variables
             .iter()
             .filter_map(|variable| variable.values.split_last())

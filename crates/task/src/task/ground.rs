@@ -133,7 +133,7 @@ pub enum Argument {
 /// objects for the parameters that determine these data.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Operator<N = Int> {
-    /// Index of the action schema in the domain.
+    /// Index of the action schema in the domain; for a wait, the number of schemas.
     pub schema: u32,
     pub arguments: Vec<Argument>,
     /// Functions that the action requires, each with the argument that is its design.
@@ -391,8 +391,8 @@ impl Task {
 }
 
 impl<N: TaskNumber> Task<N> {
-    /// Returns `true` if an operator that is not a wait costs anything but `step`, or a wait costs anything;
-    /// see [`Task::is_timed`].
+    /// Returns `false` if each wait costs 0 and each other operator costs `step`, and `true` otherwise; see
+    /// [`Task::is_timed`].
     pub fn is_measured_by_time(&self, step: &N) -> bool {
         let step = |operator: &Operator<N>| if operator.wait.is_some() { N::zero() } else { step.clone() };
         self.operators.iter().any(|operator| operator.cost != Quantity::constant(step(operator)))

@@ -23,7 +23,8 @@ pub trait TaskNumber: Number + std::fmt::Debug + std::hash::Hash + Default {
     /// If `false`, the factor is always 1.
     const SCALED: bool;
 
-    /// Converts `number * scale`. Returns `None` if this type cannot represent the result.
+    /// Converts `number * scale`. For integers, returns `None` if the result is not an integer or exceeds [`LIMIT`] in
+    /// magnitude.
     fn from_rational(number: &Rational, scale: Int) -> Option<Self>;
 
     /// Returns a floating-point approximation, for estimates only.
@@ -42,8 +43,8 @@ pub trait TaskNumber: Number + std::fmt::Debug + std::hash::Hash + Default {
     /// sums of costs.
     fn is_moderate(&self) -> bool;
 
-    /// Returns a lower bound on the numbers n with n·`part` ≥ this number, where `part` > 0. Returns 0 if no
-    /// bound is known.
+    /// Returns a lower bound on the integers n with n·`part` ≥ this number, where `part` > 0. Returns 0 if no bound is
+    /// known.
     fn times_at_least(&self, part: &Self) -> u32;
 
     /// Returns `true` if no value of the quantity can overflow. For integers, the sum of the constant's

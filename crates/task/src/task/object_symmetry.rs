@@ -20,10 +20,10 @@ use crate::task::{
 /// Limit on the total number of operators that are compared, over all pairs of objects.
 const WORK_LIMIT: usize = 2_000_000;
 
-/// Returns exchanges of neighbouring objects within classes of interchangeable objects. Every exchange
-/// preserves the operators and the goal; if `initially` is `true`, it also preserves the initial state. Some
-/// symmetries may be missing, because the number of comparisons is limited. Tasks with derived variables
-/// yield an empty list.
+/// Returns exchanges of consecutive objects in each class of interchangeable objects; for the class {a, b, c} these are
+/// the exchanges of a and b, and of b and c. Every exchange preserves the operators and the goal; if `initially` is
+/// `true`, it also preserves the initial state. Some symmetries may be missing, because the number of comparisons is
+/// limited. Tasks with derived variables yield an empty list.
 ///
 /// # Errors
 /// The deadline has passed or the run is interrupted.
@@ -168,7 +168,6 @@ impl Exchange {
         let mut facts = Vec::with_capacity(task.variables.len());
         for atoms in limits.watch(&parts.words) {
             let atoms = atoms?;
-            // All atoms of a variable must be mapped to atoms of one variable.
             let images: Option<Vec<Fact>> = atoms.iter().flatten().map(exchanged).collect();
             let Some(images) = images else { return Ok(None) };
             let Some(target) = images.first().map(|image| image.variable) else { return Ok(None) };

@@ -64,9 +64,9 @@ impl<'a, T: TimeNumber> Index<'a, T> {
         Self { task, happenings, instances, waiting, marking, setting, changing, joint }
     }
 
-    /// Computes the facts that hold strictly between the start and the end of a run of `own`, as
-    /// seen by all other happenings. `alone` assumes that no other run of the same action starts or
-    /// ends in between. `left` is the remaining work. Returns `None` if it is used up.
+    /// Computes facts that hold at every other happening strictly between the start and the end of a run of
+    /// `own`. `alone` assumes that no other run of the same action starts or ends in between. `left` is the
+    /// remaining work. Returns `None` if it is used up.
     pub(super) fn invariant(&self, own: &Instance<T>, alone: bool, left: &mut usize) -> Option<Invariant> {
         let start = &self.task.operators[own.start.index()];
         let basic = |fact: &&Fact| fact.variable.index() < self.task.basic;
@@ -144,8 +144,8 @@ impl<'a, T: TimeNumber> Index<'a, T> {
         effects.any(|effect| effect.variable == fact.variable && effect.value != fact.value)
     }
 
-    /// Returns `true` if the happening `id` cannot take place strictly inside a run of `own` during
-    /// which the invariant facts hold.
+    /// Returns `true` if it is proved that the happening `id` cannot take place strictly inside a run of
+    /// `own` during which the invariant facts hold.
     pub(super) fn excludes(&self, invariant: &Invariant, own: &Instance<T>, id: OperatorId) -> bool {
         let (operator, happening) = (&self.task.operators[id.index()], &self.happenings[id.index()]);
         let invariant_fact =
@@ -175,11 +175,10 @@ impl<'a, T: TimeNumber> Index<'a, T> {
         operator.conditional.is_empty() && required.any(contradicts)
     }
 
-    /// Like [`Self::excludes`], and also `true` for the end of an action whose over-all condition
-    /// contradicts the invariant: right before an end inside the run, both would have to hold. This
-    /// argument does not cover an end at the time of the start of `own`, so that end must also be
-    /// impossible. Either the end and the start must keep a distance, or the start requires the fact of
-    /// the invariant that the condition contradicts.
+    /// Like [`Self::excludes`], but also `true` for the end of an action whose over-all condition contradicts
+    /// the invariant, because both would hold right before an end inside the run. An end at the time of the
+    /// start of `own` must be impossible, too: either the end and the start must keep a distance, or the
+    /// start requires the fact of the invariant that the condition contradicts.
     pub(super) fn is_outside(&self, invariant: &Invariant, own: &Instance<T>, id: OperatorId) -> bool {
         if self.excludes(invariant, own, id) {
             return true;
@@ -210,8 +209,7 @@ impl<'a, T: TimeNumber> Index<'a, T> {
         self.instances[instance as usize].duration
     }
 
-    /// Pairs of the start operator and the condition-over-all operator of all instances that have
-    /// such a condition.
+    /// Pairs of the start operator and the over-all operator, for all instances with an over-all condition.
     pub(super) fn holding(&self) -> impl Iterator<Item = (OperatorId, OperatorId)> {
         self.instances.iter().filter_map(|instance| Some((instance.start, instance.over_all?)))
     }

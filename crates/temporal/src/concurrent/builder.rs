@@ -143,9 +143,9 @@ impl<'a> Builder<'a> {
         if errors.is_empty() { Ok(()) } else { Err(errors.into()) }
     }
 
-    /// Creates a start and an end for each combination of conditional variants of an instance, by
-    /// copying operators. Returns `true` if any operator was copied. Simultaneous runs of different
-    /// variants are not searched.
+    /// Creates a start and an end for each combination of a start and an end of an instance, by copying
+    /// operators. An instance has several of them if its numeric effects are conditional. Returns `true` if
+    /// any operator was copied. Simultaneous runs of different combinations are not searched.
     pub(super) fn pair(&mut self, task: &mut Task) -> bool {
         let before = task.operators.len();
         for key in &self.order {
@@ -193,7 +193,7 @@ impl<'a> Builder<'a> {
             let placed = |error: Error| error.within(&format!("`{}`", schema.name), Some(schema.place));
             let factor = |timer| unit.factor::<T>(task, timer, divisor).map(|factor| (timer, factor));
             let is_chosen = self.split.chosen[key.0];
-            // The end always clears a chosen duration, whereas no happening sets a chosen duration.
+            // No start sets a chosen duration, but every end clears it.
             let timer = timer(task, if is_chosen { end } else { start });
             let timer = timer.map(factor).transpose().map_err(placed)?;
             // A duration that depends on the state is compared with the separation when the action

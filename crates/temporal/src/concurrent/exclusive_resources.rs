@@ -1,33 +1,20 @@
 //! Lower bound on the makespan: necessary work divided among resources that do one action at a time.
 //!
-//! # Resources
+//! A variable is an *exclusive resource* if its values can be divided into *free* and *busy* ones as follows.
+//! The start of an *occupying* action changes the variable from a free value to a busy one. Only the ends of
+//! occupying actions can make a busy variable free: every other happening that sets a free value requires a
+//! free value before. The runs of occupying actions are therefore disjoint intervals. The start of a run
+//! reads what the end of the previous run has written, so both are at least the separation apart.
 //!
-//! A variable is an *exclusive resource* if some of its values, the *busy* ones, are only left by
-//! the ends of actions whose starts have made it busy: the start of such an *occupying* action
-//! requires a value that is not busy and sets a busy one, and every other happening that sets a
-//! value that is not busy requires such a value before. By induction over the happenings of a plan,
-//! at most one occupying action of the variable runs at any time, and the variable is busy while one
-//! runs: a start requires that the variable is not busy, so no occupying action runs, and only the
-//! end of the one that runs can then make it free. The runs of occupying actions of one variable are
-//! therefore disjoint intervals. Moreover the start of the next run reads what the end of the
-//! previous one has written, so the two are at least the separation apart.
+//! Given `m` resources, a plan with makespan `T` contains occupying actions of total duration at most `T` per
+//! resource, or `T + s` if each duration is increased by the separation `s`. The sum of the increased
+//! durations over all actions of the plan, once for each resource that an action occupies, is therefore at
+//! most `m (T + s)`. The LM-cut value `W` \[1\] is a lower bound on this sum if the start of each action has
+//! its increased durations as cost. So `T ≥ W / m - s`. If separations are not certain to be required, `s` is
+//! 0.
 //!
-//! # Bound
-//!
-//! Let `m` resources be given. A plan with makespan `T` contains occupying actions of total duration
-//! at most `T` per resource, and at most `T + s` if each duration is increased by the separation `s`.
-//! Therefore the sum over all actions of the plan, each with its duration plus `s` per resource that it
-//! occupies, is at most `m (T + s)`. That sum is a cost of the plan. Every admissible heuristic for
-//! this cost function is a lower bound `W` on it, and `T ≥ W / m - s`. LM-cut \[1\] is used, as it
-//! adds up the landmarks of different goals. It is admissible in the split task because each action
-//! contains its start, which pays for it, and the happenings of a plan in the order of their times
-//! are a sequence that the task admits.
-//!
-//! Without assumptions on separations the bound holds with `s = 0`, as intervals that do not overlap
-//! only require that happenings are applied in the order of their times.
-//!
-//! \[1\] M. Helmert, C. Domshlak: Landmarks, critical paths and abstractions: what's the difference
-//! anyway?, ICAPS 2009.
+//! \[1\] M. Helmert, C. Domshlak: Landmarks, critical paths and abstractions: what's the difference anyway?,
+//! ICAPS 2009.
 
 use std::collections::BTreeMap;
 
@@ -45,8 +32,8 @@ use crate::concurrent::time_number::TimeNumber;
 
 /// Upper limit on the number of groups of resources for which a bound is computed.
 const MAX_GROUPS: usize = 6;
-/// Costs are divided by a power of two until their maximum has this number of bits, a limit of
-/// LM-cut.
+/// Costs are divided by a power of two, so that their maximum has at most this number of bits. LM-cut does
+/// not support much higher costs.
 const COST_BITS: u64 = 39;
 
 #[derive(Clone)]
@@ -74,7 +61,7 @@ pub(super) fn makespan_bound<T: TimeNumber>(concurrent: &TemporalTask<T>, limits
         by_schemas.entry(schemas).or_default().push(resource);
     }
     let mut groups: Vec<Vec<Resource>> = by_size.into_values().collect();
-    // A group by schemas that is not split by size is the same group.
+    // Groups by schemas are added only if the division by size splits them.
     groups.extend(by_schemas.into_values().filter(|group| {
         let sizes: FxHashSet<usize> = group.iter().map(|resource| resource.instances.len()).collect();
         sizes.len() > 1
@@ -111,7 +98,7 @@ fn bound<T: TimeNumber>(
     group: &[Resource],
     limits: &Limits,
 ) -> T {
-    // Some constraints of an inexact task may not be those of the definition.
+    // In an inexact task, separations may be required that the semantics of plans does not require.
     let separation = if concurrent.is_exact { concurrent.separation } else { T::ZERO };
     let mut costs = vec![T::ZERO; concurrent.instances.len()];
     for instance in group.iter().flat_map(|resource| &resource.instances) {
@@ -179,8 +166,8 @@ fn value_in(facts: &[Fact], variable: VariableId) -> Option<u32> {
     facts.iter().find(|fact| fact.variable == variable).map(|fact| fact.value)
 }
 
-/// A variable as a resource, given the operators that set it. Returns `None` if no set of busy values
-/// satisfies the definition.
+/// Returns a variable as a resource; `setters` are the operators that set the variable. Returns `None` if no
+/// set of busy values satisfies the definition.
 fn resource<T: TimeNumber>(
     concurrent: &TemporalTask<T>,
     variable: VariableId,

@@ -76,12 +76,12 @@ impl<'a> Footprints<'a> {
         Self { world, supposes: false }
     }
 
-    /// Returns the write set of the effects for a binding of the parameters, including conditional
-    /// effects that may apply.
+    /// Returns the write set of the effects for a binding of the parameters, including conditional effects
+    /// that may apply. Effects on undefined numbers are ignored.
     ///
     /// # Errors
-    /// Fails if an effect changes a number that has no initial value, or if the computation is
-    /// interrupted.
+    /// Fails if an effect cannot be evaluated, for example because a number has no initial value, or if the
+    /// computation is interrupted.
     pub(super) fn writes(&mut self, effects: &[Effect], binding: &Binding) -> Result<Footprint, Error> {
         let mut footprint = Footprint::default();
         for effect in effects {

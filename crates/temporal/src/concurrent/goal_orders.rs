@@ -7,7 +7,7 @@
 //! processing time \[1\]. Local search then swaps and moves goals \[2\]; decoding a sequence of
 //! intermediate goals by a simple planner is the scheme of \[3\].
 //!
-//! The greedy search (`greedy`) usually expands each state only once, whatever its clocks are. So it
+//! The greedy search (`greedy`) usually expands each state only once, regardless of its times. So it
 //! rarely changes how actions are distributed among interchangeable objects. The search over goal
 //! orders proves nothing: it only yields plans, each of which was executed happening by happening.
 //!
@@ -46,10 +46,10 @@ use crate::concurrent::timed_relaxed_plan::{TimedRelaxation, TimedRelaxedPlan};
 
 /// Upper limit, per goal, on the number of relaxed plans whose actions are executed.
 const MAX_ROUNDS: usize = 60;
-/// Upper limit on the number of states that one best-first search evaluates, and on the number of
-/// these searches per goal. Orders that need more are dropped, so that tasks whose goals conflict
-/// leave the time to the other searches.
+/// Upper limit on the number of states that one best-first search evaluates.
 const MAX_ESCAPE: usize = 100;
+/// Upper limit on the number of best-first searches per goal. Orders that need more are dropped, so that
+/// tasks whose goals conflict leave the time to the other searches.
 const MAX_ESCAPES: usize = 3;
 /// Number of orders after which the search ends if it has found no plan.
 const MAX_FAILURES: usize = 12;
@@ -69,7 +69,7 @@ type Link = (OperatorId, bool);
 /// State in which a goal holds, and the happenings that lead there.
 type Achieved<T> = (TemporalState<T>, Vec<Link>);
 
-/// State before a goal of an order, and number of happenings up to there.
+/// Temporal state before a goal of an order is achieved, and the number of happenings up to there.
 #[derive(Clone)]
 struct Stage<T: TimeNumber = Int> {
     situation: TemporalState<T>,
@@ -388,7 +388,7 @@ fn key<T: TimeNumber>(TemporalState { state, clocks, .. }: &TemporalState<T>) ->
 }
 
 /// Extends a sequence of happenings until a goal is reached, by executable parts of relaxed plans. Returns
-/// `None` if the goal is unreachable or the limits on the number of relaxed plans are exceeded.
+/// `None` if the goal is not reached within the limits.
 fn achieve<T: TimeNumber>(
     relaxation: &mut TimedRelaxation<'_, T>,
     (concurrent, expansion): (&TemporalTask<T>, &Expansion<'_, T>),

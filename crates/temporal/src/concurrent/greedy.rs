@@ -1,18 +1,18 @@
 //! Lazy greedy best-first search over sequences of happenings, for a first plan and then better ones.
 //!
-//! Temporal states are evaluated when they are expanded, and queued by the value of their
-//! predecessor. Preferred happenings have a second queue \[1\]. A third queue prefers successors of
-//! states with a fact that is new among the states with the same number of unsatisfied goals \[2\].
-//! In sequential mode, each end directly follows its start in the sequence. Far fewer states
-//! remain, and most tasks still have a plan; actions can still overlap in time. Among states with
-//! the same facts, numbers and running actions, only the first one is expanded, or in mode `Sooner`
-//! each one with a smaller lower bound on the makespan. So this search may miss plans and proves
+//! Temporal states are evaluated when they are expanded, and queued by the value of their predecessor.
+//! Preferred happenings have a second queue \[1\]. A third queue prefers successors of states with a fact
+//! that is new among the states with the same number of unsatisfied goals \[2\]. In sequential mode, each end
+//! directly follows its start in the sequence, apart from timed initial literals. Far fewer states remain,
+//! and most tasks still have a plan; actions can still overlap in time. Among states with the same facts,
+//! running actions and numbers (without those of the metric), only the first one is expanded, or in mode
+//! `Sooner` each one with a smaller lower bound on the makespan. So this search may miss plans and proves
 //! nothing.
 //!
 //! \[1\] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010.
 //! \[2\] N. Lipovetzky, H. Geffner: Best-first width search, AAAI 2017.
-//! \[3\] R. Valenzano, N. Sturtevant, J. Schaeffer, F. Xie: A comparison of knowledge-based GBFS
-//! enhancements and knowledge-free exploration, ICAPS 2014.
+//! \[3\] R. Valenzano, N. Sturtevant, J. Schaeffer, F. Xie: A comparison of knowledge-based GBFS enhancements
+//! and knowledge-free exploration, ICAPS 2014.
 
 use std::collections::hash_map::Entry;
 use std::hash::{Hash, Hasher};
@@ -36,7 +36,7 @@ use crate::concurrent::successors::{DeadEnd, Expansion, TemporalState};
 use crate::concurrent::temporal_task::TemporalTask;
 use crate::concurrent::time_number::TimeNumber;
 
-/// Approximate memory use of a node without its packed state: the node, its queue entries and its
+/// Approximate memory use of a node without its packed state, in bytes: the node, its queue entries and its
 /// hash.
 const OVERHEAD: usize = size_of::<Node>() + 80;
 
@@ -51,8 +51,8 @@ pub(super) type Links = SmallVec<[Link; 2]>;
 /// Modes of the search: treatment of starts and ends, and of duplicate states.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Mode {
-    /// The end of an action directly follows its start in the sequence. Actions that do not
-    /// interfere may still overlap in time.
+    /// The end of an action directly follows its start in the sequence; only timed initial literals can come
+    /// in between. Actions that do not interfere may still overlap in time.
     Sequential,
     /// Starts and ends are separate successors.
     Overlapping,
@@ -326,7 +326,7 @@ impl<'a, T: TimeNumber> Greedy<'a, T> {
     fn is_new(&mut self, situation: &TemporalState<T>, makespan: T) -> bool {
         let TemporalState { state, clocks, .. } = situation;
         let mut key = state.values[..self.concurrent.task.basic].to_vec();
-        // Numbers that only the metric reads do not affect applicability.
+        // Numbers of the metric are ignored, because conditions rarely read them.
         let measured_terms = &self.concurrent.task.objective.rest;
         let is_read = |variable: u32| measured_terms.iter().all(|(number, _)| number.0 != variable);
         let numbers = (0..).zip(&state.numbers).filter(|(variable, _)| is_read(*variable));

@@ -6,7 +6,8 @@ use task::task::{Fact, NumericId, OperatorId};
 use crate::concurrent::interference::{Designs, InterferenceConstraints};
 use crate::concurrent::time_number::TimeNumber;
 
-/// Role of an operator of the split task: the part of an action that the operator executes.
+/// Role of an operator of the split task, in which the start and the end of an action are separate operators:
+/// the part of an action that the operator executes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Role {
     /// Start of the durative action with this instance index.
@@ -16,13 +17,13 @@ pub(super) enum Role {
     Whole,
     /// Timed initial literals: index into the events of the task.
     Timed(u32),
-    /// Operator that never happens: an over-all condition, or the start or end of an action that
+    /// Operator that never happens, for example an over-all condition, or the start or end of an action that
     /// cannot be executed.
     #[default]
     Never,
 }
 
-/// Role, interference constraints and write set of an operator.
+/// Temporal properties of an operator: its role, its interference constraints, and what it writes.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Happening<T: TimeNumber = Int> {
     pub(super) role: Role,
@@ -41,13 +42,13 @@ pub(super) struct Happening<T: TimeNumber = Int> {
 pub(super) struct Instance<T: TimeNumber = Int> {
     pub(super) start: OperatorId,
     pub(super) end: OperatorId,
-    /// Operator whose condition is the action's over-all condition. `None` if there is no such
-    /// condition.
+    /// Operator whose condition is the action's over-all condition. `None` if there is no over-all condition
+    /// that can change.
     pub(super) over_all: Option<OperatorId>,
     /// Duration in internal time units. Only a lower bound if the duration depends on the state or
     /// is chosen by the planner.
     pub(super) duration: T,
-    /// Number that holds the duration while the action runs, and the factor from this number to
+    /// Numeric variable that holds the duration while the action runs, and the factor from its value to
     /// internal time units. `None` if the duration is constant.
     pub(super) timer: Option<(NumericId, T)>,
     /// Whether the planner chooses the duration.

@@ -174,8 +174,8 @@ impl<T: TimeNumber> InterferenceConstraints<T> {
     }
 }
 
-/// Sorts the constraints, and removes accesses that no happening waits for and waits for accesses
-/// that no happening makes.
+/// Sorts the constraints. Removes the accesses that no happening must follow from `marks`, and the accesses
+/// that no happening makes from `after`.
 pub(super) fn prune<'a, T: TimeNumber>(
     constraints: impl Iterator<Item = &'a mut InterferenceConstraints<T>>,
 ) {

@@ -1,5 +1,5 @@
-//! Interleaves the exact search with incomplete ones (greedy search, goal orders, sequential plans).
-//! The budgets double in each round.
+//! Interleaves the exact search with incomplete ones (greedy search, goal orders, sequential plans). The
+//! budgets double in each round, and begin again when the incomplete searches restart.
 //!
 //! Small tasks are solved by the exact search alone, before the others begin. After that, the best
 //! plan of any search is the incumbent.
@@ -25,8 +25,8 @@ use crate::concurrent::time_number::TimeNumber;
 
 /// Expansions of the exact search per unit of work of the greedy search, once a plan is known.
 const EXACT_BUDGET: usize = 4;
-/// Number of rounds in which the search for sequential plans runs although a plan is known. The best
-/// sequential plan gives an upper bound on the metric.
+/// Number of first rounds in which the search for sequential plans runs even if a plan is known. In later
+/// rounds it runs only until a plan is known. Its best plan gives an upper bound on the metric.
 const WHOLE: usize = 2;
 
 /// Interleaves the searches until optimality is proved, no search can continue, a limit is reached, or
@@ -173,8 +173,8 @@ fn improve<T: TimeNumber>(
     }
 }
 
-/// Claim of an ended search. If the search is incomplete, only the initial lower bound holds for
-/// all plans.
+/// Outcome that is proved after the searches. If the exact search is incomplete, only the initial lower bound
+/// holds for all plans.
 fn claimed<T: TimeNumber>(
     search_end: SearchEnd<T>,
     (concurrent, search): (&TemporalTask<T>, &Search<'_, T>),

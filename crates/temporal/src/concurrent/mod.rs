@@ -1,7 +1,9 @@
-//! Concurrent plans of a PDDL task, with the least makespan or the best weighted sum of makespan and costs.
+//! Finds concurrent plans of a PDDL task, with the least makespan or the best weighted sum of makespan and
+//! costs. At a limit, the best known plan is returned, which need not be optimal.
 //!
-//! Plans are defined by [`validate`](pddl::validate). In addition, at any time each function that running
-//! actions require has one design, and no duration is above 0 and below the *separation* (epsilon).
+//! A plan must satisfy the semantics of [`validate`](pddl::validate). In addition, at any time each function
+//! that running actions require has only one design, and each duration is 0 or at least the *separation*
+//! (epsilon).
 //!
 //! `split` makes a start and an end of each durative action, `temporal_task` computes the constraints of each
 //! happening, and `search` explores sequences of happenings with their `simple_temporal_network`.
@@ -280,9 +282,9 @@ fn measures(effect: &ast::Effect) -> bool {
     }
 }
 
-/// Searches for an optimal plan with overlapping actions, until a limit is reached. Among optimal plans it
-/// returns one with the least makespan, if the search proves it and no duration is chosen. Calls `report` for
-/// every better plan, unless only a part of the metric is minimised.
+/// Searches for an optimal plan with overlapping actions, until optimality is proved or a limit is reached.
+/// Among optimal plans it returns one with the least makespan, if the search proves it and no duration is
+/// chosen. Calls `report` for every better plan, unless only a part of the metric is minimised.
 pub fn optimize_concurrent(
     concurrent: &ConcurrentTask,
     limits: &Limits,

@@ -8,8 +8,8 @@ use task::task::{NumericId, Operator, Task};
 use crate::concurrent::happening::Instance;
 use crate::concurrent::time_number::TimeNumber;
 
-/// Returns `true` if no operator lowers the contribution of numbers to the minimised metric, for
-/// any durations. `instances` provides the numbers that hold durations.
+/// Returns `true` if it is proved that no operator lowers the contribution of numbers to the minimised
+/// metric, for any durations. `instances` provides the numbers that hold durations.
 pub(super) fn only_grows<T: TimeNumber>(task: &Task, instances: &[Instance<T>]) -> bool {
     let timers: FxHashSet<NumericId> =
         instances.iter().filter_map(|instance| Some(instance.timer?.0)).collect();

@@ -27,7 +27,7 @@ const MAX_REPETITIONS: u32 = 1 << 20;
 
 #[derive(Debug, Clone)]
 pub(super) struct HeuristicValue {
-    /// Weight of the relaxed plan.
+    /// Sum over the happenings of the relaxed plan: weight times number of applications.
     pub(super) left: u64,
     /// Happenings of the relaxed plan without unsatisfied conditions, ascending.
     pub(super) preferred: Vec<OperatorId>,
@@ -38,8 +38,9 @@ pub(super) struct RelaxedPlanHeuristic<'a> {
     costs: Vec<u32>,
     /// Cheapest rule that adds each proposition, and its number of applications.
     supporters: Vec<Option<(u32, u32)>>,
-    /// Per rule: number of unreached conditions, and sum of the costs of the reached ones.
+    /// For each rule: number of its unreached conditions.
     unmet: Vec<u32>,
+    /// For each rule: sum of the costs of its reached conditions.
     sums: Vec<u32>,
     marked: Vec<bool>,
     /// Per numeric condition: amount that is missing. `None` if the expression can have any value, so

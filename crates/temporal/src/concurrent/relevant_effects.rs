@@ -53,7 +53,7 @@ impl<T: TimeNumber> RelevanceContext<'_, T> {
             || self.asked.get(number.index()).is_some_and(|asked| !if by < 0 { asked.down } else { asked.up })
     }
 
-    /// Returns `true` if removing an effect on a number never makes a plan worse.
+    /// Returns `true` if it is proved that removing an effect on a number never makes a plan worse.
     pub(super) fn is_loss(&self, effect: &NumericEffect) -> bool {
         matches!(change(effect), Some(Change::Adds(by)) if self.is_no_better(effect.variable, by))
     }
@@ -77,8 +77,8 @@ pub(super) fn asked<T: TimeNumber>(task: &Task, instances: &[Instance<T>]) -> Ve
     if is_judged || is_timed || !task.objective.rest.is_empty() { Vec::new() } else { directions(task) }
 }
 
-/// Per variable: whether the falsity of its atoms may be needed. `false` only for a variable of a
-/// single atom that occurs only positively in conditions and the goal, and neither in axioms nor in
+/// Per variable: whether the falsity of its atoms may be needed. `false` only for a variable of a single atom
+/// that occurs only positively in conditions and the goal, and neither in the bodies of axioms nor in
 /// conditions of conditional effects.
 pub(super) fn needed(task: &Task) -> Vec<bool> {
     let mut falsity_needed: Vec<bool> =

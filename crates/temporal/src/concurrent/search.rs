@@ -1,11 +1,11 @@
 //! A* over sequences of happenings.
 //!
-//! A node consists of a state, the running actions and a simple temporal network. A node is
-//! dominated by another one with the same state and running actions if every continuation of the
-//! first is possible for the second, no later, at no higher cost and with no less of any resource.
-//! Orders of happenings that do not interfere have the same network, so one of them is searched.
-//! Actions can start at any time, not only when others end; planners that consider no other times
-//! are incomplete \[1\].
+//! A node consists of a state, the running actions and a simple temporal network. A node is dominated by
+//! another node with the same facts and the same running actions if every continuation of the former is
+//! possible from the latter, no later and at no higher cost. The numbers of both nodes must be equal or, if
+//! larger numbers are never worse, those of the latter no smaller. Orders of happenings that do not interfere
+//! lead to the same network, so only one of these orders is continued. Actions can start at any time, not
+//! only when others end; planners that consider no other times are incomplete \[1\].
 //!
 //! \[1\] W. Cushing, S. Kambhampati, Mausam, D. Weld: When is temporal planning really temporal?, IJCAI 2007.
 

@@ -56,8 +56,9 @@ impl<'r, T: TimeNumber> Record<'r, T> {
         }
     }
 
-    /// Adds a lower bound to the history, if it has risen enough or the incumbent has changed. Returns
-    /// the bound after capping it at the ceiling and at the cost of the incumbent.
+    /// Adds a lower bound to the history, if it has risen enough or the incumbent has changed. Adds nothing
+    /// if only a part of the metric is minimised. Returns the bound after capping it at the ceiling and at
+    /// the cost of the incumbent.
     pub(super) fn report_lower_bound(&mut self, lower: Rational) -> Rational {
         let caps = self.ceiling.iter().chain(&self.cost);
         let lower = caps.fold(lower, |lower, cap| if *cap < lower { cap.clone() } else { lower });

@@ -93,8 +93,8 @@ struct Inside<'i, T: TimeNumber> {
 }
 
 impl<T: TimeNumber> Index<'_, T> {
-    /// Returns `true` if no run of the action can start during another run. Returns `None` if the
-    /// work limit `left` is used up.
+    /// Returns `true` if it is proved that no run of the action can start during another run. Returns `None`
+    /// if the work limit `left` is used up.
     fn excludes_itself(&self, own: &Instance<T>, left: &mut usize) -> Option<bool> {
         let invariant = self.invariant(own, true, left)?;
         if self.excludes(&invariant, own, own.start) {
@@ -292,8 +292,8 @@ impl<T: TimeNumber> Index<'_, T> {
         is_good_for_facts.then(|| wanted(end))
     }
 
-    /// Upper bound on the number of occurrences of a happening during a run of `own`. Returns
-    /// `None` if there is no bound or the duration of `own` is not constant.
+    /// Upper bound on the number of occurrences of a happening during a run of `own`. Returns `None` if no
+    /// bound is known, for example if the duration of `own` is not constant.
     fn times(&self, id: OperatorId, own: &Instance<T>, known: &RelevanceContext<'_, T>) -> Option<Int> {
         let happening = &self.happenings[id.index()];
         let apart = match happening.role {

@@ -47,10 +47,11 @@ type Call = (String, Vec<String>);
 
 pub(super) struct SequentialTask {
     task: Task,
-    /// Operators of the temporal task that start each action.
+    /// For each action (name and arguments): the operators of the temporal task that start the action or
+    /// execute it as a whole.
     begins: FxHashMap<Call, Vec<OperatorId>>,
-    /// Heuristics and successor data of the optimal search, computed on first use. `None` inside if
-    /// not supported.
+    /// Heuristics and successor data of the optimal search, computed on first use. The inner `None` means
+    /// that the computation failed.
     parts: OnceCell<Option<(Bounds, SearchTask)>>,
 }
 
@@ -163,9 +164,9 @@ impl<'w> SequentialPlanner<'w> {
         Self { whole, limits, satisficer, exact: Exact::Later, stored: 0, known: None }
     }
 
-    /// Resumes both searches for the work that corresponds to `situations` evaluations of the
-    /// greedy temporal search. Returns the better of the plans that are executable in the temporal
-    /// task.
+    /// Resumes both searches for the work that corresponds to `situations` evaluations of the greedy temporal
+    /// search. Returns the better of their plans, or `None` if neither search has a plan that is executable
+    /// in the temporal task.
     pub(super) fn run<T: TimeNumber>(
         &mut self,
         of: (&TemporalTask<T>, &Expansion<'_, T>),

@@ -130,9 +130,8 @@ impl<T: TimeNumber> SimpleTemporalNetwork<T> {
         self.opens.is_empty() && self.floor > self.latest()
     }
 
-    /// Returns `true` if timed initial literals at `time` are far enough behind earlier happenings that
-    /// take place as early as possible. `after` lists the access kinds that the literals must follow,
-    /// each with the required distance.
+    /// Returns `true` if timed initial literals at `time` are far enough behind the earliest times of the
+    /// accesses that they must follow. `after` lists these kinds of access, each with the required distance.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "sums of fewer than 2^32 times fit, see `TimeNumber::TIME_BITS`"

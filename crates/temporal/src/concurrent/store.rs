@@ -1,7 +1,7 @@
 //! Packed temporal states of the exact search.
 //!
-//! Finite-domain values take as many bits as they need, and times as many bytes. A *place* groups
-//! the states that may dominate each other: states with the same values and running actions and,
+//! Finite-domain values take as many bits as they need, and times as many bytes as they need. A *place*
+//! groups the states that may dominate each other: states with the same values and running actions and,
 //! unless larger numbers are never worse, the same numbers.
 
 use std::hash::{Hash, Hasher};

@@ -56,7 +56,7 @@ impl ConcurrentTask {
 #[derive(Debug, Clone)]
 pub(super) enum Width {
     Narrow(Box<TemporalTask>),
-    /// A common unit of all times needs more bits than the narrow type has.
+    /// Task whose common unit of all times needs more bits than the narrow type has.
     Wide(Box<TemporalTask<Wide>>),
 }
 
@@ -67,11 +67,12 @@ pub(super) struct TemporalTask<T: TimeNumber = Int> {
     /// Temporal properties of each operator, by operator id.
     pub(super) happenings: Vec<Happening<T>>,
     pub(super) instances: Vec<Instance<T>>,
-    /// Time (in internal units) and operator of each timed initial literal, in ascending order.
+    /// Time (in internal units) and operator of each group of simultaneous timed initial literals, ascending.
     pub(super) events: Vec<(T, OperatorId)>,
-    /// Per access key: a variable whose latest change shows that all earlier accesses of this kind
-    /// are past. Every happening that waits for such an access, except timed initial literals,
-    /// requires a value of this variable.
+    /// For each key of an access kind (such as deleting a certain atom): its guard, if there is one. Every
+    /// happening that must wait for such an access, except timed initial literals, requires a value of this
+    /// variable. Accesses that are at least the separation before the latest change of their guard delay no
+    /// later happening.
     pub(super) guards: Vec<Option<u32>>,
     pub(super) measure: Measure<T>,
     /// Per preference that can be violated: operators of which at least one is applicable in the
@@ -97,15 +98,15 @@ pub(super) struct TemporalTask<T: TimeNumber = Int> {
     pub(super) kept: Option<SourceTask>,
 }
 
-/// Requirements on the times and the metric of a temporal task.
+/// Least distance between interfering happenings, and weight of the makespan, in PDDL units.
 pub(super) struct Scale<'s> {
     pub(super) separation: &'s Rational,
-    /// Metric per PDDL time unit.
+    /// Increase of the minimised metric per PDDL time unit of the makespan.
     pub(super) time_weight: &'s Rational,
 }
 
-/// Builds the temporal task from a ground split task, with the narrow number type for times if it
-/// suffices for all constant times, and with the wide one otherwise.
+/// Builds the temporal task from a ground split task. Uses the narrow number type for times if it suffices
+/// for all constant times and the metric, unless the thresholds demand the wide type.
 pub(super) fn compile(
     mut task: Task,
     split: &Split,

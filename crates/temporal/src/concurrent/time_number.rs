@@ -1,9 +1,9 @@
-//! Number types of times: 128-bit integers, or 512-bit integers if a common unit of all times needs
-//! more bits.
+//! Number types of times: 128-bit integers, or 512-bit integers if a common unit of all times needs more
+//! bits.
 //!
-//! Twelve distinct prime speeds in durations `(/ (distance ?a ?b) (speed ?r))` have a common
-//! denominator of more than 80 bits. Times are never rounded, so such tasks are planned with wider
-//! integers. The searches are generic over the number type: tasks with small numbers pay nothing.
+//! Twelve distinct prime speeds in durations `(/ (distance ?a ?b) (speed ?r))` can have a common denominator
+//! of more than 80 bits. Times are never rounded, so such tasks are planned with wider integers. The searches
+//! are generic over the number type: tasks with small numbers pay nothing.
 
 use std::fmt::Debug;
 use std::hash::Hash;
@@ -67,7 +67,8 @@ pub(super) trait TimeNumber:
         self.to_big().bits()
     }
 
-    /// Quotient of two positive numbers, rounded down. Returns `None` if it is not representable.
+    /// Quotient of two positive numbers, rounded down. Returns `None` if the divisor is 0 or the quotient is
+    /// not representable.
     fn quotient(self, divisor: Self) -> Option<Int> {
         self.to_big().checked_div(&divisor.to_big())?.to_i128()
     }

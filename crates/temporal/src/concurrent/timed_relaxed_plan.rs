@@ -1,11 +1,11 @@
 //! Relaxed plans with times: the soonest way to reach some facts if nothing is deleted.
 //!
-//! A rule fires when its last condition holds (h^max over time). The end of an action fires a
-//! duration after its start, and timed initial literals at their time. The conditions of a state
-//! hold from the times at which they were achieved, so objects that are free early, such as the
-//! robot that finishes first, achieve a fact sooner. Each proposition is supported by the rule that
-//! adds it first; among these, by one with the smaller relaxed plan. The actions are sorted by their
-//! latest start, as in critical path scheduling, so the longest chain is executed first.
+//! A rule fires when its last condition holds (h^max over time). The end of an action fires a duration after
+//! its start, and timed initial literals at their time. The facts of a state hold from the times at which
+//! they were achieved, so objects that are free early, such as the robot that finishes first, achieve a fact
+//! sooner. Each proposition is supported by the rule that adds it first; among these, by one with the smaller
+//! relaxed plan. The actions are sorted by their latest start, as in critical path scheduling, so the longest
+//! chain is executed first.
 //!
 //! Similar relaxed plans guide Sapa \[1\].
 //!
@@ -41,24 +41,25 @@ const MAX_REPETITIONS: u32 = 8;
 pub(super) struct TimedRelaxedPlan {
     /// Time at which the last target holds.
     pub(super) finish: i64,
-    /// Starts, actions without duration, and timed initial literals, sorted by their latest time. A happening
-    /// occurs once for each of its repetitions.
+    /// Starts, actions without duration, and timed initial literals, sorted by the latest time at which they
+    /// must happen. A happening occurs once for each of its repetitions.
     pub(super) happenings: Vec<OperatorId>,
 }
 
 #[derive(Debug, Clone, Copy)]
 enum Timing {
-    /// Holds as soon as its conditions do.
+    /// The rule fires as soon as its conditions hold.
     Immediate,
     Start(u32),
     End(u32),
     At(Time),
 }
 
-/// Fixed duration of an instance, or the number from which it follows.
+/// Duration of an instance: fixed, or computed from numbers when the action starts.
 enum Duration<T: TimeNumber> {
     Constant(Time),
-    /// Value that the start assigns to the number holding the duration, and its factor.
+    /// Expression that the start assigns to the number holding the duration, and the factor from this number
+    /// to internal time units.
     Assigned(Linear<Int>, T),
 }
 
@@ -70,16 +71,18 @@ pub(super) struct TimedRelaxation<'a, T: TimeNumber = Int> {
     separation: Time,
     /// Times are rounded to multiples of 2^`shift` internal time units.
     shift: u64,
-    /// Time and number of relaxed actions of each proposition.
+    /// For each proposition: the time from which it holds, and the number of actions of its relaxed plan.
     values: Vec<(Time, u32)>,
     /// Rule that adds each proposition, and the number of its repetitions.
     supporters: Vec<Option<(u32, u32)>>,
     is_settled: Vec<bool>,
-    /// Per rule: number of unreached conditions, sum of the numbers of relaxed actions of the
-    /// reached ones, position in the order in which rules fire, and latest time.
+    /// For each rule: number of its unreached conditions.
     unmet: Vec<u32>,
+    /// For each rule: sum of the numbers of relaxed actions of its reached conditions.
     sums: Vec<u32>,
+    /// For each rule: its position in the order in which rules fire.
     order: Vec<u32>,
+    /// For each rule: the latest time at which it may fire.
     latest: Vec<Time>,
     is_used: Vec<bool>,
     fired: u32,
@@ -91,7 +94,7 @@ pub(super) struct TimedRelaxation<'a, T: TimeNumber = Int> {
     queue: BinaryHeap<Reverse<(Time, u32, Proposition)>>,
 }
 
-/// Converts a time to 2^`shift` internal time units.
+/// Converts a time to units of 2^`shift` internal time units, rounded down.
 fn time<T: TimeNumber>(time: T, shift: u64) -> Time {
     Time::try_from(time.shifted_down(shift)).unwrap_or(NEVER / 4)
 }
@@ -314,8 +317,8 @@ impl<'a, T: TimeNumber> TimedRelaxation<'a, T> {
                 self.limit(*need, by, before);
             }
         }
-        // An end counts for its start. The rules for the conditional effects of an operator are one
-        // action.
+        // An end is attributed to the start of its action. The rules for the conditional effects of an
+        // operator are one action.
         let mut timed: FxHashMap<OperatorId, (Time, u32, u32)> = FxHashMap::default();
         for (rule, times) in used {
             self.is_used[rule as usize] = false;

@@ -18,7 +18,7 @@ use crate::concurrent::time_number::TimeNumber;
 pub(super) struct StaticDurations {
     /// Durations that do not depend on the state, in PDDL time units.
     pub(super) durations: FxHashMap<OperatorId, Rational>,
-    /// Divisors of state-dependent durations: the duration is a number of the task divided by this
+    /// Divisors of state-dependent durations: the duration is the value of a numeric variable divided by this
     /// constant.
     pub(super) divisors: FxHashMap<OperatorId, Rational>,
 }
@@ -28,8 +28,8 @@ pub(super) struct StaticDurations {
 pub(super) struct Unit(pub(super) BigInt);
 
 impl Unit {
-    /// Computes a unit in which all durations, the separation and the times of timed initial literals
-    /// are integers.
+    /// Computes a unit in which all durations that the planner does not choose, the separation and the times
+    /// of timed initial literals are integers.
     ///
     /// # Errors
     /// `Error::Overflow` if the number of units per PDDL time unit has more than `T::TIME_BITS` bits.
@@ -53,7 +53,8 @@ impl Unit {
             add(duration.to_big().denom())?;
         }
         if !split.durations.is_empty() {
-            // State-dependent durations are numbers of the task, with its scale.
+            // State-dependent durations are values of numeric variables, which are stored as integers in a
+            // scale.
             let multiples = task.number_multiples.iter().copied().map(BigInt::from);
             let scale = multiples.fold(BigInt::one(), |common, multiple| common.lcm(&multiple));
             let scale = scale * task.number_scale;
@@ -95,8 +96,8 @@ impl Unit {
         units.and_then(|units| T::from_big(&units)).ok_or_else(|| Error::overflow("a time"))
     }
 
-    /// Factor from the value of the number `timer`, divided by `divisor`, to a duration in internal
-    /// time units.
+    /// Returns the factor from the stored value of the numeric variable `timer` to a duration in internal
+    /// time units. The duration in PDDL time units is the value of the fluent divided by `divisor`.
     ///
     /// # Errors
     /// `Error::Overflow` if `T` is too narrow.

@@ -10,9 +10,9 @@ use crate::store::{Bucket, Fault, Store};
 use crate::wire::{Address, Progress, Saved};
 
 impl<S: Store> Partition<S> {
-    /// Starts to save the robots that have had unsaved decisions for [`Settings::save_within`], or
-    /// with `all` every robot with unsaved decisions, and suspended robots. Omits robots as
-    /// [`Self::save_robot`] does. Returns `true` if a snapshot was started.
+    /// Starts to save all robots whose decisions have been unsaved for [`Settings::save_within`], or, with `all`, all
+    /// robots with unsaved decisions. Also starts to mark the snapshots of suspended robots. Robots that
+    /// [`Self::save_robot`] cannot save now are omitted. Returns `true` if a snapshot was started.
     pub(super) fn save(&mut self, all: bool) -> bool {
         let within = self.shared.settings.save_within;
         let is_due = |slot: &Slot| {
@@ -33,7 +33,7 @@ impl<S: Store> Partition<S> {
             return false;
         }
         let mut saved = robot.save(last.1);
-        // The progress may have passed events that wait.
+        // Events that wait may be earlier than the progress of the partition.
         saved.behind = slot.behind.is_some() || slot.is_apart && !slot.waiting.is_empty();
         // From now on, the progress must not pass later events, because the snapshot may be stored at any time.
         slot.is_apart &= saved.behind;
@@ -50,7 +50,8 @@ impl<S: Store> Partition<S> {
     /// Starts to mark the snapshot of a suspended robot, so that the progress of the partition does not wait for the
     /// robot. Does nothing if the snapshot has this mark or is being written. Returns `true` if a write was started.
     fn set_apart(&mut self, name: &str) -> bool {
-        // Without a snapshot, all that is known about the robot follows the progress.
+        // For a robot without a snapshot, an empty one is stored. It ends at the progress of the partition, because all
+        // known events and decisions of the robot have greater sequence numbers.
         let (event, decision) = (self.progress.events, self.progress.decisions);
         let Some(slot) = self.slots.get_mut(name) else { return false };
         if slot.suspended.is_none() || slot.is_apart || slot.is_saving {
@@ -70,7 +71,8 @@ impl<S: Store> Partition<S> {
                     let saved = Saved { behind: true, ..saved };
                     (saved.event, write(store, Bucket::Robots, &key, &bytes(&saved), revision).await)
                 }
-                // A snapshot that cannot be parsed is kept. Its robot was not restored, so it is not suspended.
+                // Not expected: a robot whose snapshot could not be parsed at recovery has revision 0 here. The
+                // snapshot keeps its content and gets no mark.
                 Ok(None) => {
                     return Done::Kept { robot: name, event: 0, behind: false, revision: Ok(revision) };
                 }

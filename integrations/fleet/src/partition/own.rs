@@ -271,7 +271,7 @@ impl<S: Store> Partition<S> {
         let is_page_full = events.len() == MAX_PAGE;
         let mut last = 0;
         for event in events {
-            // Later events are read in their order.
+            // Later events are still to come from the stream.
             if event.sequence <= self.seen.0 {
                 last = event.sequence;
                 if self.address(&event).is_some() {
@@ -352,7 +352,8 @@ impl<S: Store> Partition<S> {
         let warm = own.is_warm();
         let Some(slot) = self.slots.get_mut(name) else { return Ok(()) };
         slot.robot = Some(own);
-        (slot.at, slot.search) = (None, search);
+        slot.search = search;
+        let at = slot.at.take();
         match (slot.used > 0, warm) {
             (false, true) => drop(self.shared.counts.warm.fetch_add(1, Ordering::Relaxed)),
             (true, false) => drop(self.shared.counts.warm.fetch_sub(1, Ordering::Relaxed)),
@@ -373,8 +374,9 @@ impl<S: Store> Partition<S> {
             }
             Outcome::Refused(refused) => self.say(event, refused),
             Outcome::Faulted(why) => {
-                let decision = slot.chain.unwrap_or(self.recovered) + 1;
-                self.fault(name, event.sequence, decision, &why);
+                // The next owner replays the decision of a former owner about this event, and all later ones.
+                let last_decision = at.map_or(self.recovered, |(_, last_decision)| last_decision);
+                self.fault(name, event.sequence, last_decision + 1, &why);
             }
             Outcome::Fenced => return Err(End::Fenced),
         }

@@ -11,9 +11,8 @@ use crate::wire::{Decided, Progress};
 pub(super) struct Slot {
     /// State of the robot. `None` while an event is being handled.
     pub(super) robot: Option<Box<Robot>>,
-    /// While an event is being handled: its sequence number, and the sequence number of the
-    /// partition's last decision at the start. For a replayed event, this is the number before its
-    /// decision.
+    /// While an event is being handled: its sequence number, and the sequence number of the partition's last decision
+    /// at the start. For a replayed event, the second number is less than that of its decision.
     pub(super) at: Option<(u64, u64)>,
     pub(super) waiting: VecDeque<Stored>,
     /// Sequence number from which events of the robot are not in the queue and have to be read again,
@@ -104,7 +103,7 @@ pub(super) enum Done {
         robot: String,
         outcome: Result<(), Fault>,
     },
-    /// Events of a robot were read again, all of them or at most `MAX_PAGE`.
+    /// Events of a robot were read again: all that were omitted, or the first `MAX_PAGE` of them.
     Refilled {
         robot: String,
         events: Result<Vec<Stored>, Fault>,

@@ -153,8 +153,8 @@ impl<S: Store> Task<S> {
                     Ok(Some(last)) if last.id.as_deref() == Some(&id) => {
                         return Outcome::Decided(last.sequence);
                     }
-                    // The stream has a maximum age, and the robot was silent for longer. A worker that has
-                    // lost the partition for as long must not continue.
+                    // The stream has a maximum age, and the robot was silent for longer. Then the order of decisions
+                    // no longer shows whether another worker has taken over the partition.
                     Ok(None) if chain > 0 => {
                         if !self.is_owner().await {
                             return Outcome::Fenced;

@@ -1,9 +1,9 @@
 //! Threads for the loops of robots, so that long searches do not delay short work.
 //!
-//! Work without a search has threads of its own. Searches have a pool of threads for each class of durations
-//! (a multilevel feedback queue): a search begins in the class of the robot's last searches, or, for a robot that
-//! has not searched, in the class of the last searches for its mission. It leaves the class when it exceeds the
-//! maximum duration. The operating system shares the processors among the pools.
+//! Work without a search has threads of its own. Searches have a pool of threads for each class of durations (a
+//! multilevel feedback queue): a search begins in the class of the robot's last searches, or, for a robot that has
+//! not searched, in the class of the last searches for its mission. A search that exceeds the maximum duration of its
+//! class moves to the next class. The operating system shares the processors among the pools.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -23,7 +23,8 @@ const CLASSES: usize = MAX_DURATIONS.len() + 1;
 pub(crate) struct Threads {
     quick: Semaphore,
     searches: [Semaphore; CLASSES],
-    /// Number of searches that have left their class while the pools of longer ones were full.
+    /// Number of searches that run on extra threads. They have exceeded the maximum of their class while the pool of
+    /// the next class was full.
     extra: AtomicUsize,
     max_extra: usize,
     /// Estimated duration of a search by mission.

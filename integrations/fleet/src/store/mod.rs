@@ -74,7 +74,7 @@ impl Bucket {
 pub struct Stored {
     /// Sequence number in the stream, from 1, over all subjects.
     pub sequence: u64,
-    /// Subject without the prefix of the stream.
+    /// Subject without the prefixes of fleet and stream: `PARTITION.ROBOT`.
     pub subject: String,
     /// The message id, if it has one.
     pub id: Option<String>,
@@ -87,7 +87,7 @@ pub struct Stored {
 /// A message to append.
 #[derive(Debug, Clone, Copy)]
 pub struct Message<'a> {
-    /// Subject without the prefix of the stream.
+    /// Subject without the prefixes of fleet and stream: `PARTITION.ROBOT`.
     pub subject: &'a str,
     /// Message id. A further message with the same id is not stored (with NATS: for ten minutes). An
     /// empty id is not compared.
@@ -115,7 +115,7 @@ pub struct Entry {
     pub key: String,
     /// Bytes of the value.
     pub value: Vec<u8>,
-    /// Number of the write, which grows with every write in the bucket.
+    /// Number of the write of this value. It grows with every write in the bucket.
     pub revision: u64,
 }
 

@@ -45,7 +45,8 @@ pub struct Access {
 /// partitions, replicas and lease.
 #[derive(Debug, Clone)]
 pub struct Layout {
-    /// Name of the fleet, a prefix of all names: up to 64 letters, digits, `-` and `_`.
+    /// Name of the fleet, with which the names of its streams and buckets begin: up to 64 letters, digits, `-` and
+    /// `_`.
     pub fleet: String,
     /// Number of partitions, which never changes.
     pub partitions: u32,
@@ -271,8 +272,8 @@ impl Nats {
         &self.buckets[bucket as usize]
     }
 
-    /// Reads the messages of a stream that match `filter`, beginning as `from` requires. Calls `take` with each message
-    /// and its sequence number.
+    /// Reads the messages of a stream that match `filter`, beginning as `from` requires, as far as the extent states.
+    /// Calls `take` with each message and its sequence number.
     async fn read(
         &self,
         name: &str,
@@ -343,7 +344,7 @@ fn stream_name(fleet: &str, stream: Stream) -> String {
     }
 }
 
-/// Returns the first tokens of the subjects of a fleet that is created.
+/// Returns the first tokens of the subjects of a new fleet.
 fn subject_prefix(fleet: &str) -> String {
     if fleet == DEFAULT_FLEET { String::new() } else { format!("{fleet}.") }
 }

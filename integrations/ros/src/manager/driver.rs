@@ -1,5 +1,4 @@
-//! Driver of the manager: a thread that passes inputs to the state machine, one at a time, and its
-//! outputs to the robot.
+//! Driver of the manager: passes inputs to the state machine, one at a time, and its outputs to the robot.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -28,7 +27,8 @@ use crate::performer::performers;
 /// `/diagnostics`.
 const PERIOD: Duration = Duration::from_secs(1);
 
-/// Limit on the number of inputs that are kept while the manager is inactive.
+/// Limit on the number of inputs that are kept while the manager is inactive. When it is reached, the kept inputs are
+/// handled.
 const MAX_DELAYED_INPUTS: usize = 100_000;
 
 const SEARCH_TIME: Duration = Duration::from_millis(200);
@@ -46,7 +46,7 @@ pub struct Options {
     pub mission: PathBuf,
     /// Settings of the robot; by default a file `ros.toml` in the directory of the mission.
     pub settings: Option<PathBuf>,
-    /// Directory of the journal.
+    /// Directory of the journal. `None` for no journal.
     pub journal: Option<PathBuf>,
     /// `true` if the steps of designs may execute commands.
     pub allow_commands: bool,
@@ -73,7 +73,7 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
         5.0,
     )?;
     let attribute = |name: &str| {
-        // The value is of no importance: the change is tried on a copy.
+        // The check only sets some value on a copy of the mission.
         mission.clone().set(name, "0").map_err(|message| message.message.clone())
     };
     settings.check_targets(&components(mission.knowledge()), attribute)?;
@@ -130,12 +130,12 @@ struct Driver {
     settings: Settings,
     /// `true` while the lifecycle state is active. Otherwise, tasks are refused and other inputs wait.
     active: Arc<AtomicBool>,
-    /// Timeout of calls, in milliseconds.
+    /// Timeout of a change of mode, in milliseconds.
     timeout: Arc<AtomicU64>,
     clock: Arc<Clock>,
-    /// Time of the clock when the program started.
+    /// Time of `clock` when this driver was created.
     origin: Duration,
-    /// Time of the last line in the journal; zero without a journal.
+    /// Time of the adaptation loop at `origin`: that of the last line in the journal, or zero without a journal.
     start_time: Duration,
 }
 
@@ -200,7 +200,7 @@ impl Driver {
         self.node.log(Severity::Info, &text);
         self.handle(Input::Ready(modes))?;
         for input in delayed {
-            // Earlier inputs are still valid.
+            // Inputs that arrived in the meantime are handled afterwards.
             let _ = sender.send(input);
         }
         Ok(())
@@ -240,7 +240,8 @@ impl Driver {
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return Ok(()),
             }
-            // Simulated time may be faster or slower than that of the network.
+            // Ticks follow the clock of the node, whose simulated time may run faster or slower than the real time of
+            // `next`.
             if self.clock.elapsed() >= next_tick {
                 next_tick = self.clock.elapsed() + PERIOD;
                 self.handle(Input::Tick)?;

@@ -32,7 +32,7 @@ use crate::procedure::{self, Procedures, Seen};
 
 const MODE_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Time after which an observation that has shown no mode is repeated.
+/// Time after which an observation is repeated if a node was silent or in a transition, or steps were being executed.
 const OBSERVATION_DELAY: Duration = Duration::from_millis(500);
 
 /// Number of mode requests to a new server, one per period: the first ones may be lost before it
@@ -53,10 +53,10 @@ struct Function {
     means: Means,
     /// Running call. A new call replaces it.
     calling: Option<Task<()>>,
-    /// Ends the running steps before their next one.
+    /// Flag that makes the running procedure end before its next step.
     is_replaced: Arc<AtomicBool>,
     mode_request: Option<Task<()>>,
-    /// GUIDs of the mode's servers, or of the servers of the nodes that steps use.
+    /// GUIDs of the servers of `get_mode`, or of the servers that show the design that steps have set.
     servers: BTreeSet<[u8; 16]>,
     remaining_requests: u32,
 }
@@ -213,8 +213,8 @@ impl Robot {
         futures::future::join_all(answers).await.into_iter().flatten().collect()
     }
 
-    /// Calls `change_mode`, or executes the steps of the mode. A running call of the function is cancelled;
-    /// running steps are undone first.
+    /// Calls `change_mode`, or executes the steps of the mode. A running call of the function is cancelled. Running
+    /// steps end before their next step, and are undone before the new ones are executed.
     pub(super) fn change(&mut self, change: Change, within: Duration) {
         let Some(function) = self.functions.get_mut(&change.function) else { return };
         let inputs = self.inputs.clone();
@@ -285,8 +285,8 @@ impl Robot {
     pub(super) fn request_mode(&mut self, name: &str) {
         let Some(function) = self.functions.get_mut(name) else { return };
         let (inputs, name) = (self.inputs.clone(), name.to_owned());
-        // The previous request must have ended first: an observation that runs at the same time as another one is
-        // unknown, and the change that has caused this request would be missed.
+        // The previous request is cancelled and must have ended first. Its observation may have begun before the
+        // change that has caused this request, and a second observation during the first one would be unsettled.
         let previous = function.mode_request.take();
         let end_previous = async move {
             if let Some(previous) = previous {
@@ -322,8 +322,8 @@ impl Robot {
         });
     }
 
-    /// Checks later whether a function replies. A function without a mode service counts as
-    /// replying while it has a server.
+    /// Checks later whether a function replies. A function without a server of `get_mode` counts as replying if
+    /// `change_mode` has a server.
     pub(super) fn probe(&mut self, name: &str, after: Duration) {
         let Some(function) = self.functions.get(name) else { return };
         let (means, procedures) = (function.means.clone(), Arc::clone(&self.procedures));
@@ -439,8 +439,8 @@ fn subscribe_function(
     subscribe_transitions(node, &topic, move || drop(sender.send(Input::Touched(name.clone()))))
 }
 
-/// Subscribes to parameter changes of the functions' nodes and of the nodes that steps use, and to the lifecycle of the
-/// latter.
+/// Subscribes to the parameter changes of the functions' nodes and of the nodes that steps use. Also subscribes to
+/// the lifecycle transitions of the nodes that steps use.
 fn subscribe_nodes(
     node: &Arc<Node>,
     settings: &Settings,

@@ -81,7 +81,7 @@ pub struct TaskSettings {
     pub facts: BTreeMap<String, toml::Value>,
 }
 
-/// Autopilot, whose mode tells whether the robot executes commands.
+/// Autopilot, whose mode shows whether the robot executes commands.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Autopilot {
@@ -91,8 +91,8 @@ pub struct Autopilot {
     pub mode: String,
 }
 
-/// Functions on the robot: their names and designs in `system_modes`, by default those of the knowledge base,
-/// or the steps that put their designs into effect.
+/// Functions on the robot, by their names in the knowledge base. The designs of a function are either put into effect
+/// by steps, or are modes of `system_modes`, with the same names unless others are given.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(transparent)]
 pub struct Functions(BTreeMap<Spanned<String>, FunctionSettings>);
@@ -100,11 +100,11 @@ pub struct Functions(BTreeMap<Spanned<String>, FunctionSettings>);
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct FunctionSettings {
-    /// Name of the system, without slash.
+    /// Name of the system in `system_modes`, without slash; the name of the function by default.
     system: Option<String>,
     /// Node of the function; `<system>_node` by default.
     node: Option<String>,
-    /// Mode while the function is not needed.
+    /// Mode while the function is not needed; `fd_unground` by default.
     unground: Option<String>,
     /// Modes of designs, by design. The default is the name of the design.
     #[serde(default)]
@@ -162,7 +162,7 @@ impl Settings {
     /// returns the reason why a name cannot be measured.
     ///
     /// # Errors
-    /// All names that the mission does not have.
+    /// Reports all components that the mission does not have, and all attributes that cannot be measured.
     pub(crate) fn check_targets(
         &self,
         components: &[String],
@@ -191,7 +191,7 @@ impl Settings {
         if errors.is_empty() { Ok(()) } else { Err(errors.into()) }
     }
 
-    /// Checks the steps of designs against the designs of the mission, by functions.
+    /// Checks the steps in the settings against the mission. `designs` are the mission's designs, by function.
     ///
     /// # Errors
     /// A function or a design does not exist, a design has no steps, a function has both steps and names for
@@ -269,7 +269,7 @@ impl FunctionSettings {
     }
 }
 
-/// Line and column of a byte offset, from 1, in characters.
+/// Returns the line and the column (in characters) of a byte offset, both from 1.
 fn position(text: &str, at: usize) -> (usize, usize) {
     let before = text.get(..at).unwrap_or(text);
     let line = before.rsplit('\n').next().unwrap_or_default();
@@ -288,7 +288,7 @@ impl Functions {
         node.unwrap_or_else(|| format!("{}_node", self.system(function)))
     }
 
-    /// Returns the mode of a design.
+    /// Returns the mode of a design, by default the name of the design.
     pub fn mode<'s>(&'s self, function: &str, design: &'s str) -> &'s str {
         self.0.get(function).and_then(|settings| settings.modes.get(design)).map_or(design, String::as_str)
     }
@@ -318,7 +318,7 @@ impl Functions {
         with_steps.map(|(function, settings)| (function.get_ref().clone(), of_function(settings))).collect()
     }
 
-    /// Returns the design of a mode, among the designs of a function.
+    /// Returns the one of the given designs of a function that has this mode, if there is one.
     pub fn design(&self, function: &str, mode: &str, designs: &[String]) -> Option<String> {
         designs.iter().find(|design| self.mode(function, design) == mode).cloned()
     }

@@ -27,12 +27,12 @@ use crate::types::ActionType;
 
 pub use caller::{Accepted, ActionCaller, GoalError, Pursued};
 
-/// Interval between two polls of an action server, because the client library has no stream of all
-/// events of a server.
+/// Interval at which an action server polls for requests, and an action client for messages. The client library has
+/// no stream of all these events.
 const POLL_INTERVAL: Duration = Duration::from_millis(2);
 
-/// Minimum time for which the result of an ended goal remains available to clients, as in `rcl_action`. Older
-/// results are removed when another goal ends.
+/// Minimum time for which the result of an ended goal remains available to clients. Older results are removed when
+/// another goal ends.
 const LIFETIME: Duration = Duration::from_secs(15 * 60);
 
 type Server<A> = ActionServer<<A as Action>::Goal, <A as Action>::Result, <A as Action>::Feedback>;
@@ -67,14 +67,14 @@ pub enum GoalEvent<A: Action> {
     Cancel(GoalId, CancelRequest),
 }
 
-/// Request for a new goal that the server has not answered yet.
+/// Unanswered request for a new goal.
 #[derive(Debug, Clone, Copy)]
 pub struct Wanted {
     request: RmwRequestId,
     goal: GoalId,
 }
 
-/// Request to cancel a goal that the server has not answered yet.
+/// Unanswered request to cancel a goal.
 #[derive(Debug, Clone, Copy)]
 pub struct CancelRequest {
     request: RmwRequestId,
@@ -93,10 +93,32 @@ struct Known<R> {
     result_requests: Vec<RmwRequestId>,
 }
 
+/// Request to cancel one or more goals, which has a single response.
+#[derive(Debug)]
+struct Cancellation {
+    request: RmwRequestId,
+    /// Number of selected goals for which [`Goals::canceling`] was not called yet.
+    undecided: usize,
+    canceling: Vec<GoalInfo>,
+}
+
+impl Cancellation {
+    /// Records whether a selected goal will be cancelled. Returns the response after the last goal.
+    fn decide(&mut self, goal: GoalInfo, will_be: bool) -> Option<(CancelGoalResponseEnum, Vec<GoalInfo>)> {
+        self.undecided = self.undecided.saturating_sub(1);
+        self.canceling.extend(will_be.then_some(goal));
+        let is_rejected = self.canceling.is_empty();
+        let code = if is_rejected { CancelGoalResponseEnum::Rejected } else { CancelGoalResponseEnum::None };
+        (self.undecided == 0).then(|| (code, std::mem::take(&mut self.canceling)))
+    }
+}
+
 /// Accepted goals of an action server.
 pub struct Goals<A: Action> {
     server: OnceLock<Server<A>>,
     goals: Mutex<BTreeMap<GoalId, Known<A::Result>>>,
+    /// Requests to cancel that are not answered yet.
+    cancellations: Mutex<Vec<Cancellation>>,
 }
 
 impl<A: Action> std::fmt::Debug for Goals<A> {
@@ -105,7 +127,8 @@ impl<A: Action> std::fmt::Debug for Goals<A> {
     }
 }
 
-/// Requests to the three services of an action that wait until the client can receive the reply.
+/// Waiting requests to the three services of an action: to send a goal, to cancel goals and to get a result. Each
+/// request waits until its client can receive the reply (see [`ReplyGate`]).
 struct Gates<A: Action> {
     goals: ReplyGate<(GoalId, A::Goal)>,
     cancels: ReplyGate<ros2_client::action::CancelGoalRequest>,
@@ -165,15 +188,23 @@ impl<A: Action> Goals<A> {
         }
     }
 
-    /// Answers a request to cancel a goal: `will_be` states whether the goal will be cancelled.
+    /// Decides whether a goal that a client wants to cancel will be cancelled. The client gets its response after the
+    /// decision about the last goal that its request selects.
     pub fn canceling(&self, request: CancelRequest, will_be: bool) {
-        let goals_canceling =
-            if will_be { vec![GoalInfo { goal_id: request.goal, stamp: request.info }] } else { Vec::new() };
         if will_be && let Some(known) = self.goals().get_mut(&request.goal) {
             known.status = GoalStatusEnum::Canceling;
         }
-        let code = if will_be { CancelGoalResponseEnum::None } else { CancelGoalResponseEnum::Rejected };
-        self.answer_cancel(request.request, code, goals_canceling);
+        let mut cancellations = self.cancellations.lock().unwrap_or_else(PoisonError::into_inner);
+        let position = cancellations.iter().position(|waiting| waiting.request == request.request);
+        let goal = GoalInfo { goal_id: request.goal, stamp: request.info };
+        let response = position.and_then(|position| {
+            let response = cancellations[position].decide(goal, will_be);
+            response.inspect(|_| drop(cancellations.swap_remove(position)))
+        });
+        drop(cancellations);
+        if let Some((code, canceling)) = response {
+            self.answer_cancel(request.request, code, canceling);
+        }
         self.publish_status();
     }
 
@@ -226,7 +257,7 @@ impl<A: Action> Goals<A> {
         }
     }
 
-    /// Receives new requests, and handles the waiting requests whose client can receive the reply.
+    /// Receives at most one new request of each service, and handles the requests that need not wait any longer.
     /// Returns descriptions of invalid requests.
     fn poll(&self, graph: &Graph, gates: &mut Gates<A>, take: &mut impl FnMut(GoalEvent<A>)) -> Vec<String> {
         let Some(server) = self.server.get() else { return Vec::new() };
@@ -247,9 +278,12 @@ impl<A: Action> Goals<A> {
             Err(error) => errors.push(error.to_string()),
         }
         while let Some((request, (id, goal))) = gates.goals.pop(graph) {
-            // The client has sent a goal with a known id again.
-            if !self.goals().contains_key(&id) {
-                take(GoalEvent::Wanted(Wanted { request, goal: id }, goal));
+            let wanted = Wanted { request, goal: id };
+            // Like the action server of rclpy, this one rejects a second goal with the same id.
+            if self.goals().contains_key(&id) {
+                self.reject(wanted);
+            } else {
+                take(GoalEvent::Wanted(wanted, goal));
             }
         }
         while let Some((request, cancel)) = gates.cancels.pop(graph) {
@@ -277,9 +311,9 @@ impl<A: Action> Goals<A> {
         }
     }
 
-    /// Passes on each goal that a cancel request selects: a single goal, all goals, or the goals
-    /// accepted up to a time (`action_msgs/srv/CancelGoal`). Answers with an error code if the
-    /// request selects no running goal.
+    /// Passes on each running goal that a cancel request selects: all goals, the goal with an id, the goals accepted
+    /// up to a time, or the goal with an id and those accepted up to a time (`action_msgs/srv/CancelGoal`). Answers
+    /// with an error code if the request selects no running goal.
     fn cancel(
         &self,
         request: RmwRequestId,
@@ -317,7 +351,10 @@ impl<A: Action> Goals<A> {
                 (false, _) => CancelGoalResponseEnum::UnknownGoal,
             };
             self.answer_cancel(request, code, Vec::new());
+            return;
         }
+        let cancellation = Cancellation { request, undecided: selected.len(), canceling: Vec::new() };
+        self.cancellations.lock().unwrap_or_else(PoisonError::into_inner).push(cancellation);
         for (goal, info) in selected {
             take(GoalEvent::Cancel(goal, CancelRequest { request, info, goal }));
         }
@@ -399,7 +436,11 @@ impl Node {
         let full = self.resolve(name);
         let action_name = client_name(&full)?;
         expect_action(&self.graph, &full, ActionNames::of::<A>());
-        let goals = Arc::new(Goals { server: OnceLock::new(), goals: Mutex::default() });
+        let goals = Arc::new(Goals {
+            server: OnceLock::new(),
+            goals: Mutex::default(),
+            cancellations: Mutex::default(),
+        });
         let (graph, weak, served) = (Arc::clone(&self.graph), Arc::downgrade(self), Arc::clone(&goals));
         self.spawn(async move {
             let mapping = graph.mapping().await;
@@ -435,5 +476,33 @@ impl Node {
             }
         });
         Ok(goals)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn goal(byte: u8) -> GoalInfo {
+        let id = serde_json::from_value(serde_json::json!({ "uuid": [byte; 16] })).expect("an id");
+        GoalInfo { goal_id: id, stamp: Time::ZERO }
+    }
+
+    fn cancellation(undecided: usize) -> Cancellation {
+        let request = RmwRequestId::default();
+        Cancellation { request, undecided, canceling: Vec::new() }
+    }
+
+    #[test]
+    fn a_request_to_cancel_several_goals_has_one_response() {
+        let mut several = cancellation(3);
+        assert!(several.decide(goal(1), true).is_none());
+        assert!(several.decide(goal(2), false).is_none());
+        let (code, goals) = several.decide(goal(3), true).expect("the last goal");
+        assert_eq!(code, CancelGoalResponseEnum::None);
+        let ids: Vec<_> = goals.iter().map(|goal| goal.goal_id).collect();
+        assert_eq!(ids, [goal(1).goal_id, goal(3).goal_id]);
+        let (code, goals) = cancellation(1).decide(goal(1), false).expect("the only goal");
+        assert_eq!((code, goals.len()), (CancelGoalResponseEnum::Rejected, 0));
     }
 }

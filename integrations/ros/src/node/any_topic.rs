@@ -23,7 +23,7 @@ pub(crate) struct Arrivals {
 }
 
 impl Arrivals {
-    /// Returns `true` if a message has arrived since this time.
+    /// Returns `true` if the last message arrived at the time `since` or later.
     pub(crate) fn is_after(&self, since: Instant) -> bool {
         self.last.lock().unwrap_or_else(PoisonError::into_inner).is_some_and(|last| last >= since)
     }
@@ -39,7 +39,7 @@ impl Node {
         self.graph.matched_readers(&topic)
     }
 
-    /// Observes a topic from now on.
+    /// Subscribes to a topic, and records when its last message arrived.
     ///
     /// # Errors
     /// The name is not a valid topic name.
@@ -117,9 +117,9 @@ impl Node {
         inner.create_subscription(&topic, Some(profile))
     }
 
-    /// Subscribes to a topic once it has a publisher; see [`Node::subscribe_raw`]. If the publisher is latched, samples
-    /// are received reliably, beginning with the last one. Otherwise, only new samples are received, with best effort.
-    /// A failed subscription is logged.
+    /// Subscribes to a topic once it has a publisher; see [`Node::subscribe_raw`]. If this publisher is latched
+    /// (reliable, and keeps samples for late subscribers), samples are received reliably, beginning with the last
+    /// one. Otherwise, only new samples are received, with best effort. A failed subscription is logged.
     ///
     /// # Errors
     /// The name is not a valid topic name.

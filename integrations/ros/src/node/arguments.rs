@@ -40,7 +40,7 @@ impl RosArguments {
     /// Splits a command line into the arguments of the program and those after `--ros-args`.
     ///
     /// # Errors
-    /// All errors of the latter and of the files that they name.
+    /// All errors in the arguments after `--ros-args` and in the parameter files that they name.
     pub fn split(words: impl IntoIterator<Item = String>) -> Result<(Vec<String>, Self), Errors> {
         let (mut program_arguments, mut ros) = (Vec::new(), Vec::new());
         let mut is_ros = false;
@@ -70,8 +70,7 @@ impl RosArguments {
             "-p" | "--param" => self.parameters.push(parameter(&next()?)?),
             "--params-file" => self.parameters.extend(parameters_file(&PathBuf::from(next()?))?),
             "--log-level" => self.log_level = Some(next()?.to_lowercase()),
-            // These options have no counterpart here: security enclave, log4 configuration, log
-            // file.
+            // Security enclave, log configuration and log file are not supported; these options are ignored.
             "-e" | "--enclave" | "--log-config-file" | "--log-file-name" => drop(next()?),
             _ if word.starts_with("--enable-") || word.starts_with("--disable-") => {}
             _ => {
@@ -84,7 +83,7 @@ impl RosArguments {
         Ok(())
     }
 
-    /// Full name of a node after the rules `__node` and `__ns`.
+    /// Returns the full name of a node after remapping by the rules `__node` (or `__name`) and `__ns`.
     pub(crate) fn node(&self, name: &str) -> FullName {
         let rule = |key: &str| {
             let fits =
@@ -98,7 +97,7 @@ impl RosArguments {
         )
     }
 
-    /// Full name of a topic, service or action of a node after the first matching rule.
+    /// Returns the full name of a topic, service or action of a node after remapping by the first matching rule.
     pub(crate) fn remap(&self, name: &str, node: &FullName) -> String {
         let full = node.expand(name);
         let fits = |rule: &&Rule| {
@@ -108,7 +107,8 @@ impl RosArguments {
         self.rules.iter().find(fits).map_or(full, |rule| node.expand(&rule.to))
     }
 
-    /// Returns the parameter values of a node; later ones take precedence.
+    /// Returns the parameter values for a node in the order of the command line. If a name occurs several times, the
+    /// last value applies.
     pub(crate) fn parameters(&self, node: &FullName) -> Vec<(String, ParameterValue)> {
         let full = node.to_string();
         let matching = self.parameters.iter().filter(|entry| is_match(&entry.nodes, &full, node.name()));
@@ -126,7 +126,7 @@ fn rule(text: &str) -> Result<Rule, Message> {
         || invalid(format!("`{text}` is not a rule; it should be `from:=to`, or `node:from:=to`"));
     let (selector, to) = text.split_once(":=").ok_or_else(malformed)?;
     let (node, from) = match selector.split_once(':') {
-        // `rostopic://` and `rosservice://` select the kind of name.
+        // The prefixes `rostopic://` and `rosservice://` are ignored.
         Some((_, from)) if from.starts_with("//") => (None, from.trim_start_matches('/')),
         Some((node, from)) => (Some(node.to_owned()), from),
         None => (None, selector),
@@ -204,8 +204,8 @@ fn flatten(name: &str, value: &Value, nodes: &str, found: &mut Vec<Assigned>, me
     }
 }
 
-/// Converts a YAML value to a parameter. Returns `None` for mappings, null, and lists of mixed types other
-/// than numbers.
+/// Converts a YAML value to a parameter. Returns `None` for null, mappings, tagged values, and lists whose items are
+/// not all texts, all truth values or all numbers.
 pub(crate) fn parameter_value(value: &Value) -> Option<ParameterValue> {
     Some(match value {
         Value::Bool(truth) => ParameterValue::Boolean(*truth),
@@ -222,7 +222,7 @@ pub(crate) fn parameter_value(value: &Value) -> Option<ParameterValue> {
                 )
             } else if all_items(Value::is_bool) {
                 ParameterValue::BooleanArray(list.iter().filter_map(Value::as_bool).collect())
-            // Only integers: a list that also has fractions is a list of doubles.
+            // A list of integers and fractions is a list of doubles (next case).
             } else if all_items(Value::is_i64) {
                 ParameterValue::IntegerArray(list.iter().filter_map(Value::as_i64).collect())
             } else if all_items(Value::is_number) {

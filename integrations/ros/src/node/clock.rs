@@ -22,7 +22,7 @@ pub(crate) struct Clock {
 struct ClockState {
     /// Time since the creation of the clock. It never decreases.
     elapsed: Duration,
-    /// Instant up to which `elapsed` contains the time of the system.
+    /// Instant up to which system time has been added to `elapsed`.
     counted: Instant,
     is_simulated: bool,
     /// Last message on `/clock`, as time since the epoch of the simulation.
@@ -92,7 +92,7 @@ impl Clock {
 }
 
 impl ClockState {
-    /// Adds the time of the system since the last call, unless time is simulated.
+    /// Adds the system time since `counted` to `elapsed`, unless time is simulated.
     fn count(&mut self) {
         if !self.is_simulated {
             let now = Instant::now();

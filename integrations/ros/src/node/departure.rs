@@ -16,7 +16,8 @@ use ros2_client::dds::rustdds::{DomainParticipant, RTPSEntity as _};
 
 use crate::node::rmw::Vendor;
 
-/// Sends the announcement to each participant of Fast DDS. Messages that cannot be sent are lost.
+/// Sends the announcement to the participants of Fast DDS that have known endpoints. Messages that cannot be sent are
+/// lost.
 pub(super) fn announce(participant: &DomainParticipant, loopback: bool) {
     let bind = if loopback { Ipv4Addr::LOCALHOST } else { Ipv4Addr::UNSPECIFIED };
     let Ok(socket) = UdpSocket::bind((bind, 0)) else { return };
@@ -49,8 +50,8 @@ fn discovery_addresses(participant: &DomainParticipant) -> BTreeSet<SocketAddr> 
 
 /// Encodes the departure of the participant with this GUID.
 ///
-/// The sequence number is greater than that of every announcement of the library, because Fast DDS
-/// ignores lower ones than the last.
+/// The sequence number is greater than that of every announcement of the library, because Fast DDS ignores numbers
+/// that are lower than the last one.
 fn departure(guid: [u8; 16]) -> Vec<u8> {
     [
         // Header: protocol version 2.4, vendor of the library, prefix.

@@ -19,7 +19,8 @@ use crate::node::rmw::{Mapping, Rmw, Vendor};
 
 const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
-/// Time to wait for further participants if no discovered one determines the mapping.
+/// Time after the first discovery of a participant. If no participant has determined the service mapping by then, the
+/// enhanced mapping is selected.
 const DISCOVERY_WAIT: Duration = Duration::from_secs(1);
 
 #[derive(Debug)]
@@ -48,7 +49,7 @@ struct GraphState {
 pub(crate) struct Expected {
     /// DDS name of the type.
     pub(crate) type_name: String,
-    /// `RIHS01_…`; compared only if the other side publishes its hash.
+    /// Type hash (`RIHS01_…`), or empty if unknown. Compared only with endpoints that publish a hash.
     pub(crate) hash: Cow<'static, str>,
 }
 
@@ -79,7 +80,7 @@ struct Endpoint {
     topic: String,
     type_name: String,
     hash: Option<String>,
-    /// `true` if late readers receive the last samples: reliable and transient local.
+    /// `true` if late readers receive the last samples: reliable and not volatile.
     is_latched: bool,
 }
 
@@ -91,7 +92,7 @@ pub(crate) struct Endpoints {
     pub(crate) services: BTreeMap<String, String>,
     pub(crate) actions: BTreeMap<String, String>,
     pub(crate) lifecycle_nodes: Vec<String>,
-    /// Functions of `system_modes`, without slash.
+    /// Names of the systems of `system_modes` (nodes with a service `change_mode`), without the leading slash.
     pub(crate) systems: Vec<String>,
 }
 
@@ -134,15 +135,15 @@ pub(crate) struct Writer {
 }
 
 impl Graph {
-    /// Starts to watch discovery until the task is dropped. The status of the participant must have
-    /// no other listener.
+    /// Watches discovery until the returned task is dropped. The status of the participant must have no other
+    /// listener.
     pub(crate) fn watch(
         participant: &DomainParticipant,
         own_prefix: [u8; 12],
         rmw: Rmw,
         preemptive: Arc<Preemptive>,
     ) -> (Arc<Self>, Task<()>) {
-        // A given mapping is valid before the first participant is discovered.
+        // A mapping that the user has selected is valid before the first participant is discovered.
         let state = GraphState { mapping: rmw.fixed(), ..GraphState::default() };
         let graph = Arc::new(Self { rmw, own_prefix, state: Mutex::new(state) });
         let (listener, watching) = (participant.status_listener(), Arc::clone(&graph));
@@ -182,7 +183,8 @@ impl Graph {
         self.state().participants.get(&prefix(endpoint)) == Some(&Vendor::FastDds)
     }
 
-    /// Returns `true` if a reader, or a writer, of a participant is known, or the participant has left.
+    /// Returns `true` if a reader (`is_reader`) or a writer of the participant is known, or if the participant has
+    /// left.
     fn has_endpoint_of(&self, participant: [u8; 12], is_reader: bool) -> bool {
         let state = self.state();
         let is_it = |(guid, endpoint): (&[u8; 16], &Endpoint)| {
@@ -262,7 +264,7 @@ impl Graph {
         state.expected.insert(topic, expected);
     }
 
-    /// Returns the problems since the last call, each once.
+    /// Returns the problems found since the last call, without those that were returned before.
     pub(crate) fn complaints(&self) -> Vec<String> {
         let mut state = self.state();
         let new = std::mem::take(&mut state.complaints);
@@ -329,9 +331,9 @@ impl Graph {
     /// Returns `true` if a reply to this client arrives: its reply reader is matched with our reply writer. A
     /// server that replies earlier loses the reply.
     ///
-    /// Fast DDS identifies a client by its reply reader, and other enhanced clients by their request writer.
-    /// Cyclone DDS sends eight bytes that are no GUID, so that every participant that writes requests must
-    /// have as many reply readers matched.
+    /// Fast DDS identifies a client by its reply reader, and other middlewares with the enhanced mapping by its
+    /// request writer. Cyclone DDS identifies a client by eight bytes that are no GUID. Then each participant with
+    /// request writers must have at least as many matched reply readers.
     pub(crate) fn can_reply(&self, topics: &Topics, client: Gid) -> bool {
         let client = client.to_bytes16();
         let state = self.state();
@@ -367,8 +369,8 @@ impl Graph {
         readers.iter().filter(|reader| state.matched_readers.contains(*reader)).count()
     }
 
-    /// Waits for the mapping of our own services: a fixed one, or that of a discovered participant that
-    /// supports only a single one. Without such a participant, the enhanced mapping is selected
+    /// Waits until the mapping of our own services is determined: by the user, or by a discovered participant whose
+    /// middleware supports only one mapping. Without such a participant, the enhanced mapping is selected
     /// [`DISCOVERY_WAIT`] after the first discovery.
     pub(crate) async fn mapping(&self) -> Mapping {
         loop {
@@ -469,10 +471,12 @@ fn type_hash(user_data: &[u8]) -> Option<String> {
     digits.bytes().any(|digit| digit != b'0').then(|| hash.to_owned())
 }
 
-/// Removes the length before user data and the padding after them, which the library does not remove.
+/// Removes the length before user data and the padding after them, which the library does not remove. Data without a
+/// valid length are returned unchanged.
 fn without_length(user_data: &[u8]) -> &[u8] {
     let Some((length, content)) = user_data.split_first_chunk() else { return user_data };
-    // The byte order is that of the announcement, which the library does not expose.
+    // The length has the byte order of the discovery message, which the library does not expose. So both orders are
+    // tried, and the first length that fits is used.
     let lengths = [u32::from_le_bytes(*length), u32::from_be_bytes(*length)];
     let content = lengths.into_iter().find_map(|length| content.get(..length as usize));
     content.unwrap_or(user_data)

@@ -18,11 +18,11 @@ use crate::node::{Node, Publisher, Severity, depth, is_lyrical, now};
 /// Primary state of a managed node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {
-    /// The node has read nothing.
+    /// The node has not read its files, such as the mission.
     Unconfigured,
-    /// The node has read its mission and is idle.
+    /// The node has read its files and is idle.
     Inactive,
-    /// The node has read its mission and performs its role.
+    /// The node has read its files and performs its role.
     Active,
     /// The node is shutting down.
     Finalized,
@@ -33,7 +33,7 @@ pub enum Phase {
 #[serde(rename_all = "lowercase")]
 pub(crate) enum PrimaryState {
     Unconfigured,
-    /// The node is configured and does not work.
+    /// The node is configured and idle.
     Inactive,
     Active,
 }

@@ -26,7 +26,7 @@ pub enum Severity {
     Warn,
     /// A failed operation.
     Error,
-    /// A failure that ends the node.
+    /// A failure after which the node cannot perform its role.
     Fatal,
 }
 

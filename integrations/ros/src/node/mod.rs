@@ -70,7 +70,7 @@ pub struct Opening {
     pub name: String,
     /// Arguments after `--ros-args`.
     pub arguments: RosArguments,
-    /// Domain and network.
+    /// ROS domain and discovery range.
     pub network: Network,
     /// Middleware of the other participants.
     pub rmw: Rmw,
@@ -110,7 +110,7 @@ impl Node {
         };
         let participant = network.participant().build().map_err(|error| failed(&error))?;
         let guid = ros2_client::dds::rustdds::RTPSEntity::guid(&participant).to_bytes();
-        // The prefix identifies the participant: the graph ignores its own endpoints.
+        // The prefix identifies the participant. The graph ignores endpoints with this prefix.
         let mut prefix = [0; 12];
         prefix.copy_from_slice(&guid[..12]);
         let (preemptive, answering) =
@@ -149,8 +149,8 @@ impl Node {
     }
 
     /// Ends the background tasks and announces the departure to participants of Fast DDS. The library announces it to
-    /// the others when the node is dropped. Without this call, the tasks may hold the participant until the program
-    /// ends, and the others notice the departure only when the lease expires.
+    /// other participants when the node is dropped. Without this call, the tasks may hold the participant until the
+    /// program ends, and other participants notice the departure only when the lease expires.
     pub fn close(&self) {
         let tasks = std::mem::take(&mut *self.tasks.lock().unwrap_or_else(PoisonError::into_inner));
         let canceled = futures::future::join_all(tasks.into_iter().map(Task::cancel));
@@ -170,7 +170,7 @@ impl Node {
         self.arguments.remap(name, &self.name)
     }
 
-    /// Returns `true` if a topic has a writer.
+    /// Returns `true` if a topic has a publisher of another participant.
     pub fn is_written(&self, topic: &str) -> bool {
         self.graph.has_writer(&format!("rt{}", self.resolve(topic)))
     }
@@ -183,7 +183,7 @@ impl Node {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Runs a background task until it ends or the node is dropped.
+    /// Runs a background task until it ends, or the node is closed or dropped.
     fn spawn(&self, work: impl Future<Output = ()> + Send + 'static) {
         let mut tasks = self.tasks.lock().unwrap_or_else(PoisonError::into_inner);
         tasks.retain(|task| !task.is_finished());

@@ -60,9 +60,9 @@ pub(crate) fn valid_name(kind: &str, name: &str) -> Result<String, String> {
     ))
 }
 
-/// Returns `true` if a pattern of a parameter file matches a node: `*` matches a part of a name, `**` any
-/// number of parts. A pattern that is a single name matches the nodes of this name in every namespace, even
-/// with a leading slash.
+/// Returns `true` if a pattern of a parameter file matches a node: `*` matches one part of the full name (between
+/// slashes), `**` any number of parts. A pattern that is a single name matches the nodes of this name in every
+/// namespace, even with a leading slash.
 pub(crate) fn is_match(pattern: &str, full: &str, name: &str) -> bool {
     let bare = pattern.trim_start_matches('/');
     if bare == name {

@@ -44,7 +44,7 @@ impl Network {
             .map(|range| range.to_uppercase())
             .as_deref()
         {
-            // `ROS_LOCALHOST_ONLY` takes precedence if both are set (Jazzy's release notes).
+            // `ROS_LOCALHOST_ONLY=1` takes precedence over these values (release notes of Jazzy).
             None | Some("SYSTEM_DEFAULT" | "SUBNET") => only,
             Some("LOCALHOST") => true,
             Some("OFF") => {

@@ -56,8 +56,8 @@ type Table = BTreeMap<String, Declared>;
 type Listener = dyn Fn(&str, &ParameterValue) + Send + Sync;
 
 impl Node {
-    /// Declares the parameters of the node, applies the values of the command line, and serves them.
-    /// `changed` is called for each parameter that is set later. Returns warnings about undeclared
+    /// Declares the parameters of the node and `use_sim_time`, applies the values of the command line, and serves the
+    /// parameters. `changed` is called for each parameter that is set later. Returns warnings about undeclared
     /// parameters.
     ///
     /// # Errors
@@ -216,7 +216,7 @@ impl Node {
         })
     }
 
-    /// Sets all parameters, or none of them if one does not pass its check.
+    /// Sets all parameters, or none of them if one of them cannot have its value.
     fn set(
         &self,
         table: &Mutex<Table>,
@@ -280,8 +280,8 @@ fn result(outcome: Result<(), String>) -> msg::SetParametersResult {
     msg::SetParametersResult { successful: outcome.is_ok(), reason: outcome.err().unwrap_or_default() }
 }
 
-/// Returns the names below the prefixes, at most `depth` levels deep (0: unlimited), and the
-/// prefixes of these names.
+/// Returns the names that equal a prefix or are at most `depth` levels below it (0: unlimited). Without prefixes, the
+/// levels are those of the whole name. Also returns the parents of these names, such as `a.b` for `a.b.c`.
 fn listed(names: Vec<String>, prefixes: &[String], depth: u64) -> msg::ListParametersResult {
     let is_near = |below: &str| depth == 0 || (below.matches('.').count() as u64) < depth;
     let is_wanted = |name: &String| {

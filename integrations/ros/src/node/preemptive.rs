@@ -1,5 +1,5 @@
-//! Preemptive ACKNACKs to writers of Fast DDS, which make a new match deliver its first samples at
-//! once.
+//! Preemptive ACKNACKs to writers of Fast DDS, so that a reader receives samples as soon as it has matched the
+//! writer.
 //!
 //! A writer of Fast DDS often matches our reader before our reader matches the writer. The samples
 //! of this interval are discarded, and later ones are withheld, until the reader receives a
@@ -7,9 +7,9 @@
 //! (`StatefulWriter::process_acknack`). `RustDDS` 0.15.1 sends the base 1, for which Fast DDS waits
 //! until its next periodic HEARTBEAT, after 3 s.
 //!
-//! For each match, this module sends the ACKNACK with the base 0. Its count must be greater than
-//! that of the ACKNACK that the library has sent, and less than that of its next one, otherwise
-//! Fast DDS ignores one of them. Therefore the count is taken from the library:
+//! For each match of a reader and a writer, this module sends an ACKNACK with the base 0. Its count must be greater
+//! than that of the ACKNACK that the library has sent, and less than that of its next one, otherwise Fast DDS ignores
+//! one of them. Therefore the count is taken from the library:
 //!
 //! 1. An empty HEARTBEAT on behalf of the writer is sent to our own participant. An `INFO_REPLY`
 //!    directs the answer to a socket of this module.
@@ -38,18 +38,19 @@ use ros2_client::dds::rustdds::DomainParticipant;
 use smol::net::UdpSocket;
 use smol::{Task, Timer};
 
-/// Times between the repetitions of the messages for one match, in milliseconds: 8.5 s in total. On
-/// a busy machine, Fast DDS may match seconds later than the library.
+/// Times after the individual attempts for one match, in milliseconds. The last attempt begins after 3.5 s, and the
+/// match is removed after 8.5 s. On a busy machine, Fast DDS may match seconds later than the library.
 const PAUSES: [u64; 10] = [5, 20, 75, 100, 200, 200, 400, 500, 2000, 5000];
 
-/// Time after the discovery of a participant at which its endpoints are requested unless they are known. The
-/// library ignores the first HEARTBEAT of the writer after the request, so that the request waits for it.
+/// Time after the discovery of a participant at which its endpoints are requested unless they are known. During this
+/// time, a HEARTBEAT of the writer may arrive by itself. After a request, the library would ignore this HEARTBEAT.
 const ENDPOINT_DELAY: Duration = Duration::from_millis(30);
 
-/// Number of participants of a host whose default ports get the ACKNACK.
+/// Number of participant ids for which the ACKNACK is sent to the default port of a host.
 const PARTICIPANTS: u16 = 32;
 
-/// Entity ids of the built-in writers and readers of subscriptions and of publications (RTPS 2.5, table 9.2).
+/// Entity ids of the built-in writer and the built-in reader for announcements of subscriptions (RTPS 2.5, table
+/// 9.2).
 const SUBSCRIPTIONS: [[u8; 4]; 2] = [[0, 0, 4, 0xC2], [0, 0, 4, 0xC7]];
 const PUBLICATIONS: [[u8; 4]; 2] = [[0, 0, 3, 0xC2], [0, 0, 3, 0xC7]];
 
@@ -59,7 +60,7 @@ const MAX_LENGTH: usize = 1500;
 type Guid = [u8; 16];
 type Prefix = [u8; 12];
 
-/// A reader of our participant and a writer that match.
+/// A reader of our participant and the writer that it has matched.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Match {
     reader: Guid,
@@ -73,7 +74,7 @@ pub(crate) struct Preemptive {
     socket: UdpSocket,
     /// Sends to writers.
     sender: UdpSocket,
-    /// Address at which our own participant receives messages.
+    /// Address at which our own participant receives discovery messages.
     own_address: SocketAddrV4,
     /// New matches with the ACKNACK to send to the writer, once its count is known.
     matches: Mutex<BTreeMap<Match, Pending>>,
@@ -105,7 +106,7 @@ impl Preemptive {
         Ok((preemptive, task))
     }
 
-    /// Makes a writer of Fast DDS send its HEARTBEAT to a reader that it has just matched.
+    /// Makes a writer of Fast DDS send its HEARTBEAT to our reader, which has just matched the writer.
     pub(crate) fn request_heartbeat(
         self: &Arc<Self>,
         participant: &DomainParticipant,
@@ -131,8 +132,8 @@ impl Preemptive {
         .detach();
     }
 
-    /// Makes a participant of Fast DDS announce its endpoints unless `is_known` returns `true` soon. Its argument is
-    /// `true` for readers and `false` for writers.
+    /// Makes a participant of Fast DDS announce its endpoints, unless they are known after [`ENDPOINT_DELAY`].
+    /// `is_known(true)` states whether a reader of the participant is known, `is_known(false)` whether a writer is.
     pub(crate) fn request_endpoints(
         self: &Arc<Self>,
         participant: &DomainParticipant,
@@ -187,7 +188,7 @@ impl Preemptive {
         let ready = self.matches().get(&matched).and_then(|pending| {
             pending.acknack.as_ref().map(|acknack| (pending.addresses.clone(), acknack.clone()))
         });
-        // A message that cannot be sent is like a lost one: the periodic HEARTBEAT is waited for.
+        // If a message cannot be sent, the reader waits for the periodic HEARTBEAT of the writer.
         match ready {
             Some((addresses, acknack)) => {
                 for address in addresses {
@@ -222,8 +223,8 @@ impl Preemptive {
     }
 }
 
-/// Default port of the unicast discovery traffic of a participant (RTPS 2.5, table 9.8). Unlike
-/// that of the user traffic, it always determines the participant id.
+/// Default port of the unicast discovery traffic of a participant (RTPS 2.5, table 9.8). The port of the user traffic
+/// may differ from its default, but this one always corresponds to the participant id.
 const fn discovery_port(domain: u16, participant: u16) -> u16 {
     7400 + 250 * domain + 10 + 2 * participant
 }
@@ -275,7 +276,7 @@ fn discovery_addresses(participant: &DomainParticipant) -> Vec<SocketAddr> {
         .collect()
 }
 
-/// Encodes a HEARTBEAT of a writer without samples, which is to be answered to `reply_to`.
+/// Encodes a HEARTBEAT of a writer that has no samples. The answer is to be sent to `reply_to`.
 ///
 /// The sender of the message is our own participant, because the library notes the network
 /// interface on which a participant sends. The count is the lowest possible one.
@@ -300,8 +301,8 @@ fn empty_heartbeat(Match { reader, writer }: Match, reply_to: SocketAddrV4) -> V
     message
 }
 
-/// Decodes a message with an ACKNACK of a reader that has received no sample. Returns the match and
-/// the message with the base 0 and without the final flag.
+/// Decodes a message with an ACKNACK of a reader that has received no sample. Returns the match, and the message with
+/// the base 0 and without the final flag. Returns `None` for other messages.
 fn preemptive_acknack(message: &[u8]) -> Option<(Match, Vec<u8>)> {
     if !message.starts_with(b"RTPS") {
         return None;

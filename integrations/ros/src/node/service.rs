@@ -120,7 +120,7 @@ impl<S: Service> Caller<S> {
         self.node.graph.server(&self.topics).is_some()
     }
 
-    /// Returns the GUIDs of the current servers. A restarted server has a new GUID.
+    /// Returns the GUIDs of the request readers of the current servers. A restarted server has a new GUID.
     pub fn servers(&self) -> BTreeSet<[u8; 16]> {
         self.node.graph.readers(&self.topics.requests)
     }

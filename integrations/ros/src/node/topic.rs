@@ -16,8 +16,7 @@ use crate::node::graph::Expected;
 use crate::node::{Node, Severity, client_name, creation_error, dds_type};
 use crate::types::{MessageType, Raw};
 
-/// A log message about invalid samples of a topic is written once per this number of invalid
-/// samples.
+/// Number of invalid samples of a subscription per log message about them. The first invalid sample is logged.
 const INVALID_PER_LOG_MESSAGE: u64 = 1000;
 
 /// Time after the creation of a subscription during which it discards samples that are older than
@@ -38,7 +37,8 @@ impl Old {
     }
 }
 
-/// Returns the time at which a sample was published, by the clock of its writer.
+/// Returns the time at which a sample was published, by the clock of its writer, or `None` if the writer does not
+/// state it.
 fn published(info: &MessageInfo) -> Option<SystemTime> {
     let stamp = info.source_timestamp().and_then(|stamp| u64::try_from(stamp.to_nanos()).ok());
     stamp.map(|nanoseconds| UNIX_EPOCH + Duration::from_nanos(nanoseconds))
@@ -136,8 +136,8 @@ impl Node {
         self.subscribe_as(name, &names, qos, move |message, _| take(message))
     }
 
-    /// Subscribes to a topic of a type that is known at run time, as [`Node::subscribe`] does. `take` receives
-    /// the encoded message and the time at which it was published.
+    /// Subscribes to a topic of a type that is known at run time, as [`Node::subscribe`] does. `take` receives the
+    /// encoded message and the time at which it was published (if unknown, the time of its arrival).
     ///
     /// # Errors
     /// Fails if the name is invalid, or the topic exists with another type.

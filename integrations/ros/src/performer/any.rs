@@ -19,7 +19,7 @@ use crate::validated::validated;
 /// Number of bytes before a result in the answer of `get_result`: the status of the goal.
 const STATUS_LENGTH: usize = 1;
 
-/// A goal of any type.
+/// Settings of an action that is performed by a goal for an action server of any type.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AnyGoal {
     server: String,
@@ -28,7 +28,7 @@ pub struct AnyGoal {
     expected: Expectation,
 }
 
-/// A service call of any type.
+/// Settings of an action that is performed by a call of a service of any type.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AnyCall {
     service: String,
@@ -100,9 +100,9 @@ impl TryFrom<CallEntry> for AnyCall {
 
 /// Values that replace the placeholders in texts of the settings, e.g. `{2}` and `{pose 2}`.
 trait Values {
-    /// Value of an argument, counted from 1.
+    /// Returns the argument with a number, counted from 1.
     fn argument(&self, number: usize) -> Result<String, String>;
-    /// Pose of an argument, with header if `is_stamped`.
+    /// Returns the pose of the object that is the argument with a number, with a header if `is_stamped`.
     fn pose(&self, number: usize, is_stamped: bool) -> Result<Value, String>;
 }
 
@@ -144,7 +144,7 @@ impl Values for Sample {
 }
 
 fn sample(template: &Value) -> Value {
-    // A sample has all values.
+    // This cannot fail, because a sample has all values.
     fill(template, &Sample).unwrap_or_default()
 }
 

@@ -66,7 +66,8 @@ impl Hub {
     }
 }
 
-/// Execution of one action by a performer of PlanSys2, seen by the executor.
+/// The executor's side of the messages about one action. `performer` is the performer that was confirmed, if there is
+/// one.
 #[derive(Debug)]
 struct Negotiation {
     executor: String,

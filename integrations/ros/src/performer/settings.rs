@@ -37,7 +37,8 @@ pub enum By {
         /// Name of the topic.
         topic: String,
     },
-    /// `system_modes`: the action sets the design of a function. Its arguments contain both.
+    /// `system_modes`: the action sets the design of a function. Two of its arguments are the function and the
+    /// design.
     ChangeMode {
         /// Position of the function, counted from 1; by default the last argument but one.
         function: Option<NonZeroUsize>,
@@ -181,8 +182,8 @@ impl Poses {
     }
 }
 
-/// Returns an argument by its position `number`, counted from 1. Without a position, `from_end`
-/// counts from the end, where 0 is the last argument. The error describes a missing argument.
+/// Returns the argument with the position `number`, counted from 1. If `number` is `None`, `from_end` is the position
+/// counted from the end, where 0 is the last argument. The error describes a missing argument.
 pub(super) fn argument(
     arguments: &[String],
     number: Option<NonZeroUsize>,

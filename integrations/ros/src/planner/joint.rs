@@ -43,7 +43,7 @@ impl Joint {
     /// Locks the mission and applies the pending diagnostics to it.
     fn lock(&self) -> MutexGuard<'_, Mission> {
         let mut mission = self.mission.lock().unwrap_or_else(PoisonError::into_inner);
-        // Invalid or unknown diagnostics concern other devices.
+        // Diagnostics that the mission rejects are ignored, because they concern other devices.
         for event in Observation::parse(&self.diagnosed.line()).events.into_iter().flatten() {
             let _ = match event {
                 Event::Measured { attribute, value } => {

@@ -82,15 +82,14 @@ fn alternatives(value: &ParameterValue) -> Result<(), &'static str> {
     }
 }
 
-/// Planning parameters that follow the ROS parameters of the node.
+/// Planning parameters with the current values of the node's ROS parameters.
 #[derive(Debug)]
 pub(crate) struct Chosen {
     manner: Mutex<Manner>,
 }
 
 impl Chosen {
-    /// Declares the planning parameters, and follows their changes. The node must not have declared
-    /// parameters before.
+    /// Declares the planning parameters, and adopts their changes. The node must not have declared parameters before.
     ///
     /// # Errors
     /// Fails if the command line gives a parameter an invalid value.

@@ -1,9 +1,9 @@
 //! Planning for PlanSys2: computes the best plan of a domain and a problem, or the reason why no plan exists.
 //!
-//! PlanSys2's problems have no metric, so the parameters can provide one. Durative actions may overlap, as in
-//! POPF, and the makespan is minimised if there is no metric. Plans are sequential if no overlapping plan is
-//! found in time. By default, they are also sequential if a knowledge base is used, because a function has
-//! only one design at a time.
+//! PlanSys2's problems have no metric, so the parameters can provide one. Durative actions may overlap, as in POPF,
+//! and the makespan is minimised if there is no metric. If no plan with overlapping actions is found in time, a
+//! sequential plan is computed. By default, plans are also sequential if a knowledge base is used, because a function
+//! has only one design at a time.
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};

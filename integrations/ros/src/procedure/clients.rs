@@ -29,7 +29,7 @@ pub(super) const OBSERVATION_TIMEOUT: Duration = Duration::from_secs(2);
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Failure {
-    /// The robot has answered, and the operation has not succeeded.
+    /// The operation has failed, usually because the robot has refused it.
     Refused(String),
     /// The robot has given no valid answer in time.
     Silent(String),
@@ -59,10 +59,10 @@ struct NodeClient {
     get_parameters: Caller<GetParameters>,
 }
 
-/// Last message on a topic, with the time at which it was published.
+/// Message on a topic that was published last, with the time of its publication (if unknown, of its arrival).
 type LastMessage = Arc<Mutex<Option<(SystemTime, Vec<u8>)>>>;
 
-/// A topic whose last message is noted.
+/// Last message on a topic, and the publisher of this program on it.
 struct Observed {
     last: LastMessage,
     /// Exists if a step publishes on the topic.
@@ -144,7 +144,7 @@ impl Clients {
         Ok(clients)
     }
 
-    /// Notes the last message on a topic.
+    /// Subscribes to a topic, unless it is already subscribed to, and records its last message.
     fn observe(&mut self, topic: &str, kind: &Arc<MessageType>) -> Result<&mut Observed, Message> {
         let key = topic_key(topic, kind);
         if !self.observed.contains_key(&key) {
@@ -216,8 +216,8 @@ impl Clients {
     }
 
     /// Returns the GUIDs of the servers that report the state or the parameters of a node. For a condition about the
-    /// last message on a topic, returns an invented id while the condition holds, so that a change of the result shows
-    /// a change of the mode.
+    /// last message on a topic, returns an id made from the condition while the condition holds, so that the result
+    /// changes when the mode changes.
     pub(super) fn servers(&self, condition: &Condition) -> BTreeSet<[u8; 16]> {
         let (Condition::State { node, .. } | Condition::Parameters { node, .. }) = condition else {
             let is_met = !matches!(condition, Condition::Topic(_)) && self.is_met(condition);
@@ -397,7 +397,7 @@ impl Clients {
         )))
     }
 
-    /// Returns `true` if a condition about messages holds.
+    /// Returns `true` if a condition about the last message on a topic holds, and for all other conditions.
     fn is_met(&self, condition: &Condition) -> bool {
         let last = |topic: &str, kind: &MessageType| {
             self.observed.get(&topic_key(topic, kind)).and_then(|observed| last_message(&observed.last))
@@ -434,8 +434,8 @@ impl Clients {
         }
     }
 
-    /// Waits until a condition holds, at most until the deadline. A message on a topic counts if it arrives
-    /// from `since` on.
+    /// Waits until a condition holds, at most until the deadline. A `Condition::Topic` holds if the last message
+    /// arrived at `since` or later.
     pub(super) async fn until(
         &self,
         condition: &Condition,
@@ -465,7 +465,7 @@ impl Clients {
 
 fn note_message(last: &LastMessage, published: SystemTime, message: Vec<u8>) {
     let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
-    // Latched messages of several publishers arrive in any order.
+    // Latched messages of several publishers arrive in any order, so only a newer message replaces the last one.
     if last.as_ref().is_none_or(|(earlier, _)| *earlier <= published) {
         *last = Some((published, message));
     }
@@ -500,7 +500,8 @@ pub(super) async fn execute(words: &[String], deadline: Instant) -> Result<(), F
     }
 }
 
-/// Converts values to the types of the present ones: an integer for a double.
+/// Converts values to the types of the present values: an integer to a double. Other values of different type stay
+/// unchanged.
 fn fitted(values: &[(String, ParameterValue)], present: &[ParameterValue]) -> Vec<ParameterValue> {
     let fit = |((_, value), present): (&(String, ParameterValue), &ParameterValue)| {
         fitting(present, value.clone()).unwrap_or_else(|_| value.clone())

@@ -18,9 +18,9 @@ pub(crate) enum Outcome {
     /// All steps have succeeded and all conditions hold.
     Done,
     /// A step has failed, a condition does not hold although the robot answers, or a newer request replaces the
-    /// procedure. Earlier steps are undone.
+    /// procedure. Earlier steps were undone as far as possible.
     Failed(String),
-    /// A node does not answer. Earlier steps are undone as far as possible.
+    /// A node does not answer. Earlier steps were undone as far as possible.
     Silent(String),
 }
 
@@ -63,7 +63,7 @@ enum Undo {
 }
 
 impl Procedures {
-    /// Creates the procedures by functions and modes. Events about their steps are passed to `report`.
+    /// Creates the procedures, which are given by function and mode. Events about their steps are passed to `report`.
     ///
     /// # Errors
     /// A topic of a condition cannot be subscribed to.
@@ -89,8 +89,8 @@ impl Procedures {
         self.functions.contains_key(function)
     }
 
-    /// Returns `true` if a function has procedures, and none of their steps and conditions can be observed later, as
-    /// states, parameters and published messages can.
+    /// Returns `true` if a function has procedures, but none of their steps and conditions can be observed later.
+    /// Only states, parameters and messages with known content can be observed.
     pub(crate) fn is_unobservable(&self, function: &str) -> bool {
         self.functions.get(function).is_some_and(|procedures| procedures.conditions().next().is_none())
     }
@@ -106,7 +106,8 @@ impl Procedures {
     }
 
     /// Returns the servers of the nodes that show the mode of a function, and an id for each condition about messages
-    /// that holds. The result changes if a node is restarted or lost, or if another message is published.
+    /// that holds. The result changes if a node is restarted or lost, or if a message changes whether such a
+    /// condition holds.
     pub(crate) fn servers(&self, function: &str) -> BTreeSet<[u8; 16]> {
         let conditions = self.functions.get(function).into_iter().flat_map(FunctionProcedures::conditions);
         conditions.flat_map(|condition| self.clients.servers(&condition)).collect()
@@ -133,12 +134,13 @@ impl Procedures {
         missing.into_iter().min_by_key(Vec::len).unwrap_or_default()
     }
 
-    /// Returns the mode whose conditions hold: of several, the one with the most conditions, or else the one that was
-    /// put into effect or seen last. While a mode without observable conditions is in effect, it is returned. The
-    /// result is [`Seen::Unsettled`] while a procedure runs or a node does not answer.
+    /// Returns the mode whose conditions hold. If several modes qualify, those with the most conditions are
+    /// considered, and of these the mode that was put into effect or seen last is returned. If the last mode has no
+    /// observable conditions, it is returned unchecked. The result is [`Seen::Unsettled`] while a procedure runs or a
+    /// node does not answer.
     pub(crate) async fn observe(&self, function: &str) -> Seen {
         let Some(procedures) = self.functions.get(function) else { return Seen::Ambiguous };
-        // The modes in the middle of a procedure mean nothing.
+        // In the middle of a procedure, an observation would be meaningless.
         let Some(_idle) = procedures.running.try_lock() else { return Seen::Unsettled };
         let present = procedures.present();
         let is_unobservable = |mode: &String| {
@@ -189,7 +191,8 @@ impl Procedures {
         self.clients.holds(condition).await.ok()
     }
 
-    /// Returns `true` if the nodes whose silence has ended a procedure answer again. Their silence is then forgotten.
+    /// Returns `true` if the services of all modes that could not be put into effect because of a silent node answer
+    /// again. These modes are then no longer recorded as silent.
     pub(crate) async fn answers(&self, function: &str) -> bool {
         let Some(procedures) = self.functions.get(function) else { return false };
         let silent = procedures.silent.lock().unwrap_or_else(PoisonError::into_inner).clone();
@@ -228,7 +231,7 @@ impl Procedures {
             procedures.silent.lock().unwrap_or_else(PoisonError::into_inner).remove(mode);
             return Outcome::Done;
         };
-        // A node that was silent must not use up the time of those that answer.
+        // A silent node must not use up the time for restoring the other nodes.
         let first =
             if matches!(failure, Failure::Silent(_)) { timeout.min(OBSERVATION_TIMEOUT) } else { timeout };
         run.roll_back(undos, first, timeout).await;
@@ -309,7 +312,7 @@ impl Run<'_> {
         let outcome = match operation {
             Operation::State { node, state } => {
                 let target = *state;
-                // A refused transition may have changed the state, so that its undo is kept.
+                // A refused transition may have changed the state, so its undo is kept.
                 return clients
                     .bring(node, target, deadline, |before| {
                         if before != target {
@@ -356,8 +359,9 @@ impl Run<'_> {
                 execute(words, deadline).await
             }
         };
-        // A refusal has changed nothing, and without an answer the effect is unknown. Only parameters may differ
-        // although they were accepted, and to set their earlier values once more has no effect.
+        // A refused operation has changed nothing, so its undo is dropped. The undo of parameters is kept, because
+        // they may have been accepted with other values. Without an answer, the effect is unknown, and the undo is
+        // kept.
         if matches!(outcome, Err(Failure::Refused(_))) {
             let is_kept = |undo: &Undo| matches!(undo, Undo::Operation(Operation::Parameters { .. }));
             let undone = undos.split_off(count);
@@ -366,8 +370,8 @@ impl Run<'_> {
         outcome
     }
 
-    /// Undoes steps in reverse order, with a timeout for the first undo and one for each other. A step that
-    /// cannot be undone does not stop the others.
+    /// Undoes steps in reverse order, with the timeout `first` for the first undo, and `other` for each further one.
+    /// A step that cannot be undone does not stop the others.
     async fn roll_back(&self, undos: Vec<Undo>, first: Duration, other: Duration) {
         for (index, undo) in undos.into_iter().rev().enumerate() {
             let deadline = Instant::now() + if index == 0 { first } else { other };
@@ -402,7 +406,7 @@ impl Run<'_> {
     }
 }
 
-/// Operation that undoes a service call or a command.
+/// Returns the undo that the settings give for an operation, or [`Undo::Impossible`].
 fn undo_of(operation: &Operation, undo: Option<&Operation>) -> Undo {
     match undo {
         Some(undo) => Undo::Operation(undo.clone()),

@@ -14,7 +14,7 @@ use crate::interfaces::mros2_msgs::msg::QoS;
 use crate::manager::Functions;
 use crate::reasoner::memory::{Memory, Remembered};
 
-/// Delay until a design is retried that was refused or whose steps failed.
+/// Delay after which a design is retried if it was refused or its steps failed.
 const REFUSED_DELAY: Duration = Duration::from_secs(60);
 
 /// Initial delay until a design without a reply is retried; doubled with each attempt, up to 64 s.
@@ -36,7 +36,7 @@ pub(super) enum Output {
 pub(super) struct Wanted {
     pub(super) function: String,
     pub(super) mode: String,
-    /// Effect of the keeper that requires the mode. `None` if the cancellation of a goal requires it.
+    /// Number of the keeper's effect that requires the mode. `None` if the cancellation of a goal requires it.
     effect: Option<u64>,
 }
 
@@ -44,9 +44,9 @@ pub(super) struct Wanted {
 pub(super) enum Outcome {
     Done,
     Refused,
-    /// There was no answer.
+    /// There was no valid answer, for this reason.
     Failed(String),
-    /// A step has failed, and the steps before it are undone.
+    /// A step or condition has failed for this reason, and the earlier steps were undone as far as possible.
     StepFailed(String),
 }
 
@@ -67,14 +67,14 @@ pub(super) struct Keeping {
     keeper: Keeper,
     functions: Functions,
     goals: BTreeMap<GoalId, Pursued>,
-    /// Requested modes without a reply, by function, with the design.
+    /// Requested modes without a reply, by function. The second value is the design, or `None` for the unground mode.
     pending: BTreeMap<String, (Wanted, Option<String>)>,
     /// Failed designs with the time of the next attempt and the number of missing replies.
     failed: BTreeMap<String, (Duration, u32)>,
     measured: BTreeMap<String, String>,
-    /// Last event by subject.
+    /// Last event, as a line, by measured attribute or component.
     reports: BTreeMap<String, String>,
-    /// Designs of functions from before a restart.
+    /// Designs that functions had before a restart, by function. Empty after the restart is handled.
     restored: BTreeMap<String, String>,
     outputs: Vec<Output>,
     count: u64,
@@ -119,8 +119,8 @@ impl Keeping {
         Memory::new(self.reports.clone(), goals)
     }
 
-    /// Restores the state after a restart. Functions that already have the right design are not
-    /// requested again. `modes` are the modes found on the robot, if known.
+    /// Restores the state after a restart. Functions that already have the right design are not requested again.
+    /// `modes` are the known modes on the robot, by function; a function without a known mode counts as unchanged.
     pub(super) fn remember(&mut self, memory: Memory, goals: &[GoalId], modes: &BTreeMap<String, String>) {
         for line in memory.reports.values() {
             self.handle_line(line);
@@ -240,7 +240,7 @@ impl Keeping {
                     effect,
                     ..
                 }) => {
-                    // The robot still has the design from before the restart.
+                    // The function still has the design from before the restart.
                     if self.restored.get(&function) == Some(&to) {
                         self.has(&function, &to, Some(effect));
                         continue;
@@ -345,7 +345,7 @@ impl Keeping {
         if !self.pending.contains_key(&wanted.function)
             && let Some(effect) = wanted.effect
         {
-            // No alternative exists: the function keeps its former design.
+            // No other design was requested instead, so the function keeps its former design.
             self.handle_line(&Event::ReconfigurationFailed { effect }.to_json().to_string());
         }
     }

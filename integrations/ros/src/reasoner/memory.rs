@@ -18,7 +18,7 @@ const FORMAT: &str = "metaplan-reasoner/1";
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Memory {
     format: String,
-    /// Last reported event by subject, such as a measured attribute.
+    /// Last reported event, as a line, by measured attribute or component.
     pub(super) reports: BTreeMap<String, String>,
     pub(super) goals: Vec<Remembered>,
 }

@@ -39,12 +39,12 @@ pub(super) struct Network {
     node: Arc<Node>,
     keeping: Keeping,
     goals: Arc<Goals<ControlQos>>,
-    cancels: BTreeMap<GoalId, CancelRequest>,
+    cancels: BTreeMap<GoalId, Vec<CancelRequest>>,
     bridge: Arc<Caller<MetacontrolFD>>,
     systems: BTreeMap<String, Arc<Caller<ChangeMode>>>,
     calling: BTreeMap<String, Task<()>>,
     procedures: Arc<Procedures>,
-    /// Ends running steps before their next one, by function.
+    /// Flags that make a running procedure end before its next step, by function.
     replaced: BTreeMap<String, Arc<AtomicBool>>,
     diagnosed: Diagnosed,
     events: Arc<Publisher<std_msgs::msg::String>>,
@@ -196,7 +196,7 @@ impl Network {
                 }
             }
             Input::Cancel(goal, request) => {
-                self.cancels.insert(goal, request);
+                self.cancels.entry(goal).or_default().push(request);
                 self.keeping.cancel(goal);
             }
             Input::Diagnosed => {
@@ -215,7 +215,7 @@ impl Network {
                     self.goals.feedback(goal, ControlQosFeedback { qos_status });
                 }
                 Output::Cancelled(goal, is_so) => {
-                    if let Some(request) = self.cancels.remove(&goal) {
+                    for request in self.cancels.remove(&goal).unwrap_or_default() {
                         self.goals.canceling(request, is_so);
                     }
                     if is_so {

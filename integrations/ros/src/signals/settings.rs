@@ -37,7 +37,8 @@ pub(crate) enum Source {
     Presence {
         node: String,
     },
-    /// Field of the messages on a topic. Silence after `period` is a failure of a component.
+    /// Field of the messages on a topic. A component fails if no message arrives for `period`; `None` for no such
+    /// limit.
     Field {
         topic: String,
         kind: Arc<MessageType>,
@@ -84,8 +85,7 @@ impl Condition {
     }
 }
 
-/// Converts a JSON value to a number. Truth values become 0 and 1. Returns `None` for texts, lists and
-/// objects.
+/// Converts a JSON value to a number. Truth values become 0 and 1. Returns `None` for other values.
 pub(crate) fn number(value: &Value) -> Option<f64> {
     match value {
         Value::Bool(truth) => Some(f64::from(u8::from(*truth))),

@@ -90,7 +90,7 @@ struct Reporter {
 }
 
 impl Reporter {
-    /// Reports whether a component works. Attributes have no such report.
+    /// Reports whether the component works. Does nothing if the signal measures an attribute.
     fn works(&self, works: bool) {
         if let Target::Component { component, .. } = &self.target {
             self.send(COMPONENT, component, if works { "TRUE" } else { "FALSE" }.to_owned());

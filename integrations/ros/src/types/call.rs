@@ -1,4 +1,4 @@
-//! Service calls and messages of any type, as the settings give them.
+//! Service calls and topic messages in the settings, of types that are known only at run time.
 
 use std::sync::Arc;
 
@@ -19,13 +19,14 @@ pub(crate) struct ServiceCall {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Answer {
     Any,
-    /// The truth value `success` of the answer must be true.
+    /// The field `success` of the answer must be true.
     Success,
     Expected(Expectation),
 }
 
 impl ServiceCall {
-    /// Reads a service call. Without an expectation, a truth value `success` of the answer must be true.
+    /// Reads a service call. Without an expectation, every answer counts as success, unless the answer has a truth
+    /// value `success`, which must be true.
     ///
     /// # Errors
     /// The type is unknown, or a field does not exist or cannot have its value.
@@ -47,7 +48,8 @@ impl ServiceCall {
 }
 
 impl Answer {
-    /// Reads the expected answer of a service.
+    /// Reads the expected answer of a service. `None` selects [`Answer::Success`] if the answer has a truth value
+    /// `success`, otherwise [`Answer::Any`].
     ///
     /// # Errors
     /// A field does not exist or cannot have its value.
@@ -88,7 +90,7 @@ impl Answer {
     }
 }
 
-/// A message of a topic of any type.
+/// A message for a topic, of a type that is known only at run time.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct TopicMessage {
     pub(crate) topic: String,
@@ -98,7 +100,7 @@ pub(crate) struct TopicMessage {
 }
 
 impl TopicMessage {
-    /// Reads a message.
+    /// Encodes a message of the settings. Fields that the settings do not give have their default values.
     ///
     /// # Errors
     /// The type is unknown, or a field does not exist or cannot have its value.

@@ -10,7 +10,8 @@
 pub struct Part {
     /// Suffix that the structure adds to the name of the interface: empty, `_Request`, `_Goal`, …
     pub suffix: &'static str,
-    /// Fields in the order of the definition, which is the order of serialisation. Never empty.
+    /// Fields in the order of the definition, which is the order of serialisation. A definition without fields gets
+    /// one, as in rosidl.
     pub fields: Vec<Field>,
     /// Constants of the definition.
     pub constants: Vec<Constant>,
@@ -39,7 +40,7 @@ pub struct Constant {
 pub struct FieldType {
     pub base: Base,
     pub count: Count,
-    /// Greatest length of a string, in bytes.
+    /// Greatest length of a string, in bytes. `None` if there is no limit or the type is no string.
     pub string_bound: Option<u32>,
 }
 
@@ -121,7 +122,8 @@ pub struct Interface {
 }
 
 impl Interface {
-    /// Parses the definition of an interface, whose full name is such as `std_msgs/msg/String`.
+    /// Parses the definition of an interface. `full_name` is its name with package and folder, such as
+    /// `std_msgs/msg/String`.
     ///
     /// # Errors
     /// The name or a line of the text is wrong.
@@ -167,7 +169,7 @@ fn parts(text: &str, suffixes: &[&'static str], package: &str) -> Result<Vec<Par
         ));
     }
     for part in parts.iter_mut().filter(|part| part.fields.is_empty()) {
-        // The same member as in rosidl, because C structures cannot be empty.
+        // rosidl adds the same field, because C structures cannot be empty.
         let kind =
             FieldType { base: Base::Primitive(Primitive::Uint8), count: Count::One, string_bound: None };
         let name = "structure_needs_at_least_one_member".to_owned();

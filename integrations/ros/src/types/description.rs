@@ -14,7 +14,7 @@ use hiroz_schema::{
 
 use super::definition::{Base, Count, Field, Interface, Primitive};
 
-/// Descriptions by full name.
+/// Type descriptions by the full name of the type.
 pub type Descriptions = BTreeMap<String, TypeDescription>;
 
 const TIME: &str = "builtin_interfaces/msg/Time";

@@ -1,7 +1,7 @@
 //! Encoding of values to CDR, little endian [1].
 //!
-//! A value is aligned to its size, counted from the start of the data. A text has its length with the final
-//! zero, a sequence its number of elements.
+//! A number is aligned to its size, counted from the start of the data. A text begins with its length, which includes
+//! the final zero. A sequence begins with its number of elements.
 //!
 //! [1] OMG, Common Object Request Broker Architecture 3.3, part 2, 9.3.
 
@@ -41,7 +41,7 @@ impl Structure {
     }
 }
 
-/// Converts the text of a default value or a constant of a definition.
+/// Converts the text of a default value or a constant of a definition. Returns `None` if it is no value of the type.
 pub(super) fn parse_value(text: &str, layout: &Layout) -> Option<Value> {
     let text = text.trim();
     match layout {
@@ -127,7 +127,8 @@ impl Writer {
         Ok(())
     }
 
-    /// Writes a value, or the default, or zero. Constants are those of the structure that contains the value.
+    /// Writes `value`; if it is missing, the default; and without a default, zero, false or empty. Names of constants
+    /// are looked up in `container`.
     fn layout(
         &mut self,
         container: &Structure,
@@ -193,7 +194,7 @@ impl Writer {
             None if primitive == Primitive::Bool => &Value::Bool(false),
             None => &zero,
         };
-        /// Writes an integer if its type contains it.
+        /// Writes an integer. Fails if the value is outside of the range of the type.
         macro_rules! integer {
             ($kind:ty) => {{
                 let number = value.as_i64().map(i128::from).or_else(|| value.as_u64().map(i128::from));
@@ -269,14 +270,15 @@ fn of_seconds(structure: &Structure, value: &Value) -> Result<serde_json::Map<St
         let hint = if is_time { ", or a number of seconds" } else { "" };
         return Err(format!("{value} is not a table with the fields of {}{hint}", structure.name));
     };
-    // The nanoseconds are never negative.
+    // The nanoseconds are never negative, even if the time is.
     let nanoseconds = (number * 1e9).round() as i64;
     let (seconds, nanoseconds) =
         (nanoseconds.div_euclid(1_000_000_000), nanoseconds.rem_euclid(1_000_000_000));
     Ok([("sec".to_owned(), seconds.into()), ("nanosec".to_owned(), nanoseconds.into())].into_iter().collect())
 }
 
-/// Returns the number of single values that a structure has at least, or `None` above `limit`.
+/// Returns the number of single values in a structure, or `None` if it exceeds `limit`. A sequence counts as one
+/// value.
 pub(super) fn least_size(structure: &Arc<Structure>, limit: u64) -> Option<u64> {
     structure.fields.iter().try_fold(0, |sum: u64, field| {
         sum.checked_add(layout_size(&field.layout, limit)?).filter(|sum| *sum <= limit)

@@ -43,7 +43,7 @@ impl FieldPath {
     /// Returns `true` if the field is a text.
     ///
     /// # Errors
-    /// The structure has no such field, or the field has no single value.
+    /// The structure has no such field, or the field is a list or has fields itself.
     pub(crate) fn is_text(&self, structure: &Structure) -> Result<bool, String> {
         let (_, layout) = self.resolve(structure)?;
         Ok(matches!(layout, Layout::Text { .. }))
@@ -52,7 +52,7 @@ impl FieldPath {
     /// Returns the layout of the field, and the structure that contains it.
     ///
     /// # Errors
-    /// The structure has no such field, or the field has no single value.
+    /// The structure has no such field, or the field is a list or has fields itself.
     pub(super) fn resolve<'s>(
         &self,
         structure: &'s Structure,

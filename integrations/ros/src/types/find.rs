@@ -1,6 +1,6 @@
-//! Reading of single fields from data in CDR, little endian. All machines of ROS 2 are little endian.
+//! Reading of single fields from data in CDR, little endian. Data in big endian are not supported.
 //!
-//! Other fields are skipped, because an answer may contain a large map or image.
+//! Fields before the requested one are skipped without decoding them, because they may contain a large map or image.
 
 use serde_json::Value;
 
@@ -11,8 +11,8 @@ use super::structure::{Layout, Structure};
 const INCOMPLETE: &str = "the data end too early: the definition differs from that of the sender";
 
 impl Structure {
-    /// Returns the value of a field, or `None` for an element that a list does not have. NaN and infinite
-    /// numbers are null. `offset` is the number of bytes before the data, on which the alignment depends.
+    /// Returns the value of a field, or `None` for an element that a list does not have. NaN and infinite numbers are
+    /// null. `offset` is the number of bytes of the message that precede `data`; the alignment depends on it.
     ///
     /// # Errors
     /// The data are no message of this structure.
@@ -21,7 +21,7 @@ impl Structure {
         reader.structure(self, &path.0)
     }
 
-    /// Returns a text, or nothing if the data do not contain it.
+    /// Returns the text in a field, or `None` if the data contain no such text.
     pub(crate) fn text(&self, field: &str, data: &[u8]) -> Option<String> {
         let path = FieldPath::parse(field).ok()?;
         self.find(&path, data, 0).ok()??.as_str().map(str::to_owned)
@@ -29,7 +29,7 @@ impl Structure {
 }
 
 impl Layout {
-    /// Returns the value that data contain.
+    /// Decodes data that consist of one number, truth value or text.
     pub(super) fn read_single(&self, data: &[u8]) -> Result<Value, String> {
         let mut reader = Reader { data, position: 0, offset: 0 };
         Ok(reader.layout(self, &[])?.unwrap_or_default())
@@ -62,7 +62,7 @@ impl Reader<'_> {
 
     fn length(&mut self) -> Result<usize, String> {
         let length = u32::from_le_bytes(self.aligned()?) as usize;
-        // An element has at least one byte.
+        // Each element takes at least one byte.
         if length > self.data.len() { Err(INCOMPLETE.to_owned()) } else { Ok(length) }
     }
 
@@ -94,7 +94,7 @@ impl Reader<'_> {
                 let length = self.length()?;
                 self.element(element, length, *index, rest)
             }
-            // Paths are checked when they are read.
+            // Other combinations do not occur, because paths are checked when the settings are read.
             _ => Ok(None),
         }
     }
@@ -160,7 +160,7 @@ impl Reader<'_> {
 }
 
 impl Primitive {
-    /// Size of a number or truth value, in bytes, to which it is also aligned.
+    /// Size and alignment of a number or truth value, in bytes.
     fn size(self) -> usize {
         match self {
             Self::Bool | Self::Byte | Self::Char | Self::Int8 | Self::Uint8 | Self::String => 1,

@@ -17,7 +17,7 @@ use super::structure::{Layout, Structure, StructureField};
 /// Names and definitions of the interfaces of this package.
 static DEFINITIONS: &[(&str, &str)] = include!(concat!(env!("OUT_DIR"), "/definitions.rs"));
 
-/// Upper limit on the number of single values that the shortest message of a type has, without elements of sequences.
+/// Upper limit on the number of single values in a message of a type. A sequence counts as one value.
 const MAX_VALUES: u64 = 1_000_000;
 
 /// A definition in the settings.
@@ -42,7 +42,7 @@ impl Definition {
     }
 }
 
-/// A message that is known at run time.
+/// A message type that is known only at run time.
 #[derive(Debug, PartialEq)]
 pub(crate) struct MessageType {
     pub(crate) package: String,
@@ -51,7 +51,7 @@ pub(crate) struct MessageType {
     pub(crate) hash: String,
 }
 
-/// A service that is known at run time. The hashes are those of request and response.
+/// A service type that is known only at run time. The hashes are those of request and response.
 #[derive(Debug, PartialEq)]
 pub(crate) struct ServiceType {
     pub(crate) package: String,
@@ -61,7 +61,7 @@ pub(crate) struct ServiceType {
     pub(crate) hashes: [String; 2],
 }
 
-/// An action that is known at run time.
+/// An action type that is known only at run time.
 #[derive(Debug, PartialEq)]
 pub(crate) struct ActionType {
     pub(crate) package: String,
@@ -104,7 +104,8 @@ impl Library {
         Ok(())
     }
 
-    /// Returns the library within [`Library::while_current`], otherwise the types of this package.
+    /// Returns the library of the enclosing [`Library::while_current`] on this thread. Outside of it, returns a
+    /// library with only the types of this package.
     pub(crate) fn current() -> Rc<Self> {
         CURRENT.with_borrow(Rc::clone)
     }
@@ -164,7 +165,7 @@ impl Library {
             least_size(structure, MAX_VALUES)
                 .ok_or_else(|| format!("`{}` has more than {MAX_VALUES} values", structure.name))?;
         }
-        // Derived types refer to further messages.
+        // The derived types of services and actions also refer to these messages.
         let mut messages: BTreeSet<String> = resolver.structures.into_keys().collect();
         let derived = ["builtin_interfaces/msg/Time", "unique_identifier_msgs/msg/UUID"];
         messages.extend(derived.into_iter().map(str::to_owned));
@@ -229,7 +230,7 @@ fn service_hashes(name: &str, descriptions: &Descriptions) -> Result<[String; 2]
 
 struct Resolver<'l> {
     library: &'l Library,
-    /// Messages that are resolved.
+    /// Messages that have been resolved.
     structures: BTreeMap<String, Arc<Structure>>,
     /// Messages that are being resolved.
     open: BTreeSet<String>,

@@ -7,8 +7,8 @@ use serde::ser::{Serialize, SerializeTuple as _, Serializer};
 
 use crate::interfaces;
 
-/// Encoded data. They begin at a multiple of eight bytes when they are written, so that their alignment does
-/// not change.
+/// Encoded data with their padding. They must be written at a multiple of eight bytes, so that the padding remains
+/// correct.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct Raw(pub(crate) Vec<u8>);
 
@@ -37,7 +37,7 @@ impl<'de> Visitor<'de> for Remaining {
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut sequence: A) -> Result<Raw, A::Error> {
         let mut bytes = Vec::new();
-        // The end of the data is an error for a tuple that has no end.
+        // The tuple is longer than all data, so the end of the data is reported as an error.
         while let Ok(Some(byte)) = sequence.next_element() {
             bytes.push(byte);
         }
@@ -47,7 +47,7 @@ impl<'de> Visitor<'de> for Remaining {
 
 impl ros2_client::Message for Raw {}
 
-/// The name and the hash depend on the place where the data are used.
+/// Type and hash are empty, because they differ between the uses of encoded data.
 impl interfaces::Structure for Raw {
     const TYPE: &'static str = "";
     const RIHS01: &'static str = "";

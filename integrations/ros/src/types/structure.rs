@@ -14,7 +14,7 @@ pub(crate) struct Structure {
     /// Full name, such as `std_srvs/srv/SetBool_Request`.
     pub(crate) name: String,
     pub(super) fields: Vec<StructureField>,
-    /// Values by the names of constants, which may be written in place of numbers.
+    /// Values of the constants, by name. In the settings, such a name can replace a number.
     pub(super) constants: BTreeMap<String, Value>,
 }
 
@@ -50,17 +50,17 @@ impl Structure {
         self.fields.iter().map(|field| field.name.as_str())
     }
 
-    /// Returns `true` if the structure has a truth value of this name.
+    /// Returns `true` if the structure has a field of this name that is a truth value.
     pub(crate) fn has_truth_value(&self, name: &str) -> bool {
         self.field(name).is_some_and(|field| field.layout == Layout::Single(Primitive::Bool))
     }
 
-    /// Returns `true` if the structure has a text of this name.
+    /// Returns `true` if the structure has a field of this name that is a text.
     pub(crate) fn has_text(&self, name: &str) -> bool {
         self.field(name).is_some_and(|field| matches!(field.layout, Layout::Text { .. }))
     }
 
-    /// Returns `true` if no value is necessary, because the structure has no fields.
+    /// Returns `true` if the definition has no fields, so that the structure consists of the field that rosidl adds.
     pub(crate) fn is_empty(&self) -> bool {
         self.names().eq(["structure_needs_at_least_one_member"])
     }
@@ -86,7 +86,7 @@ impl Expectation {
         expected.collect::<Result<_, String>>().map(Self)
     }
 
-    /// Checks received data.
+    /// Checks received data; `offset` is as for [`Structure::find`].
     ///
     /// # Errors
     /// A field has another value, or the data are incomplete.

@@ -1,8 +1,8 @@
 //! Parser and evaluator of arithmetic expressions in the syntax of the Java Math Expression Parser 2.4.
 //!
-//! The syntax consists of numbers, variables, the operators `+`, `-`, `*`, `/`, `%` and `^`, signs, brackets, the
-//! constants `pi` and `e`, functions of one or two numbers, `sum` of any number of terms, and implicit multiplication
-//! (`2x`, `3(a + b)`).
+//! The supported syntax consists of numbers, variables, the operators `+`, `-`, `*`, `/`, `%` and `^`, signs,
+//! brackets, the constants `pi` and `e`, functions of one or two numbers, `sum` of any number of terms, and implicit
+//! multiplication (`2x`, `3(a + b)`).
 
 /// Maximum nesting depth of brackets, calls, signs and powers, which limits the recursion depth of the
 /// parser.

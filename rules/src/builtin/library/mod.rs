@@ -1,8 +1,8 @@
-//! The libraries `swrlm` and `temporal` of `SWRLTab` as [custom built-ins](super::Definition) ([1], [2]).
-//! Their ontologies were published in several versions. The IRIs of all versions are accepted.
+//! The libraries `swrlm` and `temporal` of `SWRLTab` as [custom built-ins](super::Definition) ([1], [2]). Their
+//! ontologies were published in several versions. The IRIs of all versions are accepted.
 //!
-//! Only the *basic mode* of `temporal`, on dates and times, is supported. The advanced mode applies to
-//! individuals of the temporal ontology. Since a built-in receives literals only, such atoms are false.
+//! Only the *basic mode* of `temporal`, on dates and times, is supported. The advanced mode applies to individuals of
+//! the temporal ontology. Since a built-in receives literals only, atoms in the advanced mode are false.
 //!
 //! [1] `SWRLTab` wiki: Mathematical Built-In Library.
 //! [2] `SWRLTab` wiki: Temporal Built-In Library, Basic Mode.
@@ -33,7 +33,7 @@ pub(super) fn names_in_library(iri: &str) -> Vec<&'static str> {
     iris.filter(|known| library(iri).is_some() && library(known) == library(iri)).collect()
 }
 
-/// Returns the library and the local name of an IRI, without the version; `None` for IRIs outside of the
+/// Returns the part of an IRI after the version, such as `temporal.owl#add`; `None` for IRIs outside of the
 /// libraries.
 fn name(iri: &str) -> Option<&str> {
     iri.strip_prefix(LIBRARY_ROOT)?.split_once('/').map(|(_, name)| name)

@@ -10,7 +10,8 @@ use crate::ground::vocabulary::partial_eval::{Residual, compare, truth};
 use crate::ground::vocabulary::world::World;
 use crate::lifted::{Bound, Formula};
 
-/// Evaluates a condition whose slot parameters are bound. A comparison with an undefined value is false.
+/// Evaluates a condition under a binding that assigns all slot parameters in it. A comparison with an undefined value
+/// is false.
 ///
 /// # Errors
 /// The deadline has passed, the run is interrupted, or the condition is not supported.
@@ -22,7 +23,7 @@ pub fn residual(
     Evaluation { refuses_undefined: false }.residual(world, formula, binding)
 }
 
-/// Evaluates the condition of a conditional effect whose slot parameters are bound.
+/// Evaluates the condition of a conditional effect under a binding that assigns all slot parameters in it.
 ///
 /// # Errors
 /// A comparison has an undefined value, the deadline has passed, the run is interrupted, or the condition is
@@ -71,8 +72,8 @@ impl Evaluation {
             Formula::Compare(comparison, left, right, place) => {
                 let difference = match (ground(world, left, binding), ground(world, right, binding)) {
                     (Ok(left), Ok(right)) => (left, right),
-                    // PDDL 2.1: an action whose conditional effect reads an undefined value is not
-                    // executable.
+                    // An action whose conditional effect reads an undefined value is not executable (PDDL 2.1). This is
+                    // not supported here.
                     (Err(Failure::Undefined), _) | (_, Err(Failure::Undefined)) if self.refuses_undefined => {
                         return Err(Failure::Error(Error::Unsupported {
                             construct: "a comparison in `when` with a value that is not defined".into(),

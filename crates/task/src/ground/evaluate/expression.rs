@@ -7,8 +7,8 @@ use crate::ground::vocabulary::world::World;
 use crate::lifted::{Expression, Rational};
 use crate::task::quantity::Linear;
 
-/// Evaluates an expression under a binding to a linear expression over numeric fluents. Its slot parameters
-/// must be bound.
+/// Evaluates an expression under a binding to a linear expression over numeric fluents. The binding must assign all
+/// slot parameters in the expression.
 ///
 /// # Errors
 /// A value is undefined, or the expression is not linear or not supported.

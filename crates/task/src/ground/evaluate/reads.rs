@@ -16,14 +16,14 @@ use crate::lifted::{
     Bound, Change, Effect, Expression, Formula, FunctionId, Lifted, ObjectId, PredicateId, Term,
 };
 
-/// A predicate or function with its arguments; quantified variables are placeholders. `None` as arguments
-/// matches all arguments.
+/// Pattern of atoms or numeric fluents: a predicate or function with its arguments, in which quantified variables are
+/// placeholders. `None` as arguments matches all arguments.
 pub type Pattern<S> = (S, Option<Vec<Slot>>);
 
 /// An argument of a pattern.
 #[derive(Debug, Clone)]
 pub enum Slot {
-    /// An object at a fixed position.
+    /// Exactly this object.
     Object(ObjectId),
     /// A quantified variable and its candidate objects. All occurrences of the variable match the same
     /// object.

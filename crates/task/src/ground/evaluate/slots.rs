@@ -87,8 +87,7 @@ fn table(
     for_each_combination(&mentioned, slots, binding, limits, &mut |binding, combination| {
         match ground(world, expression, binding) {
             Ok(linear) => {
-                // Fluents whose arguments mention a slot are static; otherwise the parameter would not be a
-                // slot.
+                // Functions whose arguments mention a slot are static; otherwise the parameter would not be a slot.
                 assert!(linear.coefficients.is_empty(), "invariant: a table has no fluents");
                 values.push(linear.quantity.constant);
             }

@@ -38,7 +38,7 @@ type Key = SmallVec<[ObjectId; 4]>;
 
 const CANDIDATE_LIMIT: usize = 500;
 
-/// A mutex group whose atoms become the values of a finite-domain variable.
+/// A mutex group, and those of its atoms that become the values of a finite-domain variable.
 pub struct Group {
     /// Values of the variable: at least two atoms that belong to no other variable.
     pub(crate) atoms: Vec<AtomId>,
@@ -63,7 +63,7 @@ pub fn groups(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Result<Vec
                 entry.1.push(atom);
             }
         }
-        // With two initially true atoms, the atoms of a key are not mutually exclusive.
+        // If two atoms with equal keys are initially true, the atoms with this key are not mutually exclusive.
         instances.extend(by_key.into_values().filter(|(weight, _)| *weight <= 1).map(|(_, atoms)| atoms));
     }
     cover(&instances, limits)
@@ -200,7 +200,8 @@ fn broken_by<'o>(
             Some((_, sum)) => *sum += weight,
             None => balance.push((key, weight)),
         };
-        // Adding a true atom does not increase the number, unless the operator also deletes the atom.
+        // Adding an atom that is required to be true does not increase the number, unless the operator also deletes the
+        // atom.
         let comes = |atom: &&AtomId| !change.requires(**atom) || deleted(atom);
         let added = change.adds.iter().filter(comes).filter_map(|atom| key_of(task, candidate, *atom));
         let added: SmallVec<[Key; 4]> = added.collect();
@@ -227,8 +228,8 @@ fn broken_by<'o>(
     None
 }
 
-/// Returns extensions of a violated candidate. Each extension adds a predicate that the operator deletes,
-/// with argument positions whose objects equal the key.
+/// Returns extensions of a violated candidate. Each extension adds the predicate of an atom that the operator deletes,
+/// with the argument positions at which the atom has the objects of the key.
 #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
 fn refinements(
     task: &GroundTask<'_>,

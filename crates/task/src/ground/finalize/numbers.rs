@@ -21,7 +21,7 @@ pub(super) struct Numbers<N> {
     pub(super) initial: Vec<N>,
     pub(super) names: Vec<String>,
     ids: FxHashMap<NumericId, NumericId>,
-    /// Factors by which the stored values of some numeric variables are multiplied; 1 for missing variables.
+    /// Factors by which the values of some numeric variables are multiplied before they are stored; 1 for all others.
     multiples: FxHashMap<NumericId, Int>,
     pub(super) integers: Integers<N>,
 }
@@ -54,7 +54,7 @@ impl<N: TaskNumber> Numbers<N> {
             denominator.number(number);
             denominator.note(|| (task.world.numeric_name(*variable), None));
         }
-        // Values in other initial states are multiples of 1/precision.
+        // Multiples of 1/n become integers as well, if `generality` requires this.
         for precision in generality.numbers.into_iter().chain(generality.precision) {
             denominator.number(&Rational::new(1, precision));
         }
@@ -91,8 +91,8 @@ impl<N: TaskNumber> Numbers<N> {
         self.multiples.get(&variable).copied().unwrap_or(1)
     }
 
-    /// Returns the multiple of each numeric variable (factor of its stored value) by id. Empty if all multiples
-    /// are 1.
+    /// Returns the multiple of each numeric variable (factor from its original value to its stored value) by id. Empty
+    /// if all multiples are 1.
     pub(super) fn multiples(&self) -> Vec<Int> {
         if self.multiples.is_empty() {
             return Vec::new();
@@ -106,8 +106,9 @@ impl<N: TaskNumber> Numbers<N> {
         multiples
     }
 
-    /// Converts an expression over original values to the stored multiples of the variables, and multiplies the
-    /// result by `times`. Without multiples, the expression is returned unchanged; `times` is then 1.
+    /// Rewrites an expression over the original values of the variables as an expression over their stored values, and
+    /// multiplies it by `times`. If there are no multiples, original and stored values are equal, `times` is 1, and the
+    /// expression is returned unchanged.
     pub(super) fn stored<'l>(&self, linear: &'l Linear<Rational>, times: Int) -> Cow<'l, Linear<Rational>> {
         if self.multiples.is_empty() {
             return Cow::Borrowed(linear);

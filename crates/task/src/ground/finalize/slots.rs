@@ -21,7 +21,7 @@ fn slot_keys(slots: &GroundSlots) -> impl Iterator<Item = (SlotKey, &Vec<ObjectI
     })
 }
 
-/// All slots of a task in the order of their functions, each with the union of the designs of all operators.
+/// All slots of a task in the order of their functions, each with all designs that any operator allows for it.
 pub(super) struct Slots {
     pub(super) all: Vec<Slot>,
     ids: FxHashMap<SlotKey, SlotId>,

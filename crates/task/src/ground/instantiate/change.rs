@@ -1,5 +1,4 @@
-//! Composes the changes of an action into the state after the action, in terms of the state before it
-//! (regression).
+//! Computes the state after the changes of an action, as expressions over the state before the action (regression).
 
 use std::sync::Arc;
 
@@ -37,7 +36,7 @@ impl GroundChange {
         }
     }
 
-    /// Returns `true` if the reads contain the changed atom or numeric variable.
+    /// Returns `true` if `reads` contains the changed atom or numeric variable.
     pub(super) fn disturbs(&self, world: &World<'_>, reads: &Reads) -> bool {
         match self {
             Self::Atom(atom, _) => {

@@ -57,12 +57,12 @@ impl Start {
     }
 }
 
-/// Conditions of an instance over all and at its end, and the timed events between its start and end.
+/// The over-all and at-end conditions of an instance, and the timed events between its start and end.
 pub(super) struct Middle<'m> {
     pub(super) over_all: &'m [Residual],
     pub(super) at_end: &'m [Residual],
-    /// If the task has timed events: the window of the action, and the conditions under which events
-    /// interfere with it.
+    /// If the task has timed events: the timeline window of the action (its position relative to the events), and the
+    /// conditions under which events interfere with it.
     pub(super) passage: Option<&'m (TimelineWindow<'m>, Interference)>,
 }
 
@@ -92,10 +92,10 @@ impl Middle<'_> {
     }
 }
 
-/// Returns the cases of an instance, i.e. the combinations of truth values of its effect conditions. There is a
-/// single case unless the start effects or numeric effects have conditions. An effect whose condition is false
-/// does not occur (PDDL 2.1, section 8). Contradictory cases and cases with undefined values are dropped. Fails
-/// if there are more than `CASE_LIMIT` combinations for the start, or for the numeric effects of the end.
+/// Returns the cases of an instance, i.e. the combinations of truth values of its effect conditions. There is at most
+/// one case unless the start effects or numeric effects have conditions. An effect whose condition is false does not
+/// occur (PDDL 2.1, section 8). Contradictory cases, and cases with undefined start effects, are dropped. Fails if
+/// there are more than `CASE_LIMIT` combinations for the start, or for the numeric effects of the end.
 pub(super) fn cases(
     schema: &Schema,
     before: &[Residual],

@@ -52,9 +52,9 @@ pub(super) fn admit_some(
 /// in the sorted slots of its connected component (see [`joined`]).
 type Rule<'f> = (Vec<usize>, FxHashSet<&'f SlotSet>);
 
-/// Returns `true` if the designs chosen for the first slots of a connected component can be extended to all
-/// its slots. `sizes` is the number of designs of each slot. `rules` is indexed by the last slot that a rule
-/// mentions.
+/// Returns `true` if the designs chosen for the first slots of a connected component can be extended to all its slots
+/// without a forbidden combination. `sizes` is the number of designs of each slot. `rules` holds, for each slot, the
+/// rules whose last slot it is.
 fn extends(
     chosen: &mut Vec<u32>,
     sizes: &[usize],

@@ -31,7 +31,8 @@ pub(super) struct SharedInstanceData<'a> {
     pub(super) designs: Slots<'a>,
     pub(super) slots: Arc<GroundSlots>,
     pub(super) forbidden: Arc<[ForbiddenCombinations]>,
-    /// Residuals of the conjuncts at the start that mention slots.
+    /// Residuals of the comparisons at the start that mention slots and depend on the state. Other start conditions on
+    /// slots are part of `designs` or `forbidden`.
     pub(super) start: Vec<Residual>,
     pub(super) over_all: Vec<Residual>,
     pub(super) at_end: Vec<Residual>,
@@ -54,8 +55,8 @@ pub(super) enum Operand {
 }
 
 impl<'a> SharedInstanceData<'a> {
-    /// Computes the shared data for the objects that `core` assigns to the key parameters (those that occur
-    /// together with slots or in the duration). Returns `None` if no combination of designs is possible.
+    /// Computes the shared data for the objects that `core` assigns to the key parameters. Returns `None` if no
+    /// combination of designs is possible.
     pub(super) fn new(
         world: &mut World<'_>,
         outline: &SplitSchema<'a>,

@@ -18,7 +18,7 @@ use crate::task::quantity::{Linear, Quantity, SlotSet};
 use crate::task::{Argument, ForbiddenCombinations};
 use pddl::ast::Span;
 
-/// Value of an expression in a conditional effect, before the condition is decided.
+/// Value of an expression in a conditional effect, computed before it is known whether the effect occurs.
 pub(super) struct Apart {
     /// Value of the expression; `None` if it is undefined for every design.
     pub(super) operand: Option<Linear<Rational>>,

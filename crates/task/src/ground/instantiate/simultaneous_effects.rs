@@ -100,9 +100,9 @@ fn ground_change(
     })
 }
 
-/// Returns the conditions under which two simultaneous sets of effects interfere: one set changes an atom or
-/// fluent that the other reads, both set an atom to different values, or both change a number in ways that do
-/// not commute.
+/// Returns the conditions under which two simultaneous sets of effects interfere: one set changes an atom or fluent
+/// that the other reads, both set an atom to different values, or both change a number, except by two additions or two
+/// scalings.
 pub(super) fn clashes(
     world: &World<'_>,
     (first_reads, first): (&Reads, &SimultaneousEffects),

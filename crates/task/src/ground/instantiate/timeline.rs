@@ -127,8 +127,8 @@ impl Timeline {
             tables.chain([&operator.duration.constant])
         });
         let times = self.events.iter().map(|(time, _)| time).chain(durations);
-        // The moment is at most 1/1000, the usual separation of validators, so that no start is later than
-        // necessary.
+        // The moment is at most 1/1000, the usual separation in validators. A longer moment would delay starts
+        // unnecessarily.
         let unit =
             times.fold(BigInt::from(1000), |unit, time| num_integer::lcm(unit, time.to_big().denom() * 2_u8));
         let moment = Rational::from_big(BigRational::new(BigInt::from(1), unit));

@@ -35,10 +35,10 @@ enum Start {
     Later,
     /// A moment (a very short time) after the event that begins the phase.
     AfterEvent,
-    /// Earlier than the required time of the end by the duration.
+    /// At the required time of the end minus the duration. The required time is exactly at an event, or one moment (a
+    /// very short time) after it.
     ByEnd,
-    /// Earlier than the required time of the end by the duration, and later than the event that begins the
-    /// phase of the start.
+    /// Like [`Start::ByEnd`], but later than the event that begins the phase of the start.
     LaterByEnd,
 }
 
@@ -76,9 +76,9 @@ impl<'t> TimelineWindow<'t> {
                 let apart = |later: usize, earlier: usize| {
                     timeline.events[later].0.clone() - &timeline.events[earlier].0
                 };
-                // The action starts before the phase of its start ends. It ends in the phase `to`, or exactly
-                // at the event that begins this phase. If its longest duration does not reach this event, it
-                // does not reach later phases either.
+                // The action starts before event `from`, which ends the phase of its start. It ends at or after event
+                // `to - 1`, which begins the phase `to`. If the longest duration does not reach event `to - 1`, no
+                // later phase is reached either.
                 if to > from && most <= apart(to - 1, from) {
                     break;
                 }
@@ -235,8 +235,8 @@ impl<'t> TimelineWindow<'t> {
         Some((*clock, end))
     }
 
-    /// Returns the lower bounds on the times of the start and the end that the window implies. The flag is
-    /// `true` if the time is one moment (a very short time) later.
+    /// Returns lower bounds on the times of the start and of the end, where an event implies them. If the flag is
+    /// `true`, the bound is one moment (a very short time) after the given time.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"

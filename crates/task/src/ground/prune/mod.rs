@@ -19,9 +19,9 @@ use crate::lifted::Formula;
 use crate::lifted::configuration::conjuncts;
 use crate::limits::Interrupted;
 
-/// Prunes the task in place. Numbers are not used for pruning if `generality` lets initial numbers vary.
-/// Returns the reason why the goal is unreachable if this is detected, and `None` otherwise; in the first
-/// case, pruning is not complete.
+/// Prunes the task in place. Numbers are not used for pruning if `generality` lets initial numbers vary. Returns the
+/// reason why the goal is unreachable if this is detected, and `None` otherwise. If a reason is returned, pruning is
+/// not complete.
 pub fn prune(task: &mut GroundTask<'_>, generality: &Generality) -> Result<Option<String>, Interrupted> {
     let world = &task.world;
     let initially: Vec<bool> = world

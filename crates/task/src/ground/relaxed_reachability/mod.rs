@@ -1,8 +1,8 @@
 //! Relaxed reachability: computes the instances of each action schema that are applicable in the delete
 //! relaxation.
 //!
-//! The lifted task becomes a Datalog program \[1\]. A schema with slots has an auxiliary relation for each
-//! slot. This relation contains the values of the other parameters in the conditions on the slot for which
+//! The lifted task becomes a Datalog program \[1\]. A schema with slots has an auxiliary relation for each slot. The
+//! columns of this relation are the other parameters in the conditions on the slot; its rows are the objects for which
 //! *some* design is suitable. The relation of applicable instances has no columns for designs, so its size is
 //! independent of their number.
 //!

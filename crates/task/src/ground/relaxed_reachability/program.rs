@@ -105,9 +105,9 @@ fn slots_in(formula: &Formula, slots: &[SlotParameter]) -> Vec<u32> {
         .collect()
 }
 
-/// Returns the conjuncts that are necessary for every instance of the schema. If a start effect adds atoms,
-/// conjuncts of the middle condition that mention the predicate of such an atom or a derived predicate are
-/// omitted.
+/// Returns the conjuncts that must hold for every instance of the schema. Conjuncts of the middle condition that start
+/// effects may make true are omitted: if a start effect adds atoms, these are the conjuncts that mention the predicate
+/// of such an atom or a derived predicate.
 fn needs<'a>(lifted: &Lifted, schema: &'a Schema) -> Vec<&'a Formula> {
     let provided: Vec<_> = schema
         .start_effects

@@ -175,8 +175,8 @@ impl<'a> ReachabilityProgramBuilder<'a> {
         Ok(())
     }
 
-    /// Creates a relation over the free variables of `formula` that contains the bindings for which one of
-    /// `parts` is true.
+    /// Creates a relation over the free variables of `formula` that contains the bindings for which one of `parts` is
+    /// true. If `exact` is `false`, the relation may contain further bindings.
     fn auxiliary(
         &mut self,
         formula: &Formula,

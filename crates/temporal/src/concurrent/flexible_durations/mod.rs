@@ -1,15 +1,15 @@
 //! Temporal planning with durations that the planner chooses: a linear program for each sequence of
 //! happenings.
 //!
-//! The bounds of a duration are conditions at the start of its action, and effects may depend on
-//! the duration. A sequence has a plan if some times and durations satisfy all constraints, which
-//! form a linear program as in COLIN \[1\]. The program is solved in exact arithmetic
-//! (`linear_program`), because rounding errors could make plans invalid and infeasibility is part
-//! of proofs. An exhaustive and a greedy search run interleaved (`search`). If every action can
-//! have its minimal duration, the searches for fixed durations are used as well.
+//! The bounds of a duration are conditions at the start of its action, and effects may depend on the
+//! duration. A sequence has a plan if some times and durations satisfy all constraints, which form a linear
+//! program as in COLIN \[1\]. The program is solved in exact arithmetic (`linear_program`), because rounding
+//! errors could make plans invalid and infeasibility is part of proofs. An exhaustive and a greedy search run
+//! interleaved (`search`). If the variant of the task with minimal durations is supported, the searches for
+//! fixed durations are used as well.
 //!
-//! \[1\] A. Coles, A. Coles, M. Fox, D. Long: COLIN: planning with continuous linear numeric
-//! change, JAIR 44, 2012.
+//! \[1\] A. Coles, A. Coles, M. Fox, D. Long: COLIN: planning with continuous linear numeric change, JAIR 44,
+//! 2012.
 
 mod affine;
 mod answer;
@@ -54,11 +54,11 @@ pub(super) fn check(concurrent: &TemporalTask) -> Result<(), Errors> {
     .into())
 }
 
-/// Returns `true` if the exhaustive search covers every plan with all its possible times and
-/// durations.
+/// Returns `true` if the exhaustive search covers every plan with all its possible times and durations.
 ///
 /// Returns `false` in particular if
-/// - a chosen duration may be 0 or less than the separation (the action then becomes a single happening),
+/// - a chosen duration may be less than the separation, in particular 0 (the action is then a single
+///   happening),
 /// - a duration depends on the state and is not chosen,
 /// - several happenings can jointly maintain a condition at one time, or
 /// - the task has timed initial literals, since a plan may end right before them.

@@ -264,9 +264,8 @@ impl Course {
         })
     }
 
-    /// Adds the constraint that the duration in `column` is at least `least`, and stores the bounds of
-    /// the duration that follow from all `constraints`. Returns `None` if the bounds contradict each
-    /// other.
+    /// Adds the constraint that the duration in `column` is at least `least`, and stores the bounds of the
+    /// duration that follow from single `constraints`. Returns `None` if the bounds contradict each other.
     fn note_range(&mut self, column: Column, least: Rational, constraints: &mut Vec<Affine>) -> Option<()> {
         constraints.push(Affine::column(column).shifted(&-least.clone()));
         let (mut low, mut high) = (least, None);

@@ -38,7 +38,7 @@ type QueueEntry = Reverse<(u64, Rational, Reverse<u32>, u32, u32, (OperatorId, u
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Outcome {
     Found,
-    /// The open list is empty: all sequences were expanded.
+    /// The open list is empty: all sequences were expanded or pruned.
     Exhausted,
     /// Stopped by an interrupt, or at a limit of time, memory or work.
     Stopped,

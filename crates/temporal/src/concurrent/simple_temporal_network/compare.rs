@@ -5,8 +5,8 @@ use crate::concurrent::time::TimeExpression;
 use crate::concurrent::time_number::TimeNumber;
 
 impl<T: TimeNumber> SimpleTemporalNetwork<T> {
-    /// Appends to `out` the part that must be equal for two networks to be compared: running
-    /// actions and group.
+    /// Appends to `out` the part that must be equal for two networks to be compared: the running actions, and
+    /// the time point at which further happenings must take place, if there is one.
     pub(in crate::concurrent) fn signature(&self, out: &mut Vec<u32>) {
         for open in &self.opens {
             out.extend([open.instance, open.float]);
@@ -19,9 +19,8 @@ impl<T: TimeNumber> SimpleTemporalNetwork<T> {
         }
     }
 
-    /// Removes accesses that can no longer delay a happening: those at least `separation` before
-    /// the last timed initial literals or before the last change of their guard, a variable given by
-    /// `guards` (see the field of the temporal task).
+    /// Removes accesses that can no longer delay a happening: those at least `separation` before the last
+    /// timed initial literals, or before the last change of their guard (see `TemporalTask::guards`).
     pub(in crate::concurrent) fn forget(&mut self, guards: &[Option<u32>], separation: T) {
         let mut entries = std::mem::take(&mut self.entries);
         entries.retain(|(key, time)| !self.is_past(*key, time, guards, separation));

@@ -8,7 +8,7 @@ use serde_json::json;
 use crate::manager::machine::Machine;
 use crate::manager::machine::io::{Change, Outcome, Output, State};
 
-/// Maximum number of attempts of a call without a reply. A change that consists of steps gets one attempt.
+/// Maximum number of calls for a mode if there is no reply. A change that consists of steps gets one attempt.
 const MAX_ATTEMPTS: u32 = 2;
 
 /// Half of the delay before the first probe of a function without a reply. The delay is doubled with each
@@ -20,19 +20,19 @@ const MAX_PROBE_DELAY: Duration = Duration::from_secs(60);
 /// Maximum delay until a function that did not reply to a probe is probed again.
 const SILENT_RETRY_DELAY: Duration = Duration::from_secs(2);
 
-/// Delay until a design is retried that was refused or whose steps failed.
+/// Delay after which a design is retried if it was refused or its steps failed.
 const REFUSED_RETRY_DELAY: Duration = Duration::from_secs(60);
 
-/// Time during which a granted mode is believed although the mode manager reports another one.
+/// Time after a granted change of mode during which reports of another mode are ignored.
 ///
-/// `system_modes` answers `change_mode` before the node has changed, and `get_mode` returns the old mode
-/// until its observer has noticed the change. A manager that believes the old mode requests the new one
-/// again, which causes the next report.
+/// `system_modes` answers `change_mode` before the node has changed, and `get_mode` returns the old mode until its
+/// observer has noticed the change. If this program adopted the old mode, it would request the new mode again, and
+/// the next wrong report would follow.
 const GRANT_PERIOD: Duration = Duration::from_secs(2);
 
 #[derive(Debug)]
 pub(super) struct Grant {
-    /// End of the period in which reports of other modes are not believed.
+    /// End of the period in which reports of other modes are ignored.
     until: Duration,
     /// Modes that the function had shortly before; reports of them may be late.
     earlier: Vec<String>,
@@ -41,8 +41,8 @@ pub(super) struct Grant {
 }
 
 impl Machine {
-    /// Requests the mode that the settings give a function that is not needed. Does nothing without such a
-    /// mode, or if the function has the mode or an unknown one.
+    /// Requests the mode that the settings provide for a function while it is not needed. Does nothing without such a
+    /// mode, if this mode is already set or requested, or if the function's mode is unknown.
     pub(super) fn unground(&mut self, function: &str) {
         let Some(mode) = self.settings.functions.unground(function).map(str::to_owned) else { return };
         let requested = self.pending.get(function).map(|change| &change.mode);
@@ -126,8 +126,8 @@ impl Machine {
         })));
     }
 
-    /// Handles a design that could not be set. The design is retried at the time `again`, or when the
-    /// function replies if `again` is `None`.
+    /// Handles a design that could not be set. The design is retried at the time `again`. If `again` is `None`, it is
+    /// retried once the function replies.
     pub(super) fn failed(&mut self, function: &str, effect: Option<u64>, again: Option<Duration>) {
         self.pending.remove(function);
         let Some(effect) = effect else { return };
@@ -201,8 +201,8 @@ impl Machine {
         because
     }
 
-    /// Handles a mode that was requested, but is reported only after the timeout of its call: its design is realisable
-    /// again.
+    /// If the design of a reported mode counts as failed, for example because its call has timed out, reports the
+    /// design as realisable again.
     pub(super) fn changed_late(&mut self, function: &str, mode: &str) {
         let designs = self.control.beliefs().mission().designs_of(function);
         let Some(design) = self.settings.functions.design(function, mode, &designs) else { return };
@@ -212,7 +212,8 @@ impl Machine {
         }
     }
 
-    /// Reports the design of a mode to the loop, unless the loop believes that the function has this design.
+    /// Reports the design of a mode to the loop, unless this is already the function's design in the beliefs of the
+    /// loop.
     pub(super) fn observe(&mut self, function: &str, mode: &str) {
         let designs = self.control.beliefs().mission().designs_of(function);
         let design = self.settings.functions.design(function, mode, &designs);

@@ -15,9 +15,9 @@ pub(in crate::manager) enum Input {
     Diagnosed,
     /// A line of events in the format of the loop.
     Line(String),
-    /// A task is requested. The reply has this number.
+    /// Request to start a task: the number that identifies the reply, and the name of the task.
     Request(u64, String),
-    /// The end of a task is requested.
+    /// Request to end a task: the number that identifies the reply, and the name of the task.
     Cancel(u64, String),
     /// A function has replied to a call, or the call has failed.
     Changed(Change, Outcome),
@@ -26,10 +26,11 @@ pub(in crate::manager) enum Input {
     Mode(String, String),
     /// The mode that a client has requested from a function's mode manager.
     ModeRequested(String, String),
-    /// A function has changed, but its mode is unknown.
+    /// A node of a function has reported a transition or a changed parameter, so the function's mode may have
+    /// changed.
     Touched(String),
     Performed(u64, Ended),
-    /// Completed share of an action from 0 to 1.
+    /// Number of an action, and its completed share from 0 to 1.
     Progress(u64, f64),
     /// A function without a reply was probed: `true` if it replies.
     Probed(String, bool),
@@ -37,12 +38,12 @@ pub(in crate::manager) enum Input {
     Tick,
 }
 
-/// A call of `change_mode`, or the steps that have the same effect.
+/// Request to set a mode of a function, by a call of `change_mode` or by steps.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::manager) struct Change {
     pub(in crate::manager) function: String,
     pub(in crate::manager) mode: String,
-    /// The effect of the loop that requires the change. `None` if the function is no longer needed.
+    /// Number of the effect of the loop that requires the change. `None` if the function is no longer needed.
     pub(in crate::manager) effect: Option<u64>,
     /// Number of the attempt, from 1.
     pub(in crate::manager) attempt: u32,
@@ -54,7 +55,7 @@ pub(in crate::manager) enum Outcome {
     Refused,
     /// There was no valid reply, for this reason.
     Failed(String),
-    /// A step has failed for this reason, and the steps before it are undone.
+    /// A step or condition has failed for this reason, and the earlier steps were undone as far as possible.
     StepFailed(String),
 }
 

@@ -1,7 +1,7 @@
 //! State machine between the robot and the adaptation loop.
 //!
-//! It has no clock and no network: inputs have a time, and [`super::driver`] executes the outputs.
-//! Each line for the loop is written to the journal before it is handled, and each decision of the
+//! It has no clock and no network: each input comes with its time, and [`super::driver`] executes the outputs. If
+//! there is a journal, each line for the loop is written to it before the line is handled, and each decision of the
 //! loop before its outputs are executed.
 
 mod actions;
@@ -62,12 +62,12 @@ pub(super) struct Machine {
     functions: Vec<String>,
     state: State,
     task: Option<String>,
-    /// Calls without a reply, by function.
+    /// Requested changes of mode that have not ended, by function.
     pending: BTreeMap<String, Change>,
     modes: BTreeMap<String, String>,
     grants: BTreeMap<String, Grant>,
     action: Option<Action>,
-    /// Numbers of the unanswered requests to start and to end a task.
+    /// Numbers of the unanswered requests to start a task.
     start_requests: Vec<u64>,
     end_requests: Vec<u64>,
     failures: BTreeMap<String, CallFailures>,
@@ -207,8 +207,8 @@ impl Machine {
         self.lines.push_back(event.to_json().to_string());
     }
 
-    /// Enters the state that follows from the running work, and answers requests whose result is known. Each
-    /// transition is noted in the journal.
+    /// Enters the state that follows from the pending changes, the plan and the task, and answers requests whose
+    /// result is known. Each transition is noted in the journal.
     fn enter(&mut self, because: &str) -> Result<(), Message> {
         if self.state == State::WaitGraph {
             return Ok(());
@@ -259,7 +259,7 @@ impl Machine {
                 Answer::PlanRequested { .. } => self.transient_states = vec![State::Plan],
                 Answer::PlanFound { .. } => {
                     self.without_plan = false;
-                    // The remainder of a cancelled action is no plan once its task has ended.
+                    // A plan after the end of the task could only contain a cancelled action, and is not published.
                     if self.task.is_some() || self.control.beliefs().goal().is_none() {
                         self.outputs.push(Output::Plan(answer.to_json()));
                     }

@@ -52,7 +52,7 @@ impl Machine {
             (std::mem::take(&mut deferred.answers), std::mem::take(&mut deferred.modes));
         let outstanding: BTreeSet<u64> =
             self.control.beliefs().outstanding().map(|effect| effect.number).collect();
-        // Answers without an outstanding request have been replaced.
+        // An effect that is no longer outstanding is not requested again.
         answers.retain(|answer| answer.effect().is_none_or(|effect| outstanding.contains(&effect.number)));
         self.handle_answers(answers);
         self.deferred = None;
@@ -68,8 +68,8 @@ impl Machine {
         let call = call(step);
         let is_waiting = |effect: &&Effect| matches!(effect.command, Command::Request { .. });
         let effect = self.control.beliefs().outstanding().find(is_waiting).map(|effect| effect.number);
-        // The performer may have lost the action, so the action is started again. This is correct
-        // for actions that end with a message on a topic.
+        // An action that had begun is started again, because the performer may have lost it. For an action that ends
+        // with a message on a topic, this has no disadvantage.
         self.action =
             Some(Action { number, call, effect: effect.unwrap_or_default(), begun: effect.is_none() });
         if effect.is_none()

@@ -18,11 +18,12 @@ use crate::node::rmw::Mapping;
 use crate::node::{Node, client_name, creation_error, latched, qos};
 use crate::types::{ActionType, AnyAction};
 
-/// Time for which the client waits after discovering a server, so that the server can discover the
-/// client.
+/// Time for which the client waits after discovering a server, so that the server can discover the client. Earlier
+/// answers would be lost.
 const MATCHING_TIME: Duration = Duration::from_millis(100);
 
-/// Number of consecutive failed look-ups of a server after which the server counts as lost.
+/// Maximum number of consecutive failed look-ups of a server, one per `POLL_INTERVAL`. After more, the server counts
+/// as lost.
 const MAX_FAILED_LOOKUPS: u32 = 250;
 
 type Client<A> = ActionClient<<A as Action>::Goal, <A as Action>::Result, <A as Action>::Feedback>;
@@ -41,7 +42,8 @@ pub enum Accepted<A: Action> {
 /// Reason why a goal was not accepted.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum GoalError {
-    /// The action has no server, the server has another type, or the server does not answer.
+    /// The goal was not delivered or not answered. For example, the action has no server, or the server has another
+    /// type.
     #[error("{action}: {because}")]
     Unreachable {
         /// Full name of the action.
@@ -80,7 +82,7 @@ struct Followed<A: Action> {
 #[derive(Debug)]
 pub struct Pursued<A: Action> {
     goal: GoalId,
-    /// Messages about the goal. The last message is its end.
+    /// Messages about the goal. The last one is [`Accepted::Ended`] or [`Accepted::Lost`].
     pub events: channel::Receiver<Accepted<A>>,
     cancel: channel::Sender<()>,
 }
@@ -109,12 +111,12 @@ impl<A: Action + 'static> ActionCaller<A> {
     /// server and its answer.
     ///
     /// # Errors
-    /// Fails if there is no server, no answer, or the goal is rejected.
+    /// Fails if no server of the expected type accepts the goal in time.
     pub async fn pursue(&self, goal: A::Goal, within: Duration) -> Result<Pursued<A>, GoalError> {
         let start = Instant::now();
         let unreachable = |because: String| GoalError::Unreachable { action: self.full.clone(), because };
-        // The lock is held until the answer arrives, because concurrent receivers would take
-        // answers to other goals.
+        // The lock is held until the answer arrives: of two concurrent receivers, one could take the answer to the
+        // other's goal.
         let mut connection = self.connection.lock().await;
         let connection = self.connect(&mut connection, within).await.map_err(unreachable)?;
         let (client, mapping) = (&connection.client, connection.server.mapping);
@@ -196,7 +198,8 @@ impl<A: Action + 'static> Connection<A> {
         is_first
     }
 
-    /// Forwards the messages about all goals until no goal is running. If the server is lost, all goals end.
+    /// Forwards the messages about all goals until no goal is running. If the server is lost, all goals end with
+    /// [`Accepted::Lost`].
     async fn run(&self, graph: &Graph, full: &str) {
         let topics = goal_topics(full);
         let mut absent = 0;
@@ -217,8 +220,7 @@ impl<A: Action + 'static> Connection<A> {
     }
 
     fn poll(&self) {
-        // Invalid messages are skipped. A goal with an invalid result never ends, as with other ROS
-        // clients.
+        // Invalid messages are skipped. A goal with an invalid result ends only if the server is lost.
         while let Ok(Some((message, _))) = self.client.feedback_subscription().take() {
             if let Some(followed) = self.goals().get(&message.goal_id) {
                 let _ = followed.events.try_send(Accepted::Feedback(message.feedback));
