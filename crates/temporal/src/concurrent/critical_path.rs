@@ -2,7 +2,7 @@
 //!
 //! In the delete relaxation, the earliest time of a happening is the latest of the earliest times of its
 //! conditions, and the earliest time of a proposition that of the first happening that adds it. An end takes
-//! place at least the duration after its start and after each of its over-all conditions. A happening also
+//! place at least the duration after its start and, unless the action is running, after each over-all condition. A happening also
 //! waits for earlier happenings of the plan, and for the one that adds its condition, for as long as the
 //! interference constraints say. Numeric conditions hold after the first happening that helps to satisfy them.
 //!
@@ -28,6 +28,8 @@ struct Reader<T: TimeNumber> {
     rule: u32,
     /// Least time from the happening that adds the proposition to the rule.
     delay: T,
+    /// Instance whose over-all condition has the proposition. `None` if the rule itself requires it.
+    over_all_of: Option<u32>,
 }
 
 pub(super) struct CriticalPath<'a, T: TimeNumber = Int> {
@@ -35,8 +37,10 @@ pub(super) struct CriticalPath<'a, T: TimeNumber = Int> {
     relaxation: TemporalRelaxation,
     /// Per proposition.
     readers: Vec<Vec<Reader<T>>>,
-    /// Per rule: number of propositions in `readers`.
+    /// Per rule: number of its entries in `readers`.
     conditions: Vec<u32>,
+    /// Per instance: rules of its end.
+    end_rules: Vec<Vec<u32>>,
     /// The following describe the state that is evaluated. Per proposition: earliest time, and whether the state
     /// itself satisfies it.
     times: Vec<Option<T>>,
@@ -60,26 +64,23 @@ impl<'a, T: TimeNumber> CriticalPath<'a, T> {
         let mut readers: Vec<Vec<Reader<T>>> = vec![Vec::new(); propositions];
         let mut conditions = vec![0_u32; rules];
         let ids = 0..dense(rules);
+        let mut end_rules = vec![Vec::new(); concurrent.instances.len()];
         for ((rule, origin), count) in ids.zip(&relaxation.origins).zip(&mut conditions) {
             let happening = origin.map(|id| &concurrent.happenings[id.index()]);
             let after = happening.map_or(&[][..], |happening| &happening.accesses.after);
-            let duration = happening.map_or(T::ZERO, |happening| match happening.role {
-                Role::End(instance) => concurrent.instances[instance as usize].duration,
-                _ => T::ZERO,
-            });
             let (needs, over_all) = (relaxation.needs.of(rule), relaxation.over_all.of(rule));
             for need in needs {
-                let mut delay = distance(&marks[*need as usize], after);
-                if over_all.contains(need) {
-                    delay = delay.max(duration);
+                let delay = distance(&marks[*need as usize], after);
+                readers[*need as usize].push(Reader { rule, delay, over_all_of: None });
+            }
+            if let Some(Role::End(instance)) = happening.map(|happening| happening.role) {
+                let delay = concurrent.instances[instance as usize].duration;
+                for need in over_all {
+                    readers[*need as usize].push(Reader { rule, delay, over_all_of: Some(instance) });
                 }
-                readers[*need as usize].push(Reader { rule, delay });
+                end_rules[instance as usize].push(rule);
             }
-            for need in over_all.iter().filter(|need| !needs.contains(need)) {
-                readers[*need as usize].push(Reader { rule, delay: duration });
-            }
-            let both = over_all.iter().filter(|need| needs.contains(need)).count();
-            *count = dense(needs.len().saturating_add(over_all.len()).saturating_sub(both));
+            *count = dense(needs.len().saturating_add(over_all.len()));
         }
         let keys = concurrent.happenings.iter().flat_map(|happening| {
             let accesses = &happening.accesses;
@@ -90,6 +91,7 @@ impl<'a, T: TimeNumber> CriticalPath<'a, T> {
             concurrent,
             readers,
             conditions,
+            end_rules,
             times: vec![None; propositions],
             holds: vec![false; propositions],
             is_settled: vec![false; propositions],
@@ -118,7 +120,10 @@ impl<'a, T: TimeNumber> CriticalPath<'a, T> {
             }
             let holds = self.holds[proposition as usize];
             for index in 0..self.readers[proposition as usize].len() {
-                let Reader { rule, delay } = self.readers[proposition as usize][index];
+                let Reader { rule, delay, over_all_of } = self.readers[proposition as usize][index];
+                if over_all_of.is_some_and(|instance| clocks.runs(instance) > 0) {
+                    continue;
+                }
                 if !holds {
                     let rule_time = &mut self.rule_times[rule as usize];
                     *rule_time = (*rule_time).max(time + delay);
@@ -157,6 +162,11 @@ impl<'a, T: TimeNumber> CriticalPath<'a, T> {
         }
         for open in clocks.opens() {
             self.started(open.instance, clocks.start(open), open.duration);
+            // The over-all condition has held since the start. It may already be violated at the time of the end.
+            for rule in &self.end_rules[open.instance as usize] {
+                let needs = self.relaxation.needs.of(*rule).len();
+                self.unmet[*rule as usize] = dense(needs);
+            }
         }
         for (variable, value) in state.values.iter().enumerate().take(self.relaxation.first.len()) {
             self.hold(self.relaxation.first[variable].saturating_add(*value));
