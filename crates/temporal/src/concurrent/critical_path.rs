@@ -54,6 +54,8 @@ pub(super) struct CriticalPath<'a, T: TimeNumber = Int> {
     /// Per access kind: time of its latest access.
     accesses: Vec<Option<T>>,
     queue: BinaryHeap<Reverse<(T, Proposition)>>,
+    /// Number of conditions, effects and interference constraints looked at in all evaluations.
+    pub(super) work: usize,
 }
 
 impl<'a, T: TimeNumber> CriticalPath<'a, T> {
@@ -100,6 +102,7 @@ impl<'a, T: TimeNumber> CriticalPath<'a, T> {
             ends: vec![None; concurrent.instances.len()],
             accesses: vec![None; keys],
             queue: BinaryHeap::new(),
+            work: 0,
             relaxation,
         }
     }
@@ -119,6 +122,7 @@ impl<'a, T: TimeNumber> CriticalPath<'a, T> {
                 continue;
             }
             let holds = self.holds[proposition as usize];
+            self.work = self.work.saturating_add(self.readers[proposition as usize].len());
             for index in 0..self.readers[proposition as usize].len() {
                 let Reader { rule, delay, over_all_of } = self.readers[proposition as usize][index];
                 if over_all_of.is_some_and(|instance| clocks.runs(instance) > 0) {
@@ -200,9 +204,12 @@ impl<'a, T: TimeNumber> CriticalPath<'a, T> {
     /// Applies a rule whose conditions are all satisfied.
     fn fire(&mut self, rule: u32, clocks: &SimpleTemporalNetwork<T>) {
         let mut time = self.rule_times[rule as usize];
+        self.work = self.work.saturating_add(self.relaxation.adds.of(rule).len());
         if let Some(id) = self.relaxation.origins[rule as usize] {
+            let happening = &self.concurrent.happenings[id.index()];
+            self.work = self.work.saturating_add(happening.accesses.after.len());
             time = time.max(clocks.floor()).max(self.past(id));
-            match self.concurrent.happenings[id.index()].role {
+            match happening.role {
                 Role::Start(instance) => {
                     let duration = self.concurrent.instances[instance as usize].duration;
                     self.started(instance, time, duration);

@@ -29,6 +29,8 @@ use crate::concurrent::time_number::TimeNumber;
 
 /// Number of comparisons of nodes that count as one expanded node.
 const COMPARED: usize = 4;
+/// Work of the critical-path heuristic that counts as one expanded node.
+const EVALUATED: usize = 100;
 
 /// A plan as a sequence of happenings.
 #[derive(Debug, Clone)]
@@ -231,7 +233,8 @@ impl<'a, T: TimeNumber> Search<'a, T> {
     }
 
     /// Expands a node with the given lower bound on the metric. Returns the work: the number of
-    /// successors, plus 1, plus one unit per [`COMPARED`] comparisons of nodes.
+    /// successors, plus 1, plus one unit per [`COMPARED`] comparisons of nodes, plus one per [`EVALUATED`] units of work of
+    /// the critical-path heuristic.
     ///
     /// # Errors
     /// [`Interrupted`] if a limit was reached before the last successor. A node can have tens of
@@ -248,7 +251,7 @@ impl<'a, T: TimeNumber> Search<'a, T> {
     ) -> Result<usize, Interrupted> {
         let candidates = self.expansion.candidates(situation);
         let count = candidates.len();
-        let compared = self.store.compared;
+        let (compared, evaluated) = (self.store.compared, self.evaluation_work());
         self.figures.expanded += 1;
         self.figures.generated += count as u64;
         let depth = self.store.origin(id).map_or(0, |origin| origin.depth);
@@ -265,7 +268,12 @@ impl<'a, T: TimeNumber> Search<'a, T> {
                 Err(DeadEnd::Unfit) => self.leave_out(lower),
             }
         }
-        Ok(count + 1 + (self.store.compared - compared) / COMPARED)
+        let evaluations = (self.evaluation_work() - evaluated) / EVALUATED;
+        Ok(count + 1 + (self.store.compared - compared) / COMPARED + evaluations)
+    }
+
+    fn evaluation_work(&self) -> usize {
+        self.critical_path.as_ref().map_or(0, |critical_path| critical_path.work)
     }
 
     /// Adds a node, unless it is a dead end, dominated, or no better than the incumbent. If its metric
