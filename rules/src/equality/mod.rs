@@ -158,7 +158,9 @@ impl Atom {
         match self {
             Self::Different(left, right) => *self = replacement(*left, *right),
             Self::Aggregate { body, .. } => {
-                body.iter_mut().for_each(|atom| atom.replace_different(replacement));
+                for atom in body {
+                    atom.replace_different(replacement);
+                }
             }
             _ => {}
         }

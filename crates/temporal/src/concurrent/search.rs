@@ -59,8 +59,9 @@ pub(super) enum SearchEnd<T: TimeNumber = Int> {
     Stopped(T),
 }
 
-/// Sort key of an open node: metric, makespan, remaining work estimate, depth, and node.
-type Priority<T> = (T, T, T, u32, u32);
+/// Sort key of an open node: metric, makespan, remaining work estimate, depth, and node; and whether the critical path of
+/// the node was evaluated.
+type Priority<T> = (T, T, T, u32, u32, bool);
 
 pub(super) struct Search<'a, T: TimeNumber = Int> {
     concurrent: &'a TemporalTask<T>,
@@ -109,8 +110,11 @@ impl<'a, T: TimeNumber> Search<'a, T> {
         let root = expansion.root();
         let estimated = estimate.left(&root.state, &root.clocks).map(|remaining| remaining.makespan);
         let mut critical_path = CriticalPath::new(concurrent);
-        let is_better = critical_path.makespan(&root).is_none_or(|makespan| Some(makespan) > estimated);
-        search.critical_path = is_better.then_some(critical_path);
+        let makespan = critical_path.makespan(&root);
+        if makespan.is_none_or(|makespan| Some(makespan) > estimated) {
+            search.critical_path = Some(critical_path);
+            search.floor = makespan.filter(|_| concurrent.is_bounded).unwrap_or(T::ZERO);
+        }
         // Costs and times are not negative, so 0 is a lower bound.
         search.push(&root, None, T::ZERO);
         search
@@ -157,7 +161,17 @@ impl<'a, T: TimeNumber> Search<'a, T> {
             if self.store.is_dominated(id) || !self.is_better(value) {
                 continue;
             }
+            if expanded >= max_nodes || self.is_full(limits) || pulse.beat().is_err() {
+                self.open.push(Reverse(priority));
+                return SearchEnd::Stopped(self.lower());
+            }
             let situation = self.store.situation(id);
+            if !priority.5 {
+                let (evaluated, work) = self.evaluate(priority, &situation);
+                expanded += work;
+                self.open.extend(evaluated.map(Reverse));
+                continue;
+            }
             if self.expansion.is_goal(&situation) {
                 match self.sequence(id, &situation) {
                     Some(sequence) if self.is_better(sequence.value) => {
@@ -172,10 +186,6 @@ impl<'a, T: TimeNumber> Search<'a, T> {
                 if self.concurrent.violations.is_empty() && self.concurrent.deadlines.is_empty() {
                     continue;
                 }
-            }
-            if expanded >= max_nodes || self.is_full(limits) || pulse.beat().is_err() {
-                self.open.push(Reverse(priority));
-                return SearchEnd::Stopped(self.lower());
             }
             record.report_lower_bound(self.known(value.0).to_rational());
             let Ok(work) = self.expand((id, value.0), &situation, &mut pulse) else {
@@ -233,8 +243,7 @@ impl<'a, T: TimeNumber> Search<'a, T> {
     }
 
     /// Expands a node with the given lower bound on the metric. Returns the work: the number of
-    /// successors, plus 1, plus one unit per [`COMPARED`] comparisons of nodes, plus one per [`EVALUATED`] units of work of
-    /// the critical-path heuristic.
+    /// successors, plus 1, plus one unit per [`COMPARED`] comparisons of nodes.
     ///
     /// # Errors
     /// [`Interrupted`] if a limit was reached before the last successor. A node can have tens of
@@ -251,7 +260,7 @@ impl<'a, T: TimeNumber> Search<'a, T> {
     ) -> Result<usize, Interrupted> {
         let candidates = self.expansion.candidates(situation);
         let count = candidates.len();
-        let (compared, evaluated) = (self.store.compared, self.evaluation_work());
+        let compared = self.store.compared;
         self.figures.expanded += 1;
         self.figures.generated += count as u64;
         let depth = self.store.origin(id).map_or(0, |origin| origin.depth);
@@ -268,12 +277,7 @@ impl<'a, T: TimeNumber> Search<'a, T> {
                 Err(DeadEnd::Unfit) => self.leave_out(lower),
             }
         }
-        let evaluations = (self.evaluation_work() - evaluated) / EVALUATED;
-        Ok(count + 1 + (self.store.compared - compared) / COMPARED + evaluations)
-    }
-
-    fn evaluation_work(&self) -> usize {
-        self.critical_path.as_ref().map_or(0, |critical_path| critical_path.work)
+        Ok(count + 1 + (self.store.compared - compared) / COMPARED)
     }
 
     /// Adds a node, unless it is a dead end, dominated, or no better than the incumbent. If its metric
@@ -300,29 +304,33 @@ impl<'a, T: TimeNumber> Search<'a, T> {
             return;
         }
         let depth = origin.map_or(0, |origin| origin.depth);
-        // The critical path is evaluated last, as it takes the longest.
-        if let Some(id) = self.store.add(situation, origin)
-            && let Some(value) = self.with_critical_path(value, situation, costs)
-        {
-            self.open.push(Reverse((value.0, value.1, remaining.sum, depth, id)));
+        if let Some(id) = self.store.add(situation, origin) {
+            // The critical path takes the longest, so it is evaluated only when the node would be expanded.
+            let is_evaluated = self.critical_path.is_none();
+            self.open.push(Reverse((value.0, value.1, remaining.sum, depth, id, is_evaluated)));
         }
     }
 
-    /// Raises the lower bounds on metric and makespan by that of the critical path. Returns `None` if no plan
-    /// through the node is better than the incumbent.
-    fn with_critical_path(
+    /// Evaluates the critical path of a node, and returns its sort key with the raised lower bounds on metric and
+    /// makespan. Also returns the work. The key is `None` if no plan through the node is better than the incumbent.
+    fn evaluate(
         &mut self,
-        value: (T, T),
+        priority: Priority<T>,
         situation: &TemporalState<T>,
-        costs: Int,
-    ) -> Option<(T, T)> {
-        let Some(critical_path) = &mut self.critical_path else { return Some(value) };
-        let makespan = critical_path.makespan(situation)?.max(value.1);
-        let cost = situation.cost.checked_add(costs);
-        let total = cost.and_then(|cost| self.concurrent.measure.total(makespan, cost));
-        // A metric that overflows is not a bound.
-        let value = total.filter(|total| total.is_moderate()).map_or(value, |total| (total, makespan));
-        self.is_better(value).then_some(value)
+    ) -> (Option<Priority<T>>, usize) {
+        let (total, makespan, sum, depth, id, _) = priority;
+        let Some(critical_path) = &mut self.critical_path else { return (Some(priority), 0) };
+        let before = critical_path.work;
+        let bound = critical_path.makespan(situation);
+        let work = critical_path.work.saturating_sub(before) / EVALUATED;
+        let Some(bound) = bound else { return (None, work) };
+        let bound = bound.max(makespan);
+        // The metric is linear in the makespan. A metric that overflows is not a bound.
+        let raised = self.concurrent.measure.total(bound - makespan, 0).and_then(|by| total.checked_add(by));
+        let value =
+            raised.filter(|raised| raised.is_moderate()).map_or((total, makespan), |raised| (raised, bound));
+        let is_better = self.is_better(value);
+        (is_better.then_some((value.0, value.1, sum, depth, id, true)), work)
     }
 
     /// Plan that leads to a goal node. Returns `None` if its metric overflows or it violates a hard deadline.
