@@ -5,7 +5,7 @@
 //! the conclusions of an engine. [`runtime`] updates an engine with the reports of a robot. [`kb`] contains the
 //! embedded knowledge bases.
 //!
-//! Not part of this crate: PDDL, plans, clocks and network access.
+//! Absent: PDDL, plans, clocks and network access.
 
 pub mod vocab;
 

@@ -3,7 +3,7 @@
 //!
 //! A block is a list of matches of a rule's body. The tuples of the program contain only the numbers of blocks, so
 //! that crepe's bookkeeping costs nothing per match, and the store is never copied. `Match` holds blocks of partial
-//! matches, each with the number of its plan steps so far; `Head` holds blocks of complete matches. A step
+//! matches, each with the number of plan steps that were executed; `Head` holds blocks of complete matches. A step
 //! extends a block by look-ups in the store, to which the program has a reference, and consumes the block.
 //!
 //! A small block passes several steps at once, because crepe's bookkeeping would take longer than the steps. In a

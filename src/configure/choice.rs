@@ -120,7 +120,7 @@ impl Group {
     }
 }
 
-/// Returns the local name of the design that currently provides an objective's function; `None` if there is none.
+/// Returns the local name of the design that currently provides an objective's function; `None` if no design does.
 pub(super) fn current(objective: &Objective) -> Option<&str> {
     let designs = objective.groundings.iter().filter_map(|grounding| grounding.design.as_ref());
     designs.map(|design| design.name.as_str()).next()

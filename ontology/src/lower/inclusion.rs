@@ -286,7 +286,7 @@ impl InclusionGraph {
         let is_universal = matches!(restriction, ClassExpression::AllValuesFrom(..));
         let related = if is_universal { &self.subproperties } else { &self.properties };
         let mut properties = reachable(property, related);
-        // Only properties that occur in a condition can contribute. If there are none, the superclasses of the filler
+        // Only properties that occur in a condition can contribute. Without such properties, the superclasses of the filler
         // need not be computed.
         properties.retain(|property| self.condition_properties.contains(property));
         if properties.is_empty() {

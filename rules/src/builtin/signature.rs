@@ -132,7 +132,7 @@ built_ins! {
     /// Second argument in lower case.
     LowerCase "lowerCase" 2..=2 Function,
     /// Second argument in which each character of the third argument is replaced by the character at the
-    /// corresponding position of the fourth argument, or removed if there is none.
+    /// corresponding position of the fourth argument, or removed if that argument is too short.
     Translate "translate" 4..=4 Function,
     /// Tests that the first argument contains the second.
     Contains "contains" 2..=2 Test,

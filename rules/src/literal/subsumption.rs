@@ -71,7 +71,7 @@ fn upwards(local: &str) -> Vec<&str> {
     ancestors
 }
 
-/// Returns the primitive datatype that contains a datatype; `None` if there is none, as for `owl:real`.
+/// Returns the primitive datatype that contains a datatype; `None` if it has no such datatype, as for `owl:real`.
 fn primitive(local: &str) -> Option<&'static str> {
     let ancestors = upwards(local);
     let is_ancestor = |name: &&&str| ancestors.contains(name) && **name != "integer";

@@ -65,7 +65,7 @@ pub fn parse_rules_as(
 /// (because it has three arguments, or a literal as its first one) is an unknown built-in.
 ///
 /// # Errors
-/// Returns the errors of [`parse_rules_as`] for each text. If there are none, returns R104 for unknown
+/// Returns the errors of [`parse_rules_as`] for each text. Without errors, returns R104 for unknown
 /// built-ins of any namespace.
 pub fn parse_rules_together(
     texts: &[(&str, &str)],

@@ -35,7 +35,7 @@ pub(super) fn derive_facts(world: &World<'_>, state: &mut State) {
 struct WaitingInstance {
     axiom: usize,
     arguments: Arguments,
-    /// Number of evaluations so far. Entries of this instance in [`Waiting`] with a smaller number are obsolete.
+    /// Number of evaluations that were made. Entries of this instance in [`Waiting`] with a smaller number are obsolete.
     evaluations: u32,
 }
 

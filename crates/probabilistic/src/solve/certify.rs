@@ -1,8 +1,8 @@
 //! Bounds the error of the values computed by policy iteration, for components of an MDP in doubles.
 //!
 //! Let v be the computed values, w the greatest expected numbers of steps under almost optimal policies, and δ
-//! a small number. For maximisation, v + δw is an upper bound on the true values if applying the equations to v
-//! + δw does not increase it. For minimisation, v − δw is a lower bound if applying the equations does not
+//! a small number. For maximisation, v + δw is an upper bound on the true values if applying the equations to
+//! v + δw does not increase it. For minimisation, v − δw is a lower bound if applying the equations does not
 //! decrease it. This is the inductive argument of Hartmanns and Kaminski, Optimistic Value Iteration, CAV 2020.
 //! The computed policy itself proves the bound on the other side, and its error is also at most δw. All checks
 //! include rounding errors. If the checks fail, the error is infinite.

@@ -24,7 +24,7 @@ const IMPROVEMENT_LIMIT: u64 = 100_000_000;
 /// if no method improves them.
 ///
 /// For a Markov chain, elimination has a small relative error. With choices, a certificate bounds the error. If
-/// a component is left with a tiny probability, no certificate may exist in doubles; small components are then
+/// the probability of leaving a component is tiny, there may be no certificate in doubles. Small components are then
 /// solved in rationals. If elimination is too expensive, interval iteration computes bounds from both sides.
 pub fn enclosed<N: Number>(
     quotient: &Quotient<N>,

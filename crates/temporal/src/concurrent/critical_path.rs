@@ -88,7 +88,7 @@ impl<'a, T: TimeNumber> CriticalPath<'a, T> {
             let accesses = &happening.accesses;
             accesses.marks.iter().copied().chain(accesses.after.iter().map(|(key, _)| *key))
         });
-        let keys = keys.max().map_or(0, |key| key as usize + 1);
+        let keys = keys.max().map_or(0, |key| (key as usize).saturating_add(1));
         Self {
             concurrent,
             readers,
@@ -108,6 +108,10 @@ impl<'a, T: TimeNumber> CriticalPath<'a, T> {
     }
 
     /// Lower bound on the makespan of plans through a state. Returns `None` if the goal is unreachable.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "sums of fewer than 2^32 times fit, see `TimeNumber::TIME_BITS`"
+    )]
     pub(super) fn makespan(&mut self, situation: &TemporalState<T>) -> Option<T> {
         self.begin(situation);
         let clocks = &situation.clocks;
@@ -195,6 +199,10 @@ impl<'a, T: TimeNumber> CriticalPath<'a, T> {
     }
 
     /// Records a run of an instance that starts at a time.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "sums of fewer than 2^32 times fit, see `TimeNumber::TIME_BITS`"
+    )]
     fn started(&mut self, instance: u32, start: T, duration: T) {
         let end = start + duration;
         let earliest = &mut self.ends[instance as usize];
@@ -246,6 +254,10 @@ impl<'a, T: TimeNumber> CriticalPath<'a, T> {
     }
 
     /// Earliest time of an operator after the happenings that have taken place.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "sums of fewer than 2^32 times fit, see `TimeNumber::TIME_BITS`"
+    )]
     fn past(&self, id: OperatorId) -> T {
         let after = &self.concurrent.happenings[id.index()].accesses.after;
         let times = after.iter().filter_map(|(key, by)| Some(self.accesses[*key as usize]? + *by));

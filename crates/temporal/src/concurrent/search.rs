@@ -313,6 +313,7 @@ impl<'a, T: TimeNumber> Search<'a, T> {
 
     /// Evaluates the critical path of a node, and returns its sort key with the raised lower bounds on metric and
     /// makespan. Also returns the work. The key is `None` if no plan through the node is better than the incumbent.
+    #[expect(clippy::arithmetic_side_effects, reason = "the makespan is at most the bound")]
     fn evaluate(
         &mut self,
         priority: Priority<T>,
