@@ -116,7 +116,7 @@ impl Cancellation {
 /// Accepted goals of an action server.
 pub struct Goals<A: Action> {
     server: OnceLock<Server<A>>,
-    goals: Mutex<BTreeMap<GoalId, Known<A::Result>>>,
+    accepted: Mutex<BTreeMap<GoalId, Known<A::Result>>>,
     /// Requests to cancel that are not answered yet.
     cancellations: Mutex<Vec<Cancellation>>,
 }
@@ -147,7 +147,7 @@ impl<A: Action> Gates<A> {
 
 impl<A: Action> Goals<A> {
     fn goals(&self) -> MutexGuard<'_, BTreeMap<GoalId, Known<A::Result>>> {
-        self.goals.lock().unwrap_or_else(PoisonError::into_inner)
+        self.accepted.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Accepts a requested goal and marks it as executing. Returns the id of the goal.
@@ -438,7 +438,7 @@ impl Node {
         expect_action(&self.graph, &full, ActionNames::of::<A>());
         let goals = Arc::new(Goals {
             server: OnceLock::new(),
-            goals: Mutex::default(),
+            accepted: Mutex::default(),
             cancellations: Mutex::default(),
         });
         let (graph, weak, served) = (Arc::clone(&self.graph), Arc::downgrade(self), Arc::clone(&goals));
@@ -484,7 +484,7 @@ mod tests {
     use super::*;
 
     fn goal(byte: u8) -> GoalInfo {
-        let id = serde_json::from_value(serde_json::json!({ "uuid": [byte; 16] })).expect("an id");
+        let id = serde_json::from_value(serde_json::json!({ "uuid": ([byte; 16]) })).expect("an id");
         GoalInfo { goal_id: id, stamp: Time::ZERO }
     }
 
