@@ -495,10 +495,10 @@ mod tests {
 
     #[test]
     fn a_request_to_cancel_several_goals_has_one_response() {
-        let mut several = cancellation(3);
-        assert!(several.decide(goal(1), true).is_none());
-        assert!(several.decide(goal(2), false).is_none());
-        let (code, goals) = several.decide(goal(3), true).expect("the last goal");
+        let mut cancellation_of_three = cancellation(3);
+        assert!(cancellation_of_three.decide(goal(1), true).is_none());
+        assert!(cancellation_of_three.decide(goal(2), false).is_none());
+        let (code, goals) = cancellation_of_three.decide(goal(3), true).expect("the last goal");
         assert_eq!(code, CancelGoalResponseEnum::None);
         let ids: Vec<_> = goals.iter().map(|goal| goal.goal_id).collect();
         assert_eq!(ids, [goal(1).goal_id, goal(3).goal_id]);
