@@ -278,12 +278,12 @@ impl<A: Action> Goals<A> {
             Err(error) => errors.push(error.to_string()),
         }
         while let Some((request, (id, goal))) = gates.goals.pop(graph) {
-            let wanted = Wanted { request, goal: id };
+            let offer = Wanted { request, goal: id };
             // Like the action server of rclpy, this one rejects a second goal with the same id.
             if self.goals().contains_key(&id) {
-                self.reject(wanted);
+                self.reject(offer);
             } else {
-                take(GoalEvent::Wanted(wanted, goal));
+                take(GoalEvent::Wanted(offer, goal));
             }
         }
         while let Some((request, cancel)) = gates.cancels.pop(graph) {
