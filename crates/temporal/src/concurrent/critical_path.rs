@@ -1,10 +1,11 @@
 //! Critical-path heuristic h¹ \[1\]: a lower bound on the makespan.
 //!
-//! In the delete relaxation, the earliest time of a happening is the latest of the earliest times of its
-//! conditions, and the earliest time of a proposition that of the first happening that adds it. An end takes
-//! place at least the duration after its start and, unless the action is running, after each over-all condition. A happening also
-//! waits for earlier happenings of the plan, and for the one that adds its condition, for as long as the
-//! interference constraints say. Numeric conditions hold after the first happening that helps to satisfy them.
+//! All times are earliest times in the delete relaxation. A happening takes place when the last of its conditions
+//! holds, and a proposition holds when the first happening adds it. An end takes place at least the duration after
+//! its start. Unless the action is already running, the duration also separates the end from each proposition of the
+//! over-all condition. The interference constraints add distances: to earlier happenings of the plan, and from the
+//! happening that adds a condition to the one that requires it. A numeric condition holds after the first happening
+//! that brings it closer.
 //!
 //! \[1\] P. Haslum, H. Geffner: Heuristic planning with time and resources, ECP 2001.
 
@@ -35,23 +36,26 @@ struct Reader<T: TimeNumber> {
 pub(super) struct CriticalPath<'a, T: TimeNumber = Int> {
     concurrent: &'a TemporalTask<T>,
     relaxation: TemporalRelaxation,
-    /// Per proposition.
+    /// Rules that require each proposition.
     readers: Vec<Vec<Reader<T>>>,
-    /// Per rule: number of its entries in `readers`.
+    /// Number of entries of each rule in `readers`.
     conditions: Vec<u32>,
-    /// Per instance: rules of its end.
+    /// Rules for the end of each instance.
     end_rules: Vec<Vec<u32>>,
-    /// The following describe the state that is evaluated. Per proposition: earliest time, and whether the state
-    /// itself satisfies it.
+    // The remaining fields but the last one describe the evaluated state.
+    /// Earliest time of each proposition. `None` if it is not reached.
     times: Vec<Option<T>>,
+    /// Whether the state itself satisfies each proposition.
     holds: Vec<bool>,
+    /// Whether the readers of each proposition were visited.
     is_settled: Vec<bool>,
-    /// Per rule: number of conditions without a time, and the latest time that a condition demands.
+    /// Number of conditions of each rule that are not settled.
     unmet: Vec<u32>,
+    /// Earliest time of each rule because of its settled conditions.
     rule_times: Vec<T>,
-    /// Per instance: earliest end of a run that has started in the state or in the relaxation.
+    /// Earliest end of each instance. `None` unless the instance is running or its start is reached.
     ends: Vec<Option<T>>,
-    /// Per access kind: time of its latest access.
+    /// Time of the latest access of each kind.
     accesses: Vec<Option<T>>,
     queue: BinaryHeap<Reverse<(T, Proposition)>>,
     /// Number of conditions, effects and interference constraints looked at in all evaluations.
@@ -265,8 +269,8 @@ impl<'a, T: TimeNumber> CriticalPath<'a, T> {
     }
 }
 
-/// Per proposition: access kinds that every happening makes that adds the proposition, ascending. Empty for
-/// propositions that follow from others.
+/// Returns, for each proposition, the access kinds that all happenings which add it have in common, ascending. They are
+/// empty for propositions that follow from others.
 fn common_marks<T: TimeNumber>(
     concurrent: &TemporalTask<T>,
     relaxation: &TemporalRelaxation,
