@@ -38,7 +38,7 @@ use classes::Classes;
 
 impl Program {
     /// Returns the program under OWL's semantics of names: `owl:sameAs` is equality, and `differentFrom` in rule
-    /// bodies (outside of aggregates) matches stated and derived facts of `owl:differentFrom`. Without equality,
+    /// bodies, also inside aggregates, matches stated and derived facts of `owl:differentFrom`. Without equality,
     /// `differentFrom` compares names. Two rules are added: `owl:differentFrom` is symmetric and irreflexive.
     ///
     /// `sameAs` in a body compares individuals, unless its terms are two different constants, or two variables that
