@@ -35,7 +35,7 @@ impl From<usize> for Key {
     }
 }
 
-/// Part of an entry of a manifest to which a message refers.
+/// Part of an entry to which a message refers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {
     /// The value of the entry.
@@ -222,8 +222,8 @@ fn mistakes<S: DeserializeOwned>(text: &str, first: toml::de::Error, name: &str)
     messages.into_iter().map(|(_, message)| message).collect()
 }
 
-/// Overwrites the lines of a byte range with blanks, or the whole section if the first line is a section heading. Line
-/// numbers do not change. Returns `None` if the text does not change.
+/// Overwrites the lines of a byte range with blanks, or the whole section if the first line is a
+/// section heading. Line numbers do not change. Returns `None` if this does not change the text.
 fn without(text: &str, place: std::ops::Range<usize>) -> Option<String> {
     let begin = text.get(..place.start)?.rfind('\n').map_or(0, |at| at + 1);
     let line_end =
@@ -240,8 +240,8 @@ fn without(text: &str, place: std::ops::Range<usize>) -> Option<String> {
     (blanked != text).then_some(blanked)
 }
 
-/// Returns a suggestion for a misspelt key, if the parser's message lists the valid keys. Otherwise
-/// the text is empty.
+/// Returns a suggestion for a misspelt key if the parser's message lists the valid keys, otherwise
+/// an empty text.
 fn key_suggestion(message: &str) -> String {
     let mut quoted = message.split('`').skip(1).step_by(2);
     match (["unknown field", "unknown variant"].iter().any(|start| message.starts_with(start)), quoted.next())

@@ -8,8 +8,8 @@ use serde_json::Value;
 /// exponent. Larger numbers would only consume memory.
 const MAX_CHARACTERS: usize = 40;
 
-/// Number of decimals to which values in the problem are rounded. Floating-point values of a robot
-/// would otherwise make the planner's integers huge.
+/// Number of decimals to which values are rounded. Floating-point values of a robot would otherwise
+/// make the planner's integers huge.
 const DECIMALS: u32 = 6;
 
 /// Parses a decimal, with or without an exponent: `-12`, `0.25`, `1e-2`. Returns `None` for other
@@ -43,18 +43,16 @@ pub(crate) fn from_json(value: &Value) -> Option<BigRational> {
     }
 }
 
-/// Formats a number as decimal text, rounded to at most 34 fractional digits.
 pub(crate) fn decimal(value: &BigRational) -> String {
     rules::Decimal::from_rational(value).to_string()
 }
 
-/// Converts a number to a JSON number, rounded to at most 34 fractional digits.
+/// Rounds the number to at most 34 fractional digits.
 pub(crate) fn to_json(value: &BigRational) -> Value {
     decimal(value).parse::<serde_json::Number>().map_or(Value::Null, Value::Number)
 }
 
-/// Converts an exact number of the planner to a JSON number. A fraction without a finite decimal
-/// expansion is rounded to a double.
+/// Rounds a fraction without a finite decimal expansion to a double.
 pub(crate) fn exact_to_json(value: &planner::Exact) -> Value {
     value.to_string().parse::<serde_json::Number>().map_or_else(|_| value.to_f64().into(), Value::Number)
 }

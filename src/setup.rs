@@ -173,8 +173,8 @@ impl Setup {
         self.scenarios.iter().flat_map(|(name, scenario)| self.situation(name, scenario).1).collect()
     }
 
-    /// Returns the mission in the situation of a scenario. Also returns all faults of the scenario and its simulation;
-    /// if the mission's problem is faulty itself, PDDL faults are omitted.
+    /// Returns the mission in the situation of a scenario, and the faults of this scenario as in
+    /// [`Setup::mistakes`].
     fn situation(&self, name: &str, scenario: &Scenario<Simulation>) -> (Mission, Vec<Message>) {
         let mut mission = self.mission.clone();
         let is_sound = mission.filled().is_ok();

@@ -28,11 +28,8 @@ pub use ::planner::{
     Statistics, Status, Step, Strategy, alternatives, optimize, optimize_concurrent, optimize_exact,
 };
 
-/// Callback that is called before further optimal plans are searched for, with a short description of this
-/// work.
 type Stage<'a> = dyn FnMut(&str) + 'a;
 
-/// Callback for each better plan or better lower bound. `Break` ends planning.
 type Report<'a> = dyn FnMut(&Improvement) -> ControlFlow<()> + 'a;
 
 /// Plans a mission in its present situation.
@@ -263,8 +260,8 @@ impl<'m, 'r> Planner<'m, 'r> {
         Ok(planned)
     }
 
-    /// Plans by search alone, in exact rationals. `refused` has the messages about numbers that are too large for
-    /// integers. Returns these messages as the error if there are several objectives.
+    /// Plans by search alone, in exact rationals. `refused` are the messages about numbers that are
+    /// too large for integers, and the error if there are several objectives.
     fn exact(self, objectives: Objectives, refused: Errors) -> Result<Planned<'m>, Errors> {
         // The search in rationals supports a single objective.
         if objectives.metrics.len() > 1 {
@@ -280,9 +277,9 @@ impl<'m, 'r> Planner<'m, 'r> {
         Ok(planned)
     }
 
-    /// Computes further optimal plans, and executes each of them with the validator. Plans that are not
-    /// validated within the limits are omitted. Returns `None` if the solution is not proved optimal, or if its
-    /// metric has parts that are not costs of actions.
+    /// Computes further optimal plans, and executes each of them with the validator. Plans that are
+    /// not validated within the limits are omitted. Returns `None` if the solution is not optimal,
+    /// or if operator costs are only a part of its metric.
     fn further_plans(
         &self,
         task: &Task,
@@ -310,8 +307,8 @@ impl<'m, 'r> Planner<'m, 'r> {
         Ok(Some(found))
     }
 
-    /// Executes the plan of `point` with the validator, and builds the result. `ground` is the time
-    /// of grounding.
+    /// Executes the plan of `point` with the validator, and builds the result. `ground` is the
+    /// duration of grounding.
     fn planned(
         self,
         point: Point,
@@ -343,8 +340,6 @@ impl<'m, 'r> Planner<'m, 'r> {
         })
     }
 
-    /// Returns a callback that forwards improvements to the caller's callback, and sets the interruption flag if the
-    /// caller's callback returns `Break`.
     fn improvement_listener(&mut self) -> impl FnMut(Improvement) {
         let flag = self.config.limits.interrupt();
         let report = &mut self.report;
@@ -384,14 +379,14 @@ pub fn consistent(knowledge: Option<&Knowledge>) -> Result<(), Errors> {
     }))
 }
 
-/// Returns `true` if all messages are about numbers that are too large for integers (E304), and
-/// there is at least one.
+/// Returns `true` if integers are too small (E304) for the numbers of the task, and this is the
+/// only fault.
 fn is_too_large(messages: &[Message]) -> bool {
     !messages.is_empty() && messages.iter().all(|message| message.code == "E304")
 }
 
-/// Converts the solution for a single objective to a point whose only value is the cost of the plan. The point
-/// has no value if there is no plan, or if no objective replaces the metric.
+/// Converts a solution to a point. The cost of the plan is its only value, if there is a plan and
+/// an objective replaces the metric.
 fn valued(solution: Solution, objectives: &Objectives) -> Point {
     let cost = solution.plan.as_ref().map(|plan| plan.cost.clone());
     Point { values: cost.into_iter().filter(|_| !objectives.metrics.is_empty()).collect(), solution }

@@ -15,10 +15,7 @@ pub(super) struct Objectives {
 }
 
 impl Objectives {
-    /// Parses objectives, which are expressions or names of numeric functions.
-    ///
-    /// # Errors
-    /// All faults of all objectives.
+    /// Parses objectives. Returns all faults of all objectives.
     pub(super) fn read(mission: &Mission, problem: &Problem, texts: &[String]) -> Result<Self, Errors> {
         let mut metrics = Vec::new();
         let mut messages = Vec::new();
@@ -32,8 +29,8 @@ impl Objectives {
         Ok(Self { texts: texts.to_vec(), metrics })
     }
 
-    /// Executes the plan of `point`, if there is one, with the validator, and compares the value of each objective with
-    /// the planner's value.
+    /// Executes the plan of `point`, if there is one, with the validator, and compares the value of
+    /// each objective with the planner's value.
     ///
     /// # Errors
     /// M170 if the validator rejects the plan or computes another value; M130 if a limit is

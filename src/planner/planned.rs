@@ -13,15 +13,13 @@ use crate::mission::{Blocking, Mission, Planning as _, Reading, spaced};
 use crate::planner::objectives::Objectives;
 use crate::report::{Positions, Seen, front_sheet, plan_picture};
 
-/// Ground task of a mission by the kind of its plans. Tasks of sequential plans are retained for
-/// certificates.
+/// Ground task. Tasks of sequential plans are retained for certificates.
 #[derive(Debug)]
 pub(super) enum Ground {
-    /// Sequential steps, with integer costs and values.
     Integers(Task),
-    /// Sequential steps, with costs and values that are rationals of any size.
+    /// Costs and values are rationals of any size.
     Exact(ExactTask),
-    /// Overlapping actions. `not_minimised` are the numeric fluents of the metric that were not minimised.
+    /// Actions overlap. The metric's fluents in `not_minimised` were not minimised.
     Concurrent { not_minimised: Vec<String> },
 }
 

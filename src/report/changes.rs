@@ -24,9 +24,9 @@ pub enum Cost {
     NotFound,
 }
 
-/// Returns the differences between two situations of a mission, each with its plan. The order is from causes to
-/// effects: components and measurements, the task, availability of designs, and the plans (costs, designs and
-/// common actions).
+/// Returns the differences between two situations of a mission and between their plans. The order
+/// is from causes to effects: components and measurements, the task, availability of designs, and
+/// the plans.
 pub fn changes(before: (&Mission, &Plan), after: (&Mission, &Plan), costs: &[Cost; 2]) -> Vec<Change> {
     let mut changes = Vec::new();
     let mut say = |text: String| changes.push(Change { text, because: Vec::new() });
@@ -39,8 +39,8 @@ pub fn changes(before: (&Mission, &Plan), after: (&Mission, &Plan), costs: &[Cos
     changes
 }
 
-/// Returns a sentence `name: old before, new now` for each name whose values differ. A name without
-/// a value has the value `missing`.
+/// Returns a sentence for each name whose values differ. A name without a value has the value
+/// `missing`.
 fn differences(
     before: &BTreeMap<String, String>,
     after: &BTreeMap<String, String>,
@@ -77,7 +77,6 @@ fn measured(mission: &Mission) -> BTreeMap<String, String> {
     value.collect()
 }
 
-/// Returns at most one sentence, about the initial facts and values in which the problems differ.
 fn task(before: &Mission, after: &Mission) -> Vec<String> {
     let (old, new) = (stated(before), stated(after));
     let only = |facts: &BTreeSet<String>, other_facts: &BTreeSet<String>| {
@@ -165,8 +164,8 @@ fn cost_and_design_differences(before: &Plan, after: &Plan, [old_cost, new_cost]
     texts
 }
 
-/// Returns a sentence with the number of actions that are in both plans. An action that occurs
-/// several times is counted as often as it occurs in both. Designs are ignored.
+/// An action that occurs several times is counted as often as it occurs in both plans. Designs are
+/// ignored.
 fn shared(before: &Plan, after: &Plan) -> String {
     let mut old: Vec<&str> = before.steps.iter().map(|step| step.label.as_str()).collect();
     let in_both = after.steps.iter().filter(|step| {

@@ -44,9 +44,9 @@ fn labels<'k>(kinds: &[(&'k Option<Pair>, &'k str)]) -> Vec<String> {
     kinds.iter().map(label).collect()
 }
 
-/// Returns the diagram of expected time against the probability of success without collision: the
-/// Pareto front as a line, and each candidate with a finite time as a point. A point has the label
-/// of its row in the table.
+/// Plots expected time against the probability of success without collision. The Pareto front is a
+/// line, and each candidate with a finite time is a point. A point has the label of its row in the
+/// table.
 fn front(comparison: &Comparison) -> Points {
     let kinds: Vec<String> =
         comparison.candidates.iter().map(|candidate| candidate.kind.to_string()).collect();
@@ -65,8 +65,8 @@ fn front(comparison: &Comparison) -> Points {
     }
 }
 
-/// Returns sentences about differences of penalised time between candidates, with the compared values as
-/// reasons, and about the loss of a component.
+/// Returns sentences about differences of penalised time between candidates, with the compared
+/// values as reasons, and about the loss of a component.
 fn prices(comparison: &Comparison) -> Vec<Change> {
     let leaf = |text: String| Reason { text, supports: Vec::new() };
     let price = |name: &str, value: Option<f64>, because: Vec<Reason>| Change {
@@ -161,8 +161,7 @@ fn accomplished(done: usize, all: usize) -> String {
     }
 }
 
-/// Text for a strategy without costs, because none of its missions was accomplished. It is short
-/// enough for a small screen.
+/// The text is short enough for a small screen.
 fn none_accomplished(missions: usize) -> String {
     format!("0 of {missions} accomplished")
 }
@@ -211,8 +210,6 @@ fn figures(strategies: &[Strategy], runs: &[Run]) -> Part {
     Part::Table("figures".to_owned(), header, strategies.iter().map(line).collect())
 }
 
-/// Formats a mean, followed by half the width of its confidence interval if there are several
-/// values.
 fn mean(sample: &Sample) -> String {
     match sample.count {
         1 => rounded(sample.mean),
@@ -220,7 +217,7 @@ fn mean(sample: &Sample) -> String {
     }
 }
 
-/// Formats a simulated value with at most two decimals; more digits would only be noise.
+/// More digits of a simulated value would only be noise.
 fn rounded(value: f64) -> String {
     hundredths(value).to_string()
 }
@@ -229,7 +226,6 @@ fn hundredths(value: f64) -> f64 {
     (value * 100.0).round() / 100.0
 }
 
-/// Formats a number with at most six decimals.
 fn shown(value: f64) -> String {
     ((value * 1e6).round() / 1e6).to_string()
 }

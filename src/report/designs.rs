@@ -68,8 +68,8 @@ fn required(requirement: &Requirement, measurements: &[Measurement]) -> String {
     }
 }
 
-/// Returns the reasons why a design is available or not. For an unavailable design, these are derivations from the
-/// causes that were found, or the fault that stopped the reasoning.
+/// Returns the reasons why a design is available or not. For an unavailable design, these are
+/// derivations from the causes, or the fault that stopped the reasoning.
 pub(super) fn because(knowledge: &Knowledge, design: &str, available: bool) -> Vec<Reason> {
     if available {
         let text = "no fact states or implies that the design is not realisable or not available".to_owned();

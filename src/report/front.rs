@@ -30,7 +30,7 @@ pub fn front_sheet(seen: Seen<'_>, objectives: &[String], front: &Front) -> Shee
     let places: Vec<(f64, f64)> = (0..solved.len()).filter_map(place).collect();
     let mut line = places.clone();
     line.sort_by(|left, right| left.0.total_cmp(&right.0));
-    // No plan is known that is better than a corner between two points, so the line is a staircase.
+    // The line bounds the values that these plans dominate, so it is a staircase.
     let corners = line.windows(2).flat_map(|pair| [pair[0], (pair[1].0, pair[0].1)]);
     let line: Vec<(f64, f64)> = corners.chain(line.last().copied()).collect();
     let points = (1..).zip(&titles).zip(&places);

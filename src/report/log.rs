@@ -37,7 +37,6 @@ pub fn log_picture(name: &str, journal: &JournalReport) -> Log {
     }
 }
 
-/// Converts an answer of the loop to its kind, a sentence, and details for the picture.
 fn happening(answer: &Value) -> (Kind, String, Vec<Reason>) {
     let word = |field: &str| plain(&answer[field]);
     match answer["answer"].as_str().unwrap_or_default() {
@@ -89,8 +88,6 @@ fn happening(answer: &Value) -> (Kind, String, Vec<Reason>) {
     }
 }
 
-/// Converts an `inferred` answer: the designs and objectives whose status has changed, with the
-/// reasons.
 fn inferred(answer: &Value) -> (Kind, String, Vec<Reason>) {
     let designs = list(&answer["designs"]).iter().map(|design| {
         let is = if design["available"] == Value::Bool(true) { "is available" } else { "is not available" };
@@ -109,8 +106,8 @@ fn inferred(answer: &Value) -> (Kind, String, Vec<Reason>) {
     (Kind::Inference, text.join("; "), reasons)
 }
 
-/// Formats an action with its arguments and designs. `name` is the field of `step` that contains
-/// the action's name.
+/// Formats an action with its arguments and designs. `name` is the field of `step` with the
+/// action's name.
 fn action(step: &Value, name: &str) -> String {
     let arguments = list(&step["arguments"]).iter().map(plain);
     let words: Vec<String> = std::iter::once(plain(&step[name])).chain(arguments).collect();
@@ -124,7 +121,6 @@ fn list(value: &Value) -> &[Value] {
     value.as_array().map(Vec::as_slice).unwrap_or_default()
 }
 
-/// Converts a list of sentences, or a single sentence, to reasons without supports.
 fn lines(value: &Value) -> Vec<Reason> {
     match value {
         Value::Array(all) => all.iter().map(|entry| leaf(plain(entry))).collect(),
@@ -137,7 +133,6 @@ fn leaf(text: String) -> Reason {
     Reason { text, supports: Vec::new() }
 }
 
-/// Returns a string as it is, and any other value as JSON.
 fn plain(value: &Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), ToOwned::to_owned)
 }

@@ -16,7 +16,7 @@ use planner::Plan;
 
 use crate::report::seen::Scene;
 
-/// A movement: an action that replaces the last argument of an atom.
+/// An action that replaces the last argument of an atom.
 struct Movement<'d> {
     action: &'d Name,
     predicate: &'d Name,
@@ -62,8 +62,8 @@ struct Moving<'d> {
     places: Vec<Name>,
 }
 
-/// Selects the places between which the plan moves most often; of equal candidates, those with more movements in the
-/// domain. Types with designs or with fewer than two objects are excluded. Returns `None` if no type remains.
+/// Selects the places between which the plan moves most often; of equal candidates, those with more
+/// movements in the domain. Types with designs or with fewer than two objects are excluded.
 fn places_of_most<'d>(scene: Scene<'_>, plan: &Plan, movements: &'d [Movement<'d>]) -> Option<Moving<'d>> {
     let designs: BTreeSet<Name> = scene.designs.keys().map(|design| Name::new(design)).collect();
     let mut kinds: BTreeMap<Vec<Name>, Vec<&'d Movement<'d>>> = BTreeMap::new();
@@ -82,7 +82,7 @@ fn places_of_most<'d>(scene: Scene<'_>, plan: &Plan, movements: &'d [Movement<'d
     most_used.map(|(places, movements)| Moving { movements, places })
 }
 
-/// Returns all movements that the unconditional effects of an action describe.
+/// Returns the movements that the unconditional effects of an action describe.
 fn moves(action: &Action) -> Vec<Movement<'_>> {
     let (mut added, mut deleted) = (Vec::new(), Vec::new());
     let mut parts: Vec<&Effect> = match &action.body {
@@ -161,8 +161,7 @@ fn objects(domain: &Domain, problem: &Problem, r#type: &TypeExpression) -> Vec<N
     entries.map(|entry| entry.identifier.name.clone()).filter(|name| visited.insert(name.clone())).collect()
 }
 
-/// Returns the last arguments of the atoms with these predicates, i.e. the places where something
-/// is.
+/// Returns the last arguments of the atoms with these predicates: the places where something is.
 fn ends<'p>(atoms: impl Iterator<Item = &'p Atom>, predicates: &BTreeSet<&Name>) -> BTreeSet<Name> {
     let matching = atoms.filter(|atom| predicates.contains(&atom.predicate.name));
     matching.filter_map(|atom| atom.arguments.last()).map(|term| name_of(term).clone()).collect()
@@ -181,10 +180,8 @@ fn goals(goal: &Condition) -> impl Iterator<Item = &Atom> {
     })
 }
 
-/// Returns the pairs of neighbouring places, as numbers of places. Two places are neighbours if an initial fact
-/// has exactly these two places among its arguments. If no two places are connected by a fact, initial numeric
-/// values are used instead. `moving` are the predicates that movements change, such as `robot_at`; they are
-/// ignored.
+/// Returns the pairs of neighbouring places (see the head of this file), as numbers of places.
+/// `moving` are the predicates that movements change, such as `robot_at`; they are ignored.
 fn ways(problem: &Problem, number: &BTreeMap<&Name, usize>, moving: &BTreeSet<&Name>) -> Vec<(usize, usize)> {
     let (mut facts, mut values) = (BTreeSet::new(), BTreeSet::new());
     for element in &problem.init {

@@ -12,8 +12,6 @@ use planner::Plan;
 use crate::number;
 use crate::report::seen::Scene;
 
-/// Returns a curve for the cost of a plan, and a curve for each number that the plan changes or a condition limits.
-/// Returns no curves for a plan without steps.
 pub(super) fn curves(scene: Scene<'_>, plan: &Plan, steps: &[Step], axis: Axis) -> Vec<Curve> {
     if steps.is_empty() {
         return Vec::new();
@@ -35,8 +33,8 @@ pub(super) fn curves(scene: Scene<'_>, plan: &Plan, steps: &[Step], axis: Axis) 
 }
 
 /// Returns the value of the problem's metric after each start and end of an action, as if the plan
-/// ended there. `None` if a value is undefined, or if the last value is not the cost of the plan.
-/// For example, the cost of a plan's remainder does not include costs of earlier actions.
+/// ended there. Returns `None` if a value is undefined, or if the last value is not the cost of the
+/// plan. For example, the cost of a plan's remainder does not include costs of earlier actions.
 fn metric(scene: Scene<'_>, plan: &Plan, course: &Course, axis: Axis) -> Option<Vec<(f64, f64)>> {
     let first = metric_after(scene.domain, scene.problem, &BigRational::default())?;
     let mut points = vec![(0.0, number::to_f64(&first))];
@@ -47,8 +45,9 @@ fn metric(scene: Scene<'_>, plan: &Plan, course: &Course, axis: Axis) -> Option<
     ((last - cost).abs() <= 1e-6 * cost.abs().max(1.0)).then_some(points)
 }
 
-/// Returns the cost of the plan after each step. The part of the cost that belongs to no step is added before the first
-/// step. If actions overlap, this part, such as the makespan, is spread evenly over time instead.
+/// Returns the cost of the plan after each step. The part that belongs to no step is added before
+/// the first step. If actions overlap, this part (such as the makespan) is spread evenly over time
+/// instead.
 fn spent(plan: &Plan, steps: &[Step], axis: Axis) -> Vec<(f64, f64)> {
     let costs = plan.steps.iter().map(|step| step.cost.to_f64());
     let remainder = plan.cost.to_f64() - costs.clone().sum::<f64>();
@@ -110,7 +109,7 @@ fn add<'c>(curves: &mut BTreeMap<&'c str, Curve>, bound: &'c NumberBound, (from,
     curve.bounds.push(Bound { from, to, value: number::to_f64(&bound.bound), text });
 }
 
-/// Returns the position of a moment (start or end of a step) on the axis: its time, or the number of steps that have
+/// Returns the position of a start or end of a step: its time, or the number of steps that have
 /// ended if the steps are executed in order.
 fn place(moment: &CourseMoment, axis: Axis) -> f64 {
     match axis {
@@ -119,7 +118,6 @@ fn place(moment: &CourseMoment, axis: Axis) -> f64 {
     }
 }
 
-/// Returns the name of a function without its parentheses.
 fn bare(name: &str) -> String {
     name.trim_start_matches('(').trim_end_matches(')').to_owned()
 }

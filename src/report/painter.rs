@@ -10,7 +10,7 @@ use crate::report::plan::drawn;
 use crate::report::positions::Positions;
 use crate::report::seen::{Designs, Scene, known_designs};
 
-/// Maximum number of drawn steps of a plan. Further steps are only counted.
+/// Further steps are only counted.
 const MAX_STEPS: usize = 500;
 
 /// Draws remaining plans of a loop. The designs of the mission and the coordinates of places do not
@@ -50,7 +50,6 @@ impl Painter {
     }
 }
 
-/// Builds a sequential plan from the remaining steps; its cost is the sum of their costs.
 fn plan(steps: &[PlannedStep]) -> Plan {
     let mut now = BigRational::default();
     let mut timed = |step: &PlannedStep| {

@@ -30,8 +30,8 @@ pub(super) fn drawn(scene: Scene<'_>, plan: &Plan) -> picture::Plan {
     picture::Plan { steps, axis, map, curves, ..picture::Plan::default() }
 }
 
-/// Returns a picture of a solution without map and curves: the verdict, the steps and the progress
-/// of the search.
+/// Returns a picture of a solution without map, curves and designs: the verdict, the steps and the
+/// progress of the search.
 pub fn timeline_picture(mission: &Mission, solution: &Solution) -> picture::Plan {
     let axis = solution.plan.as_ref().map(axis).unwrap_or_default();
     let functions_of_designs = known_designs(mission);
@@ -53,8 +53,6 @@ fn sentence(solution: &Solution) -> String {
     format!("{}{rest}.", first.to_uppercase())
 }
 
-/// Returns the axis of the picture: time, or step numbers if the plan is sequential and has actions
-/// of duration 0.
 fn axis(plan: &Plan) -> Axis {
     let ends = plan.steps.iter().map(|step| step.start.to_rational() + step.duration.to_rational());
     let is_sequence = plan.steps.iter().skip(1).zip(ends).all(|(next, end)| end <= next.start.to_rational());
@@ -94,8 +92,8 @@ fn steps(functions_of_designs: &Designs, plan: &Plan, axis: Axis) -> Vec<picture
     drawn
 }
 
-/// Returns the designs of a step, as pairs of function and design. If the planner has assigned no designs to
-/// functions, each argument that is a design of the knowledge base is assigned to the first function that it
+/// Returns the designs of a step, as pairs of function and design. If the planner has assigned no
+/// designs to functions, each argument that is a design is assigned to the first function that it
 /// solves. Of several designs for one function, the last one is used.
 fn configuration(step: &Step, functions_of_designs: &Designs) -> Vec<(String, String)> {
     if !step.configuration.is_empty() {
@@ -108,15 +106,13 @@ fn configuration(step: &Step, functions_of_designs: &Designs) -> Vec<(String, St
     of_arguments.collect::<BTreeMap<String, String>>().into_iter().collect()
 }
 
-/// Returns the label of a step: its action and arguments, without functions and designs.
 fn label(step: &Step, configuration: &[(String, String)]) -> String {
     let configured = |word: &&String| configuration.iter().any(|(f, design)| f == *word || design == *word);
     let words = step.arguments.iter().filter(|word| !configured(word)).map(String::as_str);
     std::iter::once(step.action.as_str()).chain(words).collect::<Vec<_>>().join(" ")
 }
 
-/// Returns the costs and lower bounds during the search. Times are omitted, because they differ
-/// between runs.
+/// Times are omitted, because they differ between runs.
 fn search(solution: &Solution) -> Vec<picture::Progress> {
     let moments = solution.statistics.history.iter().map(|moment| {
         let cost =

@@ -49,7 +49,8 @@ impl ReportSection {
     /// Reads the coordinates of places.
     ///
     /// # Errors
-    /// The file cannot be read; otherwise all lines that are not coordinates or repeat a place.
+    /// The file cannot be read or is not CSV; otherwise all lines that are not coordinates or
+    /// repeat a place.
     pub fn positions(&self, origin: &ManifestPath) -> Result<Positions, Errors> {
         match &self.positions {
             None => Ok(Positions::Unknown),
@@ -60,7 +61,7 @@ impl ReportSection {
 }
 
 impl Positions {
-    /// Returns the coordinates of `places` by name, or `None` if a coordinate is unknown.
+    /// Returns coordinates by name, or `None` if those of one of `places` are unknown.
     pub(super) fn of(&self, problem: &Problem, places: &[Name]) -> Option<BTreeMap<Name, (f64, f64)>> {
         let coordinates = match self {
             Self::Unknown => return None,
@@ -74,7 +75,6 @@ impl Positions {
     }
 }
 
-/// Returns the initial values of a numeric function with one argument, by object.
 fn values(problem: &Problem, function: &str) -> BTreeMap<Name, f64> {
     let function = Name::new(function);
     let value = |element: &InitialElement| match element {
@@ -88,8 +88,8 @@ fn values(problem: &Problem, function: &str) -> BTreeMap<Name, f64> {
     problem.init.iter().filter_map(value).collect()
 }
 
-/// Reads the coordinates of places from a CSV file with lines `place,x,y`. A first line without numbers is a
-/// heading; lines that begin with `#` are comments.
+/// Reads a CSV file with lines `place,x,y`. A first line without numbers is a heading; lines that
+/// begin with `#` are comments.
 fn read(file: &Path) -> Result<BTreeMap<Name, (f64, f64)>, Errors> {
     let source = source(file)?;
     let mut reader = csv::ReaderBuilder::new()

@@ -1,4 +1,4 @@
-//! Input of the drawing functions for a plan: domain, problem, coordinates of places, and designs.
+//! Input for drawing a plan: domain, problem, coordinates of places, and designs.
 
 use std::collections::BTreeMap;
 

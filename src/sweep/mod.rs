@@ -2,9 +2,9 @@
 //! into shards, which any number of machines can execute.
 //!
 //! A [`Study`] is the Cartesian product of its variations. Its runs are numbered, and a [`Shard`]
-//! is every N-th of them. Each run is a separate process, so a failed run affects no other run. The
-//! result of a run is one line in the shard's file. A resumed study repeats the runs without a
-//! complete line. [`Table`] joins the lines of all shards.
+//! is every N-th of them. Each run is a separate process, so a run without an answer affects no
+//! other run. The result of a run is one line in the shard's file. A resumed study repeats the runs
+//! without a complete line. [`Table`] joins the lines of all shards.
 
 mod answer;
 mod process;

@@ -14,13 +14,12 @@ use crate::message::Message;
 
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
 
-/// Maximum number of characters of a run's standard error output that are stored.
 const MAX_MESSAGE_CHARACTERS: usize = 2000;
 
-/// Executes a run of a study with `program`, and waits for its end. Returns `None` if a limit in `limits` is reached
-/// first; the run is killed in this case. If the study's time limit is reached, the run is killed, too, but a result is
-/// returned. The generator of the run's files is not subject to the limits, but its duration counts towards the time
-/// limit of the run.
+/// Executes a run of a study with `program`, and waits for its end. At the study's time limit, the
+/// run is killed and a result is returned. If a limit in `limits` is reached first, the run is killed
+/// and `None` is returned. The generator of the run's files is not subject to the limits, but its
+/// duration counts towards the time limit of the run.
 ///
 /// # Errors
 /// The program cannot be executed, or the generator of its files cannot be executed or fails.
@@ -78,8 +77,7 @@ pub fn perform(
     Ok(Some(Line { run: run.number, vary: run.vary.clone(), status, timed_out, seconds, answer, message }))
 }
 
-/// Reads a pipe to its end on a separate thread. Reading two pipes alternately on one thread may
-/// deadlock.
+/// Reads a pipe to its end on a separate thread, because reading two pipes in turn may deadlock.
 fn reader(pipe: Option<impl Read + Send + 'static>) -> std::thread::JoinHandle<String> {
     std::thread::spawn(move || {
         let mut bytes = Vec::new();
@@ -91,9 +89,8 @@ fn reader(pipe: Option<impl Read + Send + 'static>) -> std::thread::JoinHandle<S
     })
 }
 
-/// Waits for the end of a process. Returns its exit status, and `true` if it was killed because of
-/// `limit`, the time limit of a run. If a limit of `limits` is reached, kills the process and
-/// returns `None`.
+/// Waits for the end of a process. Returns its exit status, and `true` if `limit`, the time limit
+/// of a run, ended it. If a limit of `limits` is reached, kills the process and returns `None`.
 fn wait(
     child: &mut Child,
     limit: Option<Duration>,

@@ -16,11 +16,10 @@ pub(super) const FORMAT: &str = "metaplan-sweep/1";
 
 const OTHER_STUDY: &str = "it belongs to another study, or the study or its files have changed";
 
-/// The first line of a shard's file. It identifies the study.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 struct Header {
     format: String,
-    /// Checksum of the study, by which files of other studies are rejected.
+    /// Checksum by which files of other studies are rejected.
     study: String,
     runs: usize,
     shard: String,
@@ -143,11 +142,12 @@ fn parse(path: &Path, text: &str) -> Result<(Header, Vec<Line>), Message> {
     Ok((header, parsed.collect::<Result<_, _>>()?))
 }
 
-/// Reads the results in all shard files of a directory, sorted by run, without duplicates.
+/// Reads the results in all shard files of a directory, sorted by run. Omits incomplete last lines
+/// and repeated results of a run.
 ///
 /// # Errors
-/// The directory has no result file; or all faults: files that are unreadable, damaged or of another study, and
-/// runs with differing answers.
+/// The directory cannot be read or has no result file; or all faults: files that are unreadable,
+/// damaged or of another study, and runs with differing answers.
 pub fn read_lines(directory: &Path, study: &Study) -> Result<Vec<Line>, Errors> {
     let failed = |error: io::Error| Errors::from(wrong(directory, &error.to_string()));
     let mut files = Vec::new();
@@ -191,7 +191,7 @@ pub fn read_lines(directory: &Path, study: &Study) -> Result<Vec<Line>, Errors> 
 }
 
 /// Returns an answer without the fields that differ between repetitions of a run: times, memory and
-/// the course of a search.
+/// statistics of a search.
 pub(super) fn essence(answer: &Value) -> Value {
     match answer {
         Value::Object(fields) => {
@@ -203,7 +203,6 @@ pub(super) fn essence(answer: &Value) -> Value {
     }
 }
 
-/// Returns `true` if the field with this name depends on the machine and not only on the input.
 fn is_measured(name: &str) -> bool {
     ["statistics", "costs", "milliseconds", "seconds", "elapsed"].contains(&name)
 }

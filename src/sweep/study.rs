@@ -273,10 +273,10 @@ impl Study {
         self.origin.quote([Message::at("M150", self.origin.file(), place, text)]).swap_remove(0)
     }
 
-    /// Returns a sample of the runs for checking the study. The sample contains the first run and,
-    /// for each value of each key, a run that differs from the first run only in this value. Number
-    /// ranges and pairs contribute only their last value. Each run has the path of keys to its value in the file. The
-    /// sample of a study without runs is empty.
+    /// Returns a sample of the runs for checking the study: the first run and, for each value of
+    /// each key, a run that differs from the first run only in this value. Number ranges and pairs
+    /// contribute only their last value. Each run has the path of its value in the file; the first
+    /// run has the path of the command. The sample of a study without runs is empty.
     pub fn samples(&self) -> Vec<(Vec<Key>, Planned)> {
         if self.is_empty() {
             return Vec::new();
@@ -427,7 +427,7 @@ fn values(variation: &Variation) -> Result<Vec<Value>, String> {
 }
 
 /// Returns ordered pairs of a mission's places, as texts `start,goal`. If there are more than
-/// `most`, selects `most` pairs, evenly spread.
+/// `most`, selects `most` pairs (at least one), evenly spread.
 fn places(mission: &Path, most: Option<usize>) -> Result<Vec<Value>, Errors> {
     let Setup { mission, roles, .. } = Setup::read(mission)?;
     let (problem, _) = mission.filled()?;

@@ -7,13 +7,13 @@ use serde_json::{Map, Value};
 use super::results::{Line, essence};
 use crate::simulate::Sample;
 
-/// Name of the column with the exit statuses, of which no mean is computed.
+/// Column of the exit statuses, of which no mean is computed.
 const STATUS: &str = "status";
 
 /// Value in a cell. `None` if the row has no value for the column.
 pub type Cell = Option<Value>;
 
-/// A row of the table: the varied keys of a run, its status, and the fields of one JSON value of
+/// A row of the table: the varied keys of a run, how it ended, and the fields of one JSON value of
 /// its answer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
@@ -26,7 +26,7 @@ pub struct Row {
 /// All rows of a study's table. The columns are the union of the fields of all rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
-    /// Column names: first the varied keys, then the status and the fields of answers; both parts are sorted.
+    /// Column names: first the varied keys, then all others; both parts are sorted.
     pub columns: Vec<String>,
     /// Number of columns that are varied keys; they come first.
     pub keys: usize,
@@ -34,7 +34,6 @@ pub struct Table {
     pub rows: Vec<Row>,
 }
 
-/// Pairs of a column's name and the value that all rows of a group have in it.
 type Common = Vec<(String, Value)>;
 
 /// Rows with equal texts and equal values of all varied keys except those that only repeat a run, such as a

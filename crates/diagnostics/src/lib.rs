@@ -10,8 +10,8 @@ use std::ops::Deref;
 
 pub use spelling::nearest;
 
-/// All errors of an input, in reading order; at least one unless constructed from an empty vector
-/// or iterator.
+/// All errors of an input. There is at least one, unless the value is constructed from an empty
+/// vector or iterator.
 ///
 /// Dereferences to a slice of the errors. `Display` and `Debug` begin each error on a separate
 /// line, so a `main` that returns this type prints a readable list. [`Error::source`] is the source

@@ -104,7 +104,6 @@ pub(crate) fn search(search: &[Progress], canvas: Canvas) -> Picture {
     Picture { width: canvas.width, height: TOP + HEIGHT + 26.0, title, description, body }
 }
 
-/// Creates the vertical scale for a range of values; larger values are placed higher.
 fn vertical(top: f64, (low, high): (f64, f64)) -> Scale {
     let margin = (high - low) * 0.05;
     Scale::new((low - margin, high + margin), (top + HEIGHT, top))

@@ -11,7 +11,7 @@ pub struct Plan {
     pub axis: Axis,
     /// The accumulated cost, and each numeric fluent that the plan changes or a condition bounds.
     pub curves: Vec<Curve>,
-    /// The map of places if the plan moves an object.
+    /// The map of the mission's places, if there is one.
     pub map: Option<Map>,
     /// The messages of the search, in chronological order.
     pub search: Vec<Progress>,
@@ -92,8 +92,8 @@ pub struct Map {
 pub struct Place {
     /// Name of the place.
     pub name: String,
-    /// Coordinates: x increases to the right, y increases upwards. If a place of a map has none, all its places are
-    /// laid out by their ways.
+    /// Coordinates: x increases to the right, y increases upwards. If any place of a map has none,
+    /// all places of the map are laid out by the ways between them.
     pub position: Option<(f64, f64)>,
     /// Whether an object is at the place initially.
     pub is_start: bool,
@@ -108,7 +108,7 @@ pub struct Progress {
     pub cost: Option<f64>,
     /// Lower bound on the metric value of every plan.
     pub lower_bound: f64,
-    /// Description that contains the cost and the lower bound.
+    /// Description of the state, such as `cost 8, lower bound 7`.
     pub text: String,
 }
 
@@ -174,7 +174,7 @@ pub struct Report {
     pub before: Option<Plan>,
     /// The plan for the current situation.
     pub plan: Plan,
-    /// Differences between the plan `before` and the current plan.
+    /// Differences between the two situations and between their plans.
     pub changes: Vec<Change>,
     /// Result of checking the certificate, if there is one.
     pub checked: Option<Checked>,
@@ -200,7 +200,7 @@ pub struct Log {
 pub struct Happening {
     /// Number of the journal record that contains the input or decision.
     pub record: u64,
-    /// Time in seconds since the start of the journal.
+    /// Time in seconds since the start of the mission.
     pub time: f64,
     /// Kind of the input or decision.
     pub kind: Kind,
@@ -213,20 +213,21 @@ pub struct Happening {
 /// Kind of a [`Happening`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// A report from the robot.
+    /// A line that the loop received, such as a report from the robot.
     Event,
-    /// A change of the inferred facts.
+    /// A conclusion, or the failure to conclude.
     Inference,
-    /// A plan was requested, found, kept, or not found.
+    /// Progress of planning: a plan was requested, found, kept, or not found, or the goal is
+    /// reached.
     Plan,
-    /// A command to the robot.
+    /// A command to the robot, or an objective that no design can serve.
     Effect,
     /// An input that was refused or repeated.
     Refusal,
 }
 
 impl Kind {
-    /// All kinds, in causal order.
+    /// All kinds, in the order of their lanes.
     pub const ALL: [Self; 5] = [Self::Event, Self::Inference, Self::Plan, Self::Effect, Self::Refusal];
 
     /// Returns the plural name of the kind.

@@ -9,7 +9,7 @@ use crate::scale::{Scale, number, px, range, width};
 
 /// Right margin, in pixels.
 pub(crate) const RIGHT: f64 = 16.0;
-/// Upper limit on the width to which many steps extend a drawing area, in pixels.
+/// Maximum width to which many steps extend a drawing area, in pixels.
 const WIDEST: f64 = 16_000.0;
 /// Height of a name above its row, in pixels.
 const NAME: f64 = 14.0;
@@ -17,15 +17,12 @@ const NAME: f64 = 14.0;
 /// The dimensions of a picture, in pixels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Canvas {
-    /// Width of the picture, unless the contents need more.
     pub(crate) width: f64,
-    /// Left edge of the drawing area. The tick labels of vertical axes are to the left of this
-    /// edge.
+    /// Left edge of the drawing area; the tick labels of vertical axes are to the left of it.
     pub(crate) left: f64,
-    /// Whether the names of rows are above the rows instead of to their left, which leaves more
-    /// width for the drawing.
+    /// Whether the names of rows are above the rows instead of to their left.
     pub(crate) has_names_above: bool,
-    /// Minimum average width of the steps of a plan.
+    /// Minimum average width of the steps of a plan, up to [`WIDEST`] for the whole plan.
     pub(crate) step: f64,
     /// Intended minimum distance of neighbouring places of a map.
     pub(crate) apart: f64,
@@ -38,7 +35,6 @@ pub(crate) const FILE: Canvas =
 pub(crate) const PAGE: [Canvas; 3] = [WIDE, COLUMN, TELEPHONE];
 pub(crate) const PAIR: [Canvas; 2] = [COLUMN, TELEPHONE];
 const WIDE: Canvas = Canvas { width: 1146.0, left: 170.0, has_names_above: false, step: 4.0, apart: 20.0 };
-/// Canvas for half the width of a page.
 const COLUMN: Canvas = Canvas { width: 560.0, left: 60.0, has_names_above: true, step: 4.0, apart: 20.0 };
 const TELEPHONE: Canvas = Canvas { width: 328.0, left: 60.0, has_names_above: true, step: 4.0, apart: 20.0 };
 
@@ -47,7 +43,6 @@ impl Canvas {
         self.width - self.left - RIGHT
     }
 
-    /// Returns the height that a name above its row takes; 0 if names are to the left of rows.
     pub(crate) fn name_height(&self) -> f64 {
         if self.has_names_above { NAME } else { 0.0 }
     }
@@ -66,18 +61,17 @@ impl Canvas {
 pub(crate) struct NamePlace {
     pub(crate) x: f64,
     pub(crate) y: f64,
-    /// The end of the text that is at this position, as in SVG's `text-anchor`: `start` or `end`.
+    /// End of the text that is at this position, as in SVG's `text-anchor`: `start` or `end`.
     pub(crate) anchor: &'static str,
-    /// Upper limit on the width of the name.
+    /// Maximum width of the name.
     pub(crate) room: f64,
 }
 
-/// Ranges of the axes over several plans. Plans that are shown side by side share these ranges, and
-/// so have the same scales.
+/// Ranges of the axes. Plans that are shown side by side share one `Span`.
 pub(crate) struct Span {
     steps: usize,
     until: f64,
-    /// Minimum and maximum of each numeric fluent over all plans, including bounds of conditions.
+    /// Minimum and maximum of each numeric fluent, including bounds of conditions.
     values: BTreeMap<String, (f64, f64)>,
 }
 
@@ -90,7 +84,6 @@ impl Span {
         }
     }
 
-    /// Returns the range of a numeric fluent over all plans, or (0, 1) for an unknown fluent.
     pub(crate) fn values(&self, name: &str) -> (f64, f64) {
         self.values.get(name).copied().unwrap_or((0.0, 1.0))
     }
@@ -115,7 +108,6 @@ pub(crate) struct Frame {
     pub(crate) scale: Scale,
     pub(crate) end: f64,
     until: f64,
-    /// Width of the whole picture, in pixels.
     pub(crate) width: f64,
     label: &'static str,
 }
@@ -133,7 +125,6 @@ impl Frame {
         Self { canvas, scale, end: end(plan), until: span.until, width, label }
     }
 
-    /// Draws the axis at `bottom`, below all rows, with grid lines up to `top`.
     pub(crate) fn axis(&self, top: f64, bottom: f64) -> Markup {
         let widest = width(&number(self.until)) + 24.0;
         let max_ticks = ((self.width - self.canvas.left - RIGHT) / widest.max(60.0)) as usize;

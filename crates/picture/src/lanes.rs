@@ -1,6 +1,6 @@
 //! Assigns intervals to rows such that intervals in the same row do not overlap.
 
-/// Returns the row of each interval, from 0. Uses greedy interval partitioning: in the order of
+/// Returns the row of each interval, from 0, by greedy interval partitioning. In the order of
 /// starts, each interval is placed in the first free row.
 pub(crate) fn rows(intervals: &[(f64, f64)]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..intervals.len()).collect();

@@ -7,16 +7,17 @@
 
 use std::collections::VecDeque;
 
-/// Upper limit on the number of pairwise distances in a connected component. Larger components keep
-/// the start layout.
+/// Maximum number of pairs of places in a connected component. Larger components keep the start
+/// layout.
 const DISTANCES: usize = 4_000_000;
-/// Upper limit on the total work of majorization for a connected component, in pairs of places.
+/// Maximum work of majorization for a connected component: rounds times pairs of places.
 const WORK: usize = 30_000_000;
-/// Upper limit on the number of rounds of majorization; after these the layout hardly changes.
+/// Maximum number of rounds of majorization; after these the layout hardly changes.
 const ROUNDS: usize = 300;
 
 /// Computes coordinates for the places `0..places`. Ways have a length of about 1, except in
-/// components that keep the start layout. Ways with an unknown place are ignored.
+/// components that keep the start layout. Ways to unknown places, and from a place to itself, are
+/// ignored.
 pub(crate) fn layout(places: usize, ways: &[(usize, usize)]) -> Vec<(f64, f64)> {
     let mut neighbours = vec![Vec::new(); places];
     for &(one, other) in ways.iter().filter(|(one, other)| one != other && *one.max(other) < places) {
@@ -55,8 +56,7 @@ fn components(neighbours: &[Vec<usize>]) -> Vec<Vec<usize>> {
     groups
 }
 
-/// Returns the number of ways on a shortest path from a place to each place; `None` for unreachable
-/// places.
+/// Returns the numbers of ways on shortest paths; `None` for unreachable places.
 fn distances(from: usize, neighbours: &[Vec<usize>]) -> Vec<Option<u32>> {
     let mut distances = vec![None; neighbours.len()];
     let mut queue = VecDeque::from([(from, 0)]);

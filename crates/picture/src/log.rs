@@ -10,16 +10,15 @@ use crate::page::{page, reasons, shown, table};
 use crate::scale::{Scale, number, px, width};
 use crate::svg::Picture;
 
-/// Width reserved for the names of lanes, in pixels.
+/// Minimum width of the names of lanes, in pixels.
 const NAMES: f64 = 90.0;
 const LANE: f64 = 24.0;
 const TOP: f64 = 6.0;
-/// Width of the interval whose happenings (inputs and decisions) share a mark, in pixels.
+/// Width of the interval whose happenings share a mark, in pixels.
 const MARK: f64 = 4.0;
-/// Upper limit on the number of happenings (inputs and decisions) in the tooltip of a mark.
 const NAMED: usize = 5;
-/// Upper limit on the number of listed happenings (inputs and decisions). Otherwise the page of a long journal
-/// would be too large for browsers.
+/// Maximum number of listed happenings. The page of a longer journal would be too large for
+/// browsers.
 const LISTED: usize = 1000;
 
 impl Log {
@@ -55,9 +54,9 @@ impl Log {
         self.picture(PAGE[0]).file()
     }
 
-    /// Returns the happenings (inputs and decisions) that the page lists, in chronological order. If there are too
-    /// many, reports from the robot are omitted first, and then other happenings, each time beginning with the
-    /// latest.
+    /// Returns the happenings that the page lists, in chronological order. If there are too many,
+    /// reports from the robot are omitted first, and then other happenings, each time beginning
+    /// with the latest.
     fn listed(&self) -> Vec<&Happening> {
         if self.happenings.len() <= LISTED {
             return self.happenings.iter().collect();
@@ -94,8 +93,8 @@ impl Log {
         Picture { width: canvas.width, height: bottom + 24.0, title, description, body }
     }
 
-    /// Groups the happenings (inputs and decisions) of a kind into marks. The key of a mark is its position in
-    /// pixels, divided by [`MARK`] and rounded down.
+    /// Groups happenings into marks. The key of a mark is its position in pixels, divided by
+    /// [`MARK`] and rounded down.
     fn marks(&self, kind: Kind, scale: &Scale) -> BTreeMap<i64, Vec<&Happening>> {
         let mut marks: BTreeMap<i64, Vec<&Happening>> = BTreeMap::new();
         for happening in self.happenings.iter().filter(|happening| happening.kind == kind) {

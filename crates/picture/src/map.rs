@@ -1,7 +1,7 @@
 //! Draws the map of the places of a mission, with the moves of a plan coloured by configuration.
 //!
-//! Moves in opposite directions are drawn side by side. Each move has an arrow; its step numbers are on the
-//! outer side of the arrow. All lengths are in pixels, except those of [`Map`].
+//! Moves in opposite directions are drawn side by side. All moves from one place to another share
+//! an arrow with their step numbers. All lengths are in pixels, except those of [`Map`].
 
 use std::collections::BTreeMap;
 
@@ -14,43 +14,41 @@ use crate::palette::{Palette, configuration};
 use crate::scale::{px, range, width};
 use crate::svg::Picture;
 
-/// Upper limit on the side margins for the names of places, in pixels.
+/// Maximum of the side margins, which contain names of places.
 const MARGIN: f64 = 70.0;
-/// The side margins for the names of places, as a fraction of the width of the picture.
+/// Side margins as a fraction of the width of the picture.
 const MARGIN_PART: f64 = 0.12;
 const UPPER_MARGIN: f64 = 35.0;
-/// Height of a map of a single place without its margins, in pixels.
+/// Height of a map of a single place, without margins.
 const LEAST_HEIGHT: f64 = 60.0;
-/// Upper limit on the height of a map, in pixels. A map is higher if its places would otherwise be too close to
-/// each other.
+/// Maximum height of a map without margins, unless its places would then be too close to each
+/// other.
 const HEIGHT: f64 = 420.0;
-/// Upper limit on the length of short ways (5 % quantile) in pixels, which keeps small maps small.
+/// Maximum length of short ways (5 % quantile), which keeps small maps small.
 const FARTHEST: f64 = 130.0;
-/// Upper limit on the width and the height of a map that is enlarged to separate its places, in
-/// pixels.
+/// Maximum width and height to which a map is enlarged to separate its places.
 const LARGEST: f64 = 4_000.0;
-/// Radius of the circle of a place, with its surrounding space.
+/// Radius of the circle of a place, including the space around it.
 const RADIUS: f64 = 7.0;
 const LINE: f64 = 13.0;
-/// Offset of a move from the line of its way, so that moves in opposite directions are drawn side
-/// by side.
+/// Offset of a move from the line of its way.
 const ASIDE: f64 = 2.5;
-/// Distance from the centre of an arrow to its tip, in pixels.
+/// Distance from the centre of an arrow to its tip.
 const TIP: f64 = 7.0;
-/// Distance from the centre of an arrow to its sides, in pixels.
+/// Distance from the centre of an arrow to its sides.
 const SIDE: f64 = 6.0;
 const LOOP: f64 = 10.0;
-/// Distance in pixels below which two places count as coinciding, and are separated.
+/// Distance below which two places count as coinciding, and are separated.
 const SAME: f64 = 2.0;
 const LOOP_MARGIN: f64 = 58.0;
 /// Additional distance of a name from its place, if no nearby position is free of lines.
 const FARTHER: f64 = 9.0;
-/// Length of a dash, for moves that are drawn in the colours of several configurations.
+/// Length of a dash of a line that has the colours of several configurations.
 const DASH: f64 = 9.0;
 
 type Point = (f64, f64);
 
-/// A rectangle that is occupied by a label or symbol: left, top, right, bottom.
+/// An occupied rectangle: left, top, right, bottom.
 type Taken = (f64, f64, f64, f64);
 
 type Line = (Point, Point);
@@ -64,14 +62,14 @@ struct Leg {
     shape: Shape,
 }
 
-/// The drawing of a leg (all moves from one place to another): a line, or a loop around `centre`, with an arrow.
+/// The drawing of a leg: a line, or a loop around `centre`, with an arrow.
 struct Shape {
     line: Line,
     centre: Option<Point>,
     arrow: Point,
-    /// The direction of the arrow, as a unit vector.
+    /// Direction of the arrow, as a unit vector.
     along: Point,
-    /// The direction to the side where step numbers are placed, as a unit vector.
+    /// Direction to the preferred side of the step numbers, as a unit vector.
     outwards: Point,
 }
 
@@ -120,8 +118,8 @@ pub(crate) fn map(plan: &Plan, map: &Map, palette: &Palette, canvas: Canvas) -> 
     Picture { width: drawn_width, height: drawn_height, title, description, body }
 }
 
-/// Collects the moves of a plan as legs, one for each pair of origin and destination, in the order
-/// of these pairs.
+/// Collects the moves of a plan: a leg for each pair of origin and destination, in the order of
+/// these pairs.
 fn legs(plan: &Plan, map: &Map, points: &[Point]) -> Vec<Leg> {
     let mut moves: BTreeMap<(usize, usize), (Vec<usize>, Vec<String>)> = BTreeMap::new();
     for (step, number) in plan.steps.iter().zip(1..) {
@@ -148,8 +146,7 @@ fn legs(plan: &Plan, map: &Map, points: &[Point]) -> Vec<Leg> {
     legs.collect()
 }
 
-/// Returns the shape of a move between two different points: a line on the right-hand side of the
-/// way.
+/// Draws a move between two different points as a line on the right-hand side of the way.
 fn straight((x1, y1): Point, (x2, y2): Point) -> Shape {
     let length = (x2 - x1).hypot(y2 - y1).max(1e-6);
     let along = ((x2 - x1) / length, (y2 - y1) / length);
@@ -162,8 +159,8 @@ fn straight((x1, y1): Point, (x2, y2): Point) -> Shape {
     Shape { line: ((x1 + sx, y1 + sy), (x2 + sx, y2 + sy)), centre: None, arrow, along, outwards }
 }
 
-/// Returns the shape of a move that ends at its origin: a loop at a side of the place, as far from its ways as
-/// possible. The sides above and below are preferred, because step numbers need least space there.
+/// Draws a move that ends at its origin as a loop, on the side of the place that is farthest from
+/// its ways. The sides above and below are preferred, because step numbers need least space there.
 fn looped((x, y): Point, neighbours: &[Point]) -> Shape {
     let diagonal = std::f64::consts::FRAC_1_SQRT_2;
     let upright = [(0.0, -1.0), (0.0, 1.0)];
@@ -183,15 +180,14 @@ fn looped((x, y): Point, neighbours: &[Point]) -> Shape {
     Shape { line: (centre, arrow), centre: Some(centre), arrow, along: (-dy, dx), outwards: (dx, dy) }
 }
 
-/// Formats the numbers of the steps that move along a leg; at most three numbers are listed.
 fn numbers(leg: &Leg) -> String {
     let numbers: Vec<String> = leg.steps.iter().take(3).map(ToString::to_string).collect();
     numbers.join(",") + if leg.steps.len() > 3 { "…" } else { "" }
 }
 
-/// Finds a position for the step numbers of a leg (all moves from one place to another) and marks it as occupied.
-/// The position is nearer to the leg's arrow than to all other arrows, overlaps nothing, and crosses no line if
-/// possible. Returns the left end of the base line, or `None` if no position is free.
+/// Finds a free rectangle for the step numbers of a leg and marks it as occupied. It is nearer to
+/// the leg's arrow than to all other arrows, and no other line crosses it if possible. Returns the
+/// left end of the base line, or `None` if no position is free.
 fn number(
     leg: &Leg,
     legs: &[Leg],
@@ -241,8 +237,7 @@ fn names(
         (used[leg.from], used[leg.to]) = (true, true);
     }
     let mut order: Vec<usize> = (0..points.len()).collect();
-    // First start and goal places, then places of the plan's moves. Ties are broken by index, for a
-    // reproducible picture.
+    // Ties are broken by index, for a reproducible picture.
     order.sort_by_key(|place| (!is_end(*place), !used[*place], *place));
     let mut labels = vec![None; points.len()];
     for place in order {
@@ -296,9 +291,9 @@ fn draw_leg(leg: &Leg, map: &Map, palette: &Palette, number: Option<Point>) -> M
     }
 }
 
-/// Finds a position for a text of this width near a point and marks it as occupied. The position
-/// overlaps nothing and crosses no line if possible. `reach` is the distance to keep from the
-/// point. Returns the left end of the base line, or `None` if no position is free.
+/// Finds a free rectangle for a text near a point, at the distance `reach`, and marks it as
+/// occupied. No line crosses it if possible. Returns the left end of the base line, or `None` if no
+/// position is free.
 fn room(
     (x, y): Point,
     (reach, width): (f64, f64),
@@ -358,7 +353,7 @@ fn crosses(((x1, y1), (x2, y2)): Line, (left, top, right, bottom): Taken) -> boo
     from <= to
 }
 
-/// Computes the positions of the places in pixels, and the width and height of the picture.
+/// Returns the positions of the places, and the width and height of the picture.
 fn pixels(map: &Map, canvas: Canvas, has_loops: bool) -> (Vec<Point>, f64, f64) {
     let positions: Option<Vec<Point>> = map.places.iter().map(|place| place.position).collect();
     let points = positions.unwrap_or_else(|| layout(map.places.len(), &map.ways));

@@ -12,14 +12,13 @@ use crate::svg::{Picture, clean};
 pub const STYLE: &str = concat!(include_str!("picture.css"), include_str!("page.css"));
 /// The only script of a page. Without it, all contents are still visible.
 const SCRIPT: &str = include_str!("page.js");
-/// Digest of the script, which is the only script that the content security policy admits.
+/// The only script that the content security policy admits.
 const DIGEST: &str = "sha256-fZ3YNffJKRqSukU6Y8OoyeJ/9kokzwiOieJxn4wpNoc=";
 
 /// The CSS classes of the columns in which pictures are shown, in the order of [`PAGE`].
 const COLUMNS: [&str; 3] = ["in-wide", "in-half", "in-narrow"];
 
-/// Upper limit on the depth to which derivations are rendered. Deeper premises are replaced by an
-/// ellipsis.
+/// Maximum depth of rendered derivations. Deeper premises are replaced by an ellipsis.
 const DEPTH: usize = 24;
 
 pub(crate) fn page(title: &str, description: &str, body: &Markup) -> String {
@@ -55,8 +54,8 @@ pub(crate) fn page(title: &str, description: &str, body: &Markup) -> String {
 }
 
 /// Renders a picture for several canvases, given in descending width. The page shows the widest
-/// drawing that fits its column. If a picture exceeds its canvas, such as the timeline of a
-/// thousand steps, it gets a scroll bar and is not drawn for narrower canvases.
+/// drawing that fits its column. A picture that exceeds its canvas gets a scroll bar and is not
+/// drawn for narrower canvases.
 pub(crate) fn shown(name: &str, canvases: &[Canvas], draw: &dyn Fn(Canvas) -> Picture) -> Markup {
     let mut drawn: Vec<(f64, Picture)> = Vec::new();
     for canvas in canvases {

@@ -41,7 +41,6 @@ impl Palette {
     }
 }
 
-/// Returns the name of the configuration of a step: its designs, as in `fd_a + fd_b`.
 pub(crate) fn configuration(step: &Step) -> String {
     let designs: Vec<&str> = step.configuration.iter().map(|(_, design)| design.as_str()).collect();
     designs.join(" + ")

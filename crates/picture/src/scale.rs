@@ -1,7 +1,6 @@
 //! Linear scales, axis ticks, number formats and text widths.
 
-/// Upper limit on the width of a character in the fixed-width font of the pictures at 11 pixels, in
-/// pixels.
+/// Maximum width in pixels of a character of the pictures' fixed-width font at 11 pixels.
 const CHARACTER: f64 = 6.75;
 
 #[derive(Debug, Clone, Copy)]
@@ -43,7 +42,8 @@ pub(crate) fn round_step(least: f64) -> f64 {
     enough.unwrap_or(10.0) * power
 }
 
-/// Returns the minimum and maximum of the finite numbers, or 0 and 1 without finite numbers.
+/// Returns the minimum and maximum of the finite numbers, or 0 and 1 if there are no finite
+/// numbers.
 pub(crate) fn range(numbers: impl IntoIterator<Item = f64>) -> (f64, f64) {
     let finite = numbers.into_iter().filter(|number| number.is_finite());
     let range = finite.fold(None, |range: Option<(f64, f64)>, number| {
@@ -52,7 +52,6 @@ pub(crate) fn range(numbers: impl IntoIterator<Item = f64>) -> (f64, f64) {
     range.unwrap_or((0.0, 1.0))
 }
 
-/// Formats a coordinate in pixels, rounded to a tenth.
 pub(crate) fn px(value: f64) -> String {
     number((value * 10.0).round() / 10.0)
 }
@@ -73,15 +72,14 @@ pub(crate) fn compact(value: f64) -> String {
     if text.len() <= 7 { text } else { format!("{value:.1e}") }
 }
 
-/// Returns the estimated width of a text, in pixels.
 pub(crate) fn width(text: &str) -> f64 {
     // Characters of East Asian scripts are about twice as wide as ASCII characters. Every character
     // outside of ASCII counts as twice as wide, so the estimate is rather too large.
     text.chars().map(|character| if character.is_ascii() { CHARACTER } else { 2.0 * CHARACTER }).sum()
 }
 
-/// Truncates a text with an ellipsis to a width in pixels. Returns an empty text if fewer than two
-/// characters fit.
+/// Truncates a text with an ellipsis to a width in pixels. The result is empty if only one of
+/// several characters would remain.
 pub(crate) fn fit(text: &str, room: f64) -> String {
     if width(text) <= room {
         return text.to_owned();

@@ -13,14 +13,14 @@ use crate::report::alone;
 use crate::scale::{Scale, compact, fit, number, px, range};
 use crate::svg::Picture;
 
-/// Height of the drawing area of a scatter plot, in pixels.
+/// Height of the drawing area of a scatter plot.
 const HEIGHT: f64 = 300.0;
 const TOP: f64 = 24.0;
-/// Height of a row of a distribution, in pixels.
+/// Height of a row of a distribution.
 const ROW: f64 = 46.0;
-/// Distance on the axis below which the dots of values are stacked, in pixels.
+/// Distance on the axis below which dots are stacked.
 const NEAR: f64 = 6.0;
-/// Upper limit on the height of a stack of dots, in pixels.
+/// Maximum height of a stack of dots.
 const HIGHEST: f64 = 28.0;
 
 impl Sheet {
@@ -143,9 +143,8 @@ fn points(own: &Points, canvas: Canvas) -> Picture {
     Picture { width: right + RIGHT, height: bottom + 40.0, title: own.title.clone(), description, body }
 }
 
-/// Finds a free position for the label of a point, above or below the point, and marks it as
-/// occupied. Returns the left end of the base line and the possibly truncated text, or `None` if no
-/// position is free.
+/// Finds a free position for a label near the point (`x`, `y`), and marks it as occupied. Returns
+/// the left end of the base line and the possibly truncated text, or `None` if no position is free.
 fn label(
     x: &str,
     y: &str,
@@ -212,8 +211,7 @@ fn rows(own: &Rows, canvas: Canvas) -> Picture {
     Picture { width: canvas.width, height: bottom + 40.0, title: own.title.clone(), description, body }
 }
 
-/// Returns the height of each value's dot above the base line, in pixels. Dots of nearby values are
-/// stacked.
+/// Returns the height of each dot above the base line. Dots of nearby values are stacked.
 fn heights(values: &[(f64, String)], across: &Scale) -> Vec<f64> {
     let mut counts: BTreeMap<i64, usize> = BTreeMap::new();
     let mut place = |(value, _): &(f64, String)| {

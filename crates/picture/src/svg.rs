@@ -7,7 +7,6 @@ use crate::scale::px;
 /// The style sheet for a white background. Pages contain additional styles for dark mode.
 const STYLE: &str = include_str!("picture.css");
 
-/// A picture with its size in pixels.
 pub(crate) struct Picture {
     pub(crate) width: f64,
     pub(crate) height: f64,
@@ -31,7 +30,6 @@ impl Picture {
         }
     }
 
-    /// Renders the picture as an SVG file, with text as text and without scripts.
     pub(crate) fn file(&self) -> String {
         let picture = html! {
             svg xmlns="http://www.w3.org/2000/svg" class="picture" role="img"
@@ -47,7 +45,8 @@ impl Picture {
     }
 }
 
-/// Replaces the characters that XML does not permit by U+FFFD.
+/// Replaces control characters, except tabs and line breaks, and U+FFFE and U+FFFF by U+FFFD. XML
+/// does not permit most of them.
 pub(crate) fn clean(text: &str) -> String {
     let allowed = |character: char| {
         matches!(character, '\n' | '\t' | '\r')
@@ -56,8 +55,8 @@ pub(crate) fn clean(text: &str) -> String {
     text.chars().map(|character| if allowed(character) { character } else { '\u{fffd}' }).collect()
 }
 
-/// Formats the note that the design of a function has changed, such as ` (changed, before: d1)`. `before` is the
-/// previous design, or empty if it is unknown.
+/// Formats a note that a design has changed, such as ` (changed, before: d1)`. `before` is empty if
+/// the previous design is unknown.
 pub(crate) fn alternative(before: &str) -> String {
     if before.is_empty() { " (changed)".to_owned() } else { format!(" (changed, before: {before})") }
 }

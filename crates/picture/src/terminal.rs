@@ -13,9 +13,9 @@ const COLUMN: usize = 4;
 /// Minimum number of columns of a step in a picture that is not to scale, including the mark at its
 /// start.
 const NARROW: usize = 7;
-/// Upper limit on the number of bands (groups of rows for consecutive steps) below each other.
+/// Maximum number of bands (groups of rows for consecutive steps) below each other.
 const BANDS: usize = 6;
-/// Upper limit on the number of characters of a lane's name.
+/// Maximum number of characters of a lane's name.
 const NAME: usize = 24;
 
 /// The steps of a band: the index of each step, and the columns at which it starts and ends.
@@ -58,8 +58,6 @@ impl Plan {
         Some(bands.join("\n"))
     }
 
-    /// Distributes the steps over bands, and returns the columns of each step. Returns `None` if
-    /// there are no steps, if steps overlap, or if too many bands are needed.
     fn bands(&self, room: usize) -> Option<Vec<Columns>> {
         let starts = self.steps.iter().skip(1).map(|step| step.start);
         let is_sequence = self.steps.iter().zip(starts).all(|(step, next)| step.end <= next + 1e-9);
@@ -80,8 +78,8 @@ impl Plan {
         })
     }
 
-    /// Returns the columns at which each step starts and ends if widths are proportional to
-    /// durations. Returns `None` if a step then has fewer than [`COLUMN`] columns.
+    /// Returns the columns at which each step starts and ends, to scale. Returns `None` if a step
+    /// then has fewer than [`COLUMN`] columns.
     fn to_scale(&self, room: usize) -> Option<Vec<(usize, usize)>> {
         let end = self.steps.iter().map(|step| step.end).fold(0.0, f64::max);
         let column = |at: f64| if end > 0.0 { (at / end * room as f64).round() as usize } else { 0 };
@@ -90,8 +88,8 @@ impl Plan {
         is_wide.then_some(places)
     }
 
-    /// Places steps side by side with their minimum widths. The remaining columns are distributed
-    /// in proportion to the durations.
+    /// Places steps of minimum width side by side. The remaining columns are distributed in
+    /// proportion to the durations.
     fn widened(&self, steps: std::ops::Range<usize>, room: usize) -> Columns {
         let duration = |index: usize| (self.steps[index].end - self.steps[index].start).max(0.0);
         let total: f64 = steps.clone().map(duration).sum();
@@ -151,7 +149,6 @@ fn length(text: &str) -> usize {
     text.chars().count()
 }
 
-/// Truncates a text to `most` characters; the last one is then an ellipsis.
 fn short(text: &str, most: usize) -> String {
     if length(text) <= most {
         return text.to_owned();

@@ -12,14 +12,13 @@ use crate::palette::Palette;
 use crate::scale::{fit, px, width};
 use crate::svg::{Picture, alternative};
 
-/// Height of a row of a lane, in pixels.
 const ROW: f64 = 26.0;
 const BAR: f64 = 20.0;
 const GAP: f64 = 8.0;
 const TOP: f64 = 6.0;
 const LEAST: f64 = 3.0;
-/// Minimum number of characters of a shortened name, including the ellipsis. A shorter remainder is replaced by
-/// the step number (for actions) or omitted (for designs).
+/// Minimum number of characters of a shortened name, including the ellipsis. Instead of a shorter
+/// one, the step number is shown (for actions, if it fits) or nothing.
 const SHORTEST: usize = 5;
 /// Number of pixels by which a step number may be nearer to the ends of a bar than a name, for both
 /// ends together.
@@ -86,7 +85,6 @@ pub(crate) fn timeline(plan: &Plan, palette: &Palette, span: &Span, canvas: Canv
     Picture { width: frame.width, height: bottom + 24.0, title, description, body }
 }
 
-/// Creates the lanes: first the actions, then the functions in alphabetical order.
 fn lanes<'p>(plan: &'p Plan, frame: &Frame) -> Vec<Lane<'p>> {
     let place = |step: &Step| {
         let from = frame.scale.at(step.start);

@@ -6,21 +6,19 @@ use roxmltree::{Document, Node};
 
 type Point = (f64, f64);
 
-/// The width of a character and the height of a line in the pictures' font.
+/// Width of a character and height of a line in the pictures' font.
 const CHARACTER: (f64, f64) = (6.75, 13.0);
 
 struct Leg {
     from: String,
     to: String,
     steps: Vec<usize>,
-    /// The centre of the arrow, and its tip.
+    /// Centre and tip.
     arrow: [Point; 2],
-    /// The centre of the step numbers, and their text.
+    /// Centre of the step numbers, and their text.
     label: Option<(Point, String)>,
 }
 
-/// Creates a plan with places at these positions and with these moves. The moves use the designs in
-/// turn.
 fn plan(positions: &[Option<Point>], moves: &[(usize, usize)], designs: &[&str]) -> Plan {
     let place = |(index, position): (usize, &Option<Point>)| Place {
         name: format!("place_{index}"),

@@ -193,8 +193,6 @@ actions  ▕move p0············▕move p1············▕
     assert_eq!(Plan::default().text(100), None);
 }
 
-/// In a picture that is not to scale, short steps are widened and many steps continue on further
-/// lines. No line is longer than the terminal is wide.
 #[test]
 fn terminals_of_any_width_hold_the_picture() {
     let mut night = plan(16, "");
@@ -239,8 +237,6 @@ fn shown(page: &str, column: f64) -> Vec<(String, f64, bool)> {
     shown.map(drawing).collect()
 }
 
-/// Each column shows each picture exactly once. No picture of an ordinary plan is wider than its
-/// column.
 #[test]
 fn pictures_fit_their_column() {
     let alone = Report { before: None, ..report(20, "") };
@@ -260,8 +256,6 @@ fn pictures_fit_their_column() {
     }
 }
 
-/// A plan of very many steps is scrolled, and is drawn only once for all columns that are too
-/// narrow.
 #[test]
 fn long_plans_are_scrolled() {
     let page = Report { before: None, ..report(1000, "") }.html();
@@ -274,8 +268,6 @@ fn long_plans_are_scrolled() {
     assert_eq!(page.matches("-timeline-2-title").count(), 0);
 }
 
-/// Plans shown side by side share their axes: equal times are at equal positions, and the longer
-/// plan is shown completely.
 #[test]
 fn before_and_after_share_one_axis() {
     let mut report = report(14, "");
@@ -326,8 +318,6 @@ fn before_and_after_share_one_axis() {
     assert!(last.1.parse::<f64>().is_ok_and(|x| x < 560.0), "{last:?}");
 }
 
-/// A bar that is too short for a name contains the number of its step, which also occurs in the
-/// map.
 #[test]
 fn short_bars_have_the_number_of_their_step() {
     let mut plan = plan(30, "");
@@ -353,7 +343,7 @@ fn short_bars_have_the_number_of_their_step() {
     assert!(narrow.contains(">30<") || narrow.contains("move p29"), "the long one is named");
 }
 
-/// A group without values shows the reason, and a plot without values has no axis.
+/// A plot without values has no axis.
 #[test]
 fn nothing_is_said_in_words() {
     let group = |values: Vec<(f64, String)>| Group {
