@@ -5,7 +5,6 @@ use rules::{DerivationStep, Engine, Literal, Reason, Symbol, Value};
 
 use ::verify::derivations::{Document, FORMAT, Rule, Step, Term};
 
-/// Serialises all facts of an engine, stated and derived, with their derivations as JSON.
 pub(super) fn write(engine: &Engine) -> serde_json::Result<String> {
     let derivation = engine.everything();
     let mut terms: Vec<Option<u32>> = vec![None; engine.symbols().len()];

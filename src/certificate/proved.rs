@@ -15,14 +15,14 @@ use crate::message::Message;
 
 const PREPARE: &str = "metaplan-proved-prepare";
 const CHECK: &str = "metaplan-proved-check";
-/// Exit status of both programs on success. The next two constants are other exit statuses of
+/// Success of both programs. The next two constants are other exit statuses of
 /// `metaplan-proved-check`; `proved/ocaml/check.ml` defines them.
 const PROVED: i32 = 0;
 const REJECTED: i32 = 3;
 const NOT_PROVED: i32 = 30;
 
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
-/// Upper limit on the memory of each program, in kilobytes of 2^10 bytes.
+/// Maximum resident memory of each program, in kilobytes of 2^10 bytes.
 const MEMORY_LIMIT: u64 = 4 << 20;
 /// Parts of a verification that the theorem makes statements about.
 const COVERED_PARTS: [&str; 3] = ["task", "plan", "argument"];
@@ -148,7 +148,6 @@ impl ProvedChecker {
     }
 }
 
-/// The answer of the proved checker.
 enum Answer {
     Accepted(String),
     Rejected,
@@ -183,7 +182,6 @@ fn read(file: &Path) -> Result<String, Message> {
     Ok(String::from_utf8_lossy(&bytes).trim_end().to_owned())
 }
 
-/// Reads the reason for a rejection that a program has printed.
 fn reason(file: &Path) -> Result<String, Message> {
     let text = read(file)?;
     let line = text.lines().last().unwrap_or_default();
@@ -191,7 +189,8 @@ fn reason(file: &Path) -> Result<String, Message> {
     Ok(if line.is_empty() { "the program has printed no reason".to_owned() } else { line.to_owned() })
 }
 
-/// Runs a program with its output in files. Kills it when `stop` returns `true`, or at the memory limit.
+/// Runs a program with its output in files. Kills it when `stop` returns `true`, or at the memory
+/// limit (only on platforms with `/proc`).
 fn run(
     mut command: Command,
     output: &Path,
@@ -221,7 +220,7 @@ fn run(
     }
 }
 
-/// Returns the resident memory of a process in kilobytes of 2^10 bytes; `None` on platforms without `/proc`.
+/// Returns the resident memory of a process in kilobytes of 2^10 bytes.
 fn memory(child: &Child) -> Option<u64> {
     let text = fs::read_to_string(format!("/proc/{}/status", child.id())).ok()?;
     let line = text.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;

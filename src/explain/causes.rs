@@ -2,10 +2,11 @@
 //! design: single alterations that make it unavailable. An alteration is a recovery or failure of a component, or a
 //! change of a measurement.
 //!
-//! Sets of alterations are tried in ascending order of size, up to a maximum number, by reasoning with a copy of the
-//! knowledge base. So each listed set is known to suffice, but some sets may be missing. These sets are the diagnoses
-//! of \[1\]. Each alteration of a set removes one cause. To explain a cause, all other alterations of its set are
-//! applied: whatever still rules the design out is due to this cause.
+//! Sets of alterations are tried in ascending order of size, up to a maximum number, by reasoning
+//! with a copy of the knowledge base. So each listed set is known to suffice, but some sets may be
+//! missing. These sets are the diagnoses of \[1\]. Each alteration of a set removes one cause. To
+//! explain a cause, all other alterations of its set are applied. The conclusions that still rule
+//! the design out are due to this cause.
 //!
 //! \[1\] R. Reiter: A theory of diagnosis from first principles, Artificial Intelligence 32, 1987.
 
@@ -24,7 +25,7 @@ use crate::message::Errors;
 use crate::mission::Mission;
 use crate::mission::numbers::against;
 
-/// Maximum number of sets of alterations that are tried in order of size.
+/// Maximum number of tried sets of alterations.
 const MAX_TRIED: usize = 2_000;
 
 /// Availability of one design and its causes, derived without planning.
@@ -53,10 +54,10 @@ pub struct Availability {
 pub struct Cause {
     /// The alteration that removes this cause; other causes may remain.
     pub alteration: Alteration,
-    /// The rules and facts by which this cause alone rules the design out, i.e. those after the other alterations of
-    /// a minimal set.
+    /// The rules and facts by which this cause alone rules the design out. They are derived after
+    /// the other alterations of a minimal set.
     pub because: Vec<String>,
-    /// The knowledge base after the other alterations of the minimal set, for further analysis.
+    /// The knowledge base after the other alterations of the minimal set.
     pub knowledge: Knowledge,
 }
 
@@ -72,8 +73,8 @@ pub struct Causes {
     /// The causes. Empty if the design is available, or if neither a component nor a measurement is
     /// a cause.
     pub causes: Vec<Cause>,
-    /// `true` if exactly one minimal set of alterations was found: the design becomes available only after all causes
-    /// are removed. `false` if removing some of them can suffice, or if no set was found.
+    /// `true` if exactly one minimal set of alterations was found, so each found cause has to be
+    /// removed. `false` if removing some of them can suffice, or if no set was found.
     pub are_all_needed: bool,
 }
 
@@ -87,8 +88,9 @@ pub fn causes(knowledge: &Knowledge, design: &FunctionDesign) -> Causes {
     Causes { causes: causes_of(knowledge, design, &ways), are_all_needed: ways.len() == 1 }
 }
 
-/// Returns a cause for each different alteration in `ways`, unless reasoning fails. The reasons of a cause are the
-/// conclusions that still rule the design out after all other alterations of its set.
+/// Returns a cause for each different alteration in `ways`. Omits causes with which reasoning
+/// fails. The reasons of a cause are the conclusions that still rule the design out after all other
+/// alterations of its set.
 fn causes_of(knowledge: &Knowledge, design: &FunctionDesign, ways: &[Vec<Alteration>]) -> Vec<Cause> {
     let mut causes: Vec<Cause> = Vec::new();
     for (way, alteration) in ways.iter().flat_map(|way| way.iter().map(move |alteration| (way, alteration))) {
@@ -127,7 +129,6 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
             altered(knowledge, [alteration]).is_some_and(|knowledge| !is_available(&knowledge, design))
         };
         let candidates = candidates(knowledge, design).into_iter();
-        // Each listed alteration of a component or a measurement makes the design unavailable by itself.
         availability.ways = candidates.filter(loses).map(|alteration| vec![alteration]).collect();
         return availability;
     }
@@ -142,8 +143,8 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
     availability
 }
 
-/// Returns minimal sets of `candidates` that make a design available (see [`minimal`]). Small sets are tried first. At
-/// most [`MAX_TRIED`] sets are tried, so some minimal sets may be missing.
+/// Returns minimal sets of `candidates` that make a design available (see [`minimal`]). At most
+/// [`MAX_TRIED`] sets are tried, small ones first, so some minimal sets may be missing.
 fn repairs(
     knowledge: &Knowledge,
     design: &FunctionDesign,
@@ -222,8 +223,8 @@ fn minimal<'a>(
     set
 }
 
-/// Returns a copy of the knowledge base after the alterations. `None` if an alteration fails, for
-/// example because the rules do not terminate.
+/// Returns a copy of the knowledge base after the alterations, or `None` if an alteration fails,
+/// for example because the rules do not terminate.
 fn altered<'a>(
     knowledge: &Knowledge,
     alterations: impl IntoIterator<Item = &'a Alteration>,
@@ -245,8 +246,8 @@ fn is_available(knowledge: &Knowledge, design: &FunctionDesign) -> bool {
     designs.iter().any(|candidate| candidate.individual == design.individual && candidate.available)
 }
 
-/// Computes the best plan after alterations of the situation. At a limit, returns the best plan found until
-/// then. If reasoning fails with the alterations, the result has no plan and is not proved.
+/// Computes the best plan after alterations of the situation. At a limit, returns the best plan
+/// found until then. If reasoning fails with the alterations, returns no plan and no proof.
 pub(super) fn in_situation(
     mission: &Mission,
     alterations: &[Alteration],
@@ -286,9 +287,9 @@ pub(super) fn singly(mission: &Mission, repairs: &[Repair], limits: &Limits) -> 
     Ok(changes)
 }
 
-/// Returns alterations that may change whether a design is available: of its components, and of measurements. New
-/// measurements are values at or just beyond the bounds in the design's requirements, or around the design's
-/// estimation if no requirement concerns the attribute.
+/// Returns alterations that may change whether a design is available: of its components, and of
+/// measurements. New measurements are at or just beyond the bounds in the design's requirements.
+/// Without a requirement for an attribute, they are around the design's estimation.
 fn candidates(knowledge: &Knowledge, design: &FunctionDesign) -> Vec<Alteration> {
     let is_own = |component: &str| design.components.iter().any(|needed| needed.iri == component);
     let mut alterations = components(knowledge, design.available, &is_own);
@@ -308,8 +309,8 @@ fn candidates(knowledge: &Knowledge, design: &FunctionDesign) -> Vec<Alteration>
     alterations
 }
 
-/// Adds alterations for all failed components, and for the measurements on which any design
-/// depends, to `candidates_found`.
+/// Adds alterations that concern all designs to `candidates_found`: recoveries of failed
+/// components, and changes of measurements. Failures are not added.
 fn all_candidates(knowledge: &Knowledge, mut candidates_found: Vec<Alteration>) -> Vec<Alteration> {
     let designs = knowledge.view().function_designs();
     let additional = designs.iter().flat_map(|design| candidates(knowledge, design));
@@ -321,8 +322,8 @@ fn all_candidates(knowledge: &Knowledge, mut candidates_found: Vec<Alteration>) 
     candidates_found
 }
 
-/// Returns the recovery of each failed component or, with `working`, the failure of each working component.
-/// Only components are included for whose IRI `is_own` returns `true`.
+/// Returns the recovery of each failed component or, with `working`, the failure of each working
+/// component. `is_own` selects components by IRI.
 fn components(knowledge: &Knowledge, working: bool, is_own: &dyn Fn(&str) -> bool) -> Vec<Alteration> {
     let components = knowledge.view().components().into_iter();
     let components = components.filter(|component| is_own(&component.individual.iri));
@@ -334,10 +335,10 @@ fn components(knowledge: &Knowledge, working: bool, is_own: &dyn Fn(&str) -> boo
         .collect()
 }
 
-/// Returns targets for an attribute with the value `from` and the requirements `bounds`. Without `hold`, violated
-/// requirements become satisfied: the targets are at least the greatest violated minimum, and at most the least
-/// violated maximum. With `hold`, a satisfied requirement becomes violated: the targets are below the greatest
-/// satisfied minimum, and above the least satisfied maximum.
+/// Returns targets for an attribute with the value `from`. Without `hold`, violated requirements
+/// become satisfied: the targets are at least the greatest violated minimum, and at most the least
+/// violated maximum. With `hold`, a satisfied requirement becomes violated: the targets are below
+/// the greatest satisfied minimum, and above the least satisfied maximum.
 fn targets<'a>(bounds: impl Iterator<Item = &'a Requirement>, from: &BigRational, hold: bool) -> Vec<Target> {
     let (mut least, mut most): (Vec<&BigRational>, Vec<&BigRational>) = (Vec::new(), Vec::new());
     for requirement in bounds {
@@ -353,8 +354,8 @@ fn targets<'a>(bounds: impl Iterator<Item = &'a Requirement>, from: &BigRational
     least.into_iter().chain(most).collect()
 }
 
-/// Returns targets (bounds for the value) at a bound and just beyond it, as seen from the current value `from`. If
-/// the value equals the bound: just below and just above it.
+/// Returns targets at a bound and just beyond it, as seen from the current value `from`. If the
+/// value equals the bound, the targets are just below and just above it.
 fn around(bound: &BigRational, from: &BigRational) -> Vec<Target> {
     let bound = bound.clone();
     match from.cmp(&bound) {

@@ -13,8 +13,7 @@ use crate::message::Errors;
 use crate::mission::Mission;
 use crate::number;
 
-/// Bisection ends if the interval is at most the current value divided by this number. Then a
-/// number with few decimals is searched for in the interval.
+/// Bisection ends if the interval is at most the current value divided by this number.
 const BISECTION_RESOLUTION: i64 = 1000;
 
 /// Result of [`smallest_changes`]: smallest changes of single values that lead to another plan.
@@ -73,7 +72,6 @@ pub fn smallest_changes(
     Ok(result)
 }
 
-/// Returns the measured attributes that have a value, as pairs of name and value.
 pub(super) fn measured(knowledge: &Knowledge) -> Vec<(String, BigRational)> {
     let measurements = knowledge.view().measurements().into_iter();
     measurements.filter_map(|measurement| Some((measurement.attribute, measurement.value?))).collect()
@@ -92,8 +90,8 @@ struct VariedMission<'a> {
 }
 
 impl VariedMission<'_> {
-    /// Computes the best plan after a value of the mission is set. Returns `None` if a limit is reached before it is
-    /// proved that the plan is optimal, or that there is no plan.
+    /// Computes the best plan after a value of the mission is set. Returns `None` if the plan, or
+    /// that there is no plan, is not proved within the limits.
     fn with(&self, name: &str, value: &BigRational) -> Result<Option<BestPlan>, Errors> {
         if self.limits.reached() {
             return Ok(None);
@@ -118,8 +116,6 @@ impl VariedMission<'_> {
         steps(plan) != steps(&self.base) || plan.cost.is_some() != self.base.cost.is_some()
     }
 
-    /// Searches upwards or downwards for the nearest value of an attribute at which a design's
-    /// requirement begins or ceases to hold and the best plan changes.
     fn first_threshold(&self, attribute: &str, from: &BigRational, upwards: bool) -> Result<Outcome, Errors> {
         for target in thresholds(self.mission, attribute, from, upwards) {
             let Some(then) = self.with(attribute, &target.example())? else { return Ok(Outcome::AtLimit) };
@@ -227,7 +223,7 @@ fn shortest_decimal(low: &BigRational, high: &BigRational) -> BigRational {
 }
 
 /// Returns the values of an attribute, above or below `from`, at which a requirement of a design
-/// begins or ceases to hold. The nearest value comes first.
+/// begins or ceases to hold, in ascending distance.
 fn thresholds(mission: &Mission, attribute: &str, from: &BigRational, upwards: bool) -> Vec<Target> {
     let designs =
         mission.knowledge().map(|knowledge| knowledge.view().function_designs()).unwrap_or_default();
