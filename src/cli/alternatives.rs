@@ -7,8 +7,8 @@ use planner::Alternatives;
 
 use crate::cli::plan_text::steps_text;
 
-/// Formats further optimal plans as tables, and lists for each step of the first plan the choices that all optimal
-/// plans share.
+/// Formats further optimal plans as tables. Also lists for each step of the first plan the choices
+/// that all optimal plans share.
 pub(super) fn text(found: Option<&Alternatives>, planned: &Planned<'_>, columns: Option<u16>) -> String {
     let Some(found) = found else {
         return "\nequally good plans were not searched for: the plan is not proved optimal\n".to_owned();

@@ -98,7 +98,6 @@ struct CombinationResult<'a> {
     reports: Vec<Result<Report, Error>>,
 }
 
-/// Runs `metaplan check` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let _guard = arguments.time.guard(common)?;
     let file = source(&arguments.model)?;
@@ -151,7 +150,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     Ok(Exit::BadInput)
 }
 
-/// Parses the property of the command line, or the selected properties of a file.
+/// Parses the property of the command line, or reads the selected properties of a file.
 fn asked(arguments: &Arguments) -> Result<Queries, Failure> {
     let Some(path) = &arguments.props else {
         let text = arguments.property.clone().unwrap_or_default();
@@ -251,8 +250,8 @@ fn single(arguments: &Arguments, common: &Common, property: &str, report: &Repor
     Ok(if is_proved(arguments, report) { Exit::Done } else { Exit::NotProved })
 }
 
-/// Writes several answers: as JSON, as text for each property or, if constants vary, as a table with a line for
-/// each combination of values. Also writes the CSV file, if requested.
+/// Writes several answers: as JSON, as text or, if constants vary, as a table with a line for each
+/// combination of values. Also writes the CSV file, if requested.
 fn write_all(
     arguments: &Arguments,
     common: &Common,

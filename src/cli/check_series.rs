@@ -12,20 +12,18 @@ use crate::cli::check_text::{number, shown};
 use crate::cli::common::Failure;
 use crate::cli::output;
 
-/// Upper limit on the number of values in a series, and on the number of combinations of the values of all constants.
+/// Maximum number of values in a series, and of combinations of the values of all constants.
 const MOST: usize = 100_000;
 
-/// One combination of values of the given constants.
 pub struct Combination {
     pub settings: Settings,
-    /// Names and values of those constants for which a series is given, in the order of the command line.
+    /// Only constants for which a series is given, in the order of the command line.
     pub varied: Vec<(String, String)>,
 }
 
-/// A combination of constant values with the result of each property.
 pub type Row<'a> = (&'a Combination, &'a [Result<Report, Error>]);
 
-/// Returns all combinations of the constants' values. The value of the last constant changes fastest.
+/// The value of the last constant changes fastest.
 pub fn combinations(constants: &[(String, String)]) -> Result<Vec<Combination>, Failure> {
     let mut combinations = vec![Combination { settings: Settings::new(), varied: Vec::new() }];
     for (name, text) in constants {
@@ -51,8 +49,7 @@ pub fn combinations(constants: &[(String, String)]) -> Result<Vec<Combination>, 
     Ok(combinations)
 }
 
-/// Parses the values of a constant: one value, or a series in PRISM's form `first:last` or
-/// `first:step:last`.
+/// Parses one value, or a series in PRISM's form `first:last` or `first:step:last`.
 fn values(name: &str, text: &str) -> Result<Vec<String>, String> {
     let parts: Vec<&str> = text.split(':').map(str::trim).collect();
     let (first, step, last) = match parts[..] {
@@ -90,7 +87,6 @@ fn values(name: &str, text: &str) -> Result<Vec<String>, String> {
     Ok(values)
 }
 
-/// Formats the result of a property for a table cell.
 fn cell(report: &Result<Report, Error>, text: impl Fn(&Answer) -> String) -> String {
     match report {
         Err(_) => "no answer".to_owned(),
@@ -109,7 +105,6 @@ fn cell(report: &Result<Report, Error>, text: impl Fn(&Answer) -> String) -> Str
     }
 }
 
-/// Formats the results as a text table. `heads` are the column titles of the properties.
 pub fn table(heads: &[&str], rows: &[Row<'_>]) -> String {
     let header = header(heads, rows);
     let lines = rows.iter().map(|(combination, reports)| {
@@ -124,7 +119,7 @@ fn header<'a>(heads: &[&'a str], rows: &[Row<'a>]) -> Vec<&'a str> {
     varied.iter().map(|(name, _)| &name[..]).chain(heads.iter().copied()).collect()
 }
 
-/// Formats the results as CSV. Finite values are written as doubles.
+/// Finite values are written as doubles.
 pub fn csv(heads: &[&str], rows: &[Row<'_>]) -> String {
     let plain = |answer: &Answer| match answer {
         Answer::Finite(quantity) => number(quantity.value),

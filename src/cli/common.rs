@@ -23,7 +23,6 @@ pub(super) enum Exit {
     Fault = 70,
 }
 
-/// Exit status and messages of a command that fails.
 pub(super) struct Failure {
     pub(super) exit: Exit,
     pub(super) messages: Errors,
@@ -34,8 +33,7 @@ impl Failure {
         Self { exit: Exit::Usage, messages: message.into() }
     }
 
-    /// Converts errors of the planner to a failure. The exit status depends on the message codes, and on a reached
-    /// limit.
+    /// Chooses the exit status by the message codes and by whether a limit is reached.
     pub(super) fn planning(messages: Errors, limits: &Limits) -> Self {
         let is = |code: &str| messages.iter().any(|message| message.code == code);
         let exit = if is("M170") {
@@ -114,8 +112,8 @@ pub(super) enum Format {
     Turtle,
 }
 
-/// Converts an error about a model and a property to a failure. Both are given as pairs of file name and text,
-/// which messages quote.
+/// Converts an error about a model and a property to a failure. Both are pairs of file name and
+/// text, which messages quote.
 pub(super) fn process_failure(error: Error, model: (&str, &str), property: (&str, &str)) -> Failure {
     match error {
         Error::Model(problems) => in_file(&problems, model),

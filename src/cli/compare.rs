@@ -91,7 +91,6 @@ fn penalty(text: &str) -> Result<f64, String> {
     value.ok_or_else(|| format!("`{text}` is not a time that is at least 0"))
 }
 
-/// Runs `metaplan compare` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let so_far = Shared::new();
     so_far.show_after(arguments.time_limit, common);
@@ -153,9 +152,9 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     so_far.end(common)
 }
 
-/// Returns the missions to compare, each with the data from which its process (Markov decision process) is
-/// built: the mission itself, or variants with other starts and goals. The pair has the names of the start and
-/// the goal of a variant; it is `None` for the mission itself.
+/// Returns the missions to compare: the mission itself, or variants with other starts and goals.
+/// Each has the data from which its Markov decision process is built. The pair has the names of
+/// start and goal of a variant; it is `None` for the mission itself.
 fn missions(
     arguments: &Arguments,
     mission: &Mission,

@@ -28,13 +28,10 @@ pub(super) struct SoFar {
     pub of: Option<usize>,
     pub done: Vec<(Option<Pair>, Comparison)>,
     pub begun: Option<Begun>,
-    /// Rows that the user adds to the table with `--published`.
+    /// Rows of `--published`.
     pub added: Vec<Row>,
-    /// File for the table in CSV, if requested.
     pub csv: Option<PathBuf>,
-    /// The mission's name.
     pub mission: String,
-    /// Destinations of the pictures.
     pub pages: Pages,
 }
 
@@ -45,7 +42,7 @@ pub(super) struct Begun {
     pub costs: Costs,
 }
 
-/// Results shared with the thread that waits for the time limit. `None` once the results are being shown.
+/// Results shared with the thread that waits for the time limit. `None` once they are being shown.
 #[derive(Debug, Clone)]
 pub(super) struct Shared(Arc<Mutex<Option<SoFar>>>);
 
@@ -54,7 +51,7 @@ impl Shared {
         Self(Arc::new(Mutex::new(Some(SoFar::default()))))
     }
 
-    /// Applies `change` to the results. Does nothing once the results are being shown, because the program then ends.
+    /// Does nothing once the results are being shown, because the program then ends.
     pub fn change(&self, change: impl FnOnce(&mut SoFar)) {
         if let Some(so_far) = &mut *self.0.lock().unwrap_or_else(PoisonError::into_inner) {
             change(so_far);
@@ -65,8 +62,8 @@ impl Shared {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
-    /// Starts a thread that shows the available results at the time limit or at Ctrl-C, with a message, and ends the
-    /// program. A second Ctrl-C ends it at once.
+    /// Starts a thread that shows the available results at the time limit or at Ctrl-C, and ends
+    /// the program. A second Ctrl-C ends it at once.
     pub fn show_after(&self, time: Option<Duration>, common: &Common) {
         let limits = time.map_or_else(Limits::none, |time| Limits::none().with_time(time));
         let (common, shared, interrupt) = (common.clone(), self.clone(), limits.interrupt());
@@ -92,11 +89,8 @@ impl Shared {
         });
     }
 
-    /// Shows all results, and returns the exit status. Does not return if the time limit or Ctrl-C came first: then the
-    /// other thread ends the program.
-    ///
-    /// # Errors
-    /// A requested file cannot be written.
+    /// Shows all results. Does not return if the time limit or Ctrl-C came first: then the other
+    /// thread ends the program. Returns an error if a requested file cannot be written.
     pub fn end(&self, common: &Common) -> Result<Exit, Failure> {
         let Some(so_far) = self.take() else {
             // The other thread is showing the results and will end the program.
@@ -126,8 +120,8 @@ impl SoFar {
         Message::error("M130", text)
     }
 
-    /// Writes the answer and the requested files, with a message if the answer is incomplete. Files are not written if
-    /// nothing was evaluated.
+    /// Writes the answer, and the requested files if anything was evaluated. `message` tells why
+    /// the answer is incomplete.
     fn show(mut self, common: &Common, message: Option<Message>) -> Result<(), Failure> {
         let done = self.done.iter().flat_map(|(pair, comparison)| rows(pair.as_ref(), comparison));
         let begun = self

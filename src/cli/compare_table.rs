@@ -133,15 +133,15 @@ pub fn costs_text(k: &Costs) -> String {
     )
 }
 
-/// Returns the peak resident memory since the last call, or since the start of the program, in megabytes, and
-/// resets the peak. Returns `None` if the system does not support this.
+/// Returns the peak resident memory in megabytes since the last call, or since the start of the
+/// program, and resets the peak. Returns `None` if the system does not support this.
 pub fn memory_since() -> Option<u64> {
     let peak = peak_memory();
     // Linux: 5 resets the peak.
     std::fs::write("/proc/self/clear_refs", "5").ok().and(peak)
 }
 
-/// Returns the peak resident memory of this program in megabytes, if the system reports it.
+/// Returns the peak resident memory of this program in megabytes.
 pub fn peak_memory() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

@@ -26,7 +26,6 @@ pub struct ManArguments {
     output: PathBuf,
 }
 
-/// Writes the completion script of a shell to standard output.
 pub fn run(arguments: &Arguments, mut command: Command) -> Exit {
     let name = command.get_name().to_owned();
     let mut script = Vec::new();
@@ -35,7 +34,6 @@ pub fn run(arguments: &Arguments, mut command: Command) -> Exit {
     Exit::Done
 }
 
-/// Writes the manual pages of all commands to a directory.
 pub fn man(arguments: &ManArguments, command: Command) -> Result<Exit, Failure> {
     let directory = &arguments.output;
     output::make_directory(directory)?;

@@ -25,8 +25,8 @@ fn positive(text: &str) -> Result<BigRational, String> {
 }
 
 impl Overlap {
-    /// Returns the minimum time between interfering happenings (starts and ends of actions), or `None` for sequential
-    /// plans.
+    /// Returns the minimum time between interfering starts and ends of actions, or `None` for
+    /// sequential plans.
     pub(super) fn separation(&self) -> Option<&BigRational> {
         self.concurrent.then_some(&self.epsilon)
     }

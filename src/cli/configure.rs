@@ -136,7 +136,6 @@ impl Wanted {
     }
 }
 
-/// Runs `metaplan configure` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let Arguments { documents, rules, imports, set, fail, time, wanted } = arguments;
     let guard = time.guard(common)?;
@@ -190,8 +189,8 @@ fn text(configuration: &Configuration, wishes: &Wishes) -> String {
     text
 }
 
-/// Formats the reasons why designs are ruled out or cannot be chosen together with the other choices, and the
-/// requirements that the chosen design misses.
+/// Formats the reasons why designs are ruled out or cannot be combined with the other choices, and
+/// the requirements that the chosen design misses.
 fn reasons(choice: &Choice) -> String {
     let mut text = String::new();
     for considered in &choice.considered {

@@ -44,7 +44,6 @@ enum Syntax {
     Functional,
 }
 
-/// Runs `metaplan convert` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let _guard = arguments.time.guard(common)?;
     let syntax = match arguments.syntax {

@@ -66,7 +66,6 @@ impl Pages {
     }
 }
 
-/// Writes pictures, given as file names and SVG texts, into a directory.
 pub(super) fn write_pictures(directory: &Path, pictures: &[(String, String)]) -> Result<(), Failure> {
     output::make_directory(directory)?;
     pictures.iter().try_for_each(|(name, text)| output::write_file(&directory.join(name), &visible(text)))
@@ -82,8 +81,9 @@ impl Drawing {
         output::write_file(file, &visible(picture))
     }
 
-    /// Writes the timeline of a plan to an SVG file, if requested, and returns the timeline as text for a terminal. The
-    /// text is empty without a plan, if it is not requested, or if the terminal is too small.
+    /// Writes the timeline of a plan to an SVG file, if requested, and returns it as text for a
+    /// terminal. The text is empty if it is not requested or cannot be drawn in the width of the
+    /// terminal.
     pub(super) fn draw(
         &self,
         mission: &Mission,

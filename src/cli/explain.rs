@@ -36,7 +36,6 @@ pub struct Arguments {
     time: TimeLimit,
 }
 
-/// Runs `metaplan explain` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     if let Some(name) = arguments.mission.to_str().filter(|name| codes::is_code(name))
         && !arguments.mission.exists()
@@ -61,8 +60,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     Ok(if complete { Exit::Done } else { Exit::NotProved })
 }
 
-/// Explains a design. Text output shows the reasons for its availability before planning, and the comparison with the
-/// best plan after planning; JSON is written at the end. Returns `true` if all plans in the answer are proved optimal.
+/// Explains a design. Text output shows the reasons for its availability before planning, and the
+/// plans after planning. Returns `true` if each plan is proved optimal, or proved not to exist.
 fn explain_design(
     mission: &Mission,
     why: Availability,
@@ -82,8 +81,8 @@ fn explain_design(
     Ok(explanation.complete)
 }
 
-/// Explains which changes of the situation lead to another plan. Returns `true` if the answer is complete, i.e. no
-/// limit was reached.
+/// Explains which changes of the situation lead to another plan. Returns `true` if no limit was
+/// reached.
 fn explain_plan(mission: &Mission, limits: &Limits, common: &Common) -> Result<bool, Failure> {
     let changes = planning(common, limits, |hear| smallest_changes(mission, limits, hear))?;
     match common.format {
@@ -154,7 +153,7 @@ fn cost_text(answer: &BestPlan, best: &BestPlan) -> String {
     }
 }
 
-/// Formats a change of a value or of a component's status. `about` marks the bound as approximate.
+/// `about` marks the bound as approximate.
 fn alteration_text(alteration: &Alteration, about: bool) -> String {
     let Alteration { name, from, to } = alteration;
     let now = from.as_ref().map(|from| format!(" (now {})", decimal(from))).unwrap_or_default();
@@ -186,8 +185,8 @@ fn why_text(why: &Availability) -> String {
     text
 }
 
-/// Formats the plans that explain a design: the best plan, the best plan with this design as the only one of its
-/// functions, and, if the best plan uses the design, the best plan without it. Changes of the design's availability
+/// Formats the best plan, the best plan with this design as the only one of its functions, and, if
+/// the best plan uses the design, the best plan without it. Changes of the design's availability
 /// follow.
 fn design_text(found: &DesignExplanation) -> String {
     let DesignExplanation { availability, best, .. } = found;

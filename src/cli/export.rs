@@ -60,7 +60,6 @@ enum Setting {
     Published,
 }
 
-/// Runs `metaplan export` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let _guard = arguments.time.guard(common)?;
     let Setup { mission, roles, .. } = arguments.situation.setup(&arguments.inputs, common)?;
@@ -85,8 +84,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-/// Writes the co-adaptation process (Markov decision process) of a mission as a PRISM or JANI model, with all
-/// its uncertain parts or in the published setting.
+/// Writes the Markov decision process of a mission as a PRISM or JANI model.
 fn process(
     arguments: &Arguments,
     common: &Common,

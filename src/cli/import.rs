@@ -90,7 +90,6 @@ fn two(text: &str) -> Result<(String, String), String> {
     Ok((pair.0.trim().to_owned(), pair.1.trim().to_owned()))
 }
 
-/// Runs `metaplan import` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let Form::CamaraMap(map) = &arguments.what;
     let is_name = !map.name.is_empty() && map.name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');

@@ -44,7 +44,6 @@ impl From<Start> for Template {
     }
 }
 
-/// Runs `metaplan init` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let (directory, template) = (arguments.directory.as_path(), Template::from(arguments.from));
     let path = directory.display().to_string();

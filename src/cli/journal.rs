@@ -43,7 +43,6 @@ enum Operation {
     },
 }
 
-/// Runs `metaplan journal` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let _guard = arguments.time.guard(common)?;
     let (Operation::Check { directory, .. } | Operation::Show { directory }) = &arguments.what;

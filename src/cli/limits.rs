@@ -1,12 +1,14 @@
-//! Limits on time and memory, and signals, from the first file read to the last proof.
+//! Limits on time and memory, and signals.
 //!
-//! While a mission is read and reasoned about, there is no answer to save. So a signal ends the program at once, and a
-//! separate thread ends it at the time limit, unless an answer is being written. Commands that do not plan need nothing
-//! else. In commands that plan, the planner handles the first signal after the mission has been read, and returns the
-//! best plan found. A second signal ends the program at once.
+//! While a mission is read and reasoned about, there is no answer to save. So a signal ends the
+//! program at once, and a separate thread ends it at a limit, unless an answer is being written.
+//! Commands that do not plan need nothing else. In commands that plan, the planner handles the
+//! first signal after the mission has been read, and returns the best plan found. A second signal
+//! ends the program at once.
 //!
-//! The loops of the planner, of the validator and of the later stages poll the limits. If a loop does not, the separate
-//! thread ends the program a tenth of the limit later, unless an answer is being shown.
+//! The loops of the planner, of the validator and of the later stages poll the limits. If a loop
+//! does not, the separate thread ends the program about a tenth of the limit later, unless an
+//! answer is being written.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -23,8 +25,7 @@ use crate::cli::values::seconds;
 
 const INTERVAL: Duration = Duration::from_millis(10);
 
-/// Time that is added to 1.1 times the time limit. After that, a command that has not begun to write an answer is
-/// ended.
+/// Time that is added to 1.1 times the time limit (see [`Deadline`]).
 const GRACE: Duration = Duration::from_millis(150);
 
 /// The option `--time-limit` of commands that have nothing to show before their end, and of those that show what they have.
@@ -56,10 +57,8 @@ pub(super) struct Guard {
 }
 
 impl Guard {
-    /// Starts to measure time and memory.
-    ///
-    /// # Errors
-    /// There is a memory limit, but the platform does not report the memory of the process.
+    /// Starts to measure time and memory. Returns an error if memory is to be limited and the
+    /// platform does not report the memory of the process.
     pub(super) fn new(time: Option<Duration>, memory: Option<u64>, common: &Common) -> Result<Self, Failure> {
         let mut limits = Limits::none();
         if let Some(time) = time {
@@ -139,8 +138,8 @@ impl Deadline {
     }
 }
 
-/// Returns the processor time of this process since its start, in steps of 10 ms. Returns `None` on platforms without
-/// `/proc/self/stat`, i.e. other than Linux.
+/// Returns the processor time of this process since its start, in steps of 10 ms. Returns `None`
+/// without `/proc/self/stat`.
 fn processor_time() -> Option<Duration> {
     let text = std::fs::read_to_string("/proc/self/stat").ok()?;
     // The name of the program is in parentheses and may contain any characters.
@@ -151,9 +150,9 @@ fn processor_time() -> Option<Duration> {
     Some(Duration::from_millis(user.saturating_add(system).saturating_mul(10)))
 }
 
-/// Starts a thread that ends the program if it does not stop at a limit by itself. Reading does not poll the limits:
-/// the thread ends the program when a limit is reached. All later stages should poll the limits. In case a loop does
-/// not (a bug), the thread ends the program about a tenth of the limit later.
+/// Starts a thread that ends the program if it does not stop at a limit by itself. Reading does not
+/// poll the limits, so the thread ends the program when a limit is reached. All later stages should
+/// poll the limits. If a loop does not (a bug), the thread ends the program at the deadline `late`.
 fn give_up_late(limits: Limits, has_read: Arc<AtomicBool>, late: Deadline, common: Common) {
     std::thread::spawn(move || {
         while !has_read.load(Ordering::Relaxed) && !limits.reached() {

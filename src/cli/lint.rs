@@ -24,7 +24,6 @@ pub struct Arguments {
     time: TimeLimit,
 }
 
-/// Runs `metaplan lint` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let _guard = arguments.time.guard(common)?;
     let messages = match arguments.situation.setup(&arguments.inputs, common) {

@@ -152,8 +152,8 @@ pub fn main() -> ExitCode {
     ExitCode::from(exit as u8)
 }
 
-/// Runs the command, and writes a trace if requested. If the command succeeds but its trace cannot be written,
-/// returns the error about the trace.
+/// Runs the command, and writes a trace if requested. A trace that cannot be written is an error
+/// only if the command succeeds.
 fn traced(cli: &Cli) -> Result<Exit, Failure> {
     let trace = cli.common.trace.as_deref().map(Trace::begin).transpose()?;
     let outcome = run(cli);
@@ -163,8 +163,8 @@ fn traced(cli: &Cli) -> Result<Exit, Failure> {
     }
 }
 
-/// Parses the command line. `--color` also applies to messages about faulty arguments, even if these arguments
-/// precede the option.
+/// `--color` also applies to messages about faulty arguments, even if these arguments precede the
+/// option.
 fn parse() -> Cli {
     let words: Vec<String> = std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
     let beside = words.iter().zip(words.iter().skip(1)).filter(|(word, _)| *word == "--color");

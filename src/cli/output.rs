@@ -22,10 +22,8 @@ static ANSWER_LOST: AtomicBool = AtomicBool::new(false);
 /// Set once an answer, a part of one, or a file is being written.
 static HAS_BEGUN: AtomicBool = AtomicBool::new(false);
 
-/// Maximum number of messages of a failure shown as text; further messages are only counted.
 const MESSAGE_LIMIT: usize = 20;
 
-/// Maximum number of warnings shown per code; further warnings are only counted.
 const KIND_LIMIT: usize = 10;
 
 /// Writes an answer for people to standard output, with control characters made visible by
@@ -49,7 +47,6 @@ pub fn document(text: &str) {
     }
 }
 
-/// Returns `true` if an answer could not be written for another reason than a closed pipe.
 pub fn answer_lost() -> bool {
     ANSWER_LOST.load(Ordering::Relaxed)
 }
@@ -60,7 +57,6 @@ pub fn has_begun() -> bool {
     HAS_BEGUN.load(Ordering::Relaxed)
 }
 
-/// Writes an answer for programs to standard output, as indented JSON.
 pub fn json_answer(answer: &impl Serialize) {
     document(&visible_json(&pretty(answer)));
 }
@@ -70,7 +66,6 @@ pub fn line(answer: &impl Serialize) -> String {
     serde_json::to_string(answer).unwrap_or_default() + "\n"
 }
 
-/// Writes a text for people to standard error.
 pub fn note(text: &str) {
     let _ = std::io::stderr().write_all(visible(text).as_bytes());
 }
@@ -80,8 +75,8 @@ pub fn shown(message: &Message, colors: bool) -> Cow<'_, str> {
     if colors { message.colored().into() } else { visible(message.text()) }
 }
 
-/// Writes messages to standard error. `--quiet` suppresses warnings. At most [`KIND_LIMIT`] warnings per code are
-/// written; further ones are counted.
+/// Writes messages to standard error. `--quiet` suppresses warnings. At most [`KIND_LIMIT`]
+/// warnings per code are written; further ones are only counted.
 pub fn warnings<'a>(common: &Common, messages: impl IntoIterator<Item = &'a Message>) {
     let mut stderr = std::io::stderr().lock();
     let colors = common.colors(&stderr);
@@ -99,8 +94,9 @@ pub fn warnings<'a>(common: &Common, messages: impl IntoIterator<Item = &'a Mess
     }
 }
 
-/// Reports errors: text on standard error, or a JSON object as the answer. As text, at most [`MESSAGE_LIMIT`] messages
-/// are written; further ones are counted. `--quiet` suppresses warnings in the text.
+/// Reports errors: text on standard error, or a JSON object as the answer. As text, at most
+/// [`MESSAGE_LIMIT`] messages are written; further ones are only counted. `--quiet` suppresses
+/// warnings in the text.
 pub fn failure(common: &Common, messages: &[Message]) {
     if common.format == Format::Json {
         json_answer(&ErrorAnswer::new(messages));
@@ -134,7 +130,6 @@ pub fn file_named(output: Option<&PathBuf>) -> Option<&Path> {
     output.map(PathBuf::as_path).filter(|path| !file::is_stdout(path))
 }
 
-/// Creates a directory for several files, with its parent directories.
 pub fn make_directory(path: &Path) -> Result<(), Failure> {
     require_directory(path)?;
     std::fs::create_dir_all(path).map_err(|error| {
@@ -143,7 +138,6 @@ pub fn make_directory(path: &Path) -> Result<(), Failure> {
     })
 }
 
-/// Rejects `-`, which is not a directory.
 pub fn require_directory(path: &Path) -> Result<(), Failure> {
     if path.as_os_str() != "-" {
         return Ok(());
@@ -164,13 +158,11 @@ pub fn columns() -> Option<u16> {
     requested.or_else(of_terminal).filter(|columns| *columns > 0)
 }
 
-/// Formats a table without borders for standard output. Cells of a table that is too wide are
-/// wrapped.
 pub fn table(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
     table_within(columns(), header, rows)
 }
 
-/// Formats a table without borders, at most `columns` columns wide unless words are longer; `None` is no limit.
+/// Formats a table without borders, at most `columns` columns wide; `None` is no limit.
 pub fn table_within(
     columns: Option<u16>,
     header: &[&str],
@@ -221,13 +213,12 @@ fn keep_words(table: &mut Table, columns: u16) {
     }
 }
 
-/// Formats an exact number as decimal text. A fraction without a finite decimal expansion is
-/// rounded.
+/// Formats an exact number as decimal text, rounded to at most 34 fractional digits.
 pub fn decimal(value: &num_rational::BigRational) -> String {
     rules::Decimal::from_rational(value).to_string()
 }
 
-/// Formats a count with its noun, in the singular or in the plural: `1 conflict`, `2 conflicts`.
+/// Formats a count with its noun, such as `1 conflict` or `2 conflicts`.
 pub fn counted<N: Copy + std::fmt::Display + PartialEq + From<u8>>(count: N, noun: &str) -> String {
     let ending = if count == N::from(1) { "" } else { "s" };
     format!("{count} {noun}{ending}")

@@ -180,7 +180,6 @@ impl Arguments {
         Ok(())
     }
 
-    /// Returns the file for the answer, or `None` for standard output.
     fn file(&self) -> Option<&Path> {
         output::file_named(self.output.as_ref())
     }
@@ -195,7 +194,7 @@ impl Arguments {
         }
     }
 
-    /// Returns the number of columns for tables. `None` for files, which have no width, or if the width is unknown.
+    /// Returns the number of columns for tables. `None` for files, or if the width is unknown.
     fn columns(&self) -> Option<u16> {
         if self.file().is_some() { None } else { output::columns() }
     }
@@ -206,7 +205,6 @@ impl Arguments {
     }
 }
 
-/// Runs `metaplan plan` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let started = Instant::now();
     let guard = Guard::new(arguments.time_limit, arguments.memory_limit, common)?;
@@ -320,8 +318,8 @@ fn beside(planned: &Planned<'_>, arguments: &Arguments, common: &Common) -> Stri
     }
 }
 
-/// Returns the text below the verdict: statistics (with `--verbose`), values of objectives, makespan, and alternatives,
-/// or else blocking designs and missing values.
+/// Returns the text below the verdict: statistics (with `--verbose`), values of objectives and
+/// makespan. Alternatives follow or, without alternatives, blocking designs and missing values.
 fn further(planned: &Planned<'_>, solution: &Solution, (arguments, common): (&Arguments, &Common)) -> String {
     let statistics =
         if common.verbose { statistics_text(solution, &planned.preparation) } else { String::new() };
@@ -362,7 +360,6 @@ fn show(
 
 const MISSING_SHOWN: usize = 10;
 
-/// Lists values of numeric functions that are missing in the mission, one per line and at most [`MISSING_SHOWN`].
 fn missing_text(missing: &[MissingValue]) -> String {
     let line = |value: &MissingValue| {
         let (function, actions, file) = (&value.function, value.needed_by.join(", "), &value.file);

@@ -20,7 +20,6 @@ pub(super) enum PlanFormat {
     Table,
 }
 
-/// Formats the steps of a plan as a table, at most `columns` columns wide; `None` is no limit.
 pub(super) fn steps_text(plan: &Plan, columns: Option<u16>) -> String {
     let rows = plan.steps.iter().enumerate().map(|(index, step)| {
         let configuration: Vec<_> =

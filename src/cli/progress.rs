@@ -12,7 +12,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use crate::cli::common::Common;
 use crate::cli::output;
 
-/// Delay before the first line if standard error is not a terminal, so that short commands write none.
+/// A command that ends within this delay prints no progress, unless standard error is a terminal.
 const INITIAL_DELAY: Duration = Duration::from_secs(3);
 
 const INTERVAL: Duration = Duration::from_secs(5);

@@ -54,7 +54,6 @@ pub struct Arguments {
     time: TimeLimit,
 }
 
-/// Runs `metaplan reason` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let _guard = arguments.time.guard(common)?;
     let mut knowledge = during("reasoning", common, || read(arguments))?;

@@ -165,7 +165,6 @@ fn words(text: &str) -> Vec<&str> {
     words
 }
 
-/// Parses an assertion `SUBJECT PROPERTY VALUE` or `SUBJECT a CLASS` as a fact.
 fn read(knowledge: &mut Knowledge, assertion: &str) -> Result<Fact, Message> {
     let words = words(assertion.trim().trim_end_matches(" ."));
     let [subject, predicate, object] = words[..] else {

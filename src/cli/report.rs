@@ -56,7 +56,6 @@ pub struct Arguments {
     output: Option<PathBuf>,
 }
 
-/// Runs `metaplan report` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     if common.format != Format::Text {
         let text = "`report` writes HTML; the same data come as JSON from `plan --format json`";
@@ -126,8 +125,8 @@ struct Answer {
 }
 
 impl Answer {
-    /// Plans a mission, and executes the plan, if there is one, with the validator. Actions may overlap if
-    /// `separation` is given, the minimum time between interfering starts and ends of actions.
+    /// Plans a mission. Actions may overlap if `separation` is given, the minimum time between
+    /// interfering starts and ends of actions.
     fn of(
         mission: &Mission,
         positions: &Positions,

@@ -66,7 +66,6 @@ enum Fsync {
     Never,
 }
 
-/// Runs `metaplan run` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     if arguments.configure {
         return keep(arguments, common);
@@ -112,7 +111,7 @@ fn journal(
     Ok(Some((journal, recovery)))
 }
 
-/// Closes the recording and the web page after the loop has ended with `result`, also after a failure.
+/// Closes the recording and the web page, also if the loop has failed.
 fn ended(result: Result<(), Failure>, outlet: &Outlet) -> Result<Exit, Failure> {
     let closed = outlet.close();
     result?;
@@ -140,7 +139,6 @@ fn drive(
     if events.is_file() { session.replay(events) } else { session.live(events) }
 }
 
-/// Runs the configuration loop, which chooses designs without a task plan.
 fn keep(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let knowledge = arguments.situation.knowledge(&arguments.inputs, common)?;
     output::warnings(common, knowledge.warnings());
@@ -161,8 +159,7 @@ fn adaptation(file: Option<&Path>, knowledge: &Knowledge) -> Result<Settings, Fa
     Ok(Settings::read(file, Some(knowledge))?)
 }
 
-/// Prints the ready line, and then runs the configuration loop on all events until the input ends or the reader of the
-/// answers has closed the pipe.
+/// Runs the configuration loop as [`drive`] runs the adaptation loop.
 fn keep_going(
     common: &Common,
     keeper: Keeper,
@@ -178,7 +175,7 @@ fn keep_going(
     if events.is_file() { session.replay(events) } else { session.live(events) }
 }
 
-/// Time of planning before the first heartbeat (line with the progress), and between two heartbeats.
+/// Time of planning before the first progress line, and between two.
 const HEARTBEAT: Duration = Duration::from_secs(1);
 
 /// Starts a thread that prints the progress every second while a plan is being computed. The thread runs until the

@@ -1,5 +1,6 @@
-//! Session of the configuration loop: connects the loop with its input and output, in two modes: for a file, and for
-//! lines as they arrive. Designs are chosen without planning, so each line is answered completely in both modes.
+//! Session of the configuration loop: connects the loop with its input and output, in two modes:
+//! for a file, and for lines as they arrive. Each line is answered completely in both modes,
+//! because designs are chosen without planning.
 
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::time::{Duration, Instant};
@@ -47,7 +48,7 @@ impl<'a> KeeperSession<'a> {
         Ok(())
     }
 
-    /// Answers lines as they arrive, and reacts when the due time of a filter passes.
+    /// Answers lines as they arrive, and reacts when a filter becomes due.
     pub(super) fn live(mut self, events: Lines) -> Result<(), Failure> {
         let (sender, inputs) = sync_channel(MAX_WAITING);
         read(events, self.common.clone(), sender);
@@ -89,15 +90,15 @@ impl<'a> KeeperSession<'a> {
         flow(self.outlet.answer(self.keeper.lines(), &answers, read))
     }
 
-    /// Returns the time until a filter changes a belief or reports a silent sensor without a further line, for
-    /// example after a debounce time. Returns `None` if no filter does, or if lines have times.
+    /// Returns the time until a filter is due, for example after a debounce time. Returns `None` if
+    /// no filter is, or if lines have times.
     fn pause(&mut self) -> Option<Duration> {
         let due = self.keeper.due().filter(|_| !self.has_times)?;
         Some(due.saturating_sub(self.begun + self.clock.now()).max(MIN_PAUSE))
     }
 
-    /// Handles the due time of a filter, if it has passed. The answers are written with the number of the last input
-    /// line, because time has no line of its own.
+    /// Handles the due time of a filter, if it has passed. The answers have the number of the last
+    /// input line, because time has no line of its own.
     fn elapse(&mut self) -> Result<Flow, Failure> {
         let now = self.begun + self.clock.now();
         if self.keeper.due().is_none_or(|due| due > now) {
@@ -116,7 +117,7 @@ impl<'a> KeeperSession<'a> {
         warn_if_unrecorded(self.common, of_loop);
     }
 
-    /// Handles a line or a timer. With a journal, records the line before it is handled.
+    /// With a journal, records the line before it is handled.
     fn handle(
         &mut self,
         text: &str,

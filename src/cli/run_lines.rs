@@ -46,7 +46,6 @@ fn regular(path: &Path) -> io::Result<File> {
 }
 
 impl Lines {
-    /// Opens a file, or standard input for `-`.
     pub(super) fn open(path: &Path) -> Result<Self, Message> {
         let name = path.display().to_string();
         let (is_file, reader): (bool, Reader) = if name == "-" {

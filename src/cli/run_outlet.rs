@@ -47,7 +47,6 @@ enum Recorded {
 }
 
 impl Outlets {
-    /// Returns the painter of plan pictures for the web page, or `None` if no page is requested.
     pub(super) fn painter(&self, setup: &Setup) -> Result<Option<Painter>, Errors> {
         let positions = self.serve.as_ref().map(|_| setup.positions()).transpose()?;
         Ok(positions.map(|positions| Painter::new(&setup.mission, positions)))
@@ -64,7 +63,6 @@ pub(super) struct Outlet {
 }
 
 impl Outlet {
-    /// Opens the requested destinations, and prints the address of the page to standard error.
     pub(super) fn open(wanted: &Outlets, mission: &str, painter: Option<Painter>) -> Result<Self, Message> {
         let live = match &wanted.serve {
             None => None,
@@ -80,8 +78,8 @@ impl Outlet {
         Ok(Self { recorder, is_told: Arc::default(), live })
     }
 
-    /// Adds a line of input to the recording and the web page, before the line is handled. `line` is its number, and
-    /// `now` the time since the start of the mission.
+    /// Adds a line of input to the recording and the web page, before the line is handled. `now` is
+    /// the time since the start of the mission.
     pub(super) fn heard(&self, line: u64, now: Duration, text: &str) {
         if let Some((recorder, _)) = &self.recorder {
             recorder.event(line, now, text);
@@ -130,8 +128,8 @@ impl Outlet {
         Ok(())
     }
 
-    /// Writes answers to an input line, each with the number of that line. Does not acknowledge the line, because more
-    /// answers may follow. Writes nothing if there are no answers.
+    /// Writes answers to an input line, each with the number of that line. Does not acknowledge the
+    /// line, because more answers may follow.
     pub(super) fn answer_so_far(&self, line: u64, answers: &[impl Serialize]) -> io::Result<()> {
         if answers.is_empty() {
             return Ok(());
@@ -165,7 +163,7 @@ impl Outlet {
     }
 }
 
-/// Returns `true` if the reader of the answers has closed the pipe. Other errors in writing are returned as errors.
+/// Returns `true` if the reader of the answers has closed the pipe. Any other failure is an error.
 pub(super) fn is_over(written: io::Result<()>) -> Result<bool, Message> {
     match written {
         Ok(()) => Ok(false),
@@ -186,8 +184,8 @@ pub(super) fn warn_if_unrecorded<'a>(common: &Common, answers: impl IntoIterator
     }
 }
 
-/// Starts a recording, which is also completed if a signal ends the program. Returns the recorder and the name of its
-/// file.
+/// Starts a recording, which is also completed after Ctrl-C or a termination signal. Returns the
+/// recorder and the name of its file.
 fn record(path: &Path, events: Recorded, mission: &str) -> Result<(Recorder, String), Message> {
     let form = match events {
         Recorded::Json => Form::Json,

@@ -1,9 +1,12 @@
 //! Session of `metaplan run`: connects the adaptation loop with its input and output, in two modes.
 //!
-//! If all input is available, as in a file, each line is answered completely before the next one is read, so
-//! the same lines give the same answers. If lines arrive as they happen, from a pipe or a terminal, the loop
-//! reacts to all waiting lines before it deliberates. Plans are then computed on another thread while the loop
-//! keeps reacting. A line that changes the planning problem cancels the search, but only a few times in a row.
+//! If all input is available, as in a file, each line is answered completely before the next one is
+//! read, so the same lines give the same answers.
+//!
+//! If lines arrive from a pipe or a terminal, the loop reacts to all waiting lines before it
+//! deliberates. Only a line about an action that was not requested yet waits for the deliberation.
+//! Plans are computed on another thread while the loop keeps reacting. A line that changes the
+//! planning problem cancels the search, but only a few times in a row.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -19,14 +22,14 @@ use crate::cli::common::{Common, Failure};
 use crate::cli::run_lines::{Line, Lines};
 use crate::cli::run_outlet::{Outlet, is_over, unwritten, warn_if_unrecorded};
 
-/// Capacity of the channel of inputs. Also the length up to which `gather` fills the queue of waiting inputs.
+/// Capacity of the channel of inputs, and maximum length to which `gather` fills the queue of
+/// waiting inputs.
 pub(super) const MAX_WAITING: usize = 1024;
 
 /// Maximum number of consecutive cancelled searches. The next search runs to its end; otherwise
 /// input that changes all the time would prevent every plan.
 const MAX_STOPPED: u32 = 3;
 
-/// Minimum pause before the loop reacts to the passing of time.
 pub(super) const MIN_PAUSE: Duration = Duration::from_millis(1);
 
 /// Input of a session: a line with the time at which it was read, plans from another thread, the end of the lines, or
@@ -62,11 +65,11 @@ pub(super) struct Session<'a> {
     begun: Duration,
     /// Number of the current line, shared with the thread that reports the progress of planning.
     line: Arc<AtomicU64>,
-    /// Number of the last line and the time at which it was read, while further answers to the line are possible.
+    /// Number of the last line and the time at which it was read, until the line is acknowledged.
     open: Option<(u64, Instant)>,
     thinking: Option<PlanSearch>,
     stopped: u32,
-    /// `true` if a line had a time of its own: then time advances with lines only.
+    /// `true` if a line had a time of its own. Time then advances with lines only.
     has_times: bool,
 }
 
@@ -190,8 +193,9 @@ impl<'a> Session<'a> {
         now
     }
 
-    /// Reacts to a line. Also deliberates if no further line is waiting (`is_last`), the reaction has no effects, and
-    /// no search is necessary or running. A line of a recording (MCAP) is answered completely.
+    /// Reacts to a line. Also deliberates if no further line is waiting (`is_last`), the reaction
+    /// has no effects, and no search is necessary or running. A line of a recording is answered
+    /// completely.
     fn line(&mut self, line: &Line, read: Instant, is_last: bool) -> Result<Flow, Failure> {
         if self.close()? == Flow::Over {
             return Ok(Flow::Over);
@@ -253,9 +257,9 @@ impl<'a> Session<'a> {
         self.say(&answers)
     }
 
-    /// Returns `true` if deliberation is pending, no action is under way (it might need a reaction), and the
-    /// line is about an action or effect that was not requested yet. Such lines were written for answers that
-    /// the loop has not given yet, as in a file that is piped.
+    /// Returns `true` if deliberation is pending, no action is under way, and the line is about an
+    /// action or effect that was not requested yet. Such a line was written for an answer that the
+    /// loop has not given yet, as in a file that is piped.
     fn is_early(&self, line: &Line) -> bool {
         let is_idle = self.control.has_agenda() && self.control.beliefs().running().is_none();
         is_idle && self.control.is_ahead(&Observation::parse(&line.text))
@@ -365,7 +369,7 @@ impl<'a> Session<'a> {
         Ok(flow)
     }
 
-    /// Writes the acknowledgement of the last line, unless it was written before.
+    /// Acknowledges the last line, unless this was done before.
     fn close(&mut self) -> Result<Flow, Failure> {
         match self.open.take() {
             None => Ok(Flow::GoesOn),
@@ -374,12 +378,10 @@ impl<'a> Session<'a> {
     }
 }
 
-/// Converts the result of writing answers. Returns [`Flow::Over`] if the reader of the answers has closed the pipe.
 pub(super) fn flow(written: std::io::Result<()>) -> Result<Flow, Failure> {
     Ok(if is_over(written)? { Flow::Over } else { Flow::GoesOn })
 }
 
-/// Moves all received inputs to the queue `waiting`, up to [`MAX_WAITING`].
 fn gather(inputs: &Receiver<Input>, waiting: &mut VecDeque<Input>) {
     while waiting.len() < MAX_WAITING {
         match inputs.try_recv() {

@@ -16,7 +16,6 @@ pub struct Arguments {
     name: Option<String>,
 }
 
-/// Runs `metaplan schema` and returns the exit status of the program.
 pub fn run(arguments: &Arguments) -> Result<Exit, Failure> {
     let Some(name) = &arguments.name else {
         let rows = FORMATS.iter().map(|(format, about, _)| vec![(*format).to_owned(), (*about).to_owned()]);

@@ -80,7 +80,6 @@ impl Who {
     }
 }
 
-/// Runs `metaplan simulate` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let guard = Guard::new(arguments.time_limit, None, common)?;
     let mut experiment = experiment(&arguments.mission, &arguments.scenario, common)?;
@@ -132,28 +131,25 @@ fn experiment(mission: &Path, scenario: &str, common: &Common) -> Result<Experim
     during("reading", common, read).map_err(scenario_failure)
 }
 
-/// Returns a text that identifies the mission and the scenario of a command line.
 pub fn subject(arguments: &Arguments) -> String {
     format!("{} {}", arguments.mission.display(), arguments.scenario)
 }
 
-/// Checks whether the scenario of a command line can be simulated. Paths are relative to `directory`.
-///
-/// # Errors
-/// All mistakes in the mission's files, or in the scenario.
+/// Returns all mistakes in the mission's files or in the scenario. Paths are relative to
+/// `directory`.
 pub fn check(arguments: &Arguments, directory: &Path, common: &Common) -> Result<(), Failure> {
     experiment(&directory.join(&arguments.mission), &arguments.scenario, common).map(drop)
 }
 
-/// Results of the simulated missions, by strategy and seed, and a log of the observations and
-/// answers of the first mission of each strategy.
+/// Results of the simulated missions, by strategy and seed, and a log of the first mission of each
+/// strategy.
 struct SimulationResults {
     runs: Vec<Run>,
     log: String,
 }
 
-/// Simulates all runs, or those until a limit is reached. Each seed is simulated with all strategies before the next
-/// seed, so that partial results are comparable.
+/// Simulates missions until a limit is reached. Each seed is simulated with all strategies before
+/// the next seed, so that partial results are comparable.
 fn play(
     experiment: &Experiment,
     strategies: &[Strategy],

@@ -79,15 +79,14 @@ impl Situation {
         Self { knowledge, rules, imports, names, scenario, set, fail }
     }
 
-    /// Returns these options without scenario, set values and failed components. The result selects the mission
-    /// as its files define it. Returns `None` if the options contain no such changes.
+    /// Returns these options without scenario, set values and failed components. Returns `None` if
+    /// they contain no such changes.
     pub(super) fn before(&self) -> Option<Self> {
         let (scenario, set, fail) = (None, Vec::new(), Vec::new());
         let differs = self.scenario.is_some() || !self.set.is_empty() || !self.fail.is_empty();
         differs.then(|| Self { scenario, set, fail, ..self.clone() })
     }
 
-    /// Returns short descriptions of the differences from the mission's files.
     pub(super) fn words(&self) -> Vec<String> {
         let scenario = self.scenario.iter().map(|name| format!("scenario {name}"));
         let fail = self.fail.iter().map(|component| format!("{component} has failed"));
@@ -95,7 +94,7 @@ impl Situation {
         scenario.chain(fail).chain(set).collect()
     }
 
-    /// Reads a knowledge base from documents, without a mission, and applies the options `--set` and `--fail`.
+    /// Reads a knowledge base without a mission, and applies `--set` and `--fail`.
     pub(super) fn knowledge(&self, documents: &[PathBuf], common: &Common) -> Result<Knowledge, Failure> {
         if !self.knowledge.is_empty() || !self.names.is_empty() || self.scenario.is_some() {
             let text = "with `--configure` the knowledge bases are the arguments, and there is no `--kb`, `--name` or `--scenario`";
@@ -201,7 +200,6 @@ pub(super) fn knowledge(
     if wrong.is_empty() { Ok(knowledge) } else { Err(Failure { exit: Exit::Usage, messages: wrong.into() }) }
 }
 
-/// Returns an error if the knowledge base is inconsistent, because then every statement follows from it.
 pub(super) fn consistent(knowledge: Option<&Knowledge>) -> Result<(), Failure> {
     planner::consistent(knowledge).map_err(|messages| Failure { exit: Exit::Inconsistent, messages })
 }

@@ -48,7 +48,7 @@ pub struct Arguments {
 /// Parser of a command line. Returns the arguments if the command is `simulate`, and `None` for other commands.
 pub type Read<'a> = dyn Fn(Vec<String>) -> Result<Option<simulate::Arguments>, clap::Error> + 'a;
 
-/// Runs `metaplan sweep` and returns the exit status of the program. `read` parses the command lines of the study.
+/// `read` parses the command lines of the study.
 pub fn run(arguments: &Arguments, common: &Common, read: &Read<'_>) -> Result<Exit, Failure> {
     output::require_directory(&arguments.output)?;
     let guard = Guard::new(arguments.time_limit, None, common)?;
@@ -94,11 +94,8 @@ fn sweep(arguments: &Arguments, study: &Study, guard: Guard, common: &Common) ->
     Ok(exit)
 }
 
-/// Checks the commands of a sample of a study's runs (see [`Study::samples`]): their options, and the scenarios that
-/// they simulate. Scenarios of a study that generates files are not checked.
-///
-/// # Errors
-/// All mistakes in the commands, without duplicates.
+/// Checks the commands of a sample of a study's runs (see [`Study::samples`]): their options, and
+/// the scenarios that they simulate. Scenarios of a study that generates files are not checked.
 fn check(study: &Study, common: &Common, read: &Read<'_>) -> Result<(), Failure> {
     let (mut mistakes, mut simulated): (Vec<Message>, BTreeSet<String>) = (Vec::new(), BTreeSet::new());
     for (path, run) in study.samples() {
@@ -161,8 +158,7 @@ fn merge(arguments: &Arguments, study: &Study, common: &Common) -> Result<Exit, 
     Ok(say(&SweepAnswer::new(&lines, 0..study.len(), &groups), &groups, common))
 }
 
-/// Writes the answer. Returns [`Exit::NotProved`] if runs are missing or have no answer, and [`Exit::Done`]
-/// otherwise.
+/// Writes the answer. Returns [`Exit::NotProved`] if runs are missing or have no answer.
 fn say(answer: &SweepAnswer, groups: &[Group], common: &Common) -> Exit {
     if common.format == Format::Json {
         output::json_answer(answer);

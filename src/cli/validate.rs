@@ -38,7 +38,6 @@ pub struct Arguments {
     time: TimeLimit,
 }
 
-/// Runs `metaplan validate` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let (plan, mission) = match arguments.inputs.split_last() {
         Some((plan, mission)) if !mission.is_empty() => (plan, mission),

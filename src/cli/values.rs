@@ -35,8 +35,7 @@ pub(super) fn time(text: &str) -> Result<BigRational, String> {
         .ok_or_else(|| format!("`{text}` is not a time such as 0.001"))
 }
 
-/// Converts a JSON number to an exact rational number. Returns `None` for other JSON values and for numbers that are too
-/// long.
+/// Returns `None` for values that are not numbers, and for numbers that are too long.
 pub(super) fn decimal(value: &Value) -> Option<BigRational> {
     exact(&value.as_number()?.to_string())
 }

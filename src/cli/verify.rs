@@ -45,7 +45,6 @@ pub struct Arguments {
     proved: Option<Option<PathBuf>>,
 }
 
-/// Runs `metaplan verify` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let format = common.format;
     let checker = match &arguments.proved {
@@ -81,7 +80,6 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     Ok(show(&watch.end(report), theorem.as_ref(), format))
 }
 
-/// Prints the results of the checkers and returns the exit status.
 fn show(report: &Verification, theorem: Option<&Theorem>, format: Format) -> Exit {
     output::document(&match format {
         Format::Json => visible_json(&pretty(&VerifyAnswer::new(report, theorem))).into_owned(),
