@@ -132,9 +132,9 @@ impl<'a> CompareAnswer<'a> {
 /// One comparison.
 #[derive(Debug, Clone, serde::Serialize, JsonSchema)]
 pub struct ComparisonAnswer {
-    /// Start of the mission; null for a single comparison.
+    /// Start of the mission; null for the mission's own start and goal.
     start: Option<String>,
-    /// Goal of the mission; null for a single comparison.
+    /// Goal of the mission; null for the mission's own start and goal.
     goal: Option<String>,
     /// The compared plans and policies, each with `kind` (`a` to `f`), `name` and the measures. A
     /// measure is null if it is infinite or undefined.

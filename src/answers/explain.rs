@@ -25,7 +25,7 @@ pub struct ChangesAnswer<'a> {
     best: BestPart<'a>,
     /// The smallest changes that lead to another plan.
     changes: Vec<ChangePart<'a>>,
-    /// Whether all changes are listed; if not, a limit was reached.
+    /// Whether all values were examined; if not, a limit was reached.
     complete: bool,
 }
 
@@ -57,11 +57,12 @@ pub struct DesignAnswer<'a> {
     changes: Vec<ChangePart<'a>>,
     /// Failed components and measurements that contribute to ruling the design out.
     causes: Vec<CausePart<'a>>,
-    /// If the design is unavailable: sets of changes that make it available; some are missing if there are many.
-    /// Otherwise: single changes, each of which makes it unavailable. The changes of a set suffice together, and
-    /// none of them was found to be superfluous.
+    /// If the design is unavailable: sets of changes that make it available; some may be missing if
+    /// there are many. Otherwise: single changes, each of which makes it unavailable. The changes
+    /// of a set suffice together, and none of them was found to be superfluous.
     repairs: Vec<RepairPart<'a>>,
-    /// Whether all plans of this answer are proved optimal; if not, a limit was reached.
+    /// Whether each plan of this answer is proved optimal, or proved not to exist; if not, a limit
+    /// was reached or reasoning failed.
     complete: bool,
 }
 
@@ -98,7 +99,8 @@ struct ChangePart<'a> {
     /// Maximum error of the bound; null if it is exact.
     #[schemars(with = "Option<f64>")]
     within: Option<Value>,
-    /// Whether this change alone makes the design available, or unavailable.
+    /// Whether this change alone changes the availability of the design or, without a design, the
+    /// plan.
     suffices: bool,
     /// Best plan after this change.
     then: BestPart<'a>,
@@ -109,14 +111,14 @@ struct ChangePart<'a> {
 struct CausePart<'a> {
     #[serde(flatten)]
     alteration: AlterationPart<'a>,
-    /// Rules and facts that rule the design out even if everything else is repaired.
+    /// Rules and facts that rule the design out even after the other changes of a set in `repairs`.
     because: &'a [String],
 }
 
-/// Changes that are necessary together.
+/// A set of changes that together change the availability of the design.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct RepairPart<'a> {
-    /// The changes. All of them are necessary, and together they suffice.
+    /// The changes. Together they suffice, and none of them was found to be superfluous.
     changes: Vec<AlterationPart<'a>>,
     /// Best plan after these changes.
     then: BestPart<'a>,

@@ -17,7 +17,7 @@ pub struct LintAnswer<'a> {
     errors: usize,
     /// Number of warnings.
     warnings: usize,
-    /// Errors and warnings, in the order of the files.
+    /// Errors, then warnings, each in the order of the files.
     messages: &'a [Message],
 }
 

@@ -35,7 +35,8 @@ pub struct PlanAnswer {
     /// Bound on the metric of every plan: no plan has a better metric; null if unknown.
     #[schemars(with = "Option<f64>")]
     lower_bound: Option<Value>,
-    /// Number of steps up to which all plans were considered.
+    /// Number of steps up to which all plans were considered; for a proof by search, the number of
+    /// steps of the plan, or 0.
     horizon: usize,
     /// Proof of the status; null if it is not proved.
     proof: Option<ProofPart>,
@@ -51,7 +52,8 @@ pub struct PlanAnswer {
     /// With `--alternatives`, for an optimal plan: other optimal plans.
     #[serde(skip_serializing_if = "Option::is_none")]
     alternatives: Option<AlternativesPart>,
-    /// With `--concurrent`: end of the last action. The metric includes it; the `cost` of a step does not.
+    /// With `--concurrent`: end of the last action. The metric may include it; the `cost` of a step
+    /// does not.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<f64>")]
     makespan: Option<Value>,
@@ -90,7 +92,8 @@ pub struct ParetoAnswer {
     status: &'static str,
     /// The minimised objectives, as they were given.
     objectives: Vec<String>,
-    /// The Pareto-optimal plans, sorted from the best in the first objective.
+    /// The plans of the front, sorted from the best in the first objective. At a limit, the last
+    /// one may not be proved optimal.
     points: Vec<PlanAnswer>,
 }
 

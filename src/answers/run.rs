@@ -38,8 +38,6 @@ pub(super) struct RecoveryPart {
 }
 
 impl RecoveryPart {
-    /// Creates the state from the number of handled lines, the greatest sequence number `seq` of a line, the ranges
-    /// of skipped numbers, and the result of opening the journal.
     pub(super) fn new(lines: u64, seq: Option<u64>, missing: Vec<[u64; 2]>, recovery: &Recovery) -> Self {
         Self {
             resumed: recovery.replayed.is_some(),
@@ -77,7 +75,8 @@ pub struct PlanningLine {
 }
 
 impl PlanningLine {
-    /// Creates the line for planning that began `seconds` seconds ago because of input line `line`.
+    /// Creates the line. `seconds` is the duration of planning so far, `line` the number of the
+    /// last input line.
     pub fn new(planning: &Planning, seconds: u64, line: u64) -> Self {
         Self {
             answer: "planning",
@@ -89,7 +88,7 @@ impl PlanningLine {
     }
 }
 
-/// Answer with the number of the input line that caused it.
+/// Answer with the number of the last input line before it.
 #[derive(Debug, Clone, Serialize)]
 pub struct NumberedAnswer<'a, A> {
     #[serde(flatten)]
@@ -98,7 +97,7 @@ pub struct NumberedAnswer<'a, A> {
 }
 
 impl<'a, A> NumberedAnswer<'a, A> {
-    /// Answer caused by the input line with the number `line`.
+    /// Creates the answer; `line` is the number of the last input line.
     pub fn new(answer: &'a A, line: u64) -> Self {
         Self { answer, line }
     }
@@ -113,7 +112,8 @@ pub struct HandledLine {
 }
 
 impl HandledLine {
-    /// Acknowledgement of the input line with the number `line`, `microseconds` microseconds after it was read.
+    /// Creates the acknowledgement of the input line with the number `line`; handling it took
+    /// `microseconds`.
     pub fn new(line: u64, microseconds: u128) -> Self {
         Self { answer: "handled", line, microseconds }
     }

@@ -21,7 +21,8 @@ pub struct VerdictAnswer<'a> {
     /// Value of the metric after a valid plan; null without `:metric`, or if it is undefined.
     #[schemars(with = "Option<f64>")]
     metric: Option<Value>,
-    /// Sum of the durations, in the domain's time unit.
+    /// Sum of the durations; with `--concurrent`, the time of the last start or end of an action.
+    /// In the domain's time unit.
     #[schemars(with = "f64")]
     total_time: Value,
     /// Final value of each numeric function with its arguments.
