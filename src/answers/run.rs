@@ -75,7 +75,7 @@ pub struct PlanningLine {
 }
 
 impl PlanningLine {
-    /// Creates the line. `seconds` is the duration of planning so far, `line` the number of the
+    /// Creates the line. `seconds` is the duration of planning until now, `line` the number of the
     /// last input line.
     pub fn new(planning: &Planning, seconds: u64, line: u64) -> Self {
         Self {
