@@ -9,7 +9,6 @@ use crate::message::Message;
 use crate::mission::{Mission, Planning as _, numbers};
 use crate::setup::Setup;
 
-/// Time limit for grounding, which detects constructs that the planner does not support.
 const TIME_LIMIT: Duration = Duration::from_secs(20);
 
 /// Returns the errors and warnings about a mission: errors first, without duplicates. Constructs that the planner does

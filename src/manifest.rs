@@ -240,8 +240,6 @@ fn without(text: &str, place: std::ops::Range<usize>) -> Option<String> {
     (blanked != text).then_some(blanked)
 }
 
-/// Returns a suggestion for a misspelt key if the parser's message lists the valid keys, otherwise
-/// an empty text.
 fn key_suggestion(message: &str) -> String {
     let mut quoted = message.split('`').skip(1).step_by(2);
     match (["unknown field", "unknown variant"].iter().any(|start| message.starts_with(start)), quoted.next())

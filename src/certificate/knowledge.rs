@@ -14,7 +14,6 @@ use crate::knowledge::{Stated, rule_text};
 use crate::message::Message;
 use crate::mission::Mission;
 
-/// Returns names and texts of the certificate's files about the knowledge base.
 pub(super) fn files(mission: &Mission) -> Result<Option<[(&'static str, String); 3]>, Message> {
     let Some(knowledge) = mission.knowledge() else { return Ok(None) };
     let sources = knowledge.sources();

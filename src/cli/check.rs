@@ -150,7 +150,6 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     Ok(Exit::BadInput)
 }
 
-/// Parses the property of the command line, or reads the selected properties of a file.
 fn asked(arguments: &Arguments) -> Result<Queries, Failure> {
     let Some(path) = &arguments.props else {
         let text = arguments.property.clone().unwrap_or_default();
@@ -250,8 +249,6 @@ fn single(arguments: &Arguments, common: &Common, property: &str, report: &Repor
     Ok(if is_proved(arguments, report) { Exit::Done } else { Exit::NotProved })
 }
 
-/// Writes several answers: as JSON, as text or, if constants vary, as a table with a line for each
-/// combination of values. Also writes the CSV file, if requested.
 fn write_all(
     arguments: &Arguments,
     common: &Common,

@@ -79,7 +79,6 @@ pub fn shown(answer: &Answer) -> String {
     }
 }
 
-/// Formats a double, with an exponent if it would have many zeros.
 pub fn number(value: f64) -> String {
     let size = value.abs();
     if value != 0.0 && size < 1e-6 || size >= 1e21 { format!("{value:e}") } else { value.to_string() }

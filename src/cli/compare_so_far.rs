@@ -28,7 +28,6 @@ pub(super) struct SoFar {
     pub of: Option<usize>,
     pub done: Vec<(Option<Pair>, Comparison)>,
     pub begun: Option<Begun>,
-    /// Rows of `--published`.
     pub added: Vec<Row>,
     pub csv: Option<PathBuf>,
     pub mission: String,

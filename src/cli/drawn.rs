@@ -14,7 +14,6 @@ use planner::Solution;
 use crate::cli::common::Failure;
 use crate::cli::output;
 
-/// Width of a picture if the width of the terminal is unknown.
 const COLUMNS: u16 = 100;
 
 /// Options for the picture of a plan.

@@ -84,7 +84,6 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-/// Writes the Markov decision process of a mission as a PRISM or JANI model.
 fn process(
     arguments: &Arguments,
     common: &Common,

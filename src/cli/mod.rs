@@ -176,7 +176,6 @@ fn parse() -> Cli {
     Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
 }
 
-/// Parses a command line of a study. Returns the arguments of `simulate`, and `None` for other commands.
 fn read(words: Vec<String>) -> Result<Option<simulate::Arguments>, clap::Error> {
     let cli = Cli::try_parse_from(std::iter::once("metaplan".to_owned()).chain(words))?;
     Ok(match cli.command {

@@ -7,8 +7,6 @@ use planner::{Exact, Front, Status};
 use crate::cli::plan_answer::answer_text;
 use crate::cli::plan_text::steps_text;
 
-/// Formats the values of several objectives in one line. The text is empty for fewer than two
-/// objectives, or without values.
 pub(super) fn values_text(objectives: &[String], values: &[Exact]) -> String {
     if objectives.len() < 2 || values.is_empty() {
         return String::new();

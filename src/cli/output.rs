@@ -19,7 +19,6 @@ use crate::cli::common::{Common, Failure, Format};
 
 static ANSWER_LOST: AtomicBool = AtomicBool::new(false);
 
-/// Set once an answer, a part of one, or a file is being written.
 static HAS_BEGUN: AtomicBool = AtomicBool::new(false);
 
 const MESSAGE_LIMIT: usize = 20;
@@ -61,7 +60,6 @@ pub fn json_answer(answer: &impl Serialize) {
     document(&visible_json(&pretty(answer)));
 }
 
-/// Formats an answer for programs as one line of JSON.
 pub fn line(answer: &impl Serialize) -> String {
     serde_json::to_string(answer).unwrap_or_default() + "\n"
 }
@@ -162,7 +160,6 @@ pub fn table(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> St
     table_within(columns(), header, rows)
 }
 
-/// Formats a table without borders, at most `columns` columns wide; `None` is no limit.
 pub fn table_within(
     columns: Option<u16>,
     header: &[&str],
@@ -218,7 +215,6 @@ pub fn decimal(value: &num_rational::BigRational) -> String {
     rules::Decimal::from_rational(value).to_string()
 }
 
-/// Formats a count with its noun, such as `1 conflict` or `2 conflicts`.
 pub fn counted<N: Copy + std::fmt::Display + PartialEq + From<u8>>(count: N, noun: &str) -> String {
     let ending = if count == N::from(1) { "" } else { "s" };
     format!("{count} {noun}{ending}")

@@ -164,7 +164,6 @@ fn configuration(arguments: &Arguments, limits: Limits) -> Config {
 }
 
 impl Arguments {
-    /// Rejects unusable SAT solvers, and combinations of options that the parser cannot detect.
     fn check(&self) -> Result<(), Failure> {
         let usage = |code: &str, text: String| Failure::usage(Message::error(code, text));
         self.solver.check().map_err(|error| usage("M113", error.to_string()))?;
@@ -194,12 +193,10 @@ impl Arguments {
         }
     }
 
-    /// Returns the number of columns for tables. `None` for files, or if the width is unknown.
     fn columns(&self) -> Option<u16> {
         if self.file().is_some() { None } else { output::columns() }
     }
 
-    /// Returns `true` if the answer is text for people on standard output.
     fn is_text(&self, common: &Common) -> bool {
         self.plan_format.is_none() && self.file().is_none() && common.format == Format::Text
     }

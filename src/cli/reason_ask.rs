@@ -37,7 +37,6 @@ pub struct Questions {
 }
 
 impl Questions {
-    /// Answers the query of the arguments and returns the exit status. Returns `None` if there is no query.
     pub fn answer(
         &self,
         knowledge: &mut Knowledge,
@@ -188,7 +187,6 @@ fn read(knowledge: &mut Knowledge, assertion: &str) -> Result<Fact, Message> {
     Ok(Fact::new(symbols.name(&predicate), [symbols.name(&subject), object]))
 }
 
-/// Returns the names, usually IRIs, of all predicates and constants in facts and rules.
 fn names(engine: &Engine) -> BTreeSet<String> {
     let mut symbols: BTreeSet<Symbol> = BTreeSet::new();
     for fact in engine.facts() {

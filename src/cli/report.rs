@@ -106,7 +106,6 @@ fn journal(arguments: &Arguments, directory: &Path, report: &JournalReport) -> R
     Ok(if report.is_sound() { Exit::Done } else { Exit::BadInput })
 }
 
-/// Writes a page to the output file and prints the note `said`. Without a file, writes the page to standard output.
 fn write(arguments: &Arguments, page: &str, said: &str) -> Result<(), Failure> {
     let page = &*visible(page);
     match output::file_named(arguments.output.as_ref()) {

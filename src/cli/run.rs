@@ -159,7 +159,6 @@ fn adaptation(file: Option<&Path>, knowledge: &Knowledge) -> Result<Settings, Fa
     Ok(Settings::read(file, Some(knowledge))?)
 }
 
-/// Runs the configuration loop as [`drive`] runs the adaptation loop.
 fn keep_going(
     common: &Common,
     keeper: Keeper,

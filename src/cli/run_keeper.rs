@@ -48,7 +48,6 @@ impl<'a> KeeperSession<'a> {
         Ok(())
     }
 
-    /// Answers lines as they arrive, and reacts when a filter becomes due.
     pub(super) fn live(mut self, events: Lines) -> Result<(), Failure> {
         let (sender, inputs) = sync_channel(MAX_WAITING);
         read(events, self.common.clone(), sender);

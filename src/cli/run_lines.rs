@@ -60,8 +60,6 @@ impl Lines {
         Ok(Self { name, source: Source::Fresh(Some(reader)), is_file })
     }
 
-    /// Returns `true` if the input is a file on disk, so that all lines are available. Each line is then answered
-    /// before the next one is read.
     pub(super) fn is_file(&self) -> bool {
         self.is_file
     }

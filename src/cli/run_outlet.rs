@@ -98,7 +98,6 @@ impl Outlet {
         }
     }
 
-    /// Shows the plan on the web page if the answers have changed or removed the plan.
     pub(super) fn plan(&self, beliefs: &Beliefs, answers: &[Answer]) {
         let is_about_plans =
             |answer: &Answer| matches!(answer, Answer::PlanFound { .. } | Answer::PlanNone { .. });
@@ -138,8 +137,6 @@ impl Outlet {
         self.say(&lines.collect::<String>())
     }
 
-    /// Writes the last answers to an input line, each with the number of that line, and the acknowledgement of the
-    /// line.
     pub(super) fn answer(&self, line: u64, answers: &[impl Serialize], read: Instant) -> io::Result<()> {
         let mut text = String::new();
         for answer in answers {

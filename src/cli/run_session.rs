@@ -98,7 +98,6 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Answers each line completely before the next one is read.
     pub(super) fn replay(mut self, mut events: Lines) -> Result<(), Failure> {
         if self.begin(Instant::now())? == Flow::Over {
             return Ok(());
@@ -111,7 +110,6 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// Reacts to lines as they arrive, and searches for plans on another thread.
     pub(super) fn live(mut self, events: Lines) -> Result<(), Failure> {
         let (sender, inputs) = sync_channel(MAX_WAITING);
         read(events, self.common.clone(), sender.clone());
@@ -369,7 +367,6 @@ impl<'a> Session<'a> {
         Ok(flow)
     }
 
-    /// Acknowledges the last line, unless this was done before.
     fn close(&mut self) -> Result<Flow, Failure> {
         match self.open.take() {
             None => Ok(Flow::GoesOn),
@@ -391,7 +388,6 @@ fn gather(inputs: &Receiver<Input>, waiting: &mut VecDeque<Input>) {
     }
 }
 
-/// Reads lines on a separate thread and sends them to the session, up to the end or the first error.
 pub(super) fn read(mut events: Lines, common: Common, sender: SyncSender<Input>) {
     std::thread::spawn(move || {
         loop {

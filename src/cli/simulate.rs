@@ -141,8 +141,6 @@ pub fn check(arguments: &Arguments, directory: &Path, common: &Common) -> Result
     experiment(&directory.join(&arguments.mission), &arguments.scenario, common).map(drop)
 }
 
-/// Results of the simulated missions, by strategy and seed, and a log of the first mission of each
-/// strategy.
 struct SimulationResults {
     runs: Vec<Run>,
     log: String,

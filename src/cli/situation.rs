@@ -94,7 +94,6 @@ impl Situation {
         scenario.chain(fail).chain(set).collect()
     }
 
-    /// Reads a knowledge base without a mission, and applies `--set` and `--fail`.
     pub(super) fn knowledge(&self, documents: &[PathBuf], common: &Common) -> Result<Knowledge, Failure> {
         if !self.knowledge.is_empty() || !self.names.is_empty() || self.scenario.is_some() {
             let text = "with `--configure` the knowledge bases are the arguments, and there is no `--kb`, `--name` or `--scenario`";
@@ -103,8 +102,6 @@ impl Situation {
         during("reading", common, || knowledge(documents, &self.rules, &self.imports, &self.fail, &self.set))
     }
 
-    /// Reads the mission in this situation, from one input (a manifest) or two (domain and
-    /// problem).
     pub(super) fn mission(&self, inputs: &[PathBuf], common: &Common) -> Result<Mission, Failure> {
         self.setup(inputs, common).map(|setup| setup.mission)
     }

@@ -48,7 +48,6 @@ pub struct Arguments {
 /// Parser of a command line. Returns the arguments if the command is `simulate`, and `None` for other commands.
 pub type Read<'a> = dyn Fn(Vec<String>) -> Result<Option<simulate::Arguments>, clap::Error> + 'a;
 
-/// `read` parses the command lines of the study.
 pub fn run(arguments: &Arguments, common: &Common, read: &Read<'_>) -> Result<Exit, Failure> {
     output::require_directory(&arguments.output)?;
     let guard = Guard::new(arguments.time_limit, None, common)?;

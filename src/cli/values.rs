@@ -20,7 +20,6 @@ pub(super) fn setting(text: &str) -> Result<(String, String), String> {
     Ok((name.trim().to_owned(), value.trim().to_owned()))
 }
 
-/// Parses `NAME=NUMBER`. Returns the name and the exact decimal number.
 pub(super) fn amount(text: &str) -> Result<(String, BigRational), String> {
     let (name, value) = setting(text)?;
     let wrong = || format!("`{value}` is not a decimal number");

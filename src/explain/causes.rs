@@ -25,7 +25,6 @@ use crate::message::Errors;
 use crate::mission::Mission;
 use crate::mission::numbers::against;
 
-/// Maximum number of tried sets of alterations.
 const MAX_TRIED: usize = 2_000;
 
 /// Availability of one design and its causes, derived without planning.

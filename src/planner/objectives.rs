@@ -15,7 +15,6 @@ pub(super) struct Objectives {
 }
 
 impl Objectives {
-    /// Parses objectives. Returns all faults of all objectives.
     pub(super) fn read(mission: &Mission, problem: &Problem, texts: &[String]) -> Result<Self, Errors> {
         let mut metrics = Vec::new();
         let mut messages = Vec::new();

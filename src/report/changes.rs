@@ -10,7 +10,6 @@ use crate::mission::Mission;
 use crate::number::decimal;
 use crate::report::designs::because;
 
-/// Text in place of an unknown status of a component or an unknown value of an attribute.
 const UNKNOWN: &str = "unknown";
 
 /// The cost of a plan, or the reason why there is no cost.

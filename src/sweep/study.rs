@@ -15,7 +15,6 @@ use crate::manifest::{self, Key, ManifestPath, Part};
 use crate::message::{Errors, Message, did_you_mean};
 use crate::setup::Setup;
 
-/// Maximum number of runs of a study; a larger number is considered a mistake.
 const MAX_RUNS: usize = 10_000_000;
 
 /// The command of a study, and its varied parameters.

@@ -148,7 +148,6 @@ fn figure(value: &Value) -> Option<f64> {
     value.as_bool().map(|truth| f64::from(u8::from(truth))).or_else(|| value.as_f64())
 }
 
-/// Joins the values of an option that is given several times to one text.
 fn joined(value: Value) -> Value {
     match value {
         Value::Array(values) => {

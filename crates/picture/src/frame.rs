@@ -20,7 +20,6 @@ pub(crate) struct Canvas {
     pub(crate) width: f64,
     /// Left edge of the drawing area; the tick labels of vertical axes are to the left of it.
     pub(crate) left: f64,
-    /// Whether the names of rows are above the rows instead of to their left.
     pub(crate) has_names_above: bool,
     /// Minimum average width of the steps of a plan, up to [`WIDEST`] for the whole plan.
     pub(crate) step: f64,
@@ -63,7 +62,6 @@ pub(crate) struct NamePlace {
     pub(crate) y: f64,
     /// End of the text that is at this position, as in SVG's `text-anchor`: `start` or `end`.
     pub(crate) anchor: &'static str,
-    /// Maximum width of the name.
     pub(crate) room: f64,
 }
 

@@ -56,7 +56,6 @@ fn components(neighbours: &[Vec<usize>]) -> Vec<Vec<usize>> {
     groups
 }
 
-/// Returns the numbers of ways on shortest paths; `None` for unreachable places.
 fn distances(from: usize, neighbours: &[Vec<usize>]) -> Vec<Option<u32>> {
     let mut distances = vec![None; neighbours.len()];
     let mut queue = VecDeque::from([(from, 0)]);

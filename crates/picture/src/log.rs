@@ -93,8 +93,6 @@ impl Log {
         Picture { width: canvas.width, height: bottom + 24.0, title, description, body }
     }
 
-    /// Groups happenings into marks. The key of a mark is its position in pixels, divided by
-    /// [`MARK`] and rounded down.
     fn marks(&self, kind: Kind, scale: &Scale) -> BTreeMap<i64, Vec<&Happening>> {
         let mut marks: BTreeMap<i64, Vec<&Happening>> = BTreeMap::new();
         for happening in self.happenings.iter().filter(|happening| happening.kind == kind) {

@@ -16,7 +16,6 @@ use crate::svg::Picture;
 
 /// Maximum of the side margins, which contain names of places.
 const MARGIN: f64 = 70.0;
-/// Side margins as a fraction of the width of the picture.
 const MARGIN_PART: f64 = 0.12;
 const UPPER_MARGIN: f64 = 35.0;
 /// Height of a map of a single place, without margins.
@@ -43,7 +42,6 @@ const SAME: f64 = 2.0;
 const LOOP_MARGIN: f64 = 58.0;
 /// Additional distance of a name from its place, if no nearby position is free of lines.
 const FARTHER: f64 = 9.0;
-/// Length of a dash of a line that has the colours of several configurations.
 const DASH: f64 = 9.0;
 
 type Point = (f64, f64);
@@ -353,7 +351,6 @@ fn crosses(((x1, y1), (x2, y2)): Line, (left, top, right, bottom): Taken) -> boo
     from <= to
 }
 
-/// Returns the positions of the places, and the width and height of the picture.
 fn pixels(map: &Map, canvas: Canvas, has_loops: bool) -> (Vec<Point>, f64, f64) {
     let positions: Option<Vec<Point>> = map.places.iter().map(|place| place.position).collect();
     let points = positions.unwrap_or_else(|| layout(map.places.len(), &map.ways));

@@ -32,7 +32,6 @@ impl Palette {
         self.colours.entry(name.to_owned()).or_insert(next);
     }
 
-    /// Returns the CSS class for the colour of a name, or `none` for an unknown or empty name.
     pub(crate) fn class(&self, name: &str) -> String {
         match self.colours.get(name) {
             Some(colour) if !name.is_empty() => format!("c{}", colour % COLOURS),

@@ -66,7 +66,6 @@ pub(crate) fn number(value: f64) -> String {
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
-/// Formats a number for an axis, with at most about seven characters.
 pub(crate) fn compact(value: f64) -> String {
     let text = number(value);
     if text.len() <= 7 { text } else { format!("{value:.1e}") }

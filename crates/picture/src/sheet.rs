@@ -13,10 +13,8 @@ use crate::report::alone;
 use crate::scale::{Scale, compact, fit, number, px, range};
 use crate::svg::Picture;
 
-/// Height of the drawing area of a scatter plot.
 const HEIGHT: f64 = 300.0;
 const TOP: f64 = 24.0;
-/// Height of a row of a distribution.
 const ROW: f64 = 46.0;
 /// Distance on the axis below which dots are stacked.
 const NEAR: f64 = 6.0;
