@@ -103,7 +103,7 @@ pub fn rows(pair: Option<&Pair>, comparison: &Comparison) -> Vec<Row> {
     rows
 }
 
-/// All comparisons, or those that were complete at the time limit.
+/// All comparisons, or the results at the time limit.
 #[derive(Debug, Clone, serde::Serialize, JsonSchema)]
 pub struct CompareAnswer<'a> {
     /// Name and version of this format.

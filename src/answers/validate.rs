@@ -42,7 +42,7 @@ struct ViolationPart<'a> {
     #[schemars(with = "f64")]
     time: Value,
     /// `unknown_action`, `unknown_object`, `arguments`, `duration`, `at_start`, `over_all`, `at_end`, `undefined`, `conflict`, `overlap`,
-    /// `interference` or `goal`.
+    /// `interference`, `goal` or `constraint`.
     kind: &'static str,
     /// Message, one sentence.
     message: &'a str,

@@ -1,6 +1,5 @@
 //! Catalogue of the message codes of `metaplan-fleet`.
 
-/// Message codes in ascending order, each with meaning, cause and remedy.
 pub const CODES: &[[&str; 4]] = &[
     [
         "N300",

@@ -35,7 +35,8 @@ pub struct Planned<'m> {
     /// Value of the plan under each objective that replaces the problem's metric. Without such objectives, the
     /// list is empty or contains only the cost of the plan. Empty if there is no plan.
     pub values: Vec<Exact>,
-    /// Further optimal plans, if requested and if the plan is proved optimal.
+    /// Further optimal plans, if requested. `None` if the plan is not proved optimal, or if operator
+    /// costs are only a part of its metric.
     pub alternatives: Option<Alternatives>,
     /// If the mission is proved unsolvable: unavailable designs that prevent a plan, or the information that
     /// designs are not the reason. `None` also if this is not decided within the limits, and always without a

@@ -59,7 +59,7 @@ pub struct Curve {
     /// Name of the fluent.
     pub name: String,
     /// The changes: position on the horizontal axis, and new value. The first entry is the initial
-    /// value.
+    /// value, if the fluent has one.
     pub points: Vec<(f64, f64)>,
     /// The bounds that conditions impose on the fluent.
     pub bounds: Vec<Bound>,
