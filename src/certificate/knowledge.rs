@@ -1,5 +1,6 @@
-//! Exports the part of a certificate about the knowledge base: a document with its axioms, its origin (domain,
-//! problem, bindings, rules, and the changes since the knowledge base was read), and the derivations of all facts.
+//! Exports the part of a certificate about the knowledge base: a document with its axioms, its
+//! origin, and the derivations of all facts. The origin consists of domain, problem, bindings,
+//! rules, and the changes since the knowledge base was read.
 
 use ontology::OutputSyntax;
 use pddl::print_problem;

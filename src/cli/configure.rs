@@ -86,8 +86,8 @@ impl Wanted {
     /// Without this option and without objectives in the knowledge base, all functions are objectives.
     ///
     /// # Errors
-    /// All names in the options that are not in the knowledge base, negative budgets, and requirements for functions
-    /// that this method does not add as objectives.
+    /// All names in the options that are not in the knowledge base, negative budgets, and
+    /// requirements for functions that are not added as objectives here.
     pub(super) fn configurator(&self, knowledge: Knowledge) -> Result<Configurator, Failure> {
         let worth = match (&self.most, &self.least) {
             (Some(attribute), _) => Worth::Most(attribute.clone()),

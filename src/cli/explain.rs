@@ -185,9 +185,9 @@ fn why_text(why: &Availability) -> String {
     text
 }
 
-/// Formats the best plan, the best plan with this design as the only one of its functions, and, if
-/// the best plan uses the design, the best plan without it. Changes of the design's availability
-/// follow.
+/// Formats the best plan, and the best plan with this design as the only one of its functions. If
+/// the best plan uses the design, the best plan without it follows. At the end are changes of the
+/// design's availability.
 fn design_text(found: &DesignExplanation) -> String {
     let DesignExplanation { availability, best, .. } = found;
     let mut text = String::new();

@@ -119,8 +119,8 @@ fn ended(result: Result<(), Failure>, outlet: &Outlet) -> Result<Exit, Failure> 
     Ok(Exit::Done)
 }
 
-/// Prints the ready line, and then runs the loop on all events until the input ends or the reader of the answers has
-/// closed the pipe.
+/// Prints the ready line, and then runs the loop on all events. Ends at the end of the input, or
+/// when the reader of the answers closes the pipe.
 fn drive(
     common: &Common,
     control: Loop,

@@ -1,7 +1,7 @@
 //! Session of `metaplan run`: connects the adaptation loop with its input and output, in two modes.
 //!
 //! If all input is available, as in a file, each line is answered completely before the next one is
-//! read, so the same lines give the same answers.
+//! read. So the same lines give the same answers.
 //!
 //! If lines arrive from a pipe or a terminal, the loop reacts to all waiting lines before it
 //! deliberates. Only a line about an action that was not requested yet waits for the deliberation.

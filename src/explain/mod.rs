@@ -109,9 +109,11 @@ pub fn design(mission: &Mission, name: &str, limits: &Limits) -> Result<DesignEx
 }
 
 impl Availability {
-    /// Extends the explanation of the availability by plans: the best plan now, with the design as the only one for its
-    /// functions, without the design, after each set of alterations in [`Availability::ways`], and after each single
-    /// alteration. `hear` is called with a short description of the next plan or plans before they are searched for.
+    /// Extends the explanation of the availability by plans: the best plan now, the best plan with
+    /// the design as the only one for its functions, and the best plan without it. Then the best
+    /// plans after each set of alterations in [`Availability::ways`], and after each single
+    /// alteration. `hear` is called with a short description of the next plan or plans before they
+    /// are searched for.
     ///
     /// # Errors
     /// The mission cannot be planned for.

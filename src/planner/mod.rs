@@ -122,8 +122,8 @@ impl<'m, 'r> Planner<'m, 'r> {
         self
     }
 
-    /// Sets the least time between interfering happenings (starts and ends of actions), in the domain's time unit, and
-    /// allows actions to overlap as in PDDL 2.1. `None` keeps actions sequential.
+    /// Sets the least time between interfering starts and ends of actions, in the domain's time
+    /// unit. Actions may then overlap as in PDDL 2.1. `None` keeps actions sequential.
     #[must_use]
     pub fn concurrent(mut self, separation: impl Into<Option<BigRational>>) -> Self {
         self.separation = separation.into();
@@ -158,10 +158,13 @@ impl<'m, 'r> Planner<'m, 'r> {
     /// Computes the best plan and executes it with the validator.
     ///
     /// # Errors
-    /// Constructs that the planner does not support, with their places; faults of the objectives;
-    /// M107 if the options exclude each other; a limit that was reached before the task was ground or the plan was
-    /// validated; or M170, a fault of the planner. It is not an error if no plan is found or optimality is not
-    /// proved: see [`Solution::status`].
+    /// - Constructs that the planner does not support, with their places
+    /// - Faults of the objectives
+    /// - M107 if the options exclude each other
+    /// - A limit that was reached before the task was ground or the plan was validated
+    /// - M170, a fault of the planner
+    ///
+    /// It is not an error if no plan is found or optimality is not proved: see [`Solution::status`].
     pub fn plan(self) -> Result<Planned<'m>, Errors> {
         let objectives = Objectives::read(self.mission, &self.problem, &self.minimize)?;
         let several = objectives.metrics.len() > 1;

@@ -38,9 +38,10 @@ pub struct Planned<'m> {
     /// Further optimal plans, if requested. `None` if the plan is not proved optimal, or if operator
     /// costs are only a part of its metric.
     pub alternatives: Option<Alternatives>,
-    /// If the mission is proved unsolvable: unavailable designs that prevent a plan, or the information that
-    /// designs are not the reason. `None` also if this is not decided within the limits, and always without a
-    /// knowledge base, for overlapping actions, and for costs that are too large for integers.
+    /// If the mission is proved unsolvable: unavailable designs that prevent a plan, or the
+    /// information that designs are not the reason. `None` if this is not decided within the
+    /// limits. Always `None` without a knowledge base, for overlapping actions, and for costs that
+    /// are too large for integers.
     pub blocking: Option<Blocking>,
     /// If the mission is proved unsolvable: numeric functions that actions need and that have no value. If some
     /// of them are probable mistakes or have no value for any arguments, only these. Always empty for

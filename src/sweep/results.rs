@@ -146,8 +146,8 @@ fn parse(path: &Path, text: &str) -> Result<(Header, Vec<Line>), Message> {
 /// and repeated results of a run.
 ///
 /// # Errors
-/// The directory cannot be read or has no result file; or all faults: files that are unreadable,
-/// damaged or of another study, and runs with differing answers.
+/// The directory cannot be read or has no result file. Otherwise all faults: files that are
+/// unreadable, damaged or of another study, and runs with differing answers.
 pub fn read_lines(directory: &Path, study: &Study) -> Result<Vec<Line>, Errors> {
     let failed = |error: io::Error| Errors::from(wrong(directory, &error.to_string()));
     let mut files = Vec::new();

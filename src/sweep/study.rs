@@ -272,10 +272,11 @@ impl Study {
         self.origin.quote([Message::at("M150", self.origin.file(), place, text)]).swap_remove(0)
     }
 
-    /// Returns a sample of the runs for checking the study: the first run and, for each value of
-    /// each key, a run that differs from the first run only in this value. Number ranges and pairs
-    /// contribute only their last value. Each run has the path of its value in the file; the first
-    /// run has the path of the command. The sample of a study without runs is empty.
+    /// Returns a sample of the runs for checking the study. The sample contains the first run and,
+    /// for each value of each key, a run that differs from the first run only in this value. Number
+    /// ranges and pairs contribute only their last value. Each run has the path of its value in the
+    /// file; the first run has the path of the command. The sample of a study without runs is
+    /// empty.
     pub fn samples(&self) -> Vec<(Vec<Key>, Planned)> {
         if self.is_empty() {
             return Vec::new();

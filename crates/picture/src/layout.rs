@@ -124,7 +124,7 @@ fn majorized(points: &[(f64, f64)], distances: &[Vec<f64>]) -> Vec<(f64, f64)> {
     (0..points.len()).map(place).collect()
 }
 
-/// Rotates the points such that their longest extent is horizontal, and mirrors them such that the
+/// Rotates the points such that their longest extent is horizontal. Mirrors them such that the
 /// first place is to the left of and above the centre.
 fn turned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let count = points.len() as f64;

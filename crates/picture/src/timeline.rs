@@ -136,8 +136,8 @@ fn draw_bar(bar: &Bar<'_>, top: f64, (class, is_action): (&str, bool), about: &s
     let room = bar.to - bar.from - margin - 3.0;
     let number = (bar.step + 1).to_string();
     let mut text = fit(bar.text, room);
-    // A name that is shortened further is less informative than the step number, which also occurs
-    // in map and table, or than the colour of a design.
+    // A shorter part of a name is less informative than the step number, which also occurs in map
+    // and table, or than the colour of a design.
     if text != bar.text && text.chars().count() < SHORTEST {
         text = if is_action && width(&number) <= room + SLACK { number } else { String::new() };
     }
