@@ -9,8 +9,7 @@ use pddl::{Source, read};
 
 use crate::widths;
 
-/// Checks the status and the metric of the plan that is found with a separation of 1/1000. The validator
-/// executes the plan.
+/// Plans with a separation of 1/1000. The validator executes the plan.
 fn check(actions: &str, init: &str, goal: &str, expected: (Status, Option<&str>)) {
     let domain =
         format!("(define (domain d) (:predicates (p) (q) (g) (on ?x)) (:functions (fuel) (log)) {actions})");

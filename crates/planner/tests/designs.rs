@@ -27,8 +27,7 @@ fn found(cost: &str, steps: &[&str]) -> Option<(String, Vec<String>)> {
     Some((cost.to_owned(), steps.iter().map(|step| (*step).to_owned()).collect()))
 }
 
-/// Returns a problem with `count` designs, each of which solves `f1` and `f2`. `value` returns the facts
-/// about the design with an index.
+/// Each of the `count` designs solves `f1` and `f2`. `value` returns further facts about a design.
 fn designs(count: usize, value: impl Fn(usize) -> String) -> String {
     let mut text = String::from("(define (problem p) (:domain d) (:objects");
     for index in 0..count {

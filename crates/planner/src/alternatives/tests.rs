@@ -65,7 +65,7 @@ fn forced(first: &Plan, plans: &[Plan]) -> Vec<Forced> {
     first.steps.iter().enumerate().map(|(position, step)| at(position, step)).collect()
 }
 
-/// Compares the alternatives of a random mission with the enumeration. Returns the number of cheapest plans.
+/// Compares with the enumeration. Returns the number of cheapest plans.
 fn check(seed: u64) -> usize {
     let mission = Mission::random(seed);
     if mission.weights.0 == 0 {

@@ -122,7 +122,7 @@ fn first_plan(task: &Task, config: &Config) -> Option<Solution> {
     Some(solve(Run::new(task, &config, &mut stop)))
 }
 
-/// All admitted combinations of designs of each operator, or `None` if there are too many.
+/// `None` if there are too many admitted combinations of designs.
 fn choices(task: &Task) -> Option<Vec<Vec<Vec<u32>>>> {
     let mut remaining = MAX_COMBINATIONS;
     let mut choices = Vec::with_capacity(task.operators.len());
@@ -135,7 +135,6 @@ fn choices(task: &Task) -> Option<Vec<Vec<Vec<u32>>>> {
     Some(choices)
 }
 
-/// Reports of better plans, and statistics.
 struct Progress<'p> {
     started: Instant,
     statistics: Statistics,
@@ -186,7 +185,6 @@ impl Progress<'_> {
     }
 }
 
-/// Reason why A\* has ended.
 #[derive(Clone, Copy)]
 enum End {
     /// All nodes are expanded, except those that cannot lead to a plan better than the best one.
@@ -204,7 +202,6 @@ struct Node {
     steps: usize,
     /// Parent node and step; `None` for the initial state.
     origin: Option<(u32, GroundStep)>,
-    /// Whether another path dominates the path to this node.
     is_dominated: bool,
 }
 
@@ -214,7 +211,6 @@ impl Node {
     }
 }
 
-/// A path to a state, with its cost and its number of steps.
 #[derive(Clone, Copy)]
 struct Path<'n> {
     state: &'n State,
@@ -222,8 +218,8 @@ struct Path<'n> {
     steps: usize,
 }
 
-/// Sort key of an open node: lower bound on the cost of plans through the node, estimate of the remaining cost, and
-/// index of the node.
+/// Lower bound on the cost of plans through the node, estimate of the remaining cost, and index of
+/// the node.
 type Priority = (Int, Int, Reverse<u32>);
 
 struct Search<'a> {
@@ -231,7 +227,6 @@ struct Search<'a> {
     costs: &'a StateDependentCosts,
     bounds: &'a Bounds,
     choices: Vec<Vec<Vec<u32>>>,
-    /// Maximum number of steps of a plan; `None` for no limit.
     horizon: Option<usize>,
     generator: SuccessorGenerator,
     nodes: Vec<Node>,
@@ -314,7 +309,6 @@ impl<'a> Search<'a> {
         None
     }
 
-    /// Adds the successor of a node by an applicable step.
     fn extend(&mut self, id: u32, state: &State, step: GroundStep) {
         let Node { paid, total, .. } = self.nodes[id as usize];
         let operator = &self.task.operators[step.operator.index()];
@@ -382,7 +376,6 @@ impl<'a> Search<'a> {
         self.best.as_ref().is_none_or(|(total, _)| bound < *total)
     }
 
-    /// Makes the path to a goal node the best plan.
     fn adopt(&mut self, goal: u32) {
         let mut steps = Vec::new();
         let mut at = goal;
@@ -394,7 +387,7 @@ impl<'a> Search<'a> {
         self.offer(steps);
     }
 
-    /// Makes a plan the best one if it is better and not longer than the horizon.
+    /// Replaces the best plan by a better one that is not longer than the horizon.
     fn offer(&mut self, steps: Vec<GroundStep>) {
         if self.exceeds_horizon(steps.len()) {
             return;

@@ -123,7 +123,6 @@ pub(super) fn requirements(domain: &Domain, predicates: &[Name]) -> Option<Vec<V
     (total == mentions).then_some(requirements)
 }
 
-/// Returns the atoms that are conjuncts of a condition.
 fn conjuncts(condition: &Condition) -> Vec<&Atom> {
     match condition {
         Condition::And(parts) => parts.iter().flat_map(conjuncts).collect(),
@@ -132,7 +131,7 @@ fn conjuncts(condition: &Condition) -> Vec<&Atom> {
     }
 }
 
-/// Returns the number of occurrences of a predicate in the conditions and effects of actions, and in axioms.
+/// Counts conditions and effects of actions, and axioms.
 fn occurrences(domain: &Domain, predicate: &Name) -> usize {
     let mut count = Count { predicate, mentions: 0 };
     for action in &domain.actions {
@@ -145,7 +144,6 @@ fn occurrences(domain: &Domain, predicate: &Name) -> usize {
     count.mentions
 }
 
-/// Returns the number of occurrences of a predicate in a condition.
 pub(super) fn in_condition(condition: &Condition, predicate: &Name) -> usize {
     let mut count = Count { predicate, mentions: 0 };
     condition.walk(&mut |node| count.node(node));
