@@ -27,7 +27,6 @@ use num_traits::{One as _, Signed as _, ToPrimitive as _, Zero as _};
 
 use task::limits::{Interrupted, Limits};
 
-/// Number of subgradient iterations, at most.
 const ROUNDS: usize = 300;
 /// Number of fractional bits of the Lagrangian multipliers.
 const PRICE_BITS: i32 = 40;
@@ -455,8 +454,6 @@ mod tests {
         }
     }
 
-    /// Solves the multiple-choice knapsack problem by dynamic programming over the amounts of the
-    /// budget.
     fn by_amounts(functions: &[Vec<(i64, usize)>], budget: usize) -> (usize, i64) {
         let mut best = vec![(0, 0); budget + 1];
         for designs in functions {

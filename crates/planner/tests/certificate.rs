@@ -117,7 +117,6 @@ fn tasks_in_which_more_can_help_and_hurt_have_certificates() {
     assert!(proved > 10, "only {proved} tasks with certificates need more than two steps");
 }
 
-/// Replaces a random number, null or flag by another value, or removes or doubles an element.
 fn mutate(value: &mut Value, random: &mut Random) {
     match value {
         Value::Array(elements) if !elements.is_empty() => {

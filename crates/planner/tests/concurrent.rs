@@ -329,7 +329,6 @@ fn sample(random: &mut Random, is_locked: bool) -> Sample {
 /// are integers.
 const LAST: i128 = 7;
 
-/// Plans have up to three actions.
 fn brute_force(task: &Sample, domain: &Domain, problem: &Problem) -> Option<BigRational> {
     let separation = rational(1, 1);
     let mut best: Option<BigRational> = None;
@@ -395,7 +394,6 @@ fn agree(seed: u64, is_locked: bool, thresholds: Thresholds) -> bool {
     true
 }
 
-/// Checks random tasks, of which only a few may stay undecided.
 fn all_agree(seeds: std::ops::Range<u64>) {
     let count = seeds.end - seeds.start;
     let undecided = seeds.filter(|seed| !agree(*seed, false, Thresholds::default())).count() as u64;
@@ -477,7 +475,6 @@ fn robots(count: u64, side: u64, looks: u64, seed: u64) -> String {
     format!("{text}) (:goal (and{goal})) (:metric minimize (total-time)))")
 }
 
-/// Prints the result after at most ten seconds.
 #[test]
 #[ignore = "a measurement"]
 #[allow(clippy::print_stdout)]

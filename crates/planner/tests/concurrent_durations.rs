@@ -47,7 +47,6 @@ pub fn written(plan: &Plan) -> String {
     text
 }
 
-/// The validator computes the metric. The error is the reason why the plan is invalid.
 pub fn metric(
     domain: &Domain,
     problem: &Problem,
@@ -64,7 +63,7 @@ pub fn metric(
     }
 }
 
-/// Plans with a separation of 1/1000.
+/// Uses a separation of 1/1000.
 fn check(name: &str, domain: &str, problem: &str, expected: (Status, Option<&str>, &[&str])) {
     let (domain, problem) = parse(domain, problem);
     let solution = solve(&domain, &problem, &rational(1, 1000), &Limits::none());
@@ -367,7 +366,6 @@ fn sample(random: &mut Random) -> (String, String, [Vec<i128>; 3]) {
     (domain(&actions), problem, durations)
 }
 
-/// Latest start in the brute-force search.
 const LAST: i128 = 4;
 
 /// Plans have up to three actions. All starts and durations are multiples of the separation.

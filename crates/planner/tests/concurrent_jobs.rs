@@ -107,8 +107,6 @@ fn solve(robots: usize, lengths: &[i64], target: i64) -> (Solution, i64) {
     (solution, thousandths(&value))
 }
 
-/// The makespan is at most that of longest-job-first, and the lower bound is at most the makespan and
-/// at least the work per robot.
 fn check(robots: usize, lengths: &[i64]) {
     let target = longest_job_first(robots, lengths);
     let (solution, makespan) = solve(robots, lengths, target);

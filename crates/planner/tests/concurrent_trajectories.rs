@@ -151,7 +151,6 @@ fn trajectory(random: &mut Random) -> String {
     }
 }
 
-/// Three actions with their durations.
 fn sample(random: &mut Random) -> (String, String, [i128; 3]) {
     let mut domain = "(define (domain d) (:predicates (p) (q) (h))".to_owned();
     let mut durations = [0; 3];
@@ -199,7 +198,6 @@ fn sample(random: &mut Random) -> (String, String, [i128; 3]) {
     (domain, problem, durations)
 }
 
-/// Latest start in the brute-force search.
 const LAST: i128 = 5;
 
 /// Minimum metric of plans with up to three actions that start at integer times: over all plans,

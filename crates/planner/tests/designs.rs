@@ -98,7 +98,6 @@ fn a_function_may_be_a_design_itself() {
     assert_eq!(solve(&domain, problem).status, Status::Unsolvable);
 }
 
-/// Products and quotients of design-dependent values and fluents.
 #[test]
 fn factors_of_a_design_and_of_a_fluent_may_meet() {
     let task = |precondition: &str, effect: &str| {

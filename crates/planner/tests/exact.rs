@@ -30,7 +30,6 @@ fn number(decimal: &str) -> BigRational {
     BigRational::new(digits, BigInt::from(10).pow(fraction.len() as u32))
 }
 
-/// The validator computes the cost; `None` if the plan is invalid.
 fn metric(domain: &Domain, problem: &Problem, plan: &Plan) -> Option<BigRational> {
     let steps = plan.steps.iter().map(|step| PlanStep {
         action: Name::new(&step.action),
@@ -53,7 +52,6 @@ fn exact(domain: &Domain, problem: &Problem, horizon: Option<usize>) -> Solution
     solution
 }
 
-/// Returns `true` if integer grounding rejects the task because its numbers are too large.
 fn too_large(domain: &Domain, problem: &Problem) -> bool {
     match ground(domain, problem, &GroundConfig::default()) {
         Ok(_) => false,
@@ -375,7 +373,6 @@ fn many_random_tasks_have_the_cost_of_all_sequences() {
     check_all(1_000..20_000);
 }
 
-/// The expected cost is `None` if there is no plan.
 fn known(name: &str, domain: &str, problem: &str, expected: Option<&str>) -> Solution {
     let (domain, problem) = parse(domain, problem);
     assert!(too_large(&domain, &problem), "{name}");

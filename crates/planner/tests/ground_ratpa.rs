@@ -47,7 +47,6 @@ struct World<'d> {
     schemas: Vec<Schema<'d>>,
     facts: BTreeSet<Fact>,
     values: BTreeMap<Fact, f64>,
-    /// Predicates and functions that some action changes.
     changing: BTreeSet<String>,
 }
 
@@ -162,7 +161,6 @@ impl<'d> World<'d> {
         found.push(instance);
     }
 
-    /// `None` if the expression is undefined.
     fn interval(
         &self,
         expression: &Expression,

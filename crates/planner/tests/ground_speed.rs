@@ -14,7 +14,6 @@ use metaplan_planner::{GroundConfig, Task, ground};
 use pddl::{Source, read};
 use test_resources::data;
 
-/// CPU time of this thread in seconds, if the system provides it.
 fn cpu_time() -> Option<f64> {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
     Some(text.split_whitespace().next()?.parse::<f64>().ok()? / 1e9)
@@ -96,7 +95,6 @@ fn ground_size_is_linear_in_the_number_of_functions() {
     assert!(most.zip(least).is_some_and(|(most, least)| most * 10 <= least * 11), "{sizes:?}");
 }
 
-/// About `bytes` bytes, with facts and values as generators write them.
 fn large_problem(bytes: usize) -> String {
     let mut text = String::from("(define (problem large) (:domain d)\n  (:objects");
     let places = 1000;

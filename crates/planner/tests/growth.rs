@@ -105,7 +105,6 @@ fn shares_of_costs_are_ordered_however_large_their_sum_is() {
     assert_eq!(solution.plan.expect("a plan").cost.to_rational(), cost);
 }
 
-/// A domain in which work must be done many times.
 const WORK: &str = "(define (domain d) (:requirements :durative-actions :numeric-fluents :action-costs)
     (:functions (done) (total-cost) (long))
     (:durative-action work :parameters () :duration (= ?duration (long)) :condition (at start (>= (done) 0))

@@ -40,7 +40,6 @@ fn judge((domain, problem): (&Domain, &Problem), concurrent: bool, solution: &So
     assert_eq!(steps + BigRational::from_integer(at_first.into()), plan.cost.to_rational(), "{text}");
 }
 
-/// Each purchase costs the price times the demand.
 const MARKET: &str = "(define (domain market) (:types good shop)
   (:predicates (sells ?s - shop ?g - good) (at ?s - shop) (road ?a - shop ?b - shop) (done ?g - good))
   (:functions (price ?s - shop ?g - good) (wanted ?g - good) (spent) (fame))

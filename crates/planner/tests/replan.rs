@@ -38,7 +38,6 @@ fn words(atom: &Atom) -> Vec<String> {
     std::iter::once(atom.predicate.name.to_string()).chain(atom.arguments.iter().map(term)).collect()
 }
 
-/// Parts of a mission that can change.
 struct Changes {
     at: &'static str,
     places: Vec<String>,
@@ -387,7 +386,6 @@ fn a_reconfiguration_at_the_last_step_counts() {
     compare(&solution, &live(&mut new(&domain, &problem), &domain, &problem), &String::new);
 }
 
-/// A map with a battery; `None` if the script or Python is missing.
 fn generated(waypoints: usize, designs: usize, functions: usize) -> Option<(Domain, Problem)> {
     let directory = Path::new(env!("CARGO_TARGET_TMPDIR"));
     let arguments = ["--family", "ugv", "--seed", "1", "--metric", "weighted", "--enc", "n", "--name", "map"];

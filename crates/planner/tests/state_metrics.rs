@@ -88,7 +88,6 @@ impl Market {
         *at == 0 && self.goals.iter().all(|goal| bought[*goal])
     }
 
-    /// Costs of the steps, with the next states.
     fn successors(&self, (at, amount, rate, bought): &Explicit) -> Vec<(i64, Explicit)> {
         let (at, amount, rate) = (*at, *amount, *rate);
         let mut next = Vec::new();
@@ -110,7 +109,6 @@ impl Market {
         next
     }
 
-    /// Plans have at most `horizon` steps.
     fn cheapest_within(&self, horizon: usize) -> Option<i64> {
         let mut layer = BTreeMap::from([(self.start(), 0)]);
         let mut best = None;

@@ -43,7 +43,6 @@ fn written(plan: &Plan) -> String {
     text
 }
 
-/// The validator computes the metric; `None` if the plan is invalid.
 fn metric(domain: &Domain, problem: &Problem, text: &str) -> Option<String> {
     let plan =
         PlanText::parse(&Source::new("plan", text)).unwrap_or_else(|errors| panic!("{errors:?}\n{text}"));
@@ -52,7 +51,6 @@ fn metric(domain: &Domain, problem: &Problem, text: &str) -> Option<String> {
     verdict.valid.then(|| value.to_string())
 }
 
-/// Compares the cost of the plan and the start times of its actions.
 fn check(name: &str, domain: &str, problem: &str, expected: Option<(&str, &[&str])>) {
     let (domain, problem) = parse(domain, problem);
     let found = plan(&domain, &problem, Engine::Auto);

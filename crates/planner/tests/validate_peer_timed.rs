@@ -35,7 +35,6 @@ const PAIRS: [(&str, &str); 8] = [
     ("suave_extended_metaplan_domain", "suave_extended_metaplan_problem"),
 ];
 
-/// Reads a domain, a problem and plans, and prints a verdict for each plan.
 const PEER: &str = "import sys
 from unified_planning.exceptions import UPTypeError, UPUsageError
 from unified_planning.engines.plan_validator import TimeTriggeredPlanValidator
@@ -97,7 +96,6 @@ fn plan(domain: &Domain, problem: &Problem) -> Vec<Timed> {
     timed
 }
 
-/// `number` determines the change.
 fn changed(plan: &[Timed], objects: &[String], number: usize) -> Vec<Timed> {
     let mut plan = plan.to_vec();
     let place = number / 7 % plan.len();

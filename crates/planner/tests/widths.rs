@@ -33,7 +33,6 @@ pub fn solve(domain: &Domain, problem: &Problem, separation: &BigRational, limit
     narrow
 }
 
-/// Prime numbers from 101.
 fn primes() -> impl Iterator<Item = i128> {
     (101_i128..).filter(|number| {
         (2..*number).take_while(|factor| factor * factor <= *number).all(|factor| number % factor > 0)

@@ -22,7 +22,6 @@ use libfuzzer_sys::fuzz_target;
 use pddl::{Source, read, render};
 use metaplan_planner::{GroundConfig, ground};
 
-/// Words that have a meaning in PDDL or occur in the generated files.
 const WORDS: [&str; 28] = [
     "(",
     ")",

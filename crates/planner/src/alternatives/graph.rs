@@ -61,7 +61,6 @@ pub(super) struct Graph {
 
 pub(super) const ROOT: u32 = 0;
 
-/// Returns `true` if the unfinished graph already contains enough plans.
 pub(super) type IsEnough<'e> = dyn FnMut(&Graph) -> bool + 'e;
 
 /// Builds the graph of all plans with cost `cost`, which must be the cost of a cheapest plan. At a limit, or

@@ -67,7 +67,6 @@ struct List {
 }
 
 impl List {
-    /// Also returns whether the list is exhaustive or the enumeration stopped early.
     fn new(context: Context<'_>, first: &GroundPlan, most: usize, graph: &Graph) -> (Self, End) {
         let mut list = Self { plans: Vec::new(), most };
         let first_plan = decode(context, first);

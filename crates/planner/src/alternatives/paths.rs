@@ -12,7 +12,6 @@ const MAX_WORK: usize = 2_000_000;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum End {
     Exhausted,
-    /// The enumeration stopped early, so there may be further paths.
     Stopped,
 }
 
@@ -25,7 +24,6 @@ pub(super) struct Paths<'g> {
     work: usize,
 }
 
-/// A label on the current path, and the index of the next edge to follow from it.
 struct Branch {
     label: u32,
     next: usize,
@@ -68,7 +66,6 @@ impl<'g> Paths<'g> {
         End::Stopped
     }
 
-    /// Calls `visit` with each path of `length` steps. Stops early like [`Paths::each`].
     fn each_of(&mut self, length: usize, visit: &mut dyn FnMut(Vec<GroundStep>) -> bool) -> End {
         let mut path: Vec<u32> = Vec::new();
         let mut branches = vec![Branch { label: ROOT, next: self.first[ROOT as usize] }];

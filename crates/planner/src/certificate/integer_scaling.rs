@@ -14,7 +14,6 @@ use task::task::quantity::Linear;
 /// Maximum number of bits of a common denominator.
 const MOST_BITS: u64 = 1 << 20;
 
-/// Factors that convert the numbers, costs and times of a task to integers.
 pub(super) struct Scales {
     pub(super) numbers: Integer,
     pub(super) costs: Integer,

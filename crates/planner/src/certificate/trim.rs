@@ -16,7 +16,6 @@ use rustc_hash::FxHashMap;
 
 use task::limits::Limits;
 
-/// Maximum number of literals in all clauses together.
 const LITERAL_LIMIT: usize = 1 << 26;
 const NONE: u32 = u32::MAX;
 
@@ -82,7 +81,6 @@ struct Trimmer {
     /// The unit clause that permanently fixes the value of each variable.
     units: Vec<u32>,
     is_seen: Vec<bool>,
-    /// A clause whose literals are all false.
     conflict: Option<u32>,
     is_done: bool,
     size: usize,

@@ -256,7 +256,6 @@ impl<N: TaskNumber> Writer<'_, N> {
         }
     }
 
-    /// Multiplies a linear expression by the scale of the numbers and by `factor`.
     fn linear(&mut self, linear: &task::quantity::Linear<N>, factor: &Integer) -> Linear {
         let factors = linear.coefficients.iter();
         let scale = &self.scales.numbers * factor;

@@ -13,7 +13,6 @@ use task::task::quantity::{Linear, Quantity};
 use task::task::table_map::TableMap;
 use task::task::{Condition, Task};
 
-/// Maximum number of bits of a common denominator.
 const MOST_BITS: u64 = 200;
 
 /// A task whose constants are scaled to integers where possible. The factor of the costs is

@@ -30,7 +30,6 @@ use crate::exact::integer_scaling::Integral;
 use crate::optimize::{Config, can_repeat_reward};
 use pddl::ast::{Domain, Problem};
 
-/// Maximum number of stored states.
 const STATE_LIMIT: usize = 2_000_000;
 /// Maximum number of bits of the rounded integer costs from which heuristics are computed.
 const COST_BITS: u64 = 90;

@@ -33,7 +33,6 @@ use crate::optimize::state_dependent_costs::StateDependentCosts;
 
 /// Maximum number of nodes. Without it, the search may not end, as numbers can grow without bound at no cost.
 const MAX_NODES: usize = 2_000_000;
-/// Maximum number of combinations of designs, over all operators.
 const MAX_COMBINATIONS: usize = 200_000;
 /// Maximum number of nodes that A\* takes from the open list in its first turn. The number doubles in each further
 /// turn.
@@ -122,7 +121,6 @@ fn first_plan(task: &Task, config: &Config) -> Option<Solution> {
     Some(solve(Run::new(task, &config, &mut stop)))
 }
 
-/// `None` if there are too many admitted combinations of designs.
 fn choices(task: &Task) -> Option<Vec<Vec<Vec<u32>>>> {
     let mut remaining = MAX_COMBINATIONS;
     let mut choices = Vec::with_capacity(task.operators.len());
@@ -200,7 +198,6 @@ struct Node {
     /// Cost of the path, including the weighted values of the measured fluents in its last state.
     total: Int,
     steps: usize,
-    /// Parent node and step; `None` for the initial state.
     origin: Option<(u32, GroundStep)>,
     is_dominated: bool,
 }
@@ -233,7 +230,6 @@ struct Search<'a> {
     /// Nodes that no other node dominates, by the hash of the parts of their states that must be equal.
     table: FxHashMap<u64, Vec<u32>>,
     open: BinaryHeap<Reverse<Priority>>,
-    /// Best plan and its cost.
     best: Option<(Int, GroundPlan)>,
     /// Lower bound on the cost of plans through nodes that were dropped because numbers overflow.
     left_out: Option<Int>,
@@ -387,7 +383,6 @@ impl<'a> Search<'a> {
         self.offer(steps);
     }
 
-    /// Replaces the best plan by a better one that is not longer than the horizon.
     fn offer(&mut self, steps: Vec<GroundStep>) {
         if self.exceeds_horizon(steps.len()) {
             return;

@@ -25,11 +25,9 @@ use task::number::{Int, dense};
 
 use crate::optimize::optimizer_run::{Best, IncrementalSolver, Run, StrategyOutcome};
 
-/// Maximum number of solver calls to reduce one core.
 const CORE_TRIM_ROUNDS: usize = 4;
 
 struct Search {
-    /// Lower bound on the cost of every plan that the formula admits.
     lower: Int,
     /// Weight of each soft literal, at least 1. The weight is added to the cost if the literal is true.
     weights: BTreeMap<Lit, Int>,

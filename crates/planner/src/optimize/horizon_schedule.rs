@@ -19,7 +19,6 @@ use crate::optimize::sat_budget::{FORMULA_LIMIT, SatBudget};
 pub(super) struct HorizonSchedule {
     /// Horizons whose formulas are not decided yet.
     open: Vec<usize>,
-    /// `None` after the last horizon.
     next: Option<usize>,
     /// Upper bound on the number of steps of a shortest plan, or the configured horizon if it is smaller.
     /// `usize::MAX` if there is neither.
@@ -32,7 +31,6 @@ pub(super) enum FirstPlanOutcome {
     Plan(GroundPlan),
     /// There is no plan of any length, or no plan within the configured horizon.
     Refuted(Box<Solution>),
-    /// The budget is used up; the schedule can be resumed.
     Paused,
     /// A limit was reached, the formulas become too large, or the cost of a plan overflows.
     Over,

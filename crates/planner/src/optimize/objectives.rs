@@ -206,7 +206,6 @@ fn costs_by(task: &Task, objective: usize, plan: &GroundPlan) -> impl Iterator<I
     })
 }
 
-/// Returns `None` if the cost overflows.
 fn cost_by(task: &Task, objective: usize, plan: &GroundPlan) -> Option<Int> {
     costs_by(task, objective, plan).try_fold(0, Int::checked_add)
 }

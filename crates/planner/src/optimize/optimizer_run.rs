@@ -59,11 +59,9 @@ impl FormulaScope {
 pub(super) enum StrategyOutcome {
     /// The formula has no plan that is within its cost limit and cheaper than the best known plan.
     Exhausted,
-    /// A limit was reached, or the budget is used up.
     Interrupted,
 }
 
-/// A SAT solver that has already received some clauses of a formula.
 pub(super) struct IncrementalSolver {
     pub(super) solver: Box<dyn Solver>,
     known: usize,

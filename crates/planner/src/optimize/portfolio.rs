@@ -51,7 +51,6 @@ struct Portfolio<'r, 'a> {
     prover: Option<Prover>,
     best: Option<GroundPlan>,
     lower: Int,
-    /// Proof of the lower bound `lower`.
     reason: Proof,
     /// Number of times that the budget of formulas is halved, at most [`MAX_BACKOFF`].
     share: u32,
@@ -66,7 +65,6 @@ struct Portfolio<'r, 'a> {
 type Turn = Option<Ending>;
 
 enum Ending {
-    /// An optimal plan from the exact search.
     Exact(GroundPlan),
     Unsolvable,
     /// Proof of a lower bound that equals the cost of the best plan.

@@ -31,9 +31,7 @@ pub(super) struct Prover {
 }
 
 pub(super) enum ProverOutcome {
-    /// The best known plan is optimal.
     Proved(Proof),
-    /// The budget is used up; the prover can be resumed.
     Paused,
     /// A limit was reached, formulas become too large, or further formulas would prove nothing.
     Over,

@@ -17,7 +17,6 @@ use crate::optimize::{Config, Engine, Strategy, optimize};
 
 const STRATEGIES: [Strategy; 3] = [Strategy::Auto, Strategy::Tighten, Strategy::Cores];
 
-/// Returns solvable fleet and depot tasks, with their problem texts and optimal costs.
 fn tasks(seeds: std::ops::Range<u64>) -> impl Iterator<Item = (String, Task, Int)> {
     seeds.flat_map(|seed| [fleet(seed), depot(seed)]).filter_map(|text| {
         let problem = text.1.clone();

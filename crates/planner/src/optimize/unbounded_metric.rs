@@ -87,7 +87,6 @@ fn unknown(by_steps: Solution) -> Solution {
     Solution { status: Status::Unknown, plan: None, ground: None, lower_bound: None, proof: None, ..by_steps }
 }
 
-/// The metric becomes the sum of the new costs.
 fn with_costs(task: &Task, cost: impl Fn(&Operator) -> Quantity<Int>) -> Task {
     let mut task = task.clone();
     for operator in &mut task.operators {

@@ -42,7 +42,6 @@ pub use query::{FirstStep, Progress, Query, ReplanOutcome};
 
 /// Each number in the initial state must be a multiple of 1/`PRECISION`.
 const PRECISION: Int = 1_000_000;
-/// Maximum number of sets of available objects with cached data.
 const MAX_CACHED_SETS: usize = 8;
 
 /// Maximum number of states of each search of [`Replanner::blocking`]. The result is only a hint
@@ -156,7 +155,6 @@ impl Replanner {
         Some(names)
     }
 
-    /// Data of interrupted computations are not cached.
     fn set(
         &mut self,
         available: &[Vec<ObjectId>],

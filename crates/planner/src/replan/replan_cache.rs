@@ -20,7 +20,6 @@ pub(super) struct GroundBase {
     pub(super) requirements: Vec<Vec<(usize, usize)>>,
 }
 
-/// Data that all states with equal availability share.
 pub(super) struct AvailabilityContext {
     pub(super) task: Task,
     pub(super) bounds: Bounds,

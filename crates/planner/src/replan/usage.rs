@@ -16,7 +16,6 @@ pub(super) struct Usage {
     read: FxHashSet<Name>,
     /// Keys of the atoms of the goal, see [`key`].
     goal: FxHashSet<String>,
-    /// Predicates and functions that effects or axioms change.
     changed: FxHashSet<Name>,
     /// Functions that conditions (including the goal), durations or effects read.
     functions: FxHashSet<Name>,

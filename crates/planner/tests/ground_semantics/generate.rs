@@ -404,7 +404,6 @@ impl<'b> Draw<'b> {
         }
     }
 
-    /// The plan has at most five steps, and may be invalid.
     pub fn plan(&mut self, task: &Task) -> Vec<Step> {
         self.some(0, 5, |this| {
             let index = this.below(task.actions.len());

@@ -56,7 +56,6 @@ fn after(task: &Task, state: &State, index: usize, objects: Vec<usize>) -> Optio
     state.after(task, &(index, objects, duration))
 }
 
-/// Checks that none of the first [`LIMIT`] states of the lifted task satisfies the goal.
 fn goal_is_out_of_reach(task: &Task) {
     let mut open = vec![State::initial(task)];
     let mut next = 0;

@@ -125,8 +125,6 @@ impl Touch {
         }));
     }
 
-    /// Returns `true` if this happening writes an atom or number that `other` reads, or both write it in ways
-    /// that do not commute.
     pub fn disturbs(&self, other: &Self) -> bool {
         let is_read = |atom: &Atom| other.facts.contains(atom) || other.predicates.contains(&atom.0);
         let is_read_number = |atom: &Atom| other.values.contains(atom) || other.functions.contains(&atom.0);

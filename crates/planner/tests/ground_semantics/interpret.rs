@@ -391,7 +391,6 @@ impl State {
         View::new(task, self, None).holds(&task.goal, &[])
     }
 
-    /// `None` if there is no metric or it is undefined.
     pub fn metric(&self, task: &Task) -> Option<Number> {
         let (_, value) = task.metric.as_ref()?;
         View::new(task, self, None).value(value, &[])

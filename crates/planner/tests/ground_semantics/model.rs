@@ -35,13 +35,11 @@ pub const TOTAL_COST: usize = 2;
 /// Indices of the static functions, which only the initial state sets.
 pub const CONSTANT: [usize; 2] = [3, 4];
 
-/// Type of a variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Range {
     Object,
     Thing,
     Part,
-    /// The union type `(either part tool)`.
     Either,
 }
 
@@ -189,7 +187,6 @@ fn applied(name: &str, terms: &[Term]) -> String {
     format!("({})", words.join(" "))
 }
 
-/// Formats a number in PDDL: as a decimal or a quotient.
 pub fn number(value: Number) -> String {
     match (*value.numer(), *value.denom()) {
         (numerator, 1) => numerator.to_string(),

@@ -6,19 +6,16 @@ use crate::ground_semantics::interpret::{State, Step, choices};
 use crate::ground_semantics::model::{Action, Atom, Expression, Formula, Number, Sign, Task, Term};
 use crate::ground_semantics::text;
 
-/// For each valid plan.
 const CHANGES: usize = 8;
 
 fn needs_duration(action: &Action) -> bool {
     action.duration.as_ref().is_some_and(|bounds| !matches!(bounds[..], [(false, Sign::Equal, _)]))
 }
 
-/// Includes durations that no action can have.
 fn durations() -> impl Iterator<Item = Number> + Clone {
     (-1..=6).map(|halves| Number::new(halves, 2))
 }
 
-/// All steps have the correct number and types of arguments.
 fn steps(task: &Task) -> Vec<Step> {
     let mut found = Vec::new();
     for (index, action) in task.actions.iter().enumerate() {
@@ -34,7 +31,6 @@ fn steps(task: &Task) -> Vec<Step> {
     found
 }
 
-/// Draws executable steps, and returns them with the final state.
 fn walk(draw: &mut Draw<'_>, task: &Task) -> (Vec<Step>, State) {
     let (mut plan, mut state) = (Vec::new(), State::initial(task));
     let steps = steps(task);
@@ -72,7 +68,6 @@ fn difference(before: &State, after: &State) -> Formula {
     Formula::And(gained.chain(lost).chain(values).collect())
 }
 
-/// Makes one random change, which may have no effect.
 fn changed(draw: &mut Draw<'_>, task: &Task, plan: &[Step]) -> Vec<Step> {
     let mut plan = plan.to_vec();
     let place = draw.below(plan.len());

@@ -229,7 +229,6 @@ fn no_change_of_the_witness_hides_that_an_operator_is_missing() {
     assert!(count.lies >= 200, "{count:?}");
 }
 
-/// Each kind of difference is reported by a separate variant, not only by a text.
 #[test]
 fn each_difference_has_its_own_cause() {
     let example = TASKS.iter().find(|example| example.name == "ways").expect("the example");

@@ -20,7 +20,6 @@ pub(crate) struct State {
 #[derive(Debug, Clone)]
 pub(crate) enum Term {
     Object(usize),
-    /// Index in the binding.
     Variable(usize),
     Function(usize, Box<Term>),
 }
@@ -57,7 +56,6 @@ pub(crate) struct Effect {
 pub(crate) struct Action {
     pub(crate) parameters: usize,
     pub(crate) condition: Formula,
-    /// `None` for an instantaneous action.
     pub(crate) start: Option<Vec<Effect>>,
     pub(crate) end: Vec<Effect>,
 }
@@ -69,7 +67,6 @@ pub(crate) struct Task {
     pub(crate) goal: Formula,
 }
 
-/// Index of an action, and its arguments.
 pub(crate) type Step = (usize, Vec<usize>);
 
 impl Term {
@@ -110,7 +107,6 @@ impl Formula {
         }
     }
 
-    /// `bound` is the number of bound variables.
     pub(crate) fn text(&self, bound: usize) -> String {
         match self {
             Self::Equal(left, right) => format!("(= {} {})", left.text(), right.text()),
@@ -205,7 +201,6 @@ impl Task {
         Some((end, first + second + 1))
     }
 
-    /// `None` if the plan is invalid.
     pub(crate) fn cost(&self, plan: &[Step]) -> Option<u32> {
         let start = (self.init, 0);
         let (end, cost) = plan.iter().try_fold(start, |(state, cost), step| {

@@ -247,7 +247,6 @@ impl Task {
         Some((states, cost, violated))
     }
 
-    /// `None` if the plan is invalid.
     pub fn judge(&self, plan: &[(usize, usize)]) -> Option<i64> {
         let (states, mut cost, violated) = self.execute(plan)?;
         if !self.goal.holds(states.last()?, Bound::default()) {
@@ -266,7 +265,6 @@ impl Task {
         Some(if self.maximize { 20 - cost } else { cost })
     }
 
-    /// Enumerates all plans up to the maximum length.
     pub fn best(&self) -> Option<i64> {
         let instances: Vec<_> = (0..self.actions.len())
             .flat_map(|action| {

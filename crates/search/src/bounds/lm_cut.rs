@@ -58,7 +58,6 @@ pub struct LandmarkCut {
     supports: Vec<u64>,
     queue: BinaryHeap<Reverse<(u64, u32)>>,
     stack: Vec<u32>,
-    /// Payers of the rules in the current cut.
     cut: Vec<u32>,
     in_cut: Vec<bool>,
     work: u64,
@@ -154,7 +153,6 @@ impl LandmarkCut {
         }
     }
 
-    /// Marks the facts from which the goal is reachable at no cost through the supporters of rules.
     fn mark_goal_zone(&mut self) {
         self.zones[GOAL as usize] = CutSide::Goal;
         self.stack.push(GOAL);

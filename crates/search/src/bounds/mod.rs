@@ -34,7 +34,6 @@ use task::task::{State, VariableId};
 const STEP_LIMIT: usize = 4_000;
 /// Maximum number of abstract states of a projection to two variables.
 const STATE_LIMIT: usize = 20_000;
-/// Maximum number of projections to pairs of variables.
 const PAIR_LIMIT: usize = 40;
 /// Maximum number of projections that are evaluated for each state if there is no cost partitioning. More
 /// projections cost more time than the avoided expansions save.
@@ -51,7 +50,7 @@ pub struct Bounds {
     further: Vec<Projection>,
 }
 
-/// The plans within a limit on cost and steps: their maximum length, and the operators of each step.
+/// Plans within a limit on cost and steps: an upper bound on their length, and the operators of each step.
 pub struct ReachableWindow {
     /// Upper bound on the number of steps of plans within the cost limit. `None` if there is no cost limit,
     /// or no projection proves a bound below `STEP_LIMIT`.

@@ -28,7 +28,6 @@ pub struct Projection {
     operators: Vec<(Int, Vec<Transition>)>,
     /// Minimum cost of the operators without transitions, if there are any.
     idle_cost: Option<Int>,
-    /// `None` if the goal is unreachable.
     to_go: Vec<Option<Int>>,
 }
 
@@ -180,7 +179,6 @@ impl Projection {
         reached.into_iter().map(index).collect()
     }
 
-    /// `None` if the goal is unreachable from the abstract state.
     pub(crate) fn goal_distances(
         &self,
         costs: &[Int],

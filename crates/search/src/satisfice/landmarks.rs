@@ -386,7 +386,6 @@ fn connect(reach: &mut [Vec<u64>], sooner: u32, later: u32) {
     join(reach, sooner, &further);
 }
 
-/// Returns the first word in the name of the value.
 fn predicate<N>(task: &Task<N>, fact: Fact) -> &str {
     let name = &task.variables[fact.variable.index()].values[fact.value as usize];
     name.split([' ', '(', ')']).find(|word| !word.is_empty()).unwrap_or(name)

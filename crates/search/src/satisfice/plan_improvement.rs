@@ -29,7 +29,6 @@ use crate::satisfice::segment_goal::SegmentGoal;
 use crate::satisfice::step_order::StepOrder;
 use crate::search::SearchStatistics;
 
-/// Number of steps of the shortest segments.
 const MIN_STEPS: usize = 4;
 /// Number of states that the search of a segment may evaluate, before the limit is first doubled.
 const MIN_EVALUATIONS: u64 = 100;
@@ -38,10 +37,8 @@ const MAX_DOUBLINGS: u32 = 8;
 const GREEDY_WEIGHT: u64 = 2;
 const MAX_FAILURES: usize = 1 << 18;
 
-/// A resumable search for segments of a plan that can be replaced by cheaper steps.
 pub(super) struct PlanImprovement<N> {
     plan: GroundPlan<N>,
-    /// Begins with the initial state.
     states: Vec<State<N>>,
     order: StepOrder,
     random: Random,
@@ -52,7 +49,6 @@ pub(super) struct PlanImprovement<N> {
     doublings: u32,
     is_greedy: bool,
     has_improved: bool,
-    /// `None` before the next segment begins.
     current: Option<SegmentSearch<N>>,
     /// Unsuccessful searches, by the hash of first state, goal facts and weight: the number of times that the
     /// limit on evaluated states was doubled.
@@ -94,7 +90,6 @@ impl<N: TaskNumber> PlanImprovement<N> {
         self.doublings > MAX_DOUBLINGS
     }
 
-    /// Replaces the plan, and discards the search of the current segment.
     fn replace(&mut self, context: &SearchContext<'_, N>, plan: GroundPlan<N>, states: Vec<State<N>>) {
         self.order = StepOrder::new(context.task, &plan.steps);
         (self.plan, self.states, self.current) = (plan, states, None);
@@ -189,7 +184,6 @@ impl<N: TaskNumber> PlanImprovement<N> {
         }
     }
 
-    /// Chooses the length of the segments and the order of the steps for the next pass.
     fn end_pass(&mut self, context: &SearchContext<'_, N>) {
         let count = self.plan.steps.len();
         self.is_greedy = !self.is_greedy;

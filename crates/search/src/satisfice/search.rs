@@ -32,7 +32,6 @@ use crate::search::SearchStatistics;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum HeuristicWeight {
-    /// The heuristic value only (greedy best-first search).
     Greedy,
     /// The path cost plus this multiple of the heuristic value (weighted A\*).
     Times(u64),
@@ -65,7 +64,6 @@ pub(super) enum Outcome<N> {
 
 pub(super) struct Search<N> {
     weight: HeuristicWeight,
-    /// `None` if the goal is the goal of the task.
     segment: Option<SegmentGoal>,
     targets: Vec<Proposition>,
     prices: Arc<[u32]>,
@@ -139,8 +137,6 @@ impl<N: TaskNumber> Search<N> {
         self.store.size().saturating_add(self.reached.len()).saturating_add(self.open.size())
     }
 
-    /// Searches for a plan that costs less than `limit` (for any plan if `None`), with about `work` work
-    /// units.
     pub(super) fn run(
         &mut self,
         context: &mut SearchContext<'_, N>,
@@ -226,7 +222,6 @@ impl<N: TaskNumber> Search<N> {
         self.segment.as_ref().map_or_else(|| task.is_goal(state), |goal| goal.holds(task, state))
     }
 
-    /// Returns the bitset of the landmarks that are reached in `state`, a successor of `parent`.
     fn reach(&self, context: &mut SearchContext<'_, N>, parent: u32, state: &State<N>) -> Vec<u64> {
         if self.stride == 0 {
             return Vec::new();

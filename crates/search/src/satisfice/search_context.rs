@@ -86,12 +86,10 @@ impl<'a, N: TaskNumber> SearchContext<'a, N> {
         Arc::clone(self.prices[usize::from(priced)].insert(prices.into()))
     }
 
-    /// Returns the number of work units charged for the evaluation of a state.
     pub(super) fn size(&self) -> u64 {
         self.relaxation.propositions.saturating_add(self.relaxation.operators.len()) as u64
     }
 
-    /// Work units done between two readings of the counters.
     pub(super) fn work(&self, before: SearchStatistics, after: SearchStatistics) -> u64 {
         let evaluated = after.evaluated.saturating_sub(before.evaluated);
         let generated = after.generated.saturating_sub(before.generated);

@@ -21,14 +21,12 @@ const MAX_WORK: usize = 400_000_000;
 /// Maximum number of rounds of forward and backward h² analysis, which prune with each other's results.
 const MAX_ROUNDS: usize = 4;
 
-/// A bitset of facts, or one such bitset for each fact.
 type Words = Vec<u64>;
 
 struct Rule {
     before: Vec<u32>,
     /// Facts that are known to hold after the operator.
     after: Vec<u32>,
-    /// Facts that the operator may make true.
     adds: Vec<u32>,
     /// All facts of the variables that the operator certainly sets.
     set: Words,

@@ -75,7 +75,6 @@ impl Label {
     }
 }
 
-/// Values by which labels of one Pareto front are compared.
 struct Merits {
     cost: Int,
     steps: usize,
@@ -516,7 +515,6 @@ mod tests {
 
     const ENUMERATION_LIMIT: usize = 300_000;
 
-    /// Enumerates all plans with the cost and the number of steps of a known plan in model order.
     struct Enumeration<'a> {
         task: &'a Task,
         choices: Vec<Vec<(Vec<u32>, Int)>>,

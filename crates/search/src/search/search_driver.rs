@@ -155,7 +155,6 @@ pub struct InterleavedSearch<'a, N, E> {
     has_begun: bool,
     /// `true` if searches continue although memory is forecast to run out.
     is_patient: bool,
-    /// Greatest proved lower bound on the cost of every plan.
     bound: Option<N>,
     best: Option<GroundPlan<N>>,
     figures: SearchStatistics,

@@ -59,7 +59,6 @@ impl<N: TaskNumber> SearchTask<N> {
     }
 
     /// The result is 0 if no operator has a positive cost.
-    /// positive cost.
     pub(super) fn steps_at_least(&self, cost: &N) -> u32 {
         if self.dearest > N::zero() { cost.times_at_least(&self.dearest) } else { 0 }
     }

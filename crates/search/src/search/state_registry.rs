@@ -75,7 +75,6 @@ pub(super) struct StateRegistry<N> {
     fields: Vec<BitField>,
     exact: Vec<usize>,
     compared: Vec<ComparedVariable>,
-    /// Number of words of a key.
     width: usize,
     /// `width` words for each place.
     keys: Vec<u32>,

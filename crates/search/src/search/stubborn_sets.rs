@@ -43,9 +43,7 @@ const MIN_PRUNED_FRACTION: u64 = 5;
 
 pub struct Stubborn {
     first: Vec<u32>,
-    /// For each fact: operators that require it.
     requiring: Lists,
-    /// For each fact: operators that may set it.
     setting: Lists,
     /// For each variable: operators that may set it and require no value of it.
     blind: Lists,
@@ -68,7 +66,6 @@ pub(super) struct StubbornSetPruning {
     out: usize,
     /// Number of expansions after which pruning is disabled if it has pruned too little.
     trial: u64,
-    /// Number of expansions with pruning.
     looked: u64,
     applicable: u64,
     left_out: u64,
