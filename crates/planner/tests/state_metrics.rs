@@ -129,7 +129,6 @@ impl Market {
         best
     }
 
-    /// Dijkstra's algorithm over explicit states.
     fn cheapest(&self) -> Option<i64> {
         let start = self.start();
         let mut costs: BTreeMap<Explicit, i64> = BTreeMap::new();

@@ -39,7 +39,7 @@ fn primes() -> impl Iterator<Item = i128> {
     })
 }
 
-/// The speed of each design is a different prime number, as in a field report.
+/// The speed of each design is a different prime number.
 fn speeds(count: usize) -> (Domain, Problem) {
     let domain = "(define (domain speeds) (:requirements :typing :durative-actions :numeric-fluents)
       (:types place design) (:predicates (at ?p - place)) (:functions (dist ?a ?b - place) (speed ?d - design))

@@ -185,7 +185,6 @@ struct Search<'a> {
 }
 
 enum Stopped {
-    /// An operator has too many combinations of designs.
     TooMany,
     AtLimit,
 }

@@ -70,7 +70,6 @@ enum Ending {
     /// Proof of a lower bound that equals the cost of the best plan.
     Proved(Proof),
     Refuted(Box<Solution>),
-    /// A limit was reached, or no component can continue.
     Over,
 }
 

@@ -185,7 +185,6 @@ fn rows(table: &Table<Int>, kept: &KeptDesigns, sizes: &[usize]) -> Arc<[Int]> {
     positions.into_iter().map(|position| table.values[position]).collect()
 }
 
-/// Keeps the combinations whose designs all remain, with the new indices of the designs.
 fn exclusions(rule: &ForbiddenCombinations, kept: &KeptDesigns) -> ForbiddenCombinations {
     let moved = |(slot, index): (&u32, &u32)| {
         kept[*slot as usize].iter().position(|candidate| candidate == index).map(dense)

@@ -10,7 +10,6 @@ use crate::ground_semantics::model::{
     Range, STATICS, Sign, TOTAL_COST, Task, Term, UPPER, Way,
 };
 
-/// Language constructs that generated tasks may contain.
 #[expect(clippy::struct_excessive_bools, reason = "switches that have nothing to do with each other")]
 #[derive(Debug, Clone, Copy)]
 pub struct Features {
@@ -61,7 +60,6 @@ pub struct Draw<'b> {
     partial: bool,
 }
 
-/// Derived predicates that a condition may read.
 #[derive(Debug, Clone, Copy)]
 struct Allowed {
     /// Predicates that may be read anywhere.

@@ -59,7 +59,6 @@ pub fn with(scope: &[usize], object: usize) -> Vec<usize> {
     scope.iter().copied().chain([object]).collect()
 }
 
-/// Each combination has one object from each list.
 pub fn choices(lists: &[&[usize]]) -> Vec<Vec<usize>> {
     lists.iter().fold(vec![Vec::new()], |all, list| {
         all.iter().flat_map(|known| list.iter().map(|object| with(known, *object))).collect()

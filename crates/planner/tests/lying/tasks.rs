@@ -4,7 +4,6 @@ pub struct Example {
     pub name: &'static str,
     pub domain: &'static str,
     pub problem: &'static str,
-    /// `None` if there is no plan.
     pub optimum: Option<&'static str>,
 }
 

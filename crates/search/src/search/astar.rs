@@ -289,7 +289,6 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         None
     }
 
-    /// Returns a deterministic measure of the work already done.
     pub(super) fn work(&self) -> u64 {
         self.own_work.saturating_add(self.lazy_heuristic.as_ref().map_or(0, |sharper| sharper.work()))
     }
