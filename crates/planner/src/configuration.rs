@@ -27,7 +27,6 @@ use num_traits::{One as _, Signed as _, ToPrimitive as _, Zero as _};
 
 use task::limits::{Interrupted, Limits};
 
-/// Maximum number of subgradient iterations.
 const ROUNDS: usize = 300;
 /// Number of fractional bits of the Lagrangian multipliers.
 const PRICE_BITS: i32 = 40;
@@ -86,12 +85,12 @@ struct Problem {
     functions: Vec<Vec<Item>>,
     /// Budgets of the caller, followed by one budget for each component.
     budgets: Vec<BigInt>,
-    /// For each function: the minimum consumption of each budget by this and all later functions. A final
-    /// entry is 0.
+    /// For each function: the minimum consumption of each budget by this and all later functions;
+    /// at the end 0.
     least: Vec<Vec<BigInt>>,
 }
 
-/// A partial assignment: the selected designs of the functions up to some index.
+/// The selected designs of the functions up to some index.
 #[derive(Clone, Default)]
 struct Label {
     designs: Vec<Option<usize>>,
@@ -110,23 +109,22 @@ impl Label {
         label
     }
 
-    /// Returns `true` if every completion of `other` that respects the budgets is also possible for `self`,
-    /// i.e. if `self` consumes no more of any budget.
+    /// Returns `true` if `self` consumes no more of any budget than `other`.
     fn is_as_free(&self, other: &Self) -> bool {
         self.spent.iter().zip(&other.spent).all(|(left, right)| left <= right)
     }
 }
 
-/// Lagrangian multipliers (prices) of the budgets, and upper bounds on the worth that remains after paying these
-/// prices. Both are in units of 2^-`PRICE_BITS`.
+/// Lagrangian multipliers (prices) of the budgets, and upper bounds on the worth after paying these
+/// prices, in units of 2^-`PRICE_BITS`.
 struct LagrangeMultipliers {
     each: Vec<BigInt>,
-    /// For each function: greatest sum of the reduced worths (worth minus priced demands) of this and all later
-    /// functions, of which each contributes at least 0. A final entry is 0.
+    /// For each function: the greatest sum of reduced worths (worth minus priced demands) of this
+    /// and all later functions, where each contributes at least 0; at the end 0.
     after: Vec<BigInt>,
 }
 
-/// Multiplies the numbers by their least common denominator. Returns the integers and the denominator.
+/// Multiplies the numbers by their least common denominator, and returns the denominator, too.
 fn scaled<'a>(numbers: impl Iterator<Item = &'a BigRational> + Clone) -> (Vec<BigInt>, BigInt) {
     let scale = numbers.clone().fold(BigInt::one(), |scale, number| scale.lcm(number.denom()));
     (numbers.map(|number| (number * &scale).to_integer()).collect(), scale)
@@ -188,8 +186,8 @@ impl Problem {
         Label { spent: vec![BigInt::zero(); self.budgets.len()], ..Label::default() }
     }
 
-    /// Returns `true` if the functions from index `from` on have designs that stay within each budget, considered
-    /// separately.
+    /// Returns `true` if each budget, considered separately, suffices for the label and the minimum
+    /// consumption of the functions from index `from` on.
     fn fits(&self, label: &Label, from: usize) -> bool {
         let Some(least) = self.least.get(from) else { return true };
         let ahead = label.spent.iter().zip(least).map(|(spent, least)| spent + least);
@@ -215,8 +213,8 @@ impl Problem {
         self.functions.iter().fold(self.nothing(), |label, _| label.with(None, None))
     }
 
-    /// Computes multipliers with a low upper bound by a subgradient method. Also returns the best assignment found
-    /// by greedy selection along the way.
+    /// Computes multipliers by a subgradient method. Also returns the best assignment found by
+    /// greedy selection along the way.
     #[expect(clippy::cast_possible_truncation, reason = "rounding is meant; bounds hold for whatever prices")]
     fn prices(&self) -> (LagrangeMultipliers, Label) {
         let float = |number: &BigInt| number.to_f64().unwrap_or(f64::MAX);
@@ -276,7 +274,7 @@ impl Problem {
         (LagrangeMultipliers { each, after }, incumbent)
     }
 
-    /// Returns an upper bound on the worth of all completions of a label (a partial assignment), in units of
+    /// Returns an upper bound on the worth of all completions of a label, in units of
     /// 2^-`PRICE_BITS`. The functions from index `from` on are not assigned yet.
     fn bound(&self, label: &Label, from: usize, prices: &LagrangeMultipliers) -> BigInt {
         let slack = self.budgets.iter().zip(&label.spent).map(|(budget, spent)| budget - spent);
@@ -284,7 +282,7 @@ impl Problem {
         (&label.worth << PRICE_BITS) + paid + prices.after.get(from).cloned().unwrap_or_default()
     }
 
-    /// Finds the best assignment. Partial assignments that cannot reach the worth of `incumbent` are pruned.
+    /// Prunes partial assignments that cannot reach the worth of `incumbent`.
     fn search(
         &self,
         prices: &LagrangeMultipliers,
@@ -332,11 +330,10 @@ mod tests {
         BigRational::from_integer(value.into())
     }
 
-    /// Quality of an assignment: number of served functions, number of violated requirements, and utility.
+    /// Number of served functions, number of violated requirements, and utility.
     type Worth = (usize, std::cmp::Reverse<usize>, BigRational);
 
-    /// Enumerates all assignments in order of preference. Returns the quality and the designs of the first
-    /// optimal assignment.
+    /// Returns the first optimal assignment in order of preference, and its quality.
     fn by_enumeration(
         functions: &[Vec<DesignChoice>],
         budgets: &[BigRational],
@@ -412,8 +409,6 @@ mod tests {
         assert!((300..2700).contains(&partly), "the choices are of one kind: {partly}");
     }
 
-    /// Tests numbers as in sensor data and spreadsheets: 16 digits, with very large and very small numbers
-    /// mixed.
     #[test]
     fn assignments_are_exact_for_numbers_of_any_magnitude() {
         let mut draw = Random(11);
@@ -459,8 +454,6 @@ mod tests {
         }
     }
 
-    /// Solves the multiple-choice knapsack problem by dynamic programming over the amounts of the budget. Returns
-    /// the number of served functions and the utility.
     fn by_amounts(functions: &[Vec<(i64, usize)>], budget: usize) -> (usize, i64) {
         let mut best = vec![(0, 0); budget + 1];
         for designs in functions {

@@ -14,7 +14,7 @@ use task::plan::solution::{Improvement, Solution};
 use crate::exact::{ground_exact, optimize_exact};
 use crate::optimize::{Config, Front, lexicographic, pareto};
 
-/// Callback for better plans and bounds. Planning ends if it returns `Break`.
+/// Planning ends if the callback returns `Break`.
 type Report<'a> = dyn FnMut(&Improvement) -> ControlFlow<()> + 'a;
 
 /// Builder that computes plans for a domain and a problem. Both must have passed [`pddl::check()`], for
@@ -148,8 +148,7 @@ impl<'a> Planner<'a> {
         Ok(pareto(&task, &config, &mut hear))
     }
 
-    /// Returns a function that passes the optimizer's reports to the callback. This function sets the interrupt
-    /// flag if the callback returns `Break`.
+    /// The returned function sets the interrupt flag if the callback returns `Break`.
     fn hear(&mut self) -> impl FnMut(Improvement) {
         let flag = self.config.limits.interrupt();
         let report = &mut self.report;

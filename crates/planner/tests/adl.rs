@@ -9,12 +9,11 @@ use testing::random::Random;
 use crate::tally::limits;
 use pddl::{Source, read};
 
-/// Engines, each with the number of states that A\* stores before the other components of the planner
-/// (satisficing search and SAT solver) start.
+/// Engines, each with the number of states that A\* stores before satisficing search and SAT solver
+/// start.
 const WAYS: [(Engine, usize); 5] =
     [(Engine::Auto, 20_000), (Engine::Auto, 30), (Engine::Auto, 1), (Engine::Search, 1), (Engine::Sat, 0)];
 
-/// Solves a task with an engine and a head start in stored states, see [`WAYS`].
 fn solve(domain: &str, problem: &str, engine: Engine, head_start: usize) -> Solution {
     let (domain, problem, _) = read(&Source::new("domain", domain), &Source::new("problem", problem))
         .unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));
@@ -25,7 +24,7 @@ fn solve(domain: &str, problem: &str, engine: Engine, head_start: usize) -> Solu
     optimize(&task, &config, &mut |_| {})
 }
 
-/// Checks that every engine finds a plan with the expected cost; `None` means that no plan exists.
+/// `None` means that no plan exists.
 fn check(name: &str, domain: &str, problem: &str, expected: Option<&str>) {
     for (engine, head_start) in WAYS {
         let solution = solve(domain, problem, engine, head_start);
@@ -193,8 +192,7 @@ fn numbers_below_zero_do_no_harm_where_nothing_is_used() {
     check("dug", &digging, &problem("1"), Some("2"));
 }
 
-/// Maximum number of steps of compared plans. The SAT solver cannot prove that there is no plan of any
-/// length.
+/// Limit on steps, because the SAT solver cannot prove that there is no plan of any length.
 const HORIZON: usize = 4;
 
 fn agree(seeds: std::ops::Range<u64>) {

@@ -21,7 +21,6 @@ fn files(seed: u64) -> (Domain, Problem) {
     (domain, problem)
 }
 
-/// Returns the certificate of a random mission and its optimal cost (`None` if there is no plan).
 fn certified(seed: u64) -> (Certificate, Option<BigRational>) {
     let mission = Mission::random(seed);
     let (domain, problem) = files(seed);
@@ -35,7 +34,7 @@ fn certified(seed: u64) -> (Certificate, Option<BigRational>) {
     (certificate.unwrap_or_else(|| panic!("seed {seed}: no certificate")), cost)
 }
 
-/// Returns two false claims: a higher optimal cost, and unsolvability.
+/// A higher optimal cost, and unsolvability.
 fn false_claims(cost: &BigRational) -> [Option<BigRational>; 2] {
     [Some(cost + BigRational::from_integer(1.into())), None]
 }
@@ -65,7 +64,7 @@ fn the_truth_is_accepted_and_nothing_else() {
     (0..150).for_each(check);
 }
 
-/// Returns a random task of sleds with limited capacity, in which more supplies can help and can hurt.
+/// Sleds with limited capacity, so that more supplies can help and can hurt.
 fn expedition(seed: u64) -> (String, String) {
     let mut random = Random(seed);
     let domain = "(define (domain expedition) (:types sled place)
@@ -118,8 +117,6 @@ fn tasks_in_which_more_can_help_and_hurt_have_certificates() {
     assert!(proved > 10, "only {proved} tasks with certificates need more than two steps");
 }
 
-/// Changes a random value in a document: replaces a number, null or flag by another, or removes or doubles an
-/// element.
 fn mutate(value: &mut Value, random: &mut Random) {
     match value {
         Value::Array(elements) if !elements.is_empty() => {
@@ -257,7 +254,6 @@ fn instances_without_effect_need_no_operator() {
     assert!(matches!(found, Faithful::Yes { instances: 8, idle: 4, .. }), "{found:?}");
 }
 
-/// Returns the results of an SMT solver for the verification conditions of a claim.
 fn answers(solver: &str, certificate: &Certificate, claim: Option<&BigRational>) -> Vec<String> {
     let conditions = verification_conditions(&certificate.task, &certificate.argument, claim);
     let conditions = conditions.expect("documents").expect("no derived variables");

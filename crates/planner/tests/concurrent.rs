@@ -40,7 +40,7 @@ pub fn written(plan: &Plan) -> String {
     text
 }
 
-/// Returns the metric of a plan according to the validator, or the reason why the plan is invalid.
+/// The validator computes the metric. The error is the reason why the plan is invalid.
 pub fn metric(
     domain: &Domain,
     problem: &Problem,
@@ -57,8 +57,7 @@ pub fn metric(
     }
 }
 
-/// Checks the metric and the text of the plan. `None` means that the planner must prove that there is no
-/// plan.
+/// `None` means that the planner must prove that there is no plan.
 pub fn check(
     name: &str,
     domain: &str,
@@ -248,7 +247,6 @@ fn effect(random: &mut Random) -> String {
     }
 }
 
-/// Generates a conjunction of conditions or effects, each at a random time specifier.
 fn timed(random: &mut Random, times: &[&str], most: u64, part: fn(&mut Random) -> String) -> String {
     let mut text = String::from("(and");
     for _ in 0..=random.below(most) {
@@ -264,7 +262,7 @@ struct Sample {
     problem: String,
 }
 
-/// A random task. If `is_locked`, its actions with a duration use the same resource.
+/// If `is_locked`, all actions with a duration use the same resource.
 fn sample(random: &mut Random, is_locked: bool) -> Sample {
     let mut domain = String::from(
         "(define (domain d) (:requirements :durative-actions :disjunctive-preconditions) (:predicates (p) (q) (r) (idle))
@@ -327,11 +325,10 @@ fn sample(random: &mut Random, is_locked: bool) -> Sample {
     Sample { durations, domain, problem }
 }
 
-/// Latest start that the brute-force search tries. With a separation of one unit, all times of a best plan
+/// Latest start in the brute-force search. With a separation of one unit, all times of a best plan
 /// are integers.
 const LAST: i128 = 7;
 
-/// Returns the minimum metric of valid plans with up to three actions.
 fn brute_force(task: &Sample, domain: &Domain, problem: &Problem) -> Option<BigRational> {
     let separation = rational(1, 1);
     let mut best: Option<BigRational> = None;
@@ -364,7 +361,7 @@ fn brute_force(task: &Sample, domain: &Domain, problem: &Problem) -> Option<BigR
     best
 }
 
-/// Compares the planner with brute force on a random task. Returns `false` if the planner proves nothing.
+/// Compares the planner with brute force. Returns `false` if the planner proves nothing.
 fn agree(seed: u64, is_locked: bool, thresholds: Thresholds) -> bool {
     let task = sample(&mut Random(seed), is_locked);
     let (domain, problem) = parse(&task.domain, &task.problem);
@@ -397,7 +394,6 @@ fn agree(seed: u64, is_locked: bool, thresholds: Thresholds) -> bool {
     true
 }
 
-/// Checks random tasks, of which only a few may stay undecided.
 fn all_agree(seeds: std::ops::Range<u64>) {
     let count = seeds.end - seeds.start;
     let undecided = seeds.filter(|seed| !agree(*seed, false, Thresholds::default())).count() as u64;
@@ -447,8 +443,8 @@ const ROBOTS: &str = "(define (domain robots) (:requirements :durative-actions :
     :condition (and (at start (robot_at ?r ?p)) (over all (robot_at ?r ?p)) (at start (wanted ?p)))
     :effect (and (at end (seen ?p)))))";
 
-/// Generates a problem with `count` robots on a grid of `side` × `side` places. Each robot must reach a
-/// place, and `looks` places must be seen.
+/// Robots on a grid of `side` × `side` places. Each robot must reach a place, and `looks` places
+/// must be seen.
 fn robots(count: u64, side: u64, looks: u64, seed: u64) -> String {
     let mut random = Random(seed);
     let places = side * side;
@@ -479,7 +475,6 @@ fn robots(count: u64, side: u64, looks: u64, seed: u64) -> String {
     format!("{text}) (:goal (and{goal})) (:metric minimize (total-time)))")
 }
 
-/// Prints the result that is proved within ten seconds.
 #[test]
 #[ignore = "a measurement"]
 #[allow(clippy::print_stdout)]

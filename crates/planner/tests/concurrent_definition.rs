@@ -15,8 +15,7 @@ use crate::widths;
 
 const NONE: &str = "none";
 
-/// Returns the proved result of a task with a separation of 1/1000: the minimum metric, or that there is no
-/// plan.
+/// Minimum metric or unsolvability, proved with a separation of 1/1000.
 fn proved(domain: &str, problem: &str) -> String {
     let read = read(&Source::new("domain", domain), &Source::new("problem", problem));
     let (domain, problem, _) = read.unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));
@@ -52,8 +51,7 @@ fn durative(name: &str, duration: &str, condition: &str, effect: &str) -> String
     )
 }
 
-/// Checks the proved result of a task over the atoms `p`, `q`, `r`, `g` and the number `x`, which is
-/// initially 2.
+/// The atoms are `p`, `q`, `r` and `g`. The number `x` is initially 2.
 fn check(actions: &[String], init: &str, goal: &str, expected: &str) {
     let domain =
         format!("(define (domain d) (:predicates (p) (q) (r) (g)) (:functions (x))\n{})", actions.concat());
@@ -213,7 +211,6 @@ fn an_action_that_waits_for_an_event_keeps_the_separation() {
     assert_eq!(proved(domain, &problem("6")), "9.002");
 }
 
-/// Tasks from the literature, with their results according to the semantics.
 #[test]
 fn tasks_that_were_answered_wrongly() {
     for (domain, problem, expected) in [

@@ -24,7 +24,7 @@ pub fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
     (domain, problem)
 }
 
-/// Returns the best plan that the planner finds. The validator checks its claims.
+/// The validator checks the plan and its metric.
 pub fn solve(domain: &Domain, problem: &Problem, separation: &BigRational, limits: &Limits) -> Solution {
     let config = GroundConfig::default().with_limits(limits.clone());
     let task =
@@ -47,7 +47,6 @@ pub fn written(plan: &Plan) -> String {
     text
 }
 
-/// Returns the metric of a plan according to the validator, or the reason why the plan is invalid.
 pub fn metric(
     domain: &Domain,
     problem: &Problem,
@@ -64,7 +63,7 @@ pub fn metric(
     }
 }
 
-/// Checks the status, the metric and the text of the plan, with a separation of 1/1000.
+/// Uses a separation of 1/1000.
 fn check(name: &str, domain: &str, problem: &str, expected: (Status, Option<&str>, &[&str])) {
     let (domain, problem) = parse(domain, problem);
     let solution = solve(&domain, &problem, &rational(1, 1000), &Limits::none());
@@ -321,8 +320,7 @@ fn timed(random: &mut Random, times: &[&str], part: &mut dyn FnMut(&mut Random) 
     parts.collect::<Vec<_>>().join(" ")
 }
 
-/// Generates a random task with three actions. Also returns the possible durations of each action; the list
-/// is empty for an instantaneous action.
+/// Three actions with their possible durations; the list is empty for an instantaneous action.
 fn sample(random: &mut Random) -> (String, String, [Vec<i128>; 3]) {
     let mut durations = [const { Vec::new() }; 3];
     let mut actions = Vec::new();
@@ -368,11 +366,9 @@ fn sample(random: &mut Random) -> (String, String, [Vec<i128>; 3]) {
     (domain(&actions), problem, durations)
 }
 
-/// Latest start that the brute-force search tries.
 const LAST: i128 = 4;
 
-/// Returns the minimum metric of valid plans with up to three actions. All starts and durations are multiples
-/// of the separation.
+/// Plans have up to three actions. All starts and durations are multiples of the separation.
 fn brute_force(durations: &[Vec<i128>; 3], domain: &Domain, problem: &Problem) -> Option<BigRational> {
     let separation = rational(1, 1);
     let mut best: Option<BigRational> = None;
@@ -405,7 +401,7 @@ fn brute_force(durations: &[Vec<i128>; 3], domain: &Domain, problem: &Problem) -
     best
 }
 
-/// Compares the planner with brute force on a random task. Returns `true` if the planner decided the task.
+/// Compares the planner with brute force. Returns `true` if the planner decided the task.
 fn agree(seed: u64) -> bool {
     let (domain, problem, durations) = sample(&mut Random(seed));
     let (read_domain, read_problem) = parse(&domain, &problem);

@@ -1,9 +1,9 @@
 //! Several robots at once: makespans compared with longest-job-first and with brute force, and lower
 //! bounds that no plan beats.
 //!
-//! Robots start at a base, drive for 5 to a place and work there for a time of its own. An
-//! independent oracle assigns the longest job to the robot with the smallest load. The smallest tasks
-//! are solved by brute force over all assignments.
+//! Robots start at a base, drive for 5 to a place and work there; the duration depends on the
+//! place. An independent oracle assigns the longest job to the robot with the smallest load. The
+//! smallest tasks are solved by brute force over all assignments.
 
 use std::fmt::Write as _;
 use std::sync::atomic::Ordering;
@@ -57,7 +57,7 @@ fn lengths(jobs: usize, seed: u64) -> Vec<i64> {
     (0..jobs).map(|_| 10 + random.below(31)).collect()
 }
 
-/// Makespan of an assignment in thousandths: loads, and a thousandth between actions of a robot.
+/// In thousandths, with a thousandth between two actions of a robot.
 fn makespan(robots: usize, lengths: &[i64], assignment: impl Iterator<Item = usize>) -> i64 {
     let mut loads = vec![0; robots];
     for (length, robot) in lengths.iter().zip(assignment) {
@@ -89,8 +89,8 @@ fn thousandths(value: &BigRational) -> i64 {
     (value * BigRational::from(BigInt::from(1000))).ceil().to_integer().to_i64().expect("small")
 }
 
-/// Plans until the makespan is at most `target` thousandths, all is proved, or a minute is over. The
-/// validator executes the plan. Returns the solution and its makespan.
+/// Plans until the makespan is at most `target` thousandths, it is proved optimal, or a minute is
+/// over. The validator executes the plan. Also returns its makespan.
 fn solve(robots: usize, lengths: &[i64], target: i64) -> (Solution, i64) {
     let (domain, problem) = parse(DOMAIN, &problem(robots, lengths));
     let separation = rational(1, 1000);
@@ -107,8 +107,6 @@ fn solve(robots: usize, lengths: &[i64], target: i64) -> (Solution, i64) {
     (solution, thousandths(&value))
 }
 
-/// The makespan is at most that of longest-job-first, and the lower bound is at most the makespan and
-/// at least the work per robot.
 fn check(robots: usize, lengths: &[i64]) {
     let target = longest_job_first(robots, lengths);
     let (solution, makespan) = solve(robots, lengths, target);

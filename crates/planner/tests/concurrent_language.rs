@@ -9,8 +9,7 @@ use pddl::{Source, read};
 
 use crate::widths;
 
-/// Checks the status and the metric of the plan that is found with a separation of 1/1000. The validator
-/// executes the plan.
+/// Uses a separation of 1/1000. The validator executes the plan.
 fn check(actions: &str, init: &str, goal: &str, expected: (Status, Option<&str>)) {
     let domain =
         format!("(define (domain d) (:predicates (p) (q) (g) (on ?x)) (:functions (fuel) (log)) {actions})");
@@ -44,7 +43,6 @@ fn durative(name: &str, duration: &str, condition: &str, effect: &str) -> String
     )
 }
 
-/// Starts and ends with a conditional numeric effect, for each truth value of its condition.
 #[test]
 fn effects_on_numbers_have_conditions() {
     let light = durative("light", "(= ?duration 1)", "", "(at end (p))");

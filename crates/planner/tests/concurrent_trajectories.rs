@@ -13,8 +13,7 @@ use num_bigint::BigInt;
 use num_rational::BigRational;
 use pddl::ast::{Domain, Problem};
 
-/// Minimum time between interfering happenings: half a unit. Plans of the brute-force search have integer
-/// times.
+/// Half a unit. Plans of the brute-force search have integer times.
 fn separation() -> BigRational {
     BigRational::new(BigInt::from(1), BigInt::from(2))
 }
@@ -27,7 +26,6 @@ const DOMAIN: &str = "(define (domain d) (:predicates (p) (q) (r))
   (:durative-action light :parameters () :duration (= ?duration 2)
     :condition (at start (not (q))) :effect (and (at start (q)) (at end (not (q))))))";
 
-/// Checks the status, the metric and the plan for a task with these constraints.
 fn check(constraints: &str, goal: &str, metric: &str, expected: (Status, Option<&str>, &[&str])) {
     let problem = format!(
         "(define (problem n) (:domain d) (:init) (:goal (and {goal})) (:constraints (and {constraints})) {metric})"
@@ -153,7 +151,6 @@ fn trajectory(random: &mut Random) -> String {
     }
 }
 
-/// Generates a random task with three actions, and returns the duration of each action.
 fn sample(random: &mut Random) -> (String, String, [i128; 3]) {
     let mut domain = "(define (domain d) (:predicates (p) (q) (h))".to_owned();
     let mut durations = [0; 3];
@@ -201,11 +198,10 @@ fn sample(random: &mut Random) -> (String, String, [i128; 3]) {
     (domain, problem, durations)
 }
 
-/// Latest start that the brute-force search tries.
 const LAST: i128 = 5;
 
-/// Returns the minimum metric of valid plans with up to three actions that start at integer times: over all
-/// plans, and over the plans without simultaneous happenings.
+/// Minimum metric of plans with up to three actions that start at integer times: over all plans,
+/// and over the plans without simultaneous happenings.
 fn brute_force(durations: [i128; 3], domain: &Domain, problem: &Problem) -> [Option<BigRational>; 2] {
     let mut best = [None, None];
     let mut open: Vec<Vec<(i128, usize)>> = vec![Vec::new()];
@@ -236,8 +232,8 @@ fn brute_force(durations: [i128; 3], domain: &Domain, problem: &Problem) -> [Opt
     best
 }
 
-/// Compares the planner with brute force on a random task. Returns whether a plan was found, and whether it
-/// is proved optimal.
+/// Compares the planner with brute force. Returns whether a plan was found, and whether it is
+/// proved optimal.
 fn agree(seed: u64) -> (bool, bool) {
     let (domain, problem, durations) = sample(&mut Random(seed));
     let (read_domain, read_problem) = parse(&domain, &problem);
@@ -261,7 +257,8 @@ fn agree(seed: u64) -> (bool, bool) {
         }
         _ => {}
     }
-    // The planner must be at least as good as the best plan without simultaneous happenings.
+    // If the search has ended and actions have no preferences, the planner must be at least as good
+    // as the best plan without simultaneous happenings.
     let prefers = domain.contains("preference");
     if is_over
         && !prefers

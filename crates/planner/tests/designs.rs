@@ -27,8 +27,7 @@ fn found(cost: &str, steps: &[&str]) -> Option<(String, Vec<String>)> {
     Some((cost.to_owned(), steps.iter().map(|step| (*step).to_owned()).collect()))
 }
 
-/// Returns a problem with `count` designs, each of which solves `f1` and `f2`. `value` returns the facts
-/// about the design with an index.
+/// Each of the `count` designs solves `f1` and `f2`. `value` returns further facts about a design.
 fn designs(count: usize, value: impl Fn(usize) -> String) -> String {
     let mut text = String::from("(define (problem p) (:domain d) (:objects");
     for index in 0..count {
@@ -99,7 +98,6 @@ fn a_function_may_be_a_design_itself() {
     assert_eq!(solve(&domain, problem).status, Status::Unsolvable);
 }
 
-/// Products and quotients of design-dependent values and fluents.
 #[test]
 fn factors_of_a_design_and_of_a_fluent_may_meet() {
     let task = |precondition: &str, effect: &str| {

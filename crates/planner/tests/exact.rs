@@ -30,7 +30,6 @@ fn number(decimal: &str) -> BigRational {
     BigRational::new(digits, BigInt::from(10).pow(fraction.len() as u32))
 }
 
-/// Returns the cost of a plan according to the validator, or `None` if the plan is invalid.
 fn metric(domain: &Domain, problem: &Problem, plan: &Plan) -> Option<BigRational> {
     let steps = plan.steps.iter().map(|step| PlanStep {
         action: Name::new(&step.action),
@@ -53,7 +52,6 @@ fn exact(domain: &Domain, problem: &Problem, horizon: Option<usize>) -> Solution
     solution
 }
 
-/// Returns `true` if integer grounding rejects the task because its numbers are too large.
 fn too_large(domain: &Domain, problem: &Problem) -> bool {
     match ground(domain, problem, &GroundConfig::default()) {
         Ok(_) => false,
@@ -282,7 +280,7 @@ impl Model {
         (domain, problem)
     }
 
-    /// Returns the minimum cost of a plan, for each number of actions.
+    /// Minimum cost for each number of actions.
     fn oracle(&self) -> Vec<Option<BigRational>> {
         let mut layer: HashMap<Moment, BigRational> = HashMap::new();
         let [x, y] = &self.initial;
@@ -310,8 +308,8 @@ impl Model {
     }
 }
 
-/// Compares the planner with all plans of a random model. Returns whether the numbers are too large for
-/// integers, and whether there is a plan.
+/// Compares the planner with all plans of a random model. Returns whether the numbers are too large
+/// for integers, and whether there is a plan.
 fn check(seed: u64, rewards: bool, horizon: Option<usize>) -> (bool, bool) {
     let model = Model::random(seed, rewards);
     let (domain_text, problem_text) = model.text();
@@ -375,7 +373,6 @@ fn many_random_tasks_have_the_cost_of_all_sequences() {
     check_all(1_000..20_000);
 }
 
-/// Checks the result for a task whose numbers exceed integers: its cost, or `None` if there is no plan.
 fn known(name: &str, domain: &str, problem: &str, expected: Option<&str>) -> Solution {
     let (domain, problem) = parse(domain, problem);
     assert!(too_large(&domain, &problem), "{name}");

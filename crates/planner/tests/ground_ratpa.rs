@@ -24,7 +24,6 @@ use test_resources::{data, python};
 type Fact = (String, Vec<usize>);
 type Interval = (f64, f64);
 
-/// The parts of an action schema that matter for these missions.
 #[derive(Default)]
 struct Schema<'d> {
     name: String,
@@ -48,7 +47,6 @@ struct World<'d> {
     schemas: Vec<Schema<'d>>,
     facts: BTreeSet<Fact>,
     values: BTreeMap<Fact, f64>,
-    /// Predicates and functions that some action changes.
     changing: BTreeSet<String>,
 }
 
@@ -104,8 +102,7 @@ impl<'d> World<'d> {
         world
     }
 
-    /// Returns the atom under a binding, or `None` if one of its variables is unbound or one of its constants
-    /// is unknown.
+    /// `None` if a variable of the atom is unbound or a constant is unknown.
     fn fact(&self, atom: &Atom, parameters: &[(Name, Vec<usize>)], bound: &[usize]) -> Option<Fact> {
         let object = |term: &Term| match term {
             Term::Variable(variable) => {
@@ -118,7 +115,7 @@ impl<'d> World<'d> {
         Some((folded(&atom.predicate.name), arguments))
     }
 
-    /// Returns all action instances whose static conditions hold. Numbers are ignored.
+    /// Static conditions of the instances hold. Numbers are ignored.
     fn instances(&self) -> Vec<Instance> {
         let mut found = Vec::new();
         for index in 0..self.schemas.len() {
@@ -164,7 +161,6 @@ impl<'d> World<'d> {
         found.push(instance);
     }
 
-    /// Returns the range of values of an expression, or `None` if it is undefined.
     fn interval(
         &self,
         expression: &Expression,
@@ -203,8 +199,8 @@ impl<'d> World<'d> {
         }
     }
 
-    /// Returns `true` if the comparisons of an instance can hold within the intervals, and the expressions of
-    /// its numeric effects are defined.
+    /// Returns `true` if the comparisons can hold within the intervals, and the numeric effects are
+    /// defined.
     fn is_possible(&self, instance: &Instance, numbers: &BTreeMap<Fact, Interval>) -> bool {
         let schema = &self.schemas[instance.schema];
         let value = |expression| self.interval(expression, instance, numbers);
@@ -218,8 +214,8 @@ impl<'d> World<'d> {
             })
     }
 
-    /// Returns the instances that are reachable in the delete relaxation, and the reachable atoms. Without
-    /// `with_numbers`, a number that some action changes may have any value.
+    /// Instances and atoms that are reachable in the delete relaxation. Without `with_numbers`, a
+    /// number that some action changes may have any value.
     fn reached<'i>(
         &self,
         instances: &'i [Instance],
@@ -273,7 +269,6 @@ impl<'d> World<'d> {
         }
     }
 
-    /// Returns `true` if the instance changes a number that conditions compare.
     fn changes_compared(&self, instance: &Instance) -> bool {
         let compared = |name: &String| {
             self.schemas.iter().any(|schema| {
@@ -292,7 +287,7 @@ impl<'d> World<'d> {
         (self.schemas[instance.schema].name.clone(), arguments.collect())
     }
 
-    /// Returns the action with its arguments except designs.
+    /// Omits the designs among the arguments.
     fn core(&self, (name, arguments): &(String, Vec<String>)) -> (String, Vec<String>) {
         let schema = self.schemas.iter().find(|schema| schema.name == *name).expect("an action");
         let kept = schema.parameters.iter().zip(arguments);
@@ -392,8 +387,7 @@ fn compare(name: &str, domain: &Domain, problem: &Problem, task: &Task) {
     assert!(counts.0 <= counts.1, "{name}: {counts:?}");
 }
 
-/// Returns the domain and problem of a mission in all requested encodings, or an empty list if the script or
-/// Python is missing.
+/// The domain and problem in all requested encodings; empty if the script or Python is missing.
 fn mission(family: &str, seed: u64, sizes: [usize; 3], encodings: &str) -> Vec<(String, Source, Source)> {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("ratpa");
     let [n, m, k] = sizes.map(|size| size.to_string());

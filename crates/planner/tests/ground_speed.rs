@@ -14,13 +14,12 @@ use metaplan_planner::{GroundConfig, Task, ground};
 use pddl::{Source, read};
 use test_resources::data;
 
-/// Returns the CPU time of this thread in seconds, or `None` if the system does not provide it.
 fn cpu_time() -> Option<f64> {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
     Some(text.split_whitespace().next()?.parse::<f64>().ok()? / 1e9)
 }
 
-/// Returns the result of `work` and its CPU time in seconds.
+/// Also returns the CPU time of `work` in seconds.
 fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
     let before = cpu_time().unwrap_or_default();
     let result = work();
@@ -33,7 +32,7 @@ fn task(domain: String, problem: String) -> Task {
     ground(&domain, &problem, &GroundConfig::default()).unwrap_or_else(|errors| panic!("{errors:?}"))
 }
 
-/// Generates a ring of places. Moving requires `k` functions with `m` designs each.
+/// A ring of places. Moving requires `k` functions with `m` designs each.
 fn ring(places: usize, k: usize, m: usize) -> (String, String) {
     let all = |part: &dyn Fn(usize) -> String| (0..k).map(part).collect::<Vec<_>>().join(" ");
     let energy = all(&|i| format!("(energy ?fd{i})"));
@@ -96,7 +95,6 @@ fn ground_size_is_linear_in_the_number_of_functions() {
     assert!(most.zip(least).is_some_and(|(most, least)| most * 10 <= least * 11), "{sizes:?}");
 }
 
-/// Generates a problem of about `bytes` bytes, with facts and values as generators write them.
 fn large_problem(bytes: usize) -> String {
     let mut text = String::from("(define (problem large) (:domain d)\n  (:objects");
     let places = 1000;
@@ -140,8 +138,8 @@ fn ten_megabytes_are_read_in_less_than_a_second() {
     assert!(with_check < 1.0, "{with_check} s");
 }
 
-/// Runs the translator of Fast Downward. Returns its CPU time in seconds, or `None` if it does not finish in
-/// time.
+/// CPU time of the translator of Fast Downward in seconds, or `None` if it fails or does not finish
+/// in time.
 fn translator(python: &str, directory: &Path, name: &str) -> Option<f64> {
     let script = "import resource, subprocess, sys
 command = [sys.executable, '-m', 'fast_downward.translate', *sys.argv[1:3]]

@@ -13,7 +13,8 @@ use num_rational::BigRational;
 use pddl::ast::{Direction, Domain, Problem};
 use pddl::{Source, read, read_objective};
 
-/// A number close to the limit of 2^118 for numbers of a task. Multiples of it overflow 128 bits.
+/// A number close to the limit of 2^118 for numbers of a task. `MANY` times this number overflows
+/// 128 bits.
 const LARGE: &str = "330000000000000000000000000000000000";
 const MANY: usize = 520;
 
@@ -33,13 +34,11 @@ fn solve(task: &Task) -> Solution {
     optimize(task, &Config::default().with_limits(limits), &mut |_| {})
 }
 
-/// Returns `times * LARGE` in the unit of the PDDL files.
 fn large(times: usize) -> BigRational {
     BigRational::from_integer(LARGE.parse::<BigInt>().expect("a number") * BigInt::from(times))
 }
 
-/// Returns a task in which a robot must move through a corridor with `places` places. Each move has the cost
-/// effect `cost`.
+/// A robot must move through `places` places in a row. Each move has the cost effect `cost`.
 fn corridor(places: usize, cost: &str, metric: &str) -> Task {
     let domain = format!(
         "(define (domain d) (:requirements :typing :numeric-fluents) (:types place)
@@ -106,7 +105,6 @@ fn shares_of_costs_are_ordered_however_large_their_sum_is() {
     assert_eq!(solution.plan.expect("a plan").cost.to_rational(), cost);
 }
 
-/// A domain in which work must be done many times.
 const WORK: &str = "(define (domain d) (:requirements :durative-actions :numeric-fluents :action-costs)
     (:functions (done) (total-cost) (long))
     (:durative-action work :parameters () :duration (= ?duration (long)) :condition (at start (>= (done) 0))

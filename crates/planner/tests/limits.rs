@@ -20,8 +20,8 @@ fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
     (domain, problem)
 }
 
-/// Generates a task in which a robot transports parcels on a ring of places. Each move needs a design for each
-/// of two functions. Every design suits both functions, but the two designs of a move must differ.
+/// A robot transports parcels on a ring of places. Each move needs a design for each of two
+/// functions. Every design suits both functions, but the two designs of a move must differ.
 fn depot(places: usize, parcels: usize, designs: usize) -> (Domain, Problem) {
     let domain = "(define (domain depot) (:requirements :typing :fluents :equality :negative-preconditions)
       (:types place parcel design function) (:constants f1 f2 - function)
@@ -61,8 +61,8 @@ fn depot(places: usize, parcels: usize, designs: usize) -> (Domain, Problem) {
     parse(domain, &text)
 }
 
-/// Grounds, plans and computes alternatives under a time limit. Returns the status (`None` if grounding was
-/// not finished) and the time taken.
+/// Grounds, plans and computes alternatives. Returns the status (`None` if grounding was not
+/// finished) and the time taken.
 fn run(domain: &Domain, problem: &Problem, limit: Duration, engine: Engine) -> (Option<Status>, Duration) {
     let started = Instant::now();
     let limits = Limits::none().with_time(limit);

@@ -19,8 +19,8 @@ fn text(plan: &Plan) -> String {
     lines.collect()
 }
 
-/// Checks that a plan is valid, that its metric agrees with the validator, and that the costs of its steps
-/// sum to the metric minus its initial value `at_first`.
+/// Checks the plan and its metric with the validator. The costs of the steps must sum to the metric
+/// minus its initial value `at_first`.
 fn judge((domain, problem): (&Domain, &Problem), concurrent: bool, solution: &Solution, at_first: i64) {
     let status = if concurrent { Status::Feasible } else { Status::Optimal };
     assert_eq!(solution.status, status, "{solution:?}");
@@ -40,7 +40,6 @@ fn judge((domain, problem): (&Domain, &Problem), concurrent: bool, solution: &So
     assert_eq!(steps + BigRational::from_integer(at_first.into()), plan.cost.to_rational(), "{text}");
 }
 
-/// A domain in which each purchase costs the price times the remaining demand.
 const MARKET: &str = "(define (domain market) (:types good shop)
   (:predicates (sells ?s - shop ?g - good) (at ?s - shop) (road ?a - shop ?b - shop) (done ?g - good))
   (:functions (price ?s - shop ?g - good) (wanted ?g - good) (spent) (fame))

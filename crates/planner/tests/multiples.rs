@@ -33,8 +33,8 @@ fn action(random: &mut Random, number: usize) -> String {
     )
 }
 
-/// Compares both kinds of numbers on a random task. Returns whether the domain has a decimal such as `0.5`, so
-/// that the integer task may store multiples, and whether there is a plan.
+/// Compares both kinds of numbers on a random task. Returns whether the domain has a decimal such
+/// as `0.5`, so that the integer task may store multiples, and whether there is a plan.
 fn compare(seed: u64) -> (bool, bool) {
     let mut random = Random(seed);
     let actions: String = (0..4).map(|number| action(&mut random, number)).collect();

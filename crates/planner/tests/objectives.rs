@@ -8,8 +8,7 @@ use pddl::ast::{Direction, Metric};
 use pddl::{Source, read, read_objective};
 use testing::random::Random;
 
-/// A mission with waypoints, corridors and two functions. Every move costs time and energy that depend on the
-/// designs.
+/// A mission with two functions. Every move costs time and energy that depend on the designs.
 #[derive(Debug)]
 struct Mission {
     waypoints: usize,
@@ -19,7 +18,6 @@ struct Mission {
     designs: [Vec<(i64, i64)>; 2],
 }
 
-/// A plan as a list of waypoints and designs, with its time and energy.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 struct Way {
     stations: Vec<usize>,
@@ -45,7 +43,7 @@ impl Mission {
         Self { waypoints, corridors, designs: [designs(), designs()] }
     }
 
-    /// Returns all plans from the first to the last waypoint that visit no waypoint twice.
+    /// Visits no waypoint twice.
     fn ways(&self) -> Vec<Way> {
         let start = Way { stations: vec![0], designs: Vec::new(), time: 0, energy: 0 };
         let (mut open, mut found) = (vec![start], Vec::new());
@@ -73,8 +71,7 @@ impl Mission {
         found
     }
 
-    /// Returns the texts of domain and problem. If `reversed`, the names of waypoints and designs sort in
-    /// reverse order.
+    /// If `reversed`, the names of waypoints and designs sort in reverse order.
     fn text(&self, reversed: bool) -> (String, String) {
         let domain = "(define (domain d) (:types place function design)
           (:predicates (at ?p - place) (way ?a ?b - place) (fd_solve_f ?d - design ?f - function))

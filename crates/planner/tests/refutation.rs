@@ -15,7 +15,7 @@ use pddl::{Source, read};
 use testing::missions::Mission;
 use testing::random::Random;
 
-/// Returns the certificate of a random mission and its optimal cost, or `None` if there is no plan.
+/// Returns a certificate and the optimal cost, or `None` if there is no plan.
 fn certified(seed: u64) -> Option<(Certificate, BigRational)> {
     let mission = Mission::random(seed);
     let cost = BigRational::from_integer(mission.oracle()?.into());
@@ -46,7 +46,7 @@ impl Write for Memory {
     }
 }
 
-/// The files of a refutation: formula, legend, proof and hints.
+/// Formula, legend, proof and hints.
 type Files = [String; 4];
 
 fn refutation(
@@ -70,7 +70,7 @@ fn refutation(
     Ok((steps, files.map(|file| file.text())))
 }
 
-/// Returns the results of checking the formula, the proof and the number of steps.
+/// Results of checking the formula, the proof and the number of steps.
 fn verdicts(
     certificate: &Certificate,
     claim: &BigRational,
@@ -129,8 +129,8 @@ fn there_are_refutations_of_many_false_claims_only() {
     (1_000..3_000).for_each(|seed| check(seed, StepBound::Spent));
 }
 
-/// Returns the text with one random change: a line is removed, two lines are swapped, or a word is negated.
-/// Swapping a line with itself changes nothing.
+/// One random change: a line is removed, two lines are swapped, or a word is negated. Swapping a
+/// line with itself changes nothing.
 fn mutate(text: &str, random: &mut Random) -> String {
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     let line = random.below(lines.len() as u64) as usize;

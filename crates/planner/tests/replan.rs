@@ -38,8 +38,6 @@ fn words(atom: &Atom) -> Vec<String> {
     std::iter::once(atom.predicate.name.to_string()).chain(atom.arguments.iter().map(term)).collect()
 }
 
-/// Parts of a mission that can change: its position predicate, its places and designs, and the battery
-/// capacity.
 struct Changes {
     at: &'static str,
     places: Vec<String>,
@@ -144,7 +142,6 @@ fn new(domain: &Domain, problem: &Problem) -> Replanner {
     Replanner::new(domain, problem, &available, &GroundConfig::default()).expect("the domain is suited")
 }
 
-/// Checks that both results have equal plans, or that both report that no plan exists.
 fn compare(expected: &Solution, found: &ReplanOutcome, context: &dyn Fn() -> String) {
     match (&expected.plan, found) {
         (Some(plan), ReplanOutcome::Optimal { steps, metric, .. }) => {
@@ -162,8 +159,8 @@ fn compare(expected: &Solution, found: &ReplanOutcome, context: &dyn Fn() -> Str
     }
 }
 
-/// Applies changes to a mission one by one, and replans after each in both ways. Returns the number of times
-/// that the mission had to be grounded again.
+/// Applies changes one by one, and compares both ways of planning after each. Returns how often the
+/// mission had to be grounded again.
 fn check(seed: u64, changes: usize) -> usize {
     let mission = Mission::random(seed);
     let (domain, mut problem) = parse(&mission.domain(), &mission.problem());
@@ -324,8 +321,8 @@ fn the_old_plan_serves_when_time_is_up() {
     );
 }
 
-/// Checks that the blocking set is minimal: it makes the mission unsolvable, and no proper subset does.
-/// Returns `true` if the mission is unsolvable and the set is not empty.
+/// The blocking set makes the mission unsolvable, and no proper subset does. Returns `true` if the
+/// mission is unsolvable and the set is not empty.
 fn check_blocking(seed: u64) -> bool {
     let mission = Mission::random(seed);
     let (domain, mut problem) = parse(&mission.domain(), &mission.problem());
@@ -389,7 +386,6 @@ fn a_reconfiguration_at_the_last_step_counts() {
     compare(&solution, &live(&mut new(&domain, &problem), &domain, &problem), &String::new);
 }
 
-/// Returns a generated map with a battery. `None` if the script or Python is missing.
 fn generated(waypoints: usize, designs: usize, functions: usize) -> Option<(Domain, Problem)> {
     let directory = Path::new(env!("CARGO_TARGET_TMPDIR"));
     let arguments = ["--family", "ugv", "--seed", "1", "--metric", "weighted", "--enc", "n", "--name", "map"];
@@ -403,7 +399,7 @@ fn generated(waypoints: usize, designs: usize, functions: usize) -> Option<(Doma
     Some(parse(&read("domain"), &read("problem")))
 }
 
-/// Returns the CPU time of the thread in milliseconds.
+/// CPU time of the thread in milliseconds.
 fn used() -> f64 {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").expect("Linux tells");
     text.split(' ').next().and_then(|first| first.parse::<f64>().ok()).expect("nanoseconds") / 1e6

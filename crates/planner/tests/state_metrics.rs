@@ -33,7 +33,7 @@ type Explicit = (usize, i64, i64, Vec<bool>);
 
 struct Market {
     roads: Vec<(usize, usize)>,
-    /// Per place: cost of driving there, price, share, and amount that a purchase needs.
+    /// Cost of driving to the place, price, share, and amount that a purchase needs.
     places: Vec<[i64; 4]>,
     goals: Vec<usize>,
     rate: i64,
@@ -88,7 +88,6 @@ impl Market {
         *at == 0 && self.goals.iter().all(|goal| bought[*goal])
     }
 
-    /// Costs of the steps from a state, with the next states.
     fn successors(&self, (at, amount, rate, bought): &Explicit) -> Vec<(i64, Explicit)> {
         let (at, amount, rate) = (*at, *amount, *rate);
         let mut next = Vec::new();
@@ -110,7 +109,6 @@ impl Market {
         next
     }
 
-    /// Least cost of a plan with at most `horizon` steps, layer by layer.
     fn cheapest_within(&self, horizon: usize) -> Option<i64> {
         let mut layer = BTreeMap::from([(self.start(), 0)]);
         let mut best = None;
@@ -131,7 +129,6 @@ impl Market {
         best
     }
 
-    /// Least cost, by Dijkstra's algorithm over explicit states.
     fn cheapest(&self) -> Option<i64> {
         let start = self.start();
         let mut costs: BTreeMap<Explicit, i64> = BTreeMap::new();
@@ -178,7 +175,6 @@ fn state_dependent_costs_are_as_low_as_by_brute_force() {
     assert!(solved * 3 > seeds as usize, "{solved} of {seeds} are solvable");
 }
 
-/// Within a horizon, the metric is minimised over the plans with at most this number of steps.
 #[test]
 fn state_dependent_costs_within_a_horizon_are_as_low_as_by_brute_force() {
     let (mut proved, mut longer_is_cheaper) = (0, 0);
@@ -249,7 +245,8 @@ fn state_dependent_costs_that_are_not_minimised_are_not_called_optimal() {
     assert!(planned > 20, "{planned} plans");
 }
 
-/// The purchaser problem of IPC 2006: the cost of a purchase is a price times what is on sale, or what is needed.
+/// The purchaser problem of IPC 2006: a purchase costs a price times the amount that is on sale or
+/// needed.
 #[test]
 fn conditions_on_sums_bound_the_costs_of_purchases() {
     let domain = "(define (domain tpp) (:requirements :typing :numeric-fluents) (:types place goods)

@@ -16,7 +16,7 @@ const DOMAIN: &str = "(define (domain d)
   (:action flip :parameters () :precondition (not (on)) :effect (on))
   (:action flop :parameters () :precondition (on) :effect (not (on))))";
 
-/// Checks the status, the cost and the number of steps of the result, for every built-in solver and all step
+/// Compares the status, the cost and the number of steps, for every built-in solver and all step
 /// semantics.
 fn check(name: &str, init: &str, goal: &str, metric: &str, expected: (Status, Option<&str>, Option<usize>)) {
     let problem = format!(

@@ -5,14 +5,13 @@ use std::time::Duration;
 use metaplan_planner::{Config, GroundConfig, Limits, Solution, Status, Thresholds, ground, optimize};
 use pddl::ast::{Domain, Problem};
 
-/// Returns limits for a head start. With a head start of 1, all optional parts of the search are used from
-/// the start.
+/// With a head start of 1, all optional parts of the search are used from the start.
 pub fn limits(head_start: usize) -> Limits {
     let thresholds = if head_start == 1 { Thresholds::NONE } else { Thresholds::default() };
     Limits::none().with_thresholds(thresholds)
 }
 
-/// Solves a task. Returns `None` if the planner rejects the task; `reason` is the only admitted reason.
+/// Returns `None` if the planner rejects the task; `reason` is the only admitted reason.
 pub fn solve(domain: &Domain, problem: &Problem, reason: &str) -> Option<Solution> {
     let task = match ground(domain, problem, &GroundConfig::default()) {
         Ok(task) => task,
@@ -26,7 +25,6 @@ pub fn solve(domain: &Domain, problem: &Problem, reason: &str) -> Option<Solutio
     Some(optimize(&task, &Config::default().with_limits(limits), &mut |_| {}))
 }
 
-/// Numbers of tested tasks, of tasks with a proved optimum, and of tasks that are proved unsolvable.
 pub struct Tally {
     seeds: u64,
     proved: u64,
@@ -34,7 +32,7 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Creates an empty statistic. The number of seeds is read from `METAPLAN_SEEDS`; the default is 300.
+    /// The number of seeds is read from `METAPLAN_SEEDS`; the default is 300.
     pub fn new() -> Self {
         let seeds = std::env::var("METAPLAN_SEEDS").map_or(300, |text| text.parse().expect("a number"));
         Self { seeds, proved: 0, unsolvable: 0 }
@@ -49,8 +47,8 @@ impl Tally {
         self.unsolvable += u64::from(solution.status == Status::Unsolvable);
     }
 
-    /// Checks that the test is meaningful: a quarter of the tasks must be proved optimal, and one in `one_in`
-    /// tasks must be proved unsolvable.
+    /// More than a quarter of the tasks must be proved optimal, and more than one in `one_in` tasks
+    /// unsolvable.
     pub fn check(&self, one_in: u64) {
         let Self { seeds, proved, unsolvable } = self;
         assert!(

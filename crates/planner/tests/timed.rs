@@ -16,8 +16,7 @@ fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
     (domain, problem)
 }
 
-/// Returns the plan that the planner finds, or `None` if it finds none. With `Engine::Sat`, only the SAT
-/// solver is used, up to horizon 8.
+/// With `Engine::Sat`, only the SAT solver is used, up to horizon 8.
 fn plan(domain: &Domain, problem: &Problem, engine: Engine) -> Option<Plan> {
     let task =
         ground(domain, problem, &GroundConfig::default()).unwrap_or_else(|errors| panic!("{errors:?}"));
@@ -44,7 +43,6 @@ fn written(plan: &Plan) -> String {
     text
 }
 
-/// Returns the metric of a plan according to the validator, or `None` if the plan is invalid.
 fn metric(domain: &Domain, problem: &Problem, text: &str) -> Option<String> {
     let plan =
         PlanText::parse(&Source::new("plan", text)).unwrap_or_else(|errors| panic!("{errors:?}\n{text}"));
@@ -53,7 +51,6 @@ fn metric(domain: &Domain, problem: &Problem, text: &str) -> Option<String> {
     verdict.valid.then(|| value.to_string())
 }
 
-/// Checks the cost of the plan and the start times of its actions.
 fn check(name: &str, domain: &str, problem: &str, expected: Option<(&str, &[&str])>) {
     let (domain, problem) = parse(domain, problem);
     let found = plan(&domain, &problem, Engine::Auto);
@@ -152,7 +149,6 @@ fn a_wait_is_no_step_of_a_plan() {
     }
 }
 
-/// Generates a conjunction of conditions or effects, each at a random time specifier.
 fn timed(random: &mut Random, times: &[&str], most: u64) -> String {
     let mut text = String::from("(and");
     for _ in 0..=random.below(most) {
@@ -207,9 +203,9 @@ fn sample(random: &mut Random) -> Sample {
     Sample { durations, events, domain, problem }
 }
 
-/// Returns the minimum cost of valid plans with up to three actions. All times in the files are integers. An
-/// action that is possible at some time is therefore also possible directly after the previous action, or
-/// such that it starts or ends at an event or half a unit later. Times are doubled.
+/// Plans have up to three actions. All times in the files are integers. An action that is possible
+/// at some time is therefore also possible directly after the previous action, or such that it
+/// starts or ends at an event or half a unit later. Times are doubled.
 fn brute_force(task: &Sample, domain: &Domain, problem: &Problem) -> Option<i64> {
     let mut best = None;
     let mut open: Vec<(i64, String, usize)> = vec![(0, String::new(), 0)];

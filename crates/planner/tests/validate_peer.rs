@@ -14,7 +14,6 @@ use pddl::validate::{Options, PlanText, validate};
 use pddl::{Source, read};
 use test_resources::data;
 
-/// Python program that reads a domain, a problem and plans, and prints a verdict for each plan.
 const PEER: &str = "import sys
 from unified_planning.exceptions import UPTypeError
 from unified_planning.engines import SequentialPlanValidator
@@ -31,7 +30,6 @@ for text in open(sys.argv[3]).read().split('---\\n'):
         valid = False
     print('valid' if valid else 'invalid')";
 
-/// Returns the plan with a single change, which `number` determines.
 fn changed(plan: &[String], objects: &[String], number: usize) -> Vec<String> {
     let mut plan = plan.to_vec();
     let place = number / 5 % plan.len();

@@ -24,7 +24,6 @@ use pddl::validate::{Options, PlanText, ViolationKind, validate};
 use pddl::{Source, print_domain, print_problem, read};
 use test_resources::{data, data_path};
 
-/// Domains and problems that the framework can read.
 const PAIRS: [(&str, &str); 8] = [
     ("domain_expert_test_pddl_domain_charging", "domain_expert_test_pddl_problem_charging"),
     ("domain_expert_test_pddl_domain_simple", "domain_expert_test_pddl_problem_simple_1"),
@@ -36,7 +35,6 @@ const PAIRS: [(&str, &str); 8] = [
     ("suave_extended_metaplan_domain", "suave_extended_metaplan_problem"),
 ];
 
-/// Python program that reads a domain, a problem and plans, and prints a verdict for each plan.
 const PEER: &str = "import sys
 from unified_planning.exceptions import UPTypeError, UPUsageError
 from unified_planning.engines.plan_validator import TimeTriggeredPlanValidator
@@ -53,7 +51,7 @@ for text in open(sys.argv[3]).read().split('---\\n'):
         valid = False
     print('valid' if valid else 'invalid')";
 
-/// A step: start in thousandths, name and arguments, and duration in thousandths.
+/// Start in thousandths, name and arguments, and duration in thousandths.
 type Timed = (i128, Vec<String>, Option<i128>);
 
 fn file(name: &str) -> PathBuf {
@@ -73,7 +71,7 @@ fn text(plan: &[Timed]) -> String {
     plan.iter().map(line).collect()
 }
 
-/// Returns a cheapest plan with small gaps between its steps, or an empty plan if the planner finds none.
+/// A cheapest plan with small gaps between its steps; empty if the planner finds none.
 fn plan(domain: &Domain, problem: &Problem) -> Vec<Timed> {
     let steps: Vec<(Vec<String>, Exact)> = ground(domain, problem, &GroundConfig::default())
         .ok()
@@ -98,7 +96,6 @@ fn plan(domain: &Domain, problem: &Problem) -> Vec<Timed> {
     timed
 }
 
-/// Returns the plan with a single change, which `number` determines.
 fn changed(plan: &[Timed], objects: &[String], number: usize) -> Vec<Timed> {
     let mut plan = plan.to_vec();
     let place = number / 7 % plan.len();

@@ -7,7 +7,7 @@ use metaplan_planner::{Config, GroundConfig, Status, ground, optimize};
 use pddl::validate::{Options, PlanText, validate};
 use pddl::{Source, read};
 
-/// Expected result: the metric and a plan with this metric, no plan, or a rejection with an error code.
+/// The metric and a plan with this metric, no plan, or a rejection with an error code.
 enum Expected {
     Optimal(&'static str, &'static str),
     Unsolvable,
@@ -42,8 +42,8 @@ fn check(name: &str, domain: &str, problem: &str, expected: &Expected) {
     }
 }
 
-/// Returns a domain with two actions. The first has duration 2 and the given start effects in addition to
-/// `(q)`; the second has duration 100 and also achieves the goal.
+/// A domain with two actions. The first has duration 2 and further effects; the second has duration
+/// 100 and also achieves the goal.
 fn conditional(effects: &str) -> String {
     format!(
         "(define (domain d) (:requirements :durative-actions :fluents :conditional-effects) (:predicates (p) (q) (r)) (:functions (f) (g) (h))

@@ -10,15 +10,14 @@ use pddl::ast::{Domain, Problem};
 
 use crate::concurrent::{parse, rational, written};
 
-/// Returns limits with which times are wide, unless a duration is chosen.
+/// Times are wide, unless a duration is chosen.
 fn wide(limits: &Limits) -> Limits {
     let mut thresholds = *limits.thresholds();
     thresholds.narrow_times = 0;
     limits.clone().with_thresholds(thresholds)
 }
 
-/// Plans a task twice: with the narrowest integers for times, and with wide integers. The answers must be
-/// equal.
+/// Plans with the narrowest integers for times, and with wide integers. The answers must be equal.
 pub fn solve(domain: &Domain, problem: &Problem, separation: &BigRational, limits: &Limits) -> Solution {
     let plan = |limits: &Limits| {
         let config = GroundConfig::default().with_limits(limits.clone());
@@ -34,14 +33,13 @@ pub fn solve(domain: &Domain, problem: &Problem, separation: &BigRational, limit
     narrow
 }
 
-/// Prime numbers from 101.
 fn primes() -> impl Iterator<Item = i128> {
     (101_i128..).filter(|number| {
         (2..*number).take_while(|factor| factor * factor <= *number).all(|factor| number % factor > 0)
     })
 }
 
-/// A robot with a prime number of metres per minute for each of its designs, as in a field report.
+/// The speed of each design is a different prime number.
 fn speeds(count: usize) -> (Domain, Problem) {
     let domain = "(define (domain speeds) (:requirements :typing :durative-actions :numeric-fluents)
       (:types place design) (:predicates (at ?p - place)) (:functions (dist ?a ?b - place) (speed ?d - design))

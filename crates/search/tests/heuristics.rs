@@ -6,8 +6,8 @@ use task::limits::Limits;
 use testing::missions::Mission;
 use testing::{depot, fleet, ground_text, successors};
 
-/// Checks that heuristic values are consistent and 0 at goal states, so that they are lower bounds. Returns
-/// `true` if cost partitioning yields a higher value of the initial state than every single projection.
+/// Checks that heuristic values are consistent and 0 at goal states, so that they are lower bounds.
+/// Returns `true` if cost partitioning raises the value of the initial state.
 fn check_estimates(text: &(String, String)) -> bool {
     let task = ground_text(text.clone());
     if task.unreachable.is_some() {

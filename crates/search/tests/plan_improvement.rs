@@ -9,10 +9,11 @@ use testing::missions::Mission;
 use testing::random::Random;
 use testing::{depot, fleet, ground_text, optimum};
 
-/// Number of work units after which an improvement ends if it finds no cheaper plan.
+/// Work units for all improvements of one plan.
 const WORK: u64 = 20_000_000;
 
-/// Returns a plan that a random walk has found, if any: mostly a long and expensive one.
+/// Returns the plan of a random walk, if it reaches the goal. The plan is mostly long and
+/// expensive.
 fn random_plan(task: &Task, random: &mut Random) -> Option<GroundPlan> {
     let (mut state, mut steps) = (task.initial.clone(), Vec::new());
     while !task.is_goal(&state) {
@@ -35,8 +36,8 @@ fn random_plan(task: &Task, random: &mut Random) -> Option<GroundPlan> {
     Some(GroundPlan { steps, cost })
 }
 
-/// Improves plans of random walks. Returns the number of plans that became cheaper, and of those that became
-/// optimal.
+/// Improves plans of random walks. Returns the number of plans that became cheaper, and the number
+/// of plans that are optimal afterwards.
 fn improve(text: &(String, String), seed: u64) -> (usize, usize) {
     let task = ground_text(text.clone());
     if task.unreachable.is_some() {

@@ -8,11 +8,9 @@ use task::task::Task;
 use testing::missions::Mission;
 use testing::{depot, fleet, ground_text, optimum};
 
-/// Work units of a turn.
 const WORK: u64 = 10_000_000;
 
-/// Runs the search until it has a plan or ends. Returns the number of steps of the plan, if any, and the number of
-/// evaluated states.
+/// Returns the number of steps of the first plan, if any, and the number of evaluated states.
 fn first_plan(task: &Task) -> (Option<usize>, u64) {
     let limits = Limits::none();
     let satisficer = Satisficer::new(Context::new(task, &limits)).expect("no limit");
@@ -31,7 +29,7 @@ fn first_plan(task: &Task) -> (Option<usize>, u64) {
     }
 }
 
-/// Workers move one by one between farms, or with cars, of which there are none at first.
+/// Workers walk one by one between farms. Driving moves no workers, because there are no cars.
 fn farms(workers: usize, goal: &str) -> (String, String) {
     let domain = "(define (domain farms) (:requirements :typing :numeric-fluents) (:types farm)
       (:predicates (adj ?a ?b - farm)) (:functions (x ?a - farm) (cars))

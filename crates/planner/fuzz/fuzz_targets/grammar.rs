@@ -22,7 +22,6 @@ use libfuzzer_sys::fuzz_target;
 use pddl::{Source, read, render};
 use metaplan_planner::{GroundConfig, ground};
 
-/// Words that have a meaning in PDDL or occur in the generated files.
 const WORDS: [&str; 28] = [
     "(",
     ")",
@@ -54,8 +53,8 @@ const WORDS: [&str; 28] = [
     "((((",
 ];
 
-/// Returns a copy of the text with at most four changes: words are deleted, inserted, replaced, exchanged or
-/// repeated. The input bytes determine the changes.
+/// Makes at most four changes, which the input bytes determine: words are deleted, inserted,
+/// replaced, exchanged or repeated.
 fn mutated(text: &str, bytes: &mut &[u8]) -> String {
     let spaced = text.replace('(', " ( ").replace(')', " ) ");
     let mut words: Vec<&str> = spaced.split_whitespace().collect();

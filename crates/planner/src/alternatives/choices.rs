@@ -34,8 +34,8 @@ pub struct Forced {
     pub functions: Vec<String>,
 }
 
-/// A choice of the first plan: the operator of a step (if `slot` is `None`), or the design of a slot (parameter
-/// whose design is not grounded). `slot` is the position of the slot in the operator.
+/// A choice of the first plan: the operator of a step (if `slot` is `None`), or the design of a
+/// slot (parameter whose design is not grounded), given by its position in the operator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Choice {
     pub(super) step: usize,
@@ -52,9 +52,9 @@ impl Choice {
     }
 }
 
-/// Returns `true` if two steps agree in a choice. If `slot` is `None`, they must have the same operator. Otherwise,
-/// `slot` is the position of a slot (parameter whose design is not grounded) of `first`, and `second` must use the
-/// same slot of the task with the same design.
+/// Returns `true` if two steps agree in a choice. If `slot` is `None`, they must have the same
+/// operator. Otherwise, `second` must use the slot at position `slot` of `first`, with the same
+/// design.
 pub(super) fn shares(task: &Task, first: &GroundStep, second: &GroundStep, slot: Option<u32>) -> bool {
     match slot {
         None => second.operator == first.operator,
@@ -65,14 +65,13 @@ pub(super) fn shares(task: &Task, first: &GroundStep, second: &GroundStep, slot:
     }
 }
 
-/// Returns the index of a slot in the task, and the index of the design that the step selects for it. `position` is
-/// the position of the slot in the operator of the step.
+/// Returns the index of a slot in the task, and the index of the selected design. `position` refers
+/// to the operator of the step.
 fn design(task: &Task, step: &GroundStep, position: usize) -> (usize, u32) {
     let usage = &task.operators[step.operator.index()].slots[position];
     (usage.slot.index(), usage.designs[step.choice[position] as usize])
 }
 
-/// Converts the shared choices to names, for each step of the first plan.
 pub(super) fn forced(task: &Task, first: &[GroundStep], choices: &[Choice]) -> Vec<Forced> {
     let of_step = |(at, step): (usize, &GroundStep)| {
         let is_shared = |slot: Option<u32>| choices.contains(&Choice { step: at, slot });

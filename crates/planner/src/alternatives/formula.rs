@@ -22,8 +22,7 @@ use task::task::Task;
 use crate::alternatives::choices::{Alternatives, Choice, forced, shares};
 use crate::optimize::Config;
 
-/// Searches for at most `max_plans` cheapest plans other than `first`. Returns `None` if the formula cannot
-/// be built within the limits.
+/// Returns `None` if the formula cannot be built within the limits.
 pub(super) fn by_formula(
     context: Context<'_>,
     bounds: &Bounds,
@@ -101,8 +100,7 @@ impl Run<'_> {
         self.solver.add_clause(&clause);
     }
 
-    /// Solves the formula under assumptions. If it is satisfiable, also returns the decoded plan, unless the
-    /// plan is not executable.
+    /// If the formula is satisfiable, also returns the decoded plan, unless it is not executable.
     fn solve(&mut self, assumptions: &[Lit]) -> (Answer, Option<Vec<GroundStep>>) {
         let answer = self.solver.solve(assumptions);
         if answer != Answer::Satisfiable {
@@ -114,8 +112,8 @@ impl Run<'_> {
         (answer, is_plan.then_some(steps))
     }
 
-    /// Returns the choices of the first plan that all cheapest plans share. The plans in `known` reduce the
-    /// candidates before the first query. Returns `None` if the solver reaches a limit.
+    /// Returns the choices of the first plan that all cheapest plans share, or `None` at a limit.
+    /// The plans in `known` reduce the candidates before the first query.
     fn forced(&mut self, first: &[GroundStep], known: &[Vec<GroundStep>]) -> Option<Vec<Choice>> {
         let mut choices = Choice::all(first);
         for plan in known {

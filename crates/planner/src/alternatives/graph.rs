@@ -31,11 +31,9 @@ use task::plan::ground::GroundStep;
 use task::task::number::TaskNumber;
 use task::task::{OperatorId, State, Task};
 
-/// Maximum number of combinations of designs of one operator in the second search, which distinguishes all
-/// states.
+/// Maximum number of combinations of designs of one operator in the second search.
 const MAX_CHOICES: usize = 20_000;
 
-/// An edge of the graph: a step from one label (node) to another.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Edge {
     pub(super) from: u32,
@@ -54,17 +52,15 @@ pub(super) struct Graph {
     pub(super) goals: Vec<bool>,
     /// For each label (node): whether a goal label can be reached from it.
     pub(super) alive: Vec<bool>,
-    /// `true` if the search was not cut short. If the graph is also exact, every cheapest plan is then one of
-    /// its paths.
+    /// `false` if the search was cut short, or states were dropped because a number overflowed. If
+    /// the graph is complete and exact, every cheapest plan is one of its paths.
     pub(super) is_complete: bool,
     /// `true` if every path to a goal label is a plan, because each label represents a single state.
     pub(super) is_exact: bool,
 }
 
-/// Index of the label (node) of the initial state.
 pub(super) const ROOT: u32 = 0;
 
-/// Predicate on an unfinished graph. Returns `true` if the graph already contains enough plans.
 pub(super) type IsEnough<'e> = dyn FnMut(&Graph) -> bool + 'e;
 
 /// Builds the graph of all plans with cost `cost`, which must be the cost of a cheapest plan. At a limit, or
@@ -92,28 +88,27 @@ pub(super) fn cheapest(
 /// are not compared.
 type Place = (Box<[u32]>, Box<[Int]>);
 
-/// Labels (nodes) of a search: states, each with the cost of the path by which it was reached.
+/// States, each with the cost of the path by which it was reached.
 struct Labels {
     all: Vec<(State, Int)>,
     places: FxHashMap<Place, Vec<u32>>,
-    /// Numeric variables for which a label also represents worse values: their indices, and the directions in which
-    /// values are compared. All other numbers are part of the [`Place`].
+    /// Numeric variables for which a label also represents worse values, with the directions in
+    /// which values are compared. All other numbers are part of the [`Place`].
     compared: Vec<(usize, Polarity)>,
     basic: usize,
 }
 
-/// Result of comparing a state and the cost of its path with the existing labels (nodes) at the same [`Place`].
+/// Result of comparing a state and its path cost with the labels (nodes) at the same [`Place`].
 enum Known {
-    /// Another label (node) costs less and is no worse in any compared number.
+    /// Another label costs less and is no worse in any compared number.
     Beaten,
-    /// Another label (node), with this index, has equal cost and is no worse in any compared number.
+    /// This other label has equal cost and is no worse in any compared number.
     Covered(u32),
     New,
 }
 
 impl Labels {
-    /// Creates an empty set of labels (nodes) in which a label also represents all states that are no better
-    /// in any compared number.
+    /// Each label also represents all states that are no better in any compared number.
     fn comparing(task: &Task) -> Self {
         let asked = directions(task).into_iter().enumerate();
         Self::new(task, asked.filter(|(_, asked)| !(asked.up && asked.down)).collect())
@@ -140,8 +135,8 @@ impl Labels {
         })
     }
 
-    /// Returns the labels (nodes) at `place` that cost at most `cost` and are no worse than `state` in any compared
-    /// number. Each label has the flag `true` if it costs less than `cost`.
+    /// Returns the labels at `place` that cost at most `cost` and are no worse than `state` in any
+    /// compared number. The flag is `true` if the label costs less than `cost`.
     fn no_worse<'l>(
         &'l self,
         place: &Place,
@@ -174,8 +169,7 @@ impl Labels {
     }
 }
 
-/// Combinations of designs of an operator, with their costs; `None` if there are too many. Computed at first
-/// use.
+/// Computed at first use; `None` if there are too many combinations.
 type Choices = OnceCell<Option<CostedCombinations<Int>>>;
 
 struct Search<'a> {
@@ -184,14 +178,13 @@ struct Search<'a> {
     cost: Int,
     index: SuccessorGenerator,
     monotone: bool,
-    /// For each operator: the non-dominated combinations of designs.
+    /// The non-dominated combinations for each operator.
     best: Vec<Choices>,
-    /// For each operator: all combinations of designs.
+    /// All combinations for each operator.
     all: Vec<Choices>,
 }
 
 enum Stopped {
-    /// An operator has too many combinations of designs.
     TooMany,
     AtLimit,
 }
@@ -208,8 +201,9 @@ struct Growth {
     steps: Vec<GroundStep>,
     numbers: FxHashMap<GroundStep, u32>,
     goals: Vec<bool>,
-    /// Open list: estimated cost of the whole plan (0 in the second search), cost of the path, and index of the
-    /// label (node). The label with the least estimate is expanded first; of equal estimates, the greatest cost.
+    /// Estimated cost of the whole plan (0 in the second search), cost of the path, and index of
+    /// the label. The label with the least estimate is expanded first; of equal estimates, the
+    /// greatest cost.
     open: BinaryHeap<Reverse<(Int, Reverse<Int>, u32)>>,
     is_complete: bool,
 }
@@ -275,11 +269,11 @@ impl<'a> Search<'a> {
         Some(Self { context, bounds, cost, index, monotone, best: choices(), all: choices() })
     }
 
-    /// Builds a graph from the initial state until it is complete, a time or memory limit is reached, or
-    /// `is_enough` returns `true`. Returns `None` if an operator has too many combinations of designs. The first
-    /// search has no `guide`. The second search has one: the labels (nodes) of the first search, and whether a goal
-    /// can be reached from each of them. In the second search, labels represent single states, and states that the
-    /// guide excludes are omitted. `is_enough` is called only with a guide.
+    /// Builds a graph from the initial state until it is complete, a time or memory limit is
+    /// reached, or `is_enough` returns `true`. Returns `None` if an operator has too many
+    /// combinations of designs. The second search has a `guide`: the labels of the first search,
+    /// and whether a goal can be reached from each of them. States that the guide excludes are
+    /// omitted. `is_enough` is called only with a guide.
     fn explore(
         &self,
         labels: Labels,
@@ -379,8 +373,8 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// Returns the label (node) of a state that was reached at this cost, and adds the label if it is new.
-    /// Returns `None` if no cheapest plan reaches the state at this cost.
+    /// Returns the label of a state that was reached at this cost, or `None` if no cheapest plan
+    /// reaches the state at this cost.
     fn reach(
         &self,
         growth: &mut Growth,

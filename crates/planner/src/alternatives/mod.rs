@@ -45,8 +45,7 @@ pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Conf
     by_graph.or_else(|| by_formula(context, &bounds, first, most, config)).or(Some(unknown))
 }
 
-/// Lists at most `most` other cheapest plans from the graph of all cheapest plans. Returns `None` if graph search
-/// is not applicable to the task.
+/// Returns `None` if graph search is not applicable to the task.
 fn by_graph(context: Context<'_>, bounds: &Bounds, first: &GroundPlan, most: usize) -> Option<Alternatives> {
     let task = context.task;
     let mut is_enough = |graph: &Graph| List::new(context, first, most, graph).0.is_full();
@@ -68,7 +67,6 @@ struct List {
 }
 
 impl List {
-    /// Lists the plans of a graph. Also returns whether the list is exhaustive or the enumeration stopped early.
     fn new(context: Context<'_>, first: &GroundPlan, most: usize, graph: &Graph) -> (Self, End) {
         let mut list = Self { plans: Vec::new(), most };
         let first_plan = decode(context, first);
@@ -93,8 +91,7 @@ impl List {
     }
 }
 
-/// Returns the choices of a plan that all cheapest plans share. The graph must be complete, and each of its
-/// paths to a goal must be a plan.
+/// The graph must be complete, and each of its paths to a goal must be a plan.
 fn shared(task: &Task, first: &[GroundStep], graph: &Graph) -> Vec<Choice> {
     let layers = Paths::new(graph).layers(first.len());
     let mut choices = Choice::all(first);

@@ -12,22 +12,18 @@ const MAX_WORK: usize = 2_000_000;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum End {
     Exhausted,
-    /// The enumeration stopped early, so there may be further paths.
     Stopped,
 }
 
-/// Enumerator of the paths of a graph from the initial label (node) to goal labels.
 pub(super) struct Paths<'g> {
     graph: &'g Graph,
-    /// Index of the first edge of each label (node), followed by the number of edges.
+    /// Index of the first edge of each label, followed by the number of edges.
     first: Vec<usize>,
-    /// Pairs of a label (node) and a number of steps, such that no path with this number of steps leads from the
-    /// label to a goal.
+    /// Pairs of a label and a number of steps in which no path leads from the label to a goal.
     dead: FxHashSet<(u32, usize)>,
     work: usize,
 }
 
-/// A label (node of the graph) on the current path, and the index of the next edge to follow from it.
 struct Branch {
     label: u32,
     next: usize,
@@ -46,7 +42,7 @@ impl<'g> Paths<'g> {
         Self { graph, first, dead: FxHashSet::default(), work: MAX_WORK }
     }
 
-    /// Returns the edges of a label (node) that lead to labels from which a goal can be reached.
+    /// Returns the edges of a label that lead to labels from which a goal can be reached.
     pub(super) fn edges(&self, label: u32) -> impl Iterator<Item = &'g Edge> + use<'_, 'g> {
         let (from, to) = (self.first[label as usize], self.first[(label as usize).saturating_add(1)]);
         self.graph.edges[from..to].iter().filter(|edge| self.graph.alive[edge.to as usize])
@@ -70,7 +66,6 @@ impl<'g> Paths<'g> {
         End::Stopped
     }
 
-    /// Calls `visit` with each path of `length` steps. Stops early like [`Paths::each`].
     fn each_of(&mut self, length: usize, visit: &mut dyn FnMut(Vec<GroundStep>) -> bool) -> End {
         let mut path: Vec<u32> = Vec::new();
         let mut branches = vec![Branch { label: ROOT, next: self.first[ROOT as usize] }];
@@ -114,8 +109,8 @@ impl<'g> Paths<'g> {
         End::Exhausted
     }
 
-    /// Returns the number of steps of a longest path from the initial label to a goal label, or `None` if the
-    /// graph has a cycle.
+    /// Returns the number of steps of a longest path to a goal label, or `None` if the graph has a
+    /// cycle.
     fn longest(&self) -> Option<usize> {
         let labels = self.graph.goals.len();
         let mut into = vec![0_usize; labels];

@@ -17,7 +17,6 @@ use super::{Forced, alternatives};
 use crate::optimize::{Config, Engine, optimize};
 use pddl::{Source, read};
 
-/// Enumerates all plans from a state that cost exactly `left`.
 fn all(task: &Task, state: &State, left: Int, path: &mut Vec<GroundStep>, found: &mut Vec<Vec<GroundStep>>) {
     if left == 0 && task.is_goal(state) {
         found.push(path.clone());
@@ -65,7 +64,6 @@ fn forced(first: &Plan, plans: &[Plan]) -> Vec<Forced> {
     first.steps.iter().enumerate().map(|(position, step)| at(position, step)).collect()
 }
 
-/// Compares the alternatives of a random mission with the enumeration. Returns the number of cheapest plans.
 fn check(seed: u64) -> usize {
     let mission = Mission::random(seed);
     if mission.weights.0 == 0 {

@@ -14,12 +14,11 @@ use task::task::quantity::Linear;
 /// Maximum number of bits of a common denominator.
 const MOST_BITS: u64 = 1 << 20;
 
-/// Factors that convert the numbers, costs and times of a task to integers.
 pub(super) struct Scales {
     pub(super) numbers: Integer,
     pub(super) costs: Integer,
     pub(super) times: Integer,
-    /// Factor that converts cost bounds to scaled costs. The bounds are counted in multiples of a unit.
+    /// Factor for cost bounds, which are counted in multiples of a unit.
     pub(super) bounds: Integer,
 }
 
@@ -29,9 +28,9 @@ impl Scales {
         Self { numbers: unit(), costs: unit(), times: unit(), bounds: unit() }
     }
 
-    /// Computes the scales of a task in rationals. Cost bounds are counted in multiples of `unit`. Returns `None`
-    /// if an effect multiplies a number by a fraction (its values then have no common denominator), or a
-    /// denominator has too many bits.
+    /// Cost bounds are counted in multiples of `unit`. Returns `None` if an effect multiplies a
+    /// number by a fraction (its values then have no common denominator), or a denominator has too
+    /// many bits.
     pub(super) fn of(task: &Task<Rational>, unit: &Rational) -> Option<Self> {
         let mut numbers = CommonDenominator::of_at_most(MOST_BITS);
         let mut times = CommonDenominator::of_at_most(MOST_BITS);
@@ -61,7 +60,7 @@ impl Scales {
     }
 }
 
-/// Returns `number * scale` as an integer. The scale must be a multiple of the number's denominator.
+/// The scale must be a multiple of the denominator of `number`.
 pub(super) fn scaled<N: TaskNumber>(number: &N, scale: &Integer) -> Integer {
     let number = number.to_rational();
     if let Some(integer) = number.to_int() {

@@ -16,7 +16,6 @@ use rustc_hash::FxHashMap;
 
 use task::limits::Limits;
 
-/// Maximum total number of literals in all clauses.
 const LITERAL_LIMIT: usize = 1 << 26;
 const NONE: u32 = u32::MAX;
 
@@ -63,28 +62,25 @@ pub(super) fn trim<'c>(
 }
 
 struct Trimmer {
-    /// Clauses of the formula, followed by derived clauses. The first two literals of each clause are
+    /// Clauses of the formula, followed by derived clauses. The first two literals of a clause are
     /// watched.
     clauses: Vec<Vec<Literal>>,
     /// Number of clauses that belong to the formula.
     given: usize,
     hints: Vec<Vec<u32>>,
-    /// For each clause: whether the solver has deleted it.
     is_gone: Vec<bool>,
     watches: Vec<Vec<u32>>,
     /// Indices of the clauses that are not deleted, by their sorted literals.
     positions: FxHashMap<Vec<Literal>, Vec<u32>>,
     is_true: Vec<bool>,
-    /// True literals in the order of their assignment.
     trail: Vec<Literal>,
-    /// Number of literals at the front of the trail that have been propagated.
+    /// Number of literals of the trail that have been propagated.
     done: usize,
-    /// For each variable: the clause that implies its current value.
+    /// The clause that implies the current value of each variable.
     reasons: Vec<u32>,
-    /// For each variable: the unit clause that fixes its value permanently.
+    /// The unit clause that permanently fixes the value of each variable.
     units: Vec<u32>,
     is_seen: Vec<bool>,
-    /// A clause whose literals are all false, if known.
     conflict: Option<u32>,
     is_done: bool,
     size: usize,
@@ -197,8 +193,8 @@ impl Trimmer {
         units.chain([position]).collect()
     }
 
-    /// Derives a clause of the solver's proof and adds it with its hints. Ignores a tautology. Returns an
-    /// error if the clause does not follow.
+    /// Adds a clause of the solver's proof with its hints. Ignores a tautology. Fails if the clause
+    /// does not follow.
     fn conclude(&mut self, clause: &[Literal]) -> Result<(), String> {
         if clause.iter().any(|literal| clause.binary_search(&-*literal).is_ok()) {
             return Ok(());
@@ -212,8 +208,7 @@ impl Trimmer {
         Ok(())
     }
 
-    /// Marks a clause as deleted if it exists. Literals that the clause has implied permanently stay
-    /// assigned.
+    /// Literals that the clause has implied permanently stay assigned.
     fn forget(&mut self, clause: &[Literal]) {
         let Some(positions) = self.positions.get_mut(clause) else { return };
         if let Some(position) = positions.pop() {
@@ -224,8 +219,8 @@ impl Trimmer {
         }
     }
 
-    /// Returns the clauses from which a clause follows by unit propagation, in the order of propagation.
-    /// Returns `None` if it does not follow.
+    /// Returns the clauses from which a clause follows by unit propagation, in the order of
+    /// propagation; `None` if it does not follow.
     fn follows(&mut self, clause: &[Literal]) -> Option<Vec<u32>> {
         if let Some(literal) = clause.iter().find(|literal| self.is_true[literal.index()]) {
             return Some(vec![self.units[literal.variable()]]);
@@ -274,7 +269,7 @@ impl Trimmer {
         hints
     }
 
-    /// Propagates the literals of the trail. Returns a clause whose literals are all false, if there is one.
+    /// Returns a clause whose literals are all false, if there is one.
     #[expect(clippy::arithmetic_side_effects, reason = "places of clauses that are held in memory")]
     fn propagate(&mut self) -> Option<u32> {
         while let Some(literal) = self.trail.get(self.done).copied() {

@@ -63,9 +63,9 @@ pub fn certify_exact(task: &ExactTask, solution: &Solution, limits: &Limits) -> 
     certified(context, (solution, cost), &scales, bounds, |rounded| &rounded.bounds)
 }
 
-/// Creates a certificate. `bounds` computes a heuristic and the scales of its numbers, and `plain` returns the
-/// integer bounds in this heuristic. `scales` is used if grounding already proves that the task is unsolvable.
-/// Returns `None` in the cases that [`certify`] lists.
+/// `bounds` computes a heuristic and the scales of its numbers, and `plain` returns the integer
+/// bounds in it. `scales` is used if grounding already proves that the task is unsolvable. Returns
+/// `None` in the cases that [`certify`] lists.
 fn certified<N: TaskNumber, E: Heuristic<N>>(
     context: Context<'_, N>,
     (solution, cost): (&Solution, Option<N>),
@@ -142,8 +142,8 @@ impl<K: Hash + Eq + Clone, V> Pool<K, V> {
     }
 }
 
-/// Slots of an operator (parameters whose designs are not grounded), each with the indices of its suitable
-/// designs.
+/// Slots of an operator (parameters whose designs are not grounded), with the suitable designs of
+/// each slot.
 type Uses = Vec<(u32, Vec<u32>)>;
 
 struct Writer<'w, N> {
@@ -256,7 +256,6 @@ impl<N: TaskNumber> Writer<'_, N> {
         }
     }
 
-    /// Converts a linear expression, multiplied by the scale of the numbers and by `factor`.
     fn linear(&mut self, linear: &task::quantity::Linear<N>, factor: &Integer) -> Linear {
         let factors = linear.coefficients.iter();
         let scale = &self.scales.numbers * factor;

@@ -13,11 +13,10 @@ use task::task::quantity::{Linear, Quantity};
 use task::task::table_map::TableMap;
 use task::task::{Condition, Task};
 
-/// Maximum number of bits of a common denominator.
 const MOST_BITS: u64 = 200;
 
-/// A task whose constants are scaled to integers where possible. Its costs are `cost_scale` times the
-/// original costs.
+/// A task whose constants are scaled to integers where possible. The factor of the costs is
+/// `cost_scale`.
 pub struct Integral {
     pub(crate) task: Task<Rational>,
     pub(crate) cost_scale: Rational,
@@ -27,7 +26,6 @@ fn compared(condition: &mut Condition<Rational>) -> impl Iterator<Item = &mut Li
     condition.comparisons.iter_mut().chain(&mut condition.above)
 }
 
-/// Iterates over all linear expressions in conditions, effects, axioms and the goal of a task.
 fn linears(task: &mut Task<Rational>) -> impl Iterator<Item = &mut Linear<Rational>> {
     let bodies = task.axioms.iter_mut().flat_map(|layer| &mut layer.rules).map(|rule| &mut rule.body);
     let operators = task.operators.iter_mut().flat_map(|operator| {
@@ -50,7 +48,6 @@ fn multiply(quantity: &mut Quantity<Rational>, scale: &Rational, tables: &mut Ta
 }
 
 impl Integral {
-    /// Scales the conditions, effects, costs and the initial state of a task.
     pub(crate) fn of(context: Context<'_, Rational>) -> Result<Self, Interrupted> {
         let mut task = context.task.clone();
         let mut costs = CommonDenominator::of_at_most(MOST_BITS);

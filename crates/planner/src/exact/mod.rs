@@ -30,7 +30,6 @@ use crate::exact::integer_scaling::Integral;
 use crate::optimize::{Config, can_repeat_reward};
 use pddl::ast::{Domain, Problem};
 
-/// Maximum number of states that the search stores.
 const STATE_LIMIT: usize = 2_000_000;
 /// Maximum number of bits of the rounded integer costs from which heuristics are computed.
 const COST_BITS: u64 = 90;
@@ -102,8 +101,8 @@ fn cheapest(task: &Task<Rational>, config: &Config) -> Solution {
     }
 }
 
-/// Finds a best plan with at most `horizon` steps or, at a limit, the best plan known by then. `lower` is a
-/// lower bound on the cost of every plan.
+/// Finds a best plan with at most `horizon` steps or, at a limit, the best plan known by then.
+/// `lower` is a lower bound on the cost of all plans.
 fn within(context: Context<'_, Rational>, horizon: usize, lower: &Rational) -> Solution {
     let shorter = with_horizon(context.task, horizon);
     let (status, plan, proof) = match explore(Context { task: &shorter, ..context }) {
@@ -161,7 +160,7 @@ enum ExactOutcome {
     Optimal(GroundPlan<Rational>),
     /// It is proved that there is no plan; the solution contains the proof.
     Known(Box<Solution>),
-    /// A limit was reached. Contains the best plan found and a lower bound on the cost of every plan.
+    /// Best plan found before a limit was reached, and a lower bound on the cost of every plan.
     Unknown(Option<GroundPlan<Rational>>, Rational),
 }
 
@@ -199,7 +198,7 @@ fn answer(status: Status, plan: Option<Plan>, proof: Option<Proof>) -> Solution 
     }
 }
 
-/// Returns a copy of the task with other operator costs, whose sum is the metric.
+/// Replaces the operator costs. The metric becomes the sum of the new costs.
 fn with_costs(
     mut task: Task<Rational>,
     cost: impl Fn(&Operator<Rational>) -> Quantity<Rational>,
@@ -211,8 +210,8 @@ fn with_costs(
     task
 }
 
-/// Returns a copy of the task that only has plans with at most `horizon` steps: each step, including waits,
-/// consumes one unit of an additional numeric variable.
+/// Restricts the task to plans with at most `horizon` steps: each step, including waits, consumes
+/// one unit of an additional numeric variable.
 fn with_horizon(task: &Task<Rational>, horizon: usize) -> Task<Rational> {
     let mut task = task.clone();
     let steps_left = NumericId(dense(task.initial.numbers.len()));
@@ -227,7 +226,7 @@ fn with_horizon(task: &Task<Rational>, horizon: usize) -> Task<Rational> {
     task
 }
 
-/// Heuristics of a task in rationals, computed from the task without numeric variables and with costs that
+/// Heuristics of a task in rationals, from the task without numeric variables and with costs that
 /// are scaled and rounded down to integers.
 pub struct RoundedBounds {
     pub(crate) bounds: Bounds,
@@ -240,7 +239,6 @@ impl RoundedBounds {
         Self::of(context, Bounds::new)
     }
 
-    /// Computes projections only, without cost partitioning.
     pub(crate) fn of_projections(context: Context<'_, Rational>) -> Result<Self, Interrupted> {
         Self::of(context, Bounds::of_projections)
     }

@@ -33,7 +33,6 @@ use crate::optimize::state_dependent_costs::StateDependentCosts;
 
 /// Maximum number of nodes. Without it, the search may not end, as numbers can grow without bound at no cost.
 const MAX_NODES: usize = 2_000_000;
-/// Maximum number of combinations of designs, over all operators.
 const MAX_COMBINATIONS: usize = 200_000;
 /// Maximum number of nodes that A\* takes from the open list in its first turn. The number doubles in each further
 /// turn.
@@ -122,7 +121,6 @@ fn first_plan(task: &Task, config: &Config) -> Option<Solution> {
     Some(solve(Run::new(task, &config, &mut stop)))
 }
 
-/// All admitted combinations of designs of each operator, or `None` if there are too many.
 fn choices(task: &Task) -> Option<Vec<Vec<Vec<u32>>>> {
     let mut remaining = MAX_COMBINATIONS;
     let mut choices = Vec::with_capacity(task.operators.len());
@@ -135,7 +133,6 @@ fn choices(task: &Task) -> Option<Vec<Vec<Vec<u32>>>> {
     Some(choices)
 }
 
-/// Reports of better plans, and statistics.
 struct Progress<'p> {
     started: Instant,
     statistics: Statistics,
@@ -186,7 +183,6 @@ impl Progress<'_> {
     }
 }
 
-/// Reason why A\* has ended.
 #[derive(Clone, Copy)]
 enum End {
     /// All nodes are expanded, except those that cannot lead to a plan better than the best one.
@@ -202,9 +198,7 @@ struct Node {
     /// Cost of the path, including the weighted values of the measured fluents in its last state.
     total: Int,
     steps: usize,
-    /// Parent node and step; `None` for the initial state.
     origin: Option<(u32, GroundStep)>,
-    /// Whether another path dominates the path to this node.
     is_dominated: bool,
 }
 
@@ -214,7 +208,6 @@ impl Node {
     }
 }
 
-/// A path to a state, with its cost and its number of steps.
 #[derive(Clone, Copy)]
 struct Path<'n> {
     state: &'n State,
@@ -222,8 +215,8 @@ struct Path<'n> {
     steps: usize,
 }
 
-/// Sort key of an open node: lower bound on the cost of plans through the node, estimate of the remaining cost, and
-/// index of the node.
+/// Lower bound on the cost of plans through the node, estimate of the remaining cost, and index of
+/// the node.
 type Priority = (Int, Int, Reverse<u32>);
 
 struct Search<'a> {
@@ -231,14 +224,12 @@ struct Search<'a> {
     costs: &'a StateDependentCosts,
     bounds: &'a Bounds,
     choices: Vec<Vec<Vec<u32>>>,
-    /// Maximum number of steps of a plan; `None` for no limit.
     horizon: Option<usize>,
     generator: SuccessorGenerator,
     nodes: Vec<Node>,
     /// Nodes that no other node dominates, by the hash of the parts of their states that must be equal.
     table: FxHashMap<u64, Vec<u32>>,
     open: BinaryHeap<Reverse<Priority>>,
-    /// Best plan and its cost.
     best: Option<(Int, GroundPlan)>,
     /// Lower bound on the cost of plans through nodes that were dropped because numbers overflow.
     left_out: Option<Int>,
@@ -314,7 +305,6 @@ impl<'a> Search<'a> {
         None
     }
 
-    /// Adds the successor of a node by an applicable step.
     fn extend(&mut self, id: u32, state: &State, step: GroundStep) {
         let Node { paid, total, .. } = self.nodes[id as usize];
         let operator = &self.task.operators[step.operator.index()];
@@ -382,7 +372,6 @@ impl<'a> Search<'a> {
         self.best.as_ref().is_none_or(|(total, _)| bound < *total)
     }
 
-    /// Makes the path to a goal node the best plan.
     fn adopt(&mut self, goal: u32) {
         let mut steps = Vec::new();
         let mut at = goal;
@@ -394,7 +383,6 @@ impl<'a> Search<'a> {
         self.offer(steps);
     }
 
-    /// Makes a plan the best one if it is better and not longer than the horizon.
     fn offer(&mut self, steps: Vec<GroundStep>) {
         if self.exceeds_horizon(steps.len()) {
             return;

@@ -25,12 +25,9 @@ use task::number::{Int, dense};
 
 use crate::optimize::optimizer_run::{Best, IncrementalSolver, Run, StrategyOutcome};
 
-/// Maximum number of solver calls that try to reduce a core.
 const CORE_TRIM_ROUNDS: usize = 4;
 
-/// State of a core-guided search: the lower bound, the soft literals and the totalizers.
 struct Search {
-    /// Lower bound on the cost of every plan that the formula admits.
     lower: Int,
     /// Weight of each soft literal, at least 1. The weight is added to the cost if the literal is true.
     weights: BTreeMap<Lit, Int>,
@@ -54,21 +51,21 @@ impl Search {
         Self { lower, weights, totalizers: Vec::new(), outputs: FxHashMap::default() }
     }
 
-    /// Returns the negations of all soft literals with a weight of at least `least`.
+    /// Negations of all soft literals with a weight of at least `least`.
     fn assumptions(&self, least: Int) -> Vec<Lit> {
         self.weights.iter().filter(|(_, weight)| **weight >= least).map(|(literal, _)| !*literal).collect()
     }
 
-    /// Returns the minimum weight of the next stratum: the greatest weight that is at most `than / 2`, or
-    /// otherwise the least weight below `than`. Returns `None` if there is no lower weight.
+    /// Minimum weight of the next stratum: the greatest weight that is at most `than / 2`, or
+    /// otherwise the least weight below `than`. `None` if there is no lower weight.
     fn lighter(&self, than: Int) -> Option<Int> {
         let below = self.weights.values().copied().filter(|weight| *weight < than);
         let lightest = below.clone().min()?;
         Some(below.filter(|weight| *weight <= than / 2).max().unwrap_or(lightest))
     }
 
-    /// Processes a core: raises the lower bound, reduces the weights of the core, and adds totalizer outputs
-    /// as soft literals. At least one literal of the core is true in every plan.
+    /// Raises the lower bound, reduces the weights of the core, and adds totalizer outputs as soft
+    /// literals. At least one literal of the core is true in every plan.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "a core has weights that are at most what the limit leaves, and the least of them is taken off each"

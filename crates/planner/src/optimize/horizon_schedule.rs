@@ -19,7 +19,6 @@ use crate::optimize::sat_budget::{FORMULA_LIMIT, SatBudget};
 pub(super) struct HorizonSchedule {
     /// Horizons whose formulas are not decided yet.
     open: Vec<usize>,
-    /// Next longer horizon; `None` after the last horizon.
     next: Option<usize>,
     /// Upper bound on the number of steps of a shortest plan, or the configured horizon if it is smaller.
     /// `usize::MAX` if there is neither.
@@ -32,7 +31,6 @@ pub(super) enum FirstPlanOutcome {
     Plan(GroundPlan),
     /// There is no plan of any length, or no plan within the configured horizon.
     Refuted(Box<Solution>),
-    /// The budget is used up; the schedule can be resumed.
     Paused,
     /// A limit was reached, the formulas become too large, or the cost of a plan overflows.
     Over,
@@ -45,8 +43,8 @@ impl HorizonSchedule {
         Self { open: Vec::new(), next: Some(0), most: max_horizon, refuted: 0 }
     }
 
-    /// Adds the next horizon unless its formula would be too large, and solves the formulas of all undecided
-    /// horizons with the given budget each.
+    /// Adds the next horizon unless its formula would be too large, and solves the formulas of all
+    /// undecided horizons, each with the given budget, until one of them yields a plan.
     pub(super) fn advance(
         &mut self,
         run: &mut Run<'_>,
@@ -96,8 +94,8 @@ impl HorizonSchedule {
     }
 }
 
-/// Finds a first plan with increasing horizons and without a budget. If there is no plan, a limit is reached, or
-/// the formulas become too large, returns a solution without a plan as an error.
+/// Has no budget. If there is no plan, a limit is reached, or the formulas become too large,
+/// returns a solution without a plan as an error.
 pub(super) fn first_plan(run: &mut Run<'_>, bounds: &Bounds) -> Result<GroundPlan, Box<Solution>> {
     let mut first = HorizonSchedule::new(run);
     loop {
@@ -130,8 +128,8 @@ fn decide(
     })
 }
 
-/// Returns the number of states of the task, or `None` if the task has numeric variables or the number overflows. A
-/// shortest plan has fewer steps than there are states, because it visits no state twice.
+/// Returns `None` if the task has numeric variables or the number of states overflows. A shortest
+/// plan has fewer steps than there are states, because it visits no state twice.
 fn states(task: &Task) -> Option<usize> {
     if !task.initial.numbers.is_empty() {
         return None;

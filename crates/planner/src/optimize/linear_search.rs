@@ -5,9 +5,8 @@ use encodings::sat::Answer;
 
 use crate::optimize::optimizer_run::{Best, Run, StrategyOutcome};
 
-/// Solves a formula repeatedly with decreasing cost limits until it is unsatisfiable, and stores each plan in
-/// `best`. A lower limit only adds clauses, so learnt clauses stay valid. Stops after `budget` conflicts, or at a
-/// time or memory limit.
+/// Stores each plan in `best`. A lower cost limit only adds clauses, so learnt clauses stay valid.
+/// Stops after `budget` conflicts, or at a time or memory limit.
 pub(super) fn linear_search_down(
     run: &mut Run<'_>,
     mut encoding: Encoding<'_>,

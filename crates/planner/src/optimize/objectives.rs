@@ -127,9 +127,8 @@ pub fn pareto(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement))
     }
 }
 
-/// Optimises the objectives lexicographically in the order of the indices `order`. Stops at the first
-/// objective under which optimality is not proved. Each budget is the index of an objective and the maximum
-/// cost under this objective.
+/// Stops at the first objective under which optimality is not proved. Each budget is the index of
+/// an objective and the maximum cost under this objective.
 fn in_order(
     task: &Task,
     order: &[usize],
@@ -174,7 +173,7 @@ fn in_order(
     finish(context, best.unwrap_or_else(|| optimize(task, config, report)))
 }
 
-/// Decodes the plan under the original objectives of the task, and computes its values under all objectives.
+/// Computes the values of the plan under the original objectives of the task.
 fn finish(context: Context<'_>, mut solution: Solution) -> Point {
     let task = context.task;
     let mut values = Vec::new();
@@ -207,7 +206,6 @@ fn costs_by(task: &Task, objective: usize, plan: &GroundPlan) -> impl Iterator<I
     })
 }
 
-/// Returns the cost of a plan under the objective with this index, or `None` if it overflows.
 fn cost_by(task: &Task, objective: usize, plan: &GroundPlan) -> Option<Int> {
     costs_by(task, objective, plan).try_fold(0, Int::checked_add)
 }

@@ -28,32 +28,29 @@ pub(super) struct Run<'a> {
     pub(super) report: &'a mut dyn FnMut(Improvement),
     pub(super) statistics: Statistics,
     started: Instant,
-    /// Cost of the best plan (`None` without a plan) and lower bound, as recorded last.
+    /// Cost of the best plan and lower bound, as recorded last.
     noted: Option<(Option<Int>, Int)>,
-    /// Symmetries of the task, which formulas break; computed at first use.
+    /// Formulas break these symmetries; computed at first use.
     symmetry: OnceCell<Symmetry>,
 }
 
 pub(super) struct Best {
     pub(super) plan: GroundPlan,
-    /// Lower bound on the cost of every plan.
     pub(super) lower: Int,
 }
 
-/// Scope of a formula: the cost limit of the plans, the operators that are allowed at each step, and the
-/// proved bound on the number of steps.
+/// Plans that a formula describes: their maximum cost, and the operators that are allowed at each
+/// step.
 pub(super) struct FormulaScope {
     pub(super) limit: Int,
-    /// For each step and each operator: whether the operator may occur at the step.
     pub(super) allowed: Vec<Vec<bool>>,
-    /// Proved upper bound on the number of steps of all plans within the cost limit. `None` if there is no
-    /// bound or the formula has fewer steps.
+    /// Proved upper bound on the number of steps of all plans within the cost limit, unless the
+    /// formula has fewer steps.
     pub(super) step_bound: Option<usize>,
 }
 
 impl FormulaScope {
-    /// Returns the number of operator variables of the formula, i.e. the number of allowed pairs of a step
-    /// and an operator.
+    /// Number of operator variables, i.e. allowed pairs of a step and an operator.
     pub(super) fn size(&self) -> usize {
         self.allowed.iter().map(|row| row.iter().filter(|flag| **flag).count()).sum()
     }
@@ -62,11 +59,9 @@ impl FormulaScope {
 pub(super) enum StrategyOutcome {
     /// The formula has no plan that is within its cost limit and cheaper than the best known plan.
     Exhausted,
-    /// A limit was reached, or the budget is used up.
     Interrupted,
 }
 
-/// A SAT solver that has already received the first clauses of a formula.
 pub(super) struct IncrementalSolver {
     pub(super) solver: Box<dyn Solver>,
     known: usize,
@@ -98,8 +93,8 @@ impl<'a> Run<'a> {
         self.statistics.contradiction = Some(what.to_owned());
     }
 
-    /// Records the cost of the best plan, if any, and the lower bound in the history, unless the change is
-    /// too small.
+    /// Adds the cost of the best plan and the lower bound to the history, unless the change is too
+    /// small.
     pub(super) fn note(&mut self, cost: Option<Int>, lower: Int) {
         let is_news = self.noted.is_none_or(|(previous, bound)| {
             let rise = lower.saturating_sub(bound);
@@ -126,8 +121,8 @@ impl<'a> Run<'a> {
         (self.report)(improvement);
     }
 
-    /// Returns the step semantics for a formula: sequential with a horizon, otherwise the configured
-    /// semantics, otherwise `unless_given`.
+    /// With a horizon, formulas are sequential; otherwise, the configured semantics takes
+    /// precedence.
     pub(super) fn semantics(&self, unless_given: StepSemantics) -> StepSemantics {
         match self.config.horizon {
             Some(_) => StepSemantics::Sequential,
@@ -135,8 +130,8 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Encodes the plans that satisfy the constraints as a formula. Returns `None` if the formula cannot be built
-    /// within the limits, for example with at most `max_clauses` clauses.
+    /// Returns `None` if the formula cannot be built within the limits, for example with at most
+    /// `max_clauses` clauses.
     pub(super) fn encoding(
         &self,
         allowed: &[Vec<bool>],
@@ -152,9 +147,9 @@ impl<'a> Run<'a> {
         Some(encoding)
     }
 
-    /// Returns the scope of a formula for plans with a cost of at most `limit`. If their number of steps has no
-    /// proved bound, the formula has as many steps as the configured horizon or, without a horizon, about twice as
-    /// many as the best plan.
+    /// If the plans with a cost of at most `limit` have no proved bound on their number of steps,
+    /// the formula has as many steps as the configured horizon or, without a horizon, about twice
+    /// as many as the best plan.
     pub(super) fn extent(
         &self,
         bounds: &Bounds,
@@ -177,7 +172,7 @@ impl<'a> Run<'a> {
         Ok(FormulaScope { limit, allowed, step_bound })
     }
 
-    /// Creates a SAT solver without clauses. The solver stops at a limit or after `budget` conflicts.
+    /// The solver stops at a limit or after `budget` conflicts.
     pub(super) fn live(&self, budget: u64) -> IncrementalSolver {
         IncrementalSolver {
             solver: self.config.backend.start(&self.config.limits, budget),
@@ -186,9 +181,9 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Solves a formula under assumptions with a solver that may already have some of its clauses. If the
-    /// formula is satisfiable, also returns the decoded plan, unless it is not executable or its cost
-    /// overflows.
+    /// Adds the missing clauses of a formula to a solver, and solves it under assumptions. If the
+    /// formula is satisfiable, also returns the decoded plan, unless it is not executable or its
+    /// cost overflows.
     pub(super) fn call(
         &mut self,
         live: &mut IncrementalSolver,
@@ -236,8 +231,8 @@ impl<'a> Run<'a> {
         (answer, plan)
     }
 
-    /// Executes a decoded plan and computes its cost. Returns `None` if the plan is not executable or its
-    /// cost overflows. The formula should admit only plans; this check detects errors of the encoding.
+    /// The formula should admit only plans; this check detects errors of the encoding. Returns
+    /// `None` if the plan is not executable or its cost overflows.
     fn check(&mut self, steps: Vec<GroundStep>) -> Option<GroundPlan> {
         if pass(self.task, &self.task.initial, &steps).is_none() {
             self.report_internal_contradiction("a formula admits a sequence of actions that is not a plan");
@@ -247,7 +242,7 @@ impl<'a> Run<'a> {
         cost(self.task, &steps).map(|cost| GroundPlan { steps, cost })
     }
 
-    /// Builds the solution. After an internal contradiction, nothing counts as proved.
+    /// After an internal contradiction, nothing counts as proved.
     pub(super) fn finish(
         self,
         status: Status,

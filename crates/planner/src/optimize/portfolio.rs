@@ -23,9 +23,9 @@ use crate::optimize::prover::{Prover, ProverOutcome};
 use crate::optimize::sat_budget::SatBudget;
 use crate::optimize::sat_confirmation::{into_solution, proved_by_bound, proved_by_search};
 
-/// Work units of the satisficing search in a round, for each state that A\* may store in this round.
+/// Work units of the satisficing search, for each state that A\* may store in the same round.
 const RELAXATION_WORK_PER_STATE: usize = 200;
-/// Maximum number of clauses of a formula in a round, for each state that A\* may store in this round.
+/// Maximum number of clauses of a formula, for each state that A\* may store in the same round.
 const CLAUSES_PER_STATE: usize = 50;
 /// Number of stored states that correspond to one conflict of the SAT solver.
 const STATES_PER_CONFLICT: u64 = 4;
@@ -51,33 +51,29 @@ struct Portfolio<'r, 'a> {
     prover: Option<Prover>,
     best: Option<GroundPlan>,
     lower: Int,
-    /// Proof of the lower bound `lower`.
     reason: Proof,
     /// Number of times that the budget of formulas is halved, at most [`MAX_BACKOFF`].
     share: u32,
     /// Number of times that the budget of the satisficing search is halved, at most [`MAX_BACKOFF`].
     satisficer_share: u32,
-    /// Exponent of the power of two by which the budget for improving the best plan is multiplied, from
+    /// The budget for improving the best plan is multiplied by 2 to this power, from
     /// -[`MAX_BACKOFF`] to [`MAX_BOOST`].
     improvement_share: i32,
 }
 
-/// Result of a turn: how the run ends, or `None` if the next component continues.
+/// `None` if the next component continues.
 type Turn = Option<Ending>;
 
 enum Ending {
-    /// The exact search has finished with this plan, which is optimal.
     Exact(GroundPlan),
     Unsolvable,
-    /// The cost of the best plan equals the lower bound; contains the proof of the bound.
+    /// Proof of a lower bound that equals the cost of the best plan.
     Proved(Proof),
     Refuted(Box<Solution>),
-    /// A limit was reached, or no component can continue.
     Over,
 }
 
-/// Finds a cheapest plan with a portfolio of components that take turns, or the best plan known at a limit.
-/// `lower` is a lower bound on the cost of every plan.
+/// Returns the best plan known at a limit. `lower` is a lower bound on the cost of every plan.
 pub(super) fn solve(run: Run<'_>, bounds: &Bounds, lower: Int) -> Solution {
     let started = Instant::now();
     let context = run.context();
@@ -309,8 +305,7 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         }
     }
 
-    /// If `plan` is cheaper than the best known plan, reports it and makes it the best known plan. Ends the run if
-    /// the cost of the best plan then equals the lower bound.
+    /// Makes `plan` the best known plan if it is cheaper.
     fn improve(&mut self, plan: GroundPlan, part: PlannerPart) -> Turn {
         if self.best.as_ref().is_none_or(|best| plan.cost < best.cost) {
             self.run.statistics.found_by = Some(part);

@@ -17,8 +17,8 @@ use crate::optimize::linear_search::linear_search_down;
 use crate::optimize::optimizer_run::{Best, FormulaScope, Run, StrategyOutcome};
 use crate::optimize::sat_budget::{FORMULA_LIMIT, SatBudget};
 
-/// The first formula covers 1/`STAGES` of the gap between the lower bound and the cost of the best plan. Each
-/// further formula covers twice as much as the previous one.
+/// The first formula covers 1/`STAGES` of the gap between the lower bound and the cost of the best
+/// plan. Each further formula covers twice as much.
 const STAGES: Int = 8;
 
 #[derive(Default)]
@@ -31,17 +31,15 @@ pub(super) struct Prover {
 }
 
 pub(super) enum ProverOutcome {
-    /// The best known plan is optimal.
     Proved(Proof),
-    /// The budget is used up; the prover can be resumed.
     Paused,
     /// A limit was reached, formulas become too large, or further formulas would prove nothing.
     Over,
 }
 
 impl Prover {
-    /// Solves formulas, each within a budget, until the best known plan is proved optimal, a budget does not
-    /// suffice, or the prover cannot continue. Improves the best known plan and the lower bound.
+    /// Solves formulas, each within a budget, until the best known plan is proved optimal or a
+    /// budget does not suffice. Improves the best known plan and the lower bound.
     pub(super) fn advance(
         &mut self,
         run: &mut Run<'_>,
@@ -91,8 +89,8 @@ impl Prover {
     }
 }
 
-/// Searches for plans within the scope of a formula and optimises their cost, starting from the best known
-/// plan, until none is cheaper or the budget is used up.
+/// Optimises the cost of plans within the scope of a formula until none is cheaper than `best` or
+/// the budget is used up.
 pub(super) fn within(
     run: &mut Run<'_>,
     bounds: &Bounds,

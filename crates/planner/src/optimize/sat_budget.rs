@@ -5,15 +5,14 @@ const LARGE: usize = 50_000;
 
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SatBudget {
-    /// Maximum number of clauses.
     pub(super) clauses: usize,
-    /// Maximum number of conflicts for a formula that is not large.
+    /// Limit for a formula that is not large.
     pub(super) conflicts: u64,
 }
 
 impl SatBudget {
-    /// Returns the maximum number of conflicts for a formula with `clauses` clauses; the number is lower for
-    /// large formulas, unless it is unlimited.
+    /// Maximum number of conflicts for a formula with `clauses` clauses; fewer for large formulas,
+    /// unless unlimited.
     pub(super) fn conflicts(self, clauses: usize) -> u64 {
         let factor = (clauses / LARGE).saturating_add(1);
         if self.conflicts == u64::MAX {

@@ -19,28 +19,26 @@ use crate::optimize::sat_budget::{FORMULA_LIMIT, SatBudget};
 const CONFIRM_BUDGET: SatBudget = SatBudget { clauses: 50_000, conflicts: 60 };
 /// Number of operator variables of a formula above which confirmation is attempted only if it is configured.
 const CONFIRM_SIZE: usize = 5_000;
-/// Product of the number of operators and the number of steps above which a result of the search is confirmed only if
-/// this is configured.
+/// Product of the numbers of operators and steps above which a result of the search is confirmed
+/// only if this is configured.
 const CONFIRM_PRODUCT: usize = 1_500;
-/// Number of operator variables (operators × steps) above which [`confirm`] attempts a confirmation only if it is
-/// configured. Its formula does not use the lower bounds of the search to exclude operators, so it is larger than
-/// others.
+/// Number of operator variables (operators × steps) above which [`confirm`] attempts a confirmation
+/// only if it is configured. Its formula is larger than others, because it does not use the lower
+/// bounds of the search.
 const CONFIRM_LIMIT: usize = 400;
 /// Cost limit from which formulas become large, so that confirmation is attempted only if it is configured. Such
 /// costs arise from scaled products of decimals.
 const CONFIRM_COST: Int = 1 << 64;
 
-/// Returns the solution for a plan whose cost equals the lower bound. The SAT solver tries to confirm optimality if
-/// this takes little time or is configured (see [`confirm`]). The proof by the bound counts even if it is not
-/// confirmed.
+/// The SAT solver tries to confirm optimality if this takes little time or is configured (see
+/// [`confirm`]). The proof by the bound counts even if it is not confirmed.
 pub(super) fn proved_by_bound(mut run: Run<'_>, best: &Best) -> Solution {
     let proof = confirm(&mut run, &best.plan).unwrap_or(Proof::Bound);
     into_solution(run, best, 0, Some(proof))
 }
 
-/// Returns the solution for a plan that heuristic search proved optimal. The SAT solver tries to confirm optimality
-/// if the engine includes it and this takes little time or is configured. The proof by search counts even if it is
-/// not confirmed.
+/// The SAT solver tries to confirm optimality if the engine includes it and this takes little time
+/// or is configured. The proof by search counts even if it is not confirmed.
 pub(super) fn proved_by_search(mut run: Run<'_>, bounds: &Bounds, plan: GroundPlan, lower: Int) -> Solution {
     let mut best = Best { plan, lower };
     run.announce(&best, best.plan.steps.len());
@@ -111,7 +109,6 @@ fn confirm(run: &mut Run<'_>, incumbent: &GroundPlan) -> Option<Proof> {
     is_confirmed.then_some(Proof::Sat { step_bound: steps })
 }
 
-/// Returns the solution of a run: optimal if there is a proof, and feasible otherwise.
 pub(super) fn into_solution(run: Run<'_>, best: &Best, horizon: usize, proof: Option<Proof>) -> Solution {
     let horizon = horizon.max(best.plan.steps.len());
     let plan = Some(&best.plan);

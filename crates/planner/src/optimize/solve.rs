@@ -53,7 +53,6 @@ fn solve_within(mut run: Run<'_>, bounds: &Bounds, lower: Int, horizon: usize) -
     }
 }
 
-/// Finds a first plan with SAT formulas, and then cheaper plans.
 fn solve_by_formulas(mut run: Run<'_>, bounds: &Bounds, lower: Int) -> Solution {
     match first_plan(&mut run, bounds) {
         Ok(plan) => {
@@ -64,8 +63,7 @@ fn solve_by_formulas(mut run: Run<'_>, bounds: &Bounds, lower: Int) -> Solution 
     }
 }
 
-/// Improves a plan with SAT formulas until it is a cheapest plan, a limit is reached, or formulas cannot
-/// prove more.
+/// Ends when the plan is proved optimal, a limit is reached, or formulas cannot prove more.
 fn improve(mut run: Run<'_>, bounds: &Bounds, mut best: Best) -> Solution {
     run.announce(&best, best.plan.steps.len());
     if best.plan.cost <= best.lower {

@@ -24,7 +24,7 @@ use task::task::{Condition, NumericId, Objective, Operator, State, Task};
 /// Number of rounds of the interval analysis before widening, and also the number of narrowing rounds.
 const ROUNDS: usize = 3;
 
-/// Range of a number. `None` represents an infinite bound.
+/// `None` represents an infinite bound.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Interval {
     low: Option<Int>,
@@ -32,15 +32,13 @@ struct Interval {
 }
 
 impl Interval {
-    /// Smallest interval that contains both intervals.
     fn hull(self, other: Self) -> Self {
         // `zip` keeps an infinite bound (`None`) infinite.
         let low = self.low.zip(other.low).map(|(a, b)| a.min(b));
         Self { low, high: self.high.zip(other.high).map(|(a, b)| a.max(b)) }
     }
 
-    /// Widening: the larger interval `other`, but with an infinite bound where its bound differs from that of
-    /// `self`.
+    /// Widening: `other`, but with an infinite bound where its bound differs from that of `self`.
     fn widened(self, other: Self) -> Self {
         let low = other.low.filter(|low| self.low == Some(*low));
         Self { low, high: other.high.filter(|high| self.high == Some(*high)) }
@@ -54,12 +52,12 @@ pub(super) struct StateDependentCosts {
     weights: Vec<(NumericId, Int)>,
     /// For each number: whether less or more of it is never worse.
     pub(super) preferences: Vec<Preference>,
-    /// The task with constant operator costs: lower bounds on the increase of the exact cost.
+    /// Its constant operator costs are lower bounds on the increase of the exact cost.
     pub(super) priced: Task,
 }
 
 impl StateDependentCosts {
-    /// Computes the bounds. Returns `None` if the cost of an operator has no bound of at least 0, or if numbers
+    /// Returns `None` if the cost of an operator has no bound of at least 0, or if numbers
     /// overflow.
     ///
     /// # Errors
@@ -82,7 +80,7 @@ impl StateDependentCosts {
         Ok(Some(Self { factor, weights, preferences, priced }))
     }
 
-    /// Cost of an operator with chosen designs, without its effect on measured fluents. `None` on overflow.
+    /// Cost of an operator without its effect on measured fluents. `None` on overflow.
     pub(super) fn paid(&self, operator: &Operator, choice: &[u32]) -> Option<Int> {
         operator.cost_of(choice).checked_mul(self.factor)
     }
@@ -95,21 +93,20 @@ impl StateDependentCosts {
         })
     }
 
-    /// Cost of a complete plan. `None` if the plan is not executable or a number overflows.
+    /// `None` if the plan is not executable or a number overflows.
     pub(super) fn total(&self, task: &Task, plan: &GroundPlan) -> Option<Int> {
         let states = pass(task, &task.initial, &plan.steps)?;
         let paid = cost(task, &plan.steps)?.checked_mul(self.factor)?;
         paid.checked_add(self.measured(states.last()?)?).filter(Int::is_moderate)
     }
 
-    /// Converts a cost to the metric of the problem.
     pub(super) fn metric(&self, task: &Task, total: Int) -> Exact {
         metric(task, &(Rational::from_integer(total) / Rational::from_integer(self.factor)))
     }
 }
 
-/// Common factor that makes all weights of measured fluents integers, and these weights. `None` if they are too
-/// large.
+/// Common factor that makes all weights of measured fluents integers, and these weights. `None` on
+/// overflow.
 fn weights(task: &Task) -> Option<(Int, Vec<(NumericId, Int)>)> {
     let unit = Rational::from_integer(task.objective.scale) / Rational::from_integer(task.number_scale);
     let measured = &task.objective.rest;
@@ -121,8 +118,8 @@ fn weights(task: &Task) -> Option<(Int, Vec<(NumericId, Int)>)> {
     Some((factor, pairs.collect::<Option<_>>()?))
 }
 
-/// Preferences about a number: whether less of it is never worse, and whether more is never worse. With the changed
-/// number, every continuation stays possible, and its steps increase the cost by no more.
+/// Whether less or more of a number is never worse: every continuation stays possible, and its
+/// steps increase the cost by no more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Preference {
     pub(super) less: bool,
@@ -130,15 +127,15 @@ pub(super) struct Preference {
 }
 
 impl Preference {
-    /// Restricts the preference of a number that influences a quantity with the preference `other`. With a positive
-    /// influence, less of the number means less of the quantity; with a negative influence, more.
+    /// Restricts the preference of a number that influences a quantity with the preference `other`.
+    /// A positive influence means that less of the number is less of the quantity.
     fn restrict(&mut self, is_positive: bool, other: Self) {
         let (less, more) = if is_positive { (other.less, other.more) } else { (other.more, other.less) };
         *self = Self { less: self.less && less, more: self.more && more };
     }
 }
 
-/// Preferences of all numbers. Computed as a greatest fixpoint, because effects on numbers read other numbers.
+/// Greatest fixpoint, because effects on numbers read other numbers.
 fn preferences(task: &Task, weights: &[(NumericId, Int)]) -> Vec<Preference> {
     let mut preferences = vec![Preference { less: true, more: true }; task.initial.numbers.len()];
     // More of a compared expression, and less of the cost, is never worse.
@@ -185,8 +182,8 @@ fn preferences(task: &Task, weights: &[(NumericId, Int)]) -> Vec<Preference> {
     }
 }
 
-/// Lower bound on the increase of the cost by an operator, in every reachable state in which it is applicable.
-/// Returns `None` if no bound is known.
+/// Lower bound on the increase of the cost in every reachable state in which the operator is
+/// applicable. `None` if no bound is known.
 fn least_increase(
     operator: &Operator,
     intervals: &[Interval],
@@ -221,8 +218,7 @@ fn least_increase(
     Some(least)
 }
 
-/// Intervals of the numbers in states in which an operator is applicable: conditions on single numbers restrict
-/// them.
+/// Intervals of the numbers in states in which an operator is applicable.
 struct Guarded<'i> {
     operator: &'i Operator,
     intervals: &'i [Interval],
@@ -255,8 +251,8 @@ impl<'i> Guarded<'i> {
         restricted.map_or(self.intervals[variable.index()], |(_, interval)| *interval)
     }
 
-    /// Lower bound (if `is_low`) or upper bound on a weighted sum of numbers. `None` if no bound is known. A
-    /// condition of the operator on a multiple of the sum also gives a bound.
+    /// Lower bound (if `is_low`) or upper bound on a weighted sum of numbers. `None` if no bound is
+    /// known. A condition on a multiple of the sum also gives a bound.
     fn extreme(&self, coefficients: &[(NumericId, Int)], is_low: bool) -> Option<Int> {
         let mut sums = coefficients.iter();
         let by_intervals = sums.try_fold(0, |sum: Int, (variable, coefficient)| {
@@ -274,7 +270,7 @@ impl<'i> Guarded<'i> {
         if is_low { bounds.max() } else { bounds.min() }
     }
 
-    /// Bounds on the value of an expression. A bound that overflows is infinite.
+    /// A bound that overflows is infinite.
     fn range(&self, linear: &Linear<Int>) -> Interval {
         let Linear { coefficients, quantity } = linear;
         let low = self.extreme(coefficients, true).and_then(|sum| sum.checked_add(quantity.minimum()));
@@ -283,8 +279,7 @@ impl<'i> Guarded<'i> {
     }
 }
 
-/// Integer factor by which the second weighted sum must be multiplied to yield the first one; `None` if there is
-/// none.
+/// Integer factor by which `second` must be multiplied to yield `first`, if there is one.
 fn multiple(first: &[(NumericId, Int)], second: &[(NumericId, Int)]) -> Option<Int> {
     let ((_, a), (_, b)) = (first.first()?, second.first()?);
     let factor = a.checked_div(*b).filter(|factor| *factor != 0 && first.len() == second.len())?;
@@ -294,8 +289,7 @@ fn multiple(first: &[(NumericId, Int)], second: &[(NumericId, Int)]) -> Option<I
     first.iter().zip(second).all(is_multiple).then_some(factor)
 }
 
-/// Intervals that contain all values of each number in reachable states, by interval analysis with widening and
-/// narrowing \[2\].
+/// Interval analysis with widening and narrowing \[2\].
 fn reachable(task: &Task, limits: &Limits) -> Result<Vec<Interval>, Interrupted> {
     let initial =
         task.initial.numbers.iter().map(|number| Interval { low: Some(*number), high: Some(*number) });

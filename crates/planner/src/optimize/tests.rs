@@ -17,7 +17,6 @@ use crate::optimize::{Config, Engine, Strategy, optimize};
 
 const STRATEGIES: [Strategy; 3] = [Strategy::Auto, Strategy::Tighten, Strategy::Cores];
 
-/// Returns solvable fleet and depot tasks, with their problem texts and optimal costs.
 fn tasks(seeds: std::ops::Range<u64>) -> impl Iterator<Item = (String, Task, Int)> {
     seeds.flat_map(|seed| [fleet(seed), depot(seed)]).filter_map(|text| {
         let problem = text.1.clone();
@@ -31,8 +30,8 @@ fn config(backend: &Backend, strategy: Strategy, limits: Limits) -> Config {
     Config { engine: Engine::Sat, strategy, backend: backend.clone(), limits, ..Config::default() }
 }
 
-/// Checks a solution against the optimum. If all operators have positive costs, the solution must be proved
-/// optimal. Returns `true` if it is proved optimal.
+/// If all operators have positive costs, the solution must be proved optimal. Returns `true` if it
+/// is proved optimal.
 fn check_optimum(context: &str, (task, best): (&Task, Int), config: &Config) -> bool {
     let solution = optimize(task, config, &mut |_| {});
     let best = metric(task, &best);
@@ -69,9 +68,9 @@ fn every_strategy_finds_the_optimum_of_many() {
     check_optima(6..1_100);
 }
 
-/// Checks that the optimum lies between lower bound and cost in every report and in the solution, and that
-/// reports never get worse. Interrupts the run after `stop_after` reports. Returns `true` if there were that
-/// many reports.
+/// Checks that the optimum lies between lower bound and cost in every report and in the solution,
+/// and that reports never get worse. Interrupts the run after `stop_after` reports. Returns `true`
+/// if there were as many reports.
 fn check_reports(context: &str, (task, best): (&Task, Int), config: &Config, stop_after: usize) -> bool {
     let interrupt = config.limits.interrupt();
     let best = metric(task, &best);
@@ -105,8 +104,7 @@ fn check_reports(context: &str, (task, best): (&Task, Int), config: &Config, sto
     reports >= stop_after
 }
 
-/// Checks the proofs of solutions: `Proof::Bound` is returned exactly if the optimal cost equals the initial
-/// lower bound.
+/// `Proof::Bound` must be returned exactly if the optimal cost equals the initial lower bound.
 fn check_reasons(seeds: std::ops::Range<u64>) {
     let (mut by_bound, mut by_search) = (0, 0);
     for (text, task, best) in tasks(seeds) {

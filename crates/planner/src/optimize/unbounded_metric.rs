@@ -18,9 +18,8 @@ use crate::optimize::prover::within;
 use crate::optimize::sat_budget::SatBudget;
 use crate::optimize::solve::solve;
 
-/// Solves a task in which actions can improve the metric. Minimises the number of steps, and then the metric
-/// among the plans with this number of steps. If the minimum number of steps is not proved, the result has no
-/// plan.
+/// Minimises the number of steps, and then the metric among the plans with this number of steps. If
+/// the minimum number of steps is not proved, the result has no plan.
 pub(super) fn shortest_then_best(original: Run<'_>) -> Solution {
     let lowest = original.task.operators.iter().map(|operator| operator.cost.minimum()).min().unwrap_or(0);
     let by_steps = with_costs(original.task, |_| Quantity::constant(1));
@@ -88,7 +87,6 @@ fn unknown(by_steps: Solution) -> Solution {
     Solution { status: Status::Unknown, plan: None, ground: None, lower_bound: None, proof: None, ..by_steps }
 }
 
-/// Returns a copy of the task with other operator costs, whose sum is the metric.
 fn with_costs(task: &Task, cost: impl Fn(&Operator) -> Quantity<Int>) -> Task {
     let mut task = task.clone();
     for operator in &mut task.operators {
@@ -98,9 +96,9 @@ fn with_costs(task: &Task, cost: impl Fn(&Operator) -> Quantity<Int>) -> Task {
     task
 }
 
-/// Returns `true` if an action that improves the metric is applicable in a state of the plan and does not
-/// change the state. Such an action can be repeated without bound. Returns `false` if there is no such action
-/// or a limit is reached.
+/// Returns `true` if an action that improves the metric is applicable in a state of the plan and
+/// does not change the state. Such an action can be repeated without bound. Also returns `false` if
+/// a limit is reached.
 pub fn can_repeat_reward<N: TaskNumber>(context: Context<'_, N>, plan: &[GroundStep]) -> bool {
     let Context { task, limits } = context;
     let Some(states) = pass(task, &task.initial, plan) else { return false };

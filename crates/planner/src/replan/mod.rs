@@ -40,28 +40,28 @@ use usage::Usage;
 
 pub use query::{FirstStep, Progress, Query, ReplanOutcome};
 
-/// Precision of numbers in the initial state: each number must be a multiple of 1/`PRECISION`.
+/// Each number in the initial state must be a multiple of 1/`PRECISION`.
 const PRECISION: Int = 1_000_000;
-/// Maximum number of sets of available objects for which derived data are cached.
 const MAX_CACHED_SETS: usize = 8;
 
-/// Maximum number of states of each search of [`Replanner::blocking`], which tests whether unavailable
-/// objects prevent a plan. The result is only a hint for users, so it must not take longer than planning.
+/// Maximum number of states of each search of [`Replanner::blocking`]. The result is only a hint
+/// for users, so it must not take longer than planning.
 const BLOCKING_STATES: usize = 5_000;
 
 /// Incremental planner for problems of one domain that differ only in state and availability.
 #[derive(Clone)]
 pub struct Replanner {
     base: Arc<GroundBase>,
-    /// Cached sets of available objects with their data; the least recently used set comes first.
+    /// The least recently used set of available objects comes first.
     sets: Vec<(Vec<Vec<ObjectId>>, Arc<AvailabilityContext>)>,
 }
 
 impl Replanner {
     /// Grounds a problem with all objects available. `available` lists the predicates that state
-    /// availability. Returns `None` if replanning does not support the domain or problem: availability is
-    /// used other than as a condition on action parameters, there are timed initial literals, preferences or
-    /// trajectory constraints, actions have negative costs, or grounding fails.
+    /// availability. Returns `None` if replanning does not support the domain or problem. Examples:
+    /// availability is used other than as a condition on action parameters, there are timed initial
+    /// literals, preferences or trajectory constraints, actions have negative costs, or grounding
+    /// fails.
     pub fn new(
         domain: &Domain,
         problem: &Problem,
@@ -155,8 +155,6 @@ impl Replanner {
         Some(names)
     }
 
-    /// Returns the data for a set of available objects, from the cache or newly computed. Data of interrupted
-    /// computations are not cached.
     fn set(
         &mut self,
         available: &[Vec<ObjectId>],
@@ -174,7 +172,7 @@ impl Replanner {
     }
 }
 
-/// Returns a copy of the problem in which every object of a suitable type is available.
+/// Makes every object of a suitable type available.
 fn with_all(domain: &Domain, problem: &Problem, available: &[Name]) -> Problem {
     let hierarchy = TypeHierarchy::of(domain);
     let mut full = problem.clone();

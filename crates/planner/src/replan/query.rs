@@ -67,7 +67,8 @@ pub enum ReplanOutcome {
     /// It is proved that there is no plan. If the query has first steps, there is no plan that begins with one of
     /// them.
     Unsolvable,
-    /// The problem differs from the grounded problem in more than state and availability.
+    /// The problem differs from the grounded problem in more than state and availability, or the
+    /// task cannot represent one of the first steps.
     Misfit,
     /// No result: a limit was reached before a plan was found, the search stored its maximum number of
     /// states, or the search does not support the task.

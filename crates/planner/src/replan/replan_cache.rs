@@ -12,15 +12,14 @@ use crate::replan::restrict_designs;
 use crate::replan::state_mapping::Layout;
 
 pub(super) struct GroundBase {
-    /// Ground task with all objects available.
+    /// Grounded with all objects available.
     pub(super) task: Task,
     pub(super) layout: Layout,
-    /// For each schema: the parameters whose objects must be available, each with the index of the predicate
-    /// that states availability.
+    /// For each schema: the parameters whose objects must be available, each with the index of an
+    /// availability predicate.
     pub(super) requirements: Vec<Vec<(usize, usize)>>,
 }
 
-/// Data that all states with equal availability share.
 pub(super) struct AvailabilityContext {
     pub(super) task: Task,
     pub(super) bounds: Bounds,
@@ -29,8 +28,8 @@ pub(super) struct AvailabilityContext {
 }
 
 impl GroundBase {
-    /// Returns the ground task restricted to available objects. `available` has a list of these objects, in
-    /// ascending order, for each availability predicate.
+    /// `available` contains the available objects, in ascending order, for each availability
+    /// predicate.
     pub(super) fn masked(&self, available: &[Vec<ObjectId>], limits: &Limits) -> Result<Task, Interrupted> {
         let is_allowed = |schema: u32, position: usize, object: ObjectId| {
             let mut predicates_needed =
@@ -53,7 +52,7 @@ impl GroundBase {
         Ok(AvailabilityContext { task, bounds, prepared, ties })
     }
 
-    /// Returns, for each availability predicate, the objects that some operator requires to be available, in
+    /// For each availability predicate: the objects that some operator requires to be available, in
     /// ascending order.
     #[expect(clippy::arithmetic_side_effects, reason = "predicates are held in memory")]
     pub(super) fn possible(&self) -> Vec<Vec<ObjectId>> {

@@ -15,15 +15,13 @@ use task::number::{Int, dense};
 use task::task::quantity::{Linear, Quantity, SlotSet, Table};
 use task::task::{Argument, ForbiddenCombinations, NumericEffect, Operator, SlotUse, Task};
 
-/// For each slot of an operator (parameter whose design is not grounded): the indices of the designs that
-/// remain.
+/// For each slot of an operator (parameter whose design is not grounded): the indices of the
+/// remaining designs.
 type KeptDesigns = Arc<[Vec<u32>]>;
 
-/// The remaining designs of an operator's slots (parameters whose designs are not grounded), and the slots
-/// restricted to them.
 type RestrictedSlots = (KeptDesigns, Arc<[SlotUse]>);
 
-/// Cache of restricted data that several operators share. Keys contain addresses of data in the original
+/// Restricted data that several operators share. Keys contain addresses of data in the original
 /// task, which outlives the cache, and of the lists of kept designs, which `slots` keeps alive.
 #[derive(Default)]
 struct SharedTables {
@@ -32,8 +30,8 @@ struct SharedTables {
     forbidden: FxHashMap<(*const ForbiddenCombinations, *const Vec<u32>), Arc<[ForbiddenCombinations]>>,
 }
 
-/// Returns a copy of the task that contains only operators with allowed arguments. The arguments of
-/// `is_allowed` are the schema, the index of the parameter, and the object.
+/// Keeps only operators with allowed arguments. The arguments of `is_allowed` are the schema, the
+/// index of the parameter, and the object.
 pub(super) fn restrict(
     task: &Task,
     is_allowed: &dyn Fn(u32, usize, ObjectId) -> bool,
@@ -73,8 +71,7 @@ pub(super) fn restrict(
 }
 
 impl SharedTables {
-    /// Returns the operator restricted to allowed designs, or `None` if a slot (a parameter whose design is
-    /// not grounded) has no remaining design.
+    /// Returns `None` if a slot has no remaining design.
     fn operator(
         &mut self,
         task: &Task,
@@ -174,7 +171,7 @@ fn left(task: &Task, operator: &Operator, allowed: &dyn Fn(usize, ObjectId) -> b
     (remaining, uses)
 }
 
-/// Returns the entries of a table for the remaining designs, in row-major order.
+/// Entries for the remaining designs, in row-major order.
 #[expect(clippy::arithmetic_side_effects, reason = "a position in the table, which is in memory")]
 fn rows(table: &Table<Int>, kept: &KeptDesigns, sizes: &[usize]) -> Arc<[Int]> {
     let mut positions = vec![0_usize];
@@ -188,7 +185,6 @@ fn rows(table: &Table<Int>, kept: &KeptDesigns, sizes: &[usize]) -> Arc<[Int]> {
     positions.into_iter().map(|position| table.values[position]).collect()
 }
 
-/// Returns the forbidden combinations whose designs all remain, with the new indices of the designs.
 fn exclusions(rule: &ForbiddenCombinations, kept: &KeptDesigns) -> ForbiddenCombinations {
     let moved = |(slot, index): (&u32, &u32)| {
         kept[*slot as usize].iter().position(|candidate| candidate == index).map(dense)

@@ -20,21 +20,19 @@ use crate::replan::query::{FirstStep, Progress, Query, ReplanOutcome};
 use crate::replan::replan_cache::{AvailabilityContext, GroundBase};
 use crate::replan::state_mapping::ReplanState;
 
-/// A possible beginning of a plan: the initial situation, or the situation after a first step.
+/// The initial situation, or the situation after a first step.
 struct Start {
     first: Option<usize>,
     state: State,
-    /// Functions used by the first step, with their designs.
     designs: Vec<(ObjectId, ObjectId)>,
-    /// Arguments of the first step. Ids are in order of declaration.
+    /// Arguments of the first step. Object ids are in order of declaration.
     arguments: Vec<ObjectId>,
     /// Metric of the mission if it ended here, negated if it is maximised.
     own: BigRational,
 }
 
-/// Finds a best plan for a query, or the best plan known at the time limit. Each search stores at most
-/// `max_states` states; if this is not enough, the outcome is [`ReplanOutcome::Unknown`]. `report` receives
-/// the progress.
+/// Finds a best plan for a query, or the best plan known at the time limit. If a search stores more
+/// than `max_states` states, the outcome is [`ReplanOutcome::Unknown`].
 pub(super) fn solve(
     base: &GroundBase,
     set: &AvailabilityContext,
@@ -118,9 +116,9 @@ pub(super) fn solve(
     ReplanOutcome::Optimal { first, steps: decode(context, &plan).steps, metric }
 }
 
-/// Returns `Misfit` if the task cannot represent one of the query's first steps. Otherwise returns the current
-/// plan of the query after the best first step with which it is still valid, or `Unknown` if it is valid
-/// with no first step. Used if there is no time for a search.
+/// Used if there is no time for a search. Returns `Misfit` if the task cannot represent one of the
+/// first steps. Otherwise returns the current plan after the best first step with which it is still
+/// valid, or `Unknown` if it is valid with no first step.
 pub(super) fn reuse_previous_plan(
     base: &GroundBase,
     task: &Task,
@@ -137,7 +135,7 @@ pub(super) fn reuse_previous_plan(
     least.map_or(ReplanOutcome::Unknown, |least| least.feasible(Context::new(task, query.limits)))
 }
 
-/// Returns the current plan if there is one and it is valid in the given state. `old` holds its steps; a step is
+/// Returns the current plan if it is valid in the given state. `old` holds its steps; a step is
 /// `None` if the task does not contain it.
 fn old_plan(task: &Task, state: &State, query: &Query<'_>, old: &[Option<GroundStep>]) -> Option<GroundPlan> {
     query.old?;
@@ -166,8 +164,7 @@ impl Candidate {
     }
 }
 
-/// Returns the possible beginnings of plans. Returns `None` if the task cannot represent one of the query's
-/// first steps.
+/// Returns `None` if the task cannot represent one of the first steps of the query.
 fn starts(base: &GroundBase, situation: &ReplanState, query: &Query<'_>) -> Option<Vec<Start>> {
     let sign = |metric: &BigRational| if base.task.objective.maximize { -metric } else { metric.clone() };
     if query.first.is_empty() {
@@ -190,8 +187,8 @@ fn starts(base: &GroundBase, situation: &ReplanState, query: &Query<'_>) -> Opti
     query.first.iter().enumerate().map(start).collect()
 }
 
-/// Selects one of several optimal plans by the tie-breaking rules of this file. Also returns the index in `query.first`
-/// of the step that precedes the plan; `None` if the query has no first steps.
+/// Applies the tie-breaking rules of this file. Also returns the index in `query.first` of the step
+/// that precedes the plan; `None` if the query has no first steps.
 fn choose(
     set: &AvailabilityContext,
     query: &Query<'_>,
@@ -220,8 +217,7 @@ fn choose(
     chosen.unwrap_or((None, GroundPlan { steps: Vec::new(), cost: 0 }))
 }
 
-/// Returns the greatest pair of changes that is lexicographically less than the given pair, or `None` for (0,
-/// 0).
+/// Greatest pair that is lexicographically less than the given pair.
 #[expect(clippy::arithmetic_side_effects, reason = "those that are 0 are told apart")]
 fn fewer((departures, reconfigurations): plan_tiebreak::Changes) -> Option<plan_tiebreak::Changes> {
     match (departures, reconfigurations) {

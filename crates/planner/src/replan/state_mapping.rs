@@ -19,22 +19,21 @@ use crate::replan::usage::{Usage, key};
 use pddl::ast::{Atom, InitialElement, Name, Problem};
 use pddl::validate::Advance;
 
-/// Mapping of the facts and values of problems to the variables of the task.
 #[derive(Debug)]
 pub(super) struct Layout {
     usage: Usage,
-    /// Predicates that state availability. Each has one parameter.
+    /// Predicates with one parameter that state availability.
     assumed: Vec<Name>,
     objects: FxHashMap<String, ObjectId>,
-    /// Objects, goal, constraints and metric of the problem as text. All supported problems have this text.
+    /// Objects, goal, constraints and metric of all supported problems, as text.
     frame: String,
-    /// Variable and value of each fact, and whether the fact is reachable in the relaxation.
+    /// Variable and value of each fact, and whether it is reachable in the relaxation.
     facts: FxHashMap<String, (Fact, bool)>,
     numbers: FxHashMap<String, usize>,
     scale: BigRational,
-    /// Static facts that must be true in every problem, each with an index from 0.
+    /// Static facts that must be true in every problem, numbered from 0.
     fixed: FxHashMap<String, usize>,
-    /// Static numeric values that must be equal in every problem, each with an index from 0.
+    /// Static numeric values that must be equal in every problem, numbered from 0.
     values: FxHashMap<String, (usize, BigRational)>,
     /// Values of the variables if no fact is true.
     nothing: Vec<u32>,
@@ -100,7 +99,7 @@ impl Layout {
         !self.usage.is_changed(name) || self.usage.is_function_read(name)
     }
 
-    /// Returns the state that the problem describes, or `None` if the task does not support the problem.
+    /// Returns `None` if the task does not support the problem.
     pub(super) fn situation(&self, task: &Task, problem: &Problem) -> Option<ReplanState> {
         if frame(problem) != self.frame {
             return None;
@@ -162,8 +161,7 @@ impl Layout {
         Some(())
     }
 
-    /// Makes a fact true. Returns `None` if its variable already has another fact, or the fact is
-    /// unreachable.
+    /// Returns `None` if the variable already has another fact, or the fact is unreachable.
     fn set(&self, values: &mut [u32], fact: Fact, is_reached: bool) -> Option<()> {
         let value = &mut values[fact.variable.index()];
         let is_free = *value == self.nothing[fact.variable.index()] || *value == fact.value;
@@ -176,8 +174,8 @@ impl Layout {
         scaled.is_integer().then(|| scaled.to_integer().to_i128()).flatten()
     }
 
-    /// Returns the state after a step. Returns `None` if the step changes facts or values that must not
-    /// change, or if the task cannot represent the new state.
+    /// Returns `None` if the step changes facts or values that must not change, or if the task
+    /// cannot represent the new state.
     pub(super) fn advance(&self, task: &Task, state: &State, step: &Advance) -> Option<State> {
         let mut next = state.clone();
         for atom in &step.deleted {
@@ -215,7 +213,7 @@ impl Layout {
         Some(next)
     }
 
-    /// Returns the object with this name; letter case is ignored.
+    /// Letter case is ignored.
     pub(super) fn object(&self, name: &str) -> Option<ObjectId> {
         self.objects.get(&name.to_ascii_lowercase()).copied()
     }
@@ -230,12 +228,10 @@ struct Reading {
     values: Vec<u32>,
     numbers: Vec<Option<Int>>,
     available: Vec<Vec<ObjectId>>,
-    /// For each static fact that must be true: whether it was read.
     fixed: Vec<bool>,
     fixed_values: Vec<bool>,
 }
 
-/// Returns the objects, the goal, the constraints and the metric of a problem as text.
 fn frame(problem: &Problem) -> String {
     use std::fmt::Write as _;
     let mut text = String::new();
@@ -253,8 +249,8 @@ fn frame(problem: &Problem) -> String {
     text
 }
 
-/// Returns the facts of the basic (not derived) variables by their names, and whether each is true initially
-/// or an effect of an operator.
+/// Facts of basic (not derived) variables by name, and whether each is true initially or an effect
+/// of an operator.
 fn facts(task: &Task) -> FxHashMap<String, (Fact, bool)> {
     let mut reached: FxHashSet<Fact> = FxHashSet::default();
     for operator in &task.operators {

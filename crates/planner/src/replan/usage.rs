@@ -16,7 +16,6 @@ pub(super) struct Usage {
     read: FxHashSet<Name>,
     /// Keys of the atoms of the goal, see [`key`].
     goal: FxHashSet<String>,
-    /// Predicates and functions that effects or axioms change.
     changed: FxHashSet<Name>,
     /// Functions that conditions (including the goal), durations or effects read.
     functions: FxHashSet<Name>,
@@ -123,7 +122,6 @@ pub(super) fn requirements(domain: &Domain, predicates: &[Name]) -> Option<Vec<V
     (total == mentions).then_some(requirements)
 }
 
-/// Returns the atoms that are conjuncts of a condition.
 fn conjuncts(condition: &Condition) -> Vec<&Atom> {
     match condition {
         Condition::And(parts) => parts.iter().flat_map(conjuncts).collect(),
@@ -132,7 +130,7 @@ fn conjuncts(condition: &Condition) -> Vec<&Atom> {
     }
 }
 
-/// Returns the number of occurrences of a predicate in the conditions and effects of actions, and in axioms.
+/// Counts conditions and effects of actions, and axioms.
 fn occurrences(domain: &Domain, predicate: &Name) -> usize {
     let mut count = Count { predicate, mentions: 0 };
     for action in &domain.actions {
@@ -145,7 +143,6 @@ fn occurrences(domain: &Domain, predicate: &Name) -> usize {
     count.mentions
 }
 
-/// Returns the number of occurrences of a predicate in a condition.
 pub(super) fn in_condition(condition: &Condition, predicate: &Name) -> usize {
     let mut count = Count { predicate, mentions: 0 };
     condition.walk(&mut |node| count.node(node));

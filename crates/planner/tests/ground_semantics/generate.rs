@@ -10,7 +10,6 @@ use crate::ground_semantics::model::{
     Range, STATICS, Sign, TOTAL_COST, Task, Term, UPPER, Way,
 };
 
-/// Language constructs that generated tasks may contain.
 #[expect(clippy::struct_excessive_bools, reason = "switches that have nothing to do with each other")]
 #[derive(Debug, Clone, Copy)]
 pub struct Features {
@@ -29,7 +28,6 @@ pub struct Features {
     pub nonlinear: bool,
 }
 
-/// All constructs of the language.
 pub const ALL: Features = Features {
     conditional: true,
     derived: true,
@@ -53,16 +51,15 @@ pub const PLANNED: Features = Features {
     nonlinear: false,
 };
 
-/// Decoder that draws choices from bytes. If no bytes remain, it draws the first choice, so that every task
-/// is finite.
+/// Draws choices from bytes. If no bytes remain, it draws the first choice, so that every task is
+/// finite.
 pub struct Draw<'b> {
     bytes: &'b [u8],
     features: Features,
-    /// Whether static expressions may be undefined in the generated task.
+    /// Static expressions may be undefined.
     partial: bool,
 }
 
-/// Derived predicates that a condition may read.
 #[derive(Debug, Clone, Copy)]
 struct Allowed {
     /// Predicates that may be read anywhere.
@@ -70,7 +67,6 @@ struct Allowed {
     /// Predicates that may be read only where they are not negated.
     positive: &'static [usize],
     negated: bool,
-    /// Whether the condition may contain numeric comparisons.
     numeric: bool,
 }
 
@@ -139,7 +135,7 @@ impl<'b> Draw<'b> {
         Formula::Fact(predicate, self.terms(PREDICATES[predicate].1, depth))
     }
 
-    /// Generates an expression. If `is_constant`, it contains only functions that never change.
+    /// If `is_constant`, the expression contains only functions that never change.
     fn expression(&mut self, depth: usize, nesting: usize, is_constant: bool, duration: bool) -> Expression {
         let leaf = nesting == 0 || self.chance(50);
         if leaf {
@@ -222,7 +218,6 @@ impl<'b> Draw<'b> {
         Allowed { positive, ..allowed }
     }
 
-    /// Generates a condition of an action or of the goal, usually a small conjunction.
     fn condition(&mut self, depth: usize, most: usize, duration: bool) -> Formula {
         self.condition_over(depth, most, duration, true)
     }
@@ -382,7 +377,6 @@ impl<'b> Draw<'b> {
         Some((self.chance(30), Expression::Sum(parts)))
     }
 
-    /// Generates a task.
     pub fn task(&mut self) -> Task {
         self.partial = self.chance(50);
         let axioms = if self.features.derived { self.axioms() } else { Vec::new() };
@@ -408,7 +402,6 @@ impl<'b> Draw<'b> {
         }
     }
 
-    /// Generates a random plan of at most five steps, which may be invalid.
     pub fn plan(&mut self, task: &Task) -> Vec<Step> {
         self.some(0, 5, |this| {
             let index = this.below(task.actions.len());

@@ -33,7 +33,7 @@ fn rewards_time(task: &Task) -> bool {
     if *maximize { sum > zero } else { sum < zero }
 }
 
-/// Returns the duration that the planner should choose: the value of the only equation, or otherwise of the
+/// The duration that the planner should choose: the value of the only equation, or otherwise of the
 /// only bound that is optimal for the metric.
 fn duration(task: &Task, action: &Action, scope: &[usize], state: &State) -> Option<Number> {
     let bounds = action.duration.as_ref()?;
@@ -50,13 +50,12 @@ fn duration(task: &Task, action: &Action, scope: &[usize], state: &State) -> Opt
     state.value(task, chosen?, scope)
 }
 
-/// Returns the state after an action instance with the duration that the planner should choose.
+/// The action has the duration that the planner should choose.
 fn after(task: &Task, state: &State, index: usize, objects: Vec<usize>) -> Option<State> {
     let duration = duration(task, &task.actions[index], &objects, state);
     state.after(task, &(index, objects, duration))
 }
 
-/// Checks that none of the first [`LIMIT`] states of the lifted task satisfies the goal.
 fn goal_is_out_of_reach(task: &Task) {
     let mut open = vec![State::initial(task)];
     let mut next = 0;
@@ -80,13 +79,13 @@ fn is_small(state: &State) -> bool {
 struct Pair {
     lifted: State,
     ground: TaskState,
-    /// Number of actions from the initial state. `None` if one of them is not in the ground task, so that its
-    /// cost is unknown.
+    /// Number of actions from the initial state, unless one of them is not in the ground task, so
+    /// that its cost is unknown.
     steps: Option<usize>,
 }
 
-/// Compares corresponding states up to the limit, and returns the number of compared pairs (0 if grounding
-/// finds the goal unreachable). Returns `None` if grounding rejects the task.
+/// Returns the number of compared pairs of states (0 if grounding finds the goal unreachable), or
+/// `None` if grounding rejects the task.
 pub fn check(task: &Task, (domain, problem): &(Domain, Problem)) -> Option<usize> {
     let context = || format!("{}\n{}", task.domain(), task.problem());
     let ground = match ground(domain, problem, &GroundConfig::default()) {

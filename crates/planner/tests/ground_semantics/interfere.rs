@@ -6,18 +6,17 @@ use std::collections::BTreeSet;
 use crate::ground_semantics::interpret::{Change, Changes, objects, with};
 use crate::ground_semantics::model::{Atom, DERIVED, Effect, Expression, Formula, PREDICATES, Task, UPPER};
 
-/// The atoms and numbers that a happening reads and writes.
 #[derive(Debug, Default)]
 pub struct Touch {
     facts: BTreeSet<Atom>,
-    /// Predicates all of whose atoms count as read.
+    /// All atoms of these predicates count as read.
     predicates: BTreeSet<usize>,
     values: BTreeSet<Atom>,
-    /// Functions all of whose values count as read.
+    /// All values of these functions count as read.
     functions: BTreeSet<usize>,
     pub added: BTreeSet<Atom>,
     pub deleted: BTreeSet<Atom>,
-    /// Changed numbers, each with the kind of change: assignment, addition or scaling.
+    /// Each number with the kind of change: assignment, addition or scaling.
     changed: BTreeSet<(Atom, u8)>,
 }
 
@@ -95,7 +94,7 @@ impl Touch {
         }
     }
 
-    /// Adds everything that a derived predicate depends on, for all objects.
+    /// Adds all predicates and functions on which a derived predicate depends.
     fn below(&mut self, task: &Task, predicate: usize) {
         if !self.predicates.insert(predicate) {
             return;
@@ -126,8 +125,6 @@ impl Touch {
         }));
     }
 
-    /// Returns `true` if this happening writes an atom or number that `other` reads, or both write it in ways
-    /// that do not commute.
     pub fn disturbs(&self, other: &Self) -> bool {
         let is_read = |atom: &Atom| other.facts.contains(atom) || other.predicates.contains(&atom.0);
         let is_read_number = |atom: &Atom| other.values.contains(atom) || other.functions.contains(&atom.0);

@@ -9,7 +9,6 @@ use crate::ground_semantics::model::{
     Action, Atom, DERIVED, Effect, Expression, Formula, Number, PREDICATES, Task, Term, UPPER, Way,
 };
 
-/// A state of a lifted task: true atoms, values of functions, and elapsed time.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct State {
     pub facts: BTreeSet<Atom>,
@@ -22,7 +21,7 @@ pub struct State {
 /// A step of a plan: the index of the action, its objects, and its duration if the plan must state it.
 pub type Step = (usize, Vec<usize>, Option<Number>);
 
-/// Truth value; `None` if it is undefined because a function has no value.
+/// `None` if the truth value is undefined because a function has no value.
 type Truth = Option<bool>;
 
 fn conjunction(parts: impl Iterator<Item = Truth>) -> Truth {
@@ -41,7 +40,7 @@ fn disjunction(parts: impl Iterator<Item = Truth>) -> Truth {
     negation(conjunction(parts.map(negation)))
 }
 
-/// A state with its derived atoms, and the value of `?duration` (`None` outside of actions).
+/// Derived atoms of a state, and the value of `?duration` (`None` outside of actions).
 struct View<'a> {
     state: &'a State,
     derived: BTreeSet<Atom>,
@@ -60,7 +59,6 @@ pub fn with(scope: &[usize], object: usize) -> Vec<usize> {
     scope.iter().copied().chain([object]).collect()
 }
 
-/// Returns all combinations of one object from each list.
 pub fn choices(lists: &[&[usize]]) -> Vec<Vec<usize>> {
     lists.iter().fold(vec![Vec::new()], |all, list| {
         all.iter().flat_map(|known| list.iter().map(|object| with(known, *object))).collect()
@@ -142,7 +140,7 @@ impl<'a> View<'a> {
         })
     }
 
-    /// Collects the changes of an effect. Returns `None` if a change is undefined or contradicts another.
+    /// Returns `None` if a change is undefined or contradicts another.
     fn collect(&self, effect: &Effect, scope: &[usize], changes: &mut Changes) -> Option<()> {
         match effect {
             Effect::And(parts) => parts.iter().try_for_each(|part| self.collect(part, scope, changes))?,
@@ -207,7 +205,7 @@ impl Changes {
     }
 }
 
-/// The start or the end of an action: its condition, its effects, and the bounds of its duration that are
+/// The start or the end of an action: condition, effects, and the bounds of the duration that are
 /// evaluated then.
 type Half<'a> = (&'a Formula, &'a [Effect], Vec<&'a Expression>);
 
@@ -256,9 +254,9 @@ impl State {
         }
     }
 
-    /// Returns the duration of an action in this state: 0 for an instantaneous action, otherwise the value of
-    /// the first equation, or without an equation the stated duration. Bounds at the end are ignored. Returns
-    /// `None` if the bounds do not admit the stated duration, or if the duration is negative or unknown.
+    /// Returns 0 for an instantaneous action, otherwise the value of the first equation, or without
+    /// an equation the stated duration. Bounds at the end are ignored. Returns `None` if the bounds
+    /// do not admit the stated duration, or if the duration is negative or unknown.
     fn duration(
         &self,
         task: &Task,
@@ -281,14 +279,13 @@ impl State {
         exact.or(stated).filter(|duration| *duration >= Ratio::from_integer(0))
     }
 
-    /// Returns the value of an expression in this state.
     pub fn value(&self, task: &Task, expression: &Expression, scope: &[usize]) -> Option<Number> {
         View::new(task, self, None).value(expression, scope)
     }
 
-    /// Returns the state after a happening. All its effects read this state. Returns `None` if a condition
-    /// does not hold, an effect is undefined, or its parts interfere with each other or with a simultaneous
-    /// event.
+    /// All effects of a happening read this state. Returns `None` if a condition does not hold, an
+    /// effect is undefined, or parts of the happening interfere with each other or with a
+    /// simultaneous event.
     fn happen(
         &self,
         task: &Task,
@@ -332,8 +329,8 @@ impl State {
         Some(after)
     }
 
-    /// Returns the state after a step that starts as soon as the previous step has ended, or `None` if the
-    /// step cannot be executed.
+    /// The step starts as soon as the previous step has ended. Returns `None` if it cannot be
+    /// executed.
     pub fn after(&self, task: &Task, (action, scope, stated): &Step) -> Option<Self> {
         let action = &task.actions[*action];
         let start = self.time;
@@ -383,7 +380,7 @@ impl State {
         Some(state)
     }
 
-    /// Returns all true atoms, including derived atoms.
+    /// Includes derived atoms.
     pub fn all_facts(&self, task: &Task) -> BTreeSet<Atom> {
         let derived = View::new(task, self, None).derived;
         self.facts.iter().cloned().chain(derived).collect()
@@ -393,7 +390,6 @@ impl State {
         View::new(task, self, None).holds(&task.goal, &[])
     }
 
-    /// Returns the value of the metric in this state, or `None` if there is no metric or it is undefined.
     pub fn metric(&self, task: &Task) -> Option<Number> {
         let (_, value) = task.metric.as_ref()?;
         View::new(task, self, None).value(value, &[])

@@ -8,7 +8,6 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use num_rational::Ratio;
 
-/// An exact number.
 pub type Number = Ratio<i128>;
 /// A predicate or function (as an index) applied to objects.
 pub type Atom = (usize, Vec<usize>);
@@ -32,18 +31,15 @@ pub const UPPER: usize = 7;
 pub const FUNCTIONS: [(&str, usize); 5] = [("f", 0), ("g", 1), ("total-cost", 0), ("c", 1), ("k", 0)];
 /// Indices of the functions that actions change, except `total-cost`.
 pub const CHANGING: [usize; 2] = [0, 1];
-/// Index of the function `total-cost`.
 pub const TOTAL_COST: usize = 2;
 /// Indices of the static functions, which only the initial state sets.
 pub const CONSTANT: [usize; 2] = [3, 4];
 
-/// Type of a variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Range {
     Object,
     Thing,
     Part,
-    /// The union type `(either part tool)`.
     Either,
 }
 
@@ -191,7 +187,6 @@ fn applied(name: &str, terms: &[Term]) -> String {
     format!("({})", words.join(" "))
 }
 
-/// Formats a number in PDDL: as a decimal or a quotient.
 pub fn number(value: Number) -> String {
     match (*value.numer(), *value.denom()) {
         (numerator, 1) => numerator.to_string(),
@@ -221,7 +216,7 @@ fn bound(range: Range, depth: usize) -> String {
 }
 
 impl Formula {
-    /// Formats the formula in PDDL. `depth` is the number of variables bound around it.
+    /// `depth` is the number of variables bound around the formula.
     pub fn text(&self, depth: usize) -> String {
         match self {
             Self::Fact(predicate, terms) => applied(PREDICATES[*predicate].0, terms),
@@ -277,7 +272,6 @@ impl Effect {
 }
 
 impl Action {
-    /// Returns `true` if the action has a conditional effect.
     pub fn is_conditional(&self) -> bool {
         self.start_effects.iter().chain(&self.end_effects).any(Effect::is_conditional)
     }
@@ -318,17 +312,15 @@ fn ground_text(name: &str, arguments: &[usize]) -> String {
     applied(name, &arguments.iter().map(|object| Term::Object(*object)).collect::<Vec<_>>())
 }
 
-/// Formats an atom as messages and ground tasks do, e.g. `(q o0)`.
+/// As in messages and ground tasks, e.g. `(q o0)`.
 pub fn fact_text((predicate, arguments): &Atom) -> String {
     ground_text(PREDICATES[*predicate].0, arguments)
 }
 
-/// Formats a function with objects, e.g. `(g o0)`.
 pub fn function_text((function, arguments): &Atom) -> String {
     ground_text(FUNCTIONS[*function].0, arguments)
 }
 
-/// Returns the declaration of `arity` variables of type `object`.
 fn objects_of(arity: usize) -> String {
     join(&(0..arity).collect::<Vec<_>>(), |at| format!("?v{at} - object"))
 }

@@ -6,19 +6,16 @@ use crate::ground_semantics::interpret::{State, Step, choices};
 use crate::ground_semantics::model::{Action, Atom, Expression, Formula, Number, Sign, Task, Term};
 use crate::ground_semantics::text;
 
-/// Number of changed plans for each valid plan.
 const CHANGES: usize = 8;
 
 fn needs_duration(action: &Action) -> bool {
     action.duration.as_ref().is_some_and(|bounds| !matches!(bounds[..], [(false, Sign::Equal, _)]))
 }
 
-/// Returns some durations, including durations that no action can have.
 fn durations() -> impl Iterator<Item = Number> + Clone {
     (-1..=6).map(|halves| Number::new(halves, 2))
 }
 
-/// Returns all steps with the correct number and types of arguments.
 fn steps(task: &Task) -> Vec<Step> {
     let mut found = Vec::new();
     for (index, action) in task.actions.iter().enumerate() {
@@ -34,7 +31,6 @@ fn steps(task: &Task) -> Vec<Step> {
     found
 }
 
-/// Draws a sequence of executable steps, and returns it with its final state.
 fn walk(draw: &mut Draw<'_>, task: &Task) -> (Vec<Step>, State) {
     let (mut plan, mut state) = (Vec::new(), State::initial(task));
     let steps = steps(task);
@@ -59,7 +55,7 @@ fn terms(objects: &[usize]) -> Vec<Term> {
     objects.iter().map(|object| Term::Object(*object)).collect()
 }
 
-/// Returns a formula that describes all differences between two states.
+/// The formula describes all differences between two states.
 fn difference(before: &State, after: &State) -> Formula {
     let fact = |(predicate, objects): &Atom| Formula::Fact(*predicate, terms(objects));
     let gained = after.facts.difference(&before.facts).map(fact);
@@ -72,7 +68,6 @@ fn difference(before: &State, after: &State) -> Formula {
     Formula::And(gained.chain(lost).chain(values).collect())
 }
 
-/// Returns the plan after one random change, which may have no effect.
 fn changed(draw: &mut Draw<'_>, task: &Task, plan: &[Step]) -> Vec<Step> {
     let mut plan = plan.to_vec();
     let place = draw.below(plan.len());
@@ -100,8 +95,7 @@ fn changed(draw: &mut Draw<'_>, task: &Task, plan: &[Step]) -> Vec<Step> {
     plan
 }
 
-/// Checks a valid plan and its changed copies. Returns how many changed copies are valid, and how many are
-/// invalid.
+/// Returns the numbers of valid and of invalid changed copies of a valid plan.
 pub fn check(draw: &mut Draw<'_>) -> (usize, usize) {
     let mut task = draw.task();
     let (plan, last) = walk(draw, &task);

@@ -8,7 +8,6 @@ use pddl::{Source, has_errors, parse_domain, parse_problem, print_domain, print_
 use crate::ground_semantics::interpret::{State, Step};
 use crate::ground_semantics::model::{Number, OBJECTS, Task, function_text};
 
-/// Parses the domain and the problem text of a task.
 pub fn trees(task: &Task) -> (Domain, Problem) {
     let (domain, problem) = (Source::new("domain", task.domain()), Source::new("problem", task.problem()));
     match read(&domain, &problem) {
@@ -17,7 +16,6 @@ pub fn trees(task: &Task) -> (Domain, Problem) {
     }
 }
 
-/// Returns a syntax tree as text without source positions.
 fn without_places(tree: &impl std::fmt::Debug) -> String {
     let text = format!("{tree:?}");
     let mut parts = text.split("Span { start: ");
@@ -25,7 +23,6 @@ fn without_places(tree: &impl std::fmt::Debug) -> String {
     parts.fold(first, |kept, part| kept + part.split_once(" }").map_or(part, |(_, rest)| rest))
 }
 
-/// Prints both syntax trees, reads the texts, and compares the trees.
 pub fn check_printing(domain: &Domain, problem: &Problem) {
     let source = Source::new("printed domain", print_domain(domain));
     let (again, found) = parse_domain(&source);
@@ -50,8 +47,7 @@ fn step_text((action, objects, duration): &Step) -> String {
     format!("(a{action} {}){duration}\n", objects.join(" "))
 }
 
-/// Returns the final state of a valid plan, or otherwise the number of the first inapplicable step (0 for an
-/// unsatisfied goal).
+/// The error is the number of the first inapplicable step (0 for an unsatisfied goal).
 fn interpret(task: &Task, plan: &[Step]) -> Result<State, usize> {
     let mut state = State::initial(task);
     for (number, step) in plan.iter().enumerate() {
@@ -63,8 +59,8 @@ fn interpret(task: &Task, plan: &[Step]) -> Result<State, usize> {
 /// Limit on numerators and denominators. Products of larger numbers could overflow in the interpreter.
 const LARGE: i128 = 200;
 
-/// Returns the prefix of the plan before the first step that makes a number larger than [`LARGE`]. The goal
-/// is thus never evaluated with a larger number.
+/// Cuts the plan before the first step that makes a number larger than [`LARGE`]. The goal is thus
+/// never evaluated with a larger number.
 fn with_small_numbers<'s>(task: &Task, plan: &'s [Step]) -> &'s [Step] {
     let mut state = State::initial(task);
     for (number, step) in plan.iter().enumerate() {
@@ -82,8 +78,7 @@ fn with_small_numbers<'s>(task: &Task, plan: &'s [Step]) -> &'s [Step] {
     plan
 }
 
-/// Executes a plan with the validator and with the interpreter, and compares the results. Returns `true` if
-/// the plan is valid.
+/// Compares the validator with the interpreter. Returns `true` if the plan is valid.
 pub fn check_plan(task: &Task, (domain, problem): &(Domain, Problem), plan: &[Step]) -> bool {
     let plan = with_small_numbers(task, plan);
     let text: String = plan.iter().map(step_text).collect();

@@ -35,7 +35,7 @@ fn fraction(text: &str) -> BigRational {
     text.parse().unwrap_or_else(|_| panic!("{text} is not a fraction"))
 }
 
-/// Returns the certificate of an example, and its witness (the over-approximation of the reachable states).
+/// The second text is the witness (the over-approximation of the reachable states).
 fn certified(example: &Example) -> (Certificate, String) {
     let (domain, problem) = files(example);
     let task = ground(&domain, &problem, &GroundConfig::default())
@@ -74,8 +74,8 @@ fn true_certificates_are_accepted() {
     }
 }
 
-/// Collects some changes of each part of a document: the JSON pointer and the new value (`None` to remove the
-/// element of an array).
+/// Collects changes of each part of a document: the JSON pointer and the new value (`None` to
+/// remove the element of an array).
 fn changes(value: &Value, path: &str, found: &mut Vec<(String, Option<Value>)>) {
     match value {
         Value::Array(elements) => {
@@ -168,7 +168,8 @@ fn no_change_of_the_task_makes_a_false_claim_verified() {
     assert!(count.lies >= 200 && count.harmless >= 100, "{count:?}");
 }
 
-/// Shifts bounds and starts by a moment, half a unit or a unit of time, and omits parts of events.
+/// Shifts constants and waits by the smallest amount, half a unit or a unit of time, and omits
+/// effects.
 #[test]
 fn no_shift_of_a_time_makes_a_false_claim_verified() {
     let mut count = Count::default();
@@ -228,7 +229,6 @@ fn no_change_of_the_witness_hides_that_an_operator_is_missing() {
     assert!(count.lies >= 200, "{count:?}");
 }
 
-/// Each kind of difference is reported by a separate variant, not only by a text.
 #[test]
 fn each_difference_has_its_own_cause() {
     let example = TASKS.iter().find(|example| example.name == "ways").expect("the example");
@@ -344,7 +344,6 @@ fn contradictions_are_no_steps() {
     assert!(matches!(found, Faithful::Yes { .. }), "{found:?}");
 }
 
-/// The result names the unsupported construct.
 #[test]
 fn unsupported_constructs_are_named() {
     let domain = "(define (domain d) (:predicates (p) (q) (r)) (:functions (p) (total-cost))

@@ -25,16 +25,14 @@ fn index(value: &Value) -> Option<usize> {
 
 struct Task<'t>(&'t Value);
 
-/// Result of the search: the cost of a cheapest plan, or that there is no plan.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Best {
-    /// Cost of a cheapest plan, in units of the metric.
+    /// In units of the metric.
     Cost(BigRational),
     NoPlan,
 }
 
-/// Computes the optimal cost of a written task. Returns `None` if the text is not a valid task or the task is
-/// too large.
+/// Returns `None` if the text is not a valid task or the task is too large.
 pub fn optimum(text: &str) -> Option<Best> {
     let document: Value = serde_json::from_str(text).ok()?;
     let task = Task(&document);
@@ -82,8 +80,7 @@ impl Task<'_> {
         Some(Best::NoPlan)
     }
 
-    /// Returns all combinations of designs for the slots of an operator. Each slot has the index of its
-    /// design and the number of its designs.
+    /// Each slot of an operator has the index of its design and the number of its designs.
     fn choices(&self, operator: &Value) -> Option<Vec<BTreeMap<usize, (i64, i64)>>> {
         let mut all = vec![BTreeMap::new()];
         for (slot, uses) in list(self.0["uses"].get(index(&operator["uses"])?)?).iter().enumerate() {
@@ -182,7 +179,7 @@ impl Task<'_> {
         self.derived(next)
     }
 
-    /// Evaluates the derived variables layer by layer. A derived variable is false unless a rule derives it.
+    /// A derived variable is false unless a rule derives it.
     fn derived(&self, mut state: State) -> Option<State> {
         let basic = index(&self.0["basic"])?;
         for (variable, values) in list(&self.0["variables"]).iter().enumerate().skip(basic) {

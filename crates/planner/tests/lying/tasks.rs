@@ -4,7 +4,6 @@ pub struct Example {
     pub name: &'static str,
     pub domain: &'static str,
     pub problem: &'static str,
-    /// Optimal cost; `None` if there is no plan.
     pub optimum: Option<&'static str>,
 }
 
@@ -256,8 +255,7 @@ pub const TASKS: &[Example] = &[
           (:goal (at d)) (:metric maximize (* 2 (fuel))))",
         optimum: Some("25"),
     },
-    // The work takes its shortest duration. For the shorter kind of work, the greater of its lower bounds
-    // counts.
+    // Actions take their shortest durations: 0.5 for clearing c, and 2.5 for the work on c.
     Example {
         name: "as little",
         domain: "(define (domain d) (:predicates (p ?x) (q)) (:functions (least ?x))

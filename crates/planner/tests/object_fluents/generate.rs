@@ -89,7 +89,7 @@ impl Generator {
         task
     }
 
-    /// Returns a formula that holds after some random steps but not initially, if one is found soon.
+    /// The formula holds after some random steps but not initially, if one is found soon.
     fn goal(&mut self, task: &Task) -> Formula {
         let (steps, mut end) = (task.steps(), task.init);
         for _ in 0..20 {

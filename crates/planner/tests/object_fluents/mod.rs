@@ -15,7 +15,7 @@ use pddl::validate::{Options, PlanText, validate};
 use pddl::{Source, print_domain, print_problem, read};
 use test_resources::data;
 
-/// Returns the compiled domain and problem. Printing and reading them must yield equal trees.
+/// Compiles a task. Printing and reading it must yield equal trees.
 fn compiled(domain: &str, problem: &str) -> (pddl::ast::Domain, pddl::ast::Problem) {
     let read_both = |domain: &str, problem: &str| {
         let (tree, task, found) = read(&Source::new("domain", domain), &Source::new("problem", problem))
@@ -31,8 +31,8 @@ fn compiled(domain: &str, problem: &str) -> (pddl::ast::Domain, pddl::ast::Probl
     (tree, task)
 }
 
-/// Solves a task. Returns `None` if it is rejected because an effect at the start or a numeric effect has too
-/// many cases.
+/// Returns `None` if the task is rejected because an effect at the start or a numeric effect has
+/// too many cases.
 fn solve(domain: &str, problem: &str) -> Option<Solution> {
     let (tree, task) = compiled(domain, problem);
     tally::solve(&tree, &task, "with more than 64 cases")

@@ -20,7 +20,6 @@ pub(crate) struct State {
 #[derive(Debug, Clone)]
 pub(crate) enum Term {
     Object(usize),
-    /// Index of a variable in the binding.
     Variable(usize),
     Function(usize, Box<Term>),
 }
@@ -57,7 +56,6 @@ pub(crate) struct Effect {
 pub(crate) struct Action {
     pub(crate) parameters: usize,
     pub(crate) condition: Formula,
-    /// Effects at the start; `None` for an instantaneous action.
     pub(crate) start: Option<Vec<Effect>>,
     pub(crate) end: Vec<Effect>,
 }
@@ -69,7 +67,6 @@ pub(crate) struct Task {
     pub(crate) goal: Formula,
 }
 
-/// Index of an action, and its arguments.
 pub(crate) type Step = (usize, Vec<usize>);
 
 impl Term {
@@ -91,8 +88,7 @@ impl Term {
 }
 
 impl Formula {
-    /// Returns the truth value of a formula. Atoms with undefined terms are false, except the test whether a
-    /// term is undefined.
+    /// Atoms with undefined terms are false, except the test whether a term is undefined.
     pub(crate) fn holds(&self, state: &State, binding: &[usize]) -> bool {
         let with = |object| [binding, &[object]].concat();
         match self {
@@ -111,7 +107,6 @@ impl Formula {
         }
     }
 
-    /// Returns the PDDL text. `bound` is the number of bound variables.
     pub(crate) fn text(&self, bound: usize) -> String {
         match self {
             Self::Equal(left, right) => format!("(= {} {})", left.text(), right.text()),
@@ -147,8 +142,8 @@ impl Effect {
     }
 }
 
-/// Returns the state after some effects, and their cost. Returns `None` if an effect reads an undefined term
-/// or two effects assign different values to one term.
+/// Returns the next state and the cost of the effects. Returns `None` if an effect reads an
+/// undefined term or two effects assign different values to one term.
 pub(crate) fn after(state: &State, effects: &[Effect], arguments: &[usize]) -> Option<(State, u32)> {
     let mut assigned: BTreeMap<(usize, usize), Option<usize>> = BTreeMap::new();
     let (mut added, mut deleted, mut cost) = (BTreeSet::new(), BTreeSet::new(), 0);
@@ -206,7 +201,6 @@ impl Task {
         Some((end, first + second + 1))
     }
 
-    /// Returns the cost of a plan, or `None` if the plan is invalid.
     pub(crate) fn cost(&self, plan: &[Step]) -> Option<u32> {
         let start = (self.init, 0);
         let (end, cost) = plan.iter().try_fold(start, |(state, cost), step| {
@@ -230,7 +224,7 @@ impl Task {
         self.actions.iter().enumerate().flat_map(of).collect()
     }
 
-    /// Returns the minimum cost of a plan, or `None` if it exceeds [`REACH`].
+    /// Minimum cost of a plan, if it is at most [`REACH`].
     pub(crate) fn best(&self) -> Option<u32> {
         let steps = self.steps();
         let mut open = BTreeSet::from([(0, self.init)]);

@@ -5,7 +5,7 @@ use testing::random::Random;
 /// Maximum length of the plans that are enumerated.
 pub(crate) const DEPTH: usize = 5;
 
-/// A state: truth values of the facts r and s, and the values of the numbers a and b.
+/// Truth values of the facts r and s, and values of the numbers a and b.
 #[derive(Debug, Clone, Copy)]
 struct State {
     facts: [bool; 2],
@@ -73,7 +73,7 @@ impl Number {
 }
 
 impl Formula {
-    /// Returns the truth value in Kleene's three-valued logic; `None` is undefined.
+    /// Kleene's three-valued logic; `None` is undefined.
     fn truth(&self, state: &State) -> Option<bool> {
         match self {
             Self::Fact(fact) => Some(state.facts[*fact]),
@@ -123,7 +123,7 @@ impl Effect {
     }
 }
 
-/// Returns the state after some effects, or `None` if an effect reads an undefined value.
+/// Returns `None` if an effect reads an undefined value.
 fn after(state: State, effects: &[Effect]) -> Option<State> {
     let mut next = state;
     let mut added = Vec::new();
@@ -163,7 +163,7 @@ impl Task {
         self.execute(plan).is_some_and(|state| self.goal.truth(&state) == Some(true))
     }
 
-    /// Returns the length of a shortest plan, or `None` if there is no plan up to the maximum length.
+    /// `None` if there is no plan with at most [`DEPTH`] actions.
     pub(crate) fn shortest(&self) -> Option<usize> {
         let mut layer: Vec<Vec<usize>> = vec![Vec::new()];
         for length in 0..=DEPTH {
@@ -243,7 +243,7 @@ impl Generator {
         }
     }
 
-    /// Generates effects with at most one effect on each number.
+    /// At most one effect on each number.
     fn effects(&mut self) -> Vec<Effect> {
         let mut changes = Vec::new();
         if self.below(2) == 0 {

@@ -13,7 +13,7 @@ use pddl::validate::{Options, PlanText, validate};
 use pddl::{Source, read};
 use testing::random::Random;
 
-/// Solves a task. Returns `None` if it is rejected because an instance has too many cases.
+/// Returns `None` if the task is rejected because an instance has too many cases.
 fn solve(domain: &str, problem: &str, engine: Engine) -> Option<Solution> {
     let (domain, problem, _) = read(&Source::new("domain", domain), &Source::new("problem", problem))
         .unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));

@@ -6,14 +6,14 @@ use std::fmt::Write as _;
 /// Maximum length of the plans that are enumerated.
 const DEPTH: usize = 4;
 
-/// A state: truth values of p(o0), p(o1), r and s, and the value of the number n.
+/// Truth values of p(o0), p(o1), r and s, and value of the number n.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct State {
     pub facts: [bool; 4],
     pub n: i64,
 }
 
-/// A term: an object, the parameter ?x, or the quantified variable ?z.
+/// An object, the parameter ?x, or the quantified variable ?z.
 #[derive(Debug, Clone, Copy)]
 pub enum Term {
     Object(usize),
@@ -59,7 +59,7 @@ pub struct Action {
     pub has_parameter: bool,
     pub is_durative: bool,
     pub condition: Formula,
-    /// Preference of the action: whether it refers to the end, and its condition.
+    /// Whether the preference refers to the end, and its condition.
     pub preference: Option<(bool, Formula)>,
     pub start: Vec<Effect>,
     pub end: Vec<Effect>,
@@ -72,7 +72,7 @@ pub struct Constraint {
     pub first: Formula,
     pub second: Formula,
     pub for_all: bool,
-    /// Index of the preference; `None` for a hard constraint.
+    /// `None` for a hard constraint.
     pub preference: Option<usize>,
 }
 
@@ -170,7 +170,7 @@ impl Effect {
     }
 }
 
-/// Returns the state after some effects. An atom that is added and deleted is true.
+/// An atom that is added and deleted is true.
 pub fn after(state: &State, effects: &[Effect], bound: Bound) -> State {
     let mut next = state.clone();
     let mut set = Vec::new();
@@ -200,7 +200,7 @@ pub fn after(state: &State, effects: &[Effect], bound: Bound) -> State {
     next
 }
 
-/// Returns `true` if the states satisfy a constraint by the definition of PDDL 3.
+/// Evaluates the constraint by the definition of PDDL 3.
 pub fn follows(constraint: &Constraint, states: &[State], bound: Bound) -> bool {
     let first: Vec<bool> = states.iter().map(|state| constraint.first.holds(state, bound)).collect();
     let second: Vec<bool> = states.iter().map(|state| constraint.second.holds(state, bound)).collect();
@@ -223,8 +223,8 @@ pub fn follows(constraint: &Constraint, states: &[State], bound: Bound) -> bool 
 }
 
 impl Task {
-    /// Returns the states of a plan, its cost, and the number of violated action preferences. Returns `None`
-    /// if an action is not applicable.
+    /// Returns the states of a plan, its cost, and the number of violated action preferences;
+    /// `None` if an action is not applicable.
     pub fn execute(&self, plan: &[(usize, usize)]) -> Option<(Vec<State>, i64, i64)> {
         let mut states = vec![self.init.clone()];
         let (mut cost, mut violated) = (0, 0);
@@ -247,7 +247,6 @@ impl Task {
         Some((states, cost, violated))
     }
 
-    /// Returns the metric of a plan, or `None` if the plan is invalid.
     pub fn judge(&self, plan: &[(usize, usize)]) -> Option<i64> {
         let (states, mut cost, violated) = self.execute(plan)?;
         if !self.goal.holds(states.last()?, Bound::default()) {
@@ -266,7 +265,6 @@ impl Task {
         Some(if self.maximize { 20 - cost } else { cost })
     }
 
-    /// Returns the best metric of all plans up to the maximum length.
     pub fn best(&self) -> Option<i64> {
         let instances: Vec<_> = (0..self.actions.len())
             .flat_map(|action| {

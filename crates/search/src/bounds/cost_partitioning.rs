@@ -24,15 +24,15 @@ const MAX_ORDERS: usize = 60;
 /// If a single order would exceed it, no cost partitioning is computed.
 const MAX_TRANSITIONS: usize = 6_000_000;
 
-/// A cost partitioning: for some projections, the index of the projection and the goal distances of its
-/// abstract states under its share of the costs. A projection whose distances are all 0 is omitted.
+/// For some projections, given by index: the goal distances under their shares of the costs. A
+/// projection whose distances are all 0 is omitted.
 pub(super) struct CostPartitioning {
     parts: Vec<(usize, Vec<Option<Int>>)>,
 }
 
 impl CostPartitioning {
-    /// Returns the heuristic value of a state: the sum of the goal distances, where unreachable goals count
-    /// as 0. `states` contains, for each projection, the abstract state that represents the state.
+    /// Returns the sum of the goal distances. `states` contains the abstract state of each
+    /// projection.
     pub(super) fn estimate(&self, states: &[u32]) -> Int {
         let shares = self.parts.iter().map(|(position, to_go)| to_go[states[*position] as usize]);
         // Dead ends are detected by the projections, so a missing distance counts as 0. The capped sum
@@ -62,11 +62,9 @@ impl CostPartitioning {
     }
 }
 
-/// Returns at most `MAX_PARTITIONINGS` saturated cost partitionings, sorted by decreasing heuristic value of
-/// the initial state. A projection is useful if its value for the initial state is positive and no projection
-/// to fewer variables has equal goal distances. The list is empty if fewer than two projections are useful,
-/// if these have too many transitions, or if no cost partitioning is better for the initial state than the
-/// best single projection.
+/// Returns at most `MAX_PARTITIONINGS` saturated cost partitionings, sorted by decreasing heuristic
+/// value of the initial state. The list is empty if the projections have too many transitions, or
+/// if no cost partitioning is better for the initial state than the best single projection.
 pub(super) fn saturated_cost_partitionings(
     context: Context<'_>,
     projections: &[Projection],
@@ -123,9 +121,8 @@ pub(super) fn saturated_cost_partitionings(
     Ok(tried.into_iter().map(|(.., partition)| partition).collect())
 }
 
-/// Orders the projections `useful` by a ratio, highest first: the goal distance of the initial state
-/// (`alone`) divided by the sum of the operator costs that the projection uses. Projections are given by
-/// their indices.
+/// Returns the projections `useful` (indices), sorted by decreasing ratio of the initial goal
+/// distance `alone` to the sum of the used operator costs.
 fn by_yield(projections: &[Projection], useful: &[usize], alone: impl Fn(usize) -> Int) -> Vec<usize> {
     let used_cost = |position: usize| {
         let projection = &projections[position];

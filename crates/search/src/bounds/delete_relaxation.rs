@@ -14,9 +14,8 @@ use task::task::{Condition, Fact, Literal, Task};
 
 /// Maximum operator cost, so that sums do not overflow.
 const COST_LIMIT: Int = 1 << 40;
-/// Number of the artificial fact that is always true.
+/// Artificial fact that is always true.
 pub(super) const ALWAYS: u32 = 0;
-/// Number of the artificial fact that represents the goal.
 pub(super) const GOAL: u32 = 1;
 
 #[derive(Default)]
@@ -57,12 +56,11 @@ impl Lists {
 }
 
 pub(super) struct DeleteRelaxation {
-    /// Cost of each payer. The payer of a rule is the operator that the rule belongs to. The last payer has
-    /// no cost and pays for rules without an operator.
+    /// Cost of each payer. The payer of a rule is its operator. The last payer has no cost and pays
+    /// for rules without an operator.
     pub(super) costs: Vec<u64>,
-    /// For each rule: the index of its payer in `costs`.
     pub(super) payers: Vec<u32>,
-    /// For each rule: the facts of its condition, which is never empty.
+    /// For each rule: the facts of its condition; never empty.
     pub(super) required: Lists,
     pub(super) given: Lists,
     pub(super) rules_of: Lists,
@@ -84,7 +82,6 @@ struct Builder<'a> {
 }
 
 impl DeleteRelaxation {
-    /// Creates the delete relaxation of a task. Returns `None` if an operator costs more than `COST_LIMIT`.
     pub(super) fn new(task: &Task) -> Option<Self> {
         let costs = task.operators.iter().map(|operator| operator.cost.minimum().max(0));
         let costs = costs.map(|cost| u64::try_from(cost).ok().filter(|_| cost <= COST_LIMIT));
@@ -132,8 +129,7 @@ impl DeleteRelaxation {
         self.required_by.len()
     }
 
-    /// Returns the numbers of the facts that hold in a state, without derived variables, followed by
-    /// `ALWAYS`.
+    /// Returns the facts that hold in a state, without derived variables, followed by `ALWAYS`.
     #[expect(clippy::arithmetic_side_effects, reason = "facts are numbered")]
     pub(super) fn state<'s>(&'s self, values: &'s [u32]) -> impl Iterator<Item = u32> + 's {
         let values = values[..self.basic].iter().zip(&self.first);
@@ -156,7 +152,7 @@ impl<'a> Builder<'a> {
         Self { task, first, facts, payers, required, given, clauses: FxHashMap::default(), free }
     }
 
-    /// Returns the number of a fact. A derived variable may be false at any time, so its falsity is `ALWAYS`.
+    /// A derived variable may be false at any time, so its falsity is `ALWAYS`.
     #[expect(clippy::arithmetic_side_effects, reason = "facts are numbered")]
     fn fact(&self, fact: Fact) -> u32 {
         let variable = fact.variable.index();
@@ -176,8 +172,8 @@ impl<'a> Builder<'a> {
         values.map(|value| self.fact(Fact { value, ..literal.fact })).collect()
     }
 
-    /// Returns a fact that represents the disjunction of `facts`. If no existing fact represents it, creates
-    /// an artificial fact with a rule for each disjunct.
+    /// Returns a fact that represents the disjunction of `facts`, if necessary a new artificial
+    /// fact with a rule for each disjunct.
     #[expect(clippy::arithmetic_side_effects, reason = "facts are held in memory")]
     fn any(&mut self, mut facts: Vec<u32>) -> u32 {
         facts.sort_unstable();

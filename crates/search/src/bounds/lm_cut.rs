@@ -19,7 +19,8 @@ use task::task::Task;
 
 use crate::bounds::delete_relaxation::{ALWAYS, DeleteRelaxation, GOAL};
 
-/// Work units after which [`landmark_cut_bound`] keeps the landmarks that it has.
+/// Work units after which [`landmark_cut_bound`] ends and returns the sum over the landmarks found
+/// until then.
 const MAX_WORK: u64 = 100_000_000;
 /// Work units per visited fact or rule.
 const WORK_PER_VISIT: u64 = 8;
@@ -53,12 +54,10 @@ pub struct LandmarkCut {
     lengths: Vec<u32>,
     /// For each rule: the number of its unreached conditions.
     left: Vec<u32>,
-    /// For each rule: its supporter, i.e. the condition with the greatest h^max value.
     supporters: Vec<u32>,
     supports: Vec<u64>,
     queue: BinaryHeap<Reverse<(u64, u32)>>,
     stack: Vec<u32>,
-    /// Payers (operators, or the payer without cost) of the rules in the current cut.
     cut: Vec<u32>,
     in_cut: Vec<bool>,
     work: u64,
@@ -123,7 +122,7 @@ impl LandmarkCut {
         Some(sum)
     }
 
-    /// Computes the h^max values of all facts from a state, and the supporter of each reached rule.
+    /// Computes the h^max values of all facts, and the supporter of each reached rule.
     fn reach(&mut self, values: &[u32]) {
         self.values.fill(UNREACHABLE);
         self.supporters.fill(NONE);
@@ -154,8 +153,6 @@ impl LandmarkCut {
         }
     }
 
-    /// Marks the goal zone: the facts from which the goal is reachable at no cost through the supporters of
-    /// rules.
     fn mark_goal_zone(&mut self) {
         self.zones[GOAL as usize] = CutSide::Goal;
         self.stack.push(GOAL);

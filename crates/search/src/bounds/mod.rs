@@ -30,11 +30,10 @@ use task::number::Int;
 use task::task::quantity::NumericId;
 use task::task::{State, VariableId};
 
-/// Upper bounds on the number of steps are computed only if they are below this number.
+/// Upper bounds on the number of steps are used only if they are below this number.
 const STEP_LIMIT: usize = 4_000;
 /// Maximum number of abstract states of a projection to two variables.
 const STATE_LIMIT: usize = 20_000;
-/// Maximum number of projections to pairs of variables.
 const PAIR_LIMIT: usize = 40;
 /// Maximum number of projections that are evaluated for each state if there is no cost partitioning. More
 /// projections cost more time than the avoided expansions save.
@@ -51,13 +50,14 @@ pub struct Bounds {
     further: Vec<Projection>,
 }
 
-/// The plans within a limit on cost and steps: their maximum length, and the operators of each step.
+/// Plans within a limit on cost and steps: an upper bound on their length, and the operators of each step.
 pub struct ReachableWindow {
     /// Upper bound on the number of steps of plans within the cost limit. `None` if there is no cost limit,
     /// or no projection proves a bound below `STEP_LIMIT`.
     pub steps: Option<usize>,
-    /// For each step and each operator: whether the operator can occur at the step. The number of steps is
-    /// the lesser of `steps` and the horizon given to [`Bounds::window`]; 0 if there is neither.
+    /// For each step and each operator: `false` if it is proved that the operator cannot occur at
+    /// the step. The number of steps is the lesser of `steps` and the horizon given to
+    /// [`Bounds::window`]; 0 if there is neither.
     pub allowed: Vec<Vec<bool>>,
 }
 
@@ -135,8 +135,8 @@ impl Bounds {
         self.resources.iter().all(enough).then_some(cost)
     }
 
-    /// Returns a lower bound like [`Bounds::estimate`] that ignores resources. It depends only on the
-    /// finite-domain variables of the state.
+    /// Like [`Bounds::estimate`], but ignores resources. Depends only on the finite-domain
+    /// variables.
     pub(crate) fn cost_estimate(&self, state: &State) -> Option<Int> {
         let mut best = 0;
         if self.partitions.is_empty() {
@@ -166,8 +166,9 @@ impl Bounds {
         })
     }
 
-    /// Returns the maximum length and the possible operators of the plans with a cost of at most `limit` and
-    /// at most `horizon` steps. `None` means that cost or steps are not limited.
+    /// Returns an upper bound on the number of steps of plans with a cost of at most `limit`, and
+    /// the operators that may occur at each step of such plans up to `horizon`. `None` means that
+    /// cost or steps are not limited.
     ///
     /// # Errors
     /// Fails if the deadline has passed or the interrupt flag is set.

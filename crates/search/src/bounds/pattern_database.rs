@@ -22,13 +22,12 @@ pub struct Projection {
     sizes: Vec<usize>,
     initial: u32,
     goals: Vec<u32>,
-    /// For each operator: its cost with the cheapest designs (0 if it is negative), and its transitions.
-    /// There are no transitions if the operator neither reads nor changes the pattern.
+    /// For each operator: its cost with the cheapest designs (0 if it is negative), and its
+    /// transitions. There are no transitions if the operator neither requires a fact of the pattern
+    /// nor changes the pattern.
     operators: Vec<(Int, Vec<Transition>)>,
-    /// Minimum cost of an operator that neither reads nor changes the pattern; `None` if there is no such
-    /// operator.
+    /// Minimum cost of the operators without transitions, if there are any.
     idle_cost: Option<Int>,
-    /// Goal distance of each abstract state; `None` if the goal is unreachable.
     to_go: Vec<Option<Int>>,
 }
 
@@ -139,8 +138,8 @@ impl Projection {
         states
     }
 
-    /// Returns the abstract states to which an operator can lead from `source`. If the values of the pattern
-    /// do not determine whether a conditional effect occurs, both outcomes are included.
+    /// If the values of the pattern do not determine whether a conditional effect occurs, both
+    /// outcomes are included.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "abstract states are below the number of them, which are in memory"
@@ -180,8 +179,6 @@ impl Projection {
         reached.into_iter().map(index).collect()
     }
 
-    /// Returns the goal distance of each abstract state under the given operator costs; `None` if the goal is
-    /// unreachable from it.
     pub(crate) fn goal_distances(
         &self,
         costs: &[Int],
@@ -221,8 +218,8 @@ impl Projection {
         })
     }
 
-    /// Returns the number of abstract states plus the number of transitions, as a measure of the work to
-    /// compute goal distances.
+    /// Number of abstract states plus the number of transitions: a measure of the work to compute
+    /// goal distances.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(crate) fn transition_count(&self) -> usize {
         self.size() + self.operators.iter().map(|(_, transitions)| transitions.len()).sum::<usize>()
@@ -232,10 +229,10 @@ impl Projection {
         self.distances(|_| 1, self.goals.iter().map(|goal| (*goal, 0)), limits)
     }
 
-    /// Returns, for each abstract state, a lower bound on the consumption of a resource until the resource is
-    /// replenished or a goal state is reached; `None` if neither is reachable. `used` is the consumption of
-    /// each operator, or `None` if the operator may replenish. `left` is the amount that must remain in a
-    /// goal state.
+    /// Returns, for each abstract state, a lower bound on the amount of a resource that is needed
+    /// until the resource is replenished or a goal state is reached; `None` if neither is
+    /// reachable. `used` is the consumption of each operator, or `None` if the operator may
+    /// replenish. `left` is the amount that must remain in a goal state.
     pub(crate) fn needs(
         &self,
         used: &[Option<Int>],
@@ -248,14 +245,13 @@ impl Projection {
         self.distances(|operator| used[operator].unwrap_or(0).max(0), goals.chain(free), limits)
     }
 
-    /// Returns `true` if the operator requires a fact of the pattern or changes the pattern, and is applicable
-    /// in some abstract state.
+    /// Returns `true` if the operator requires a fact of the pattern or may change the pattern.
     pub(crate) fn affects_pattern(&self, operator: usize) -> bool {
         !self.operators[operator].1.is_empty()
     }
 
-    /// Returns the minimum, over all targets, of the path cost from each abstract state to the target plus
-    /// the target's initial value; `None` if no target is reachable. Uses a backward Dijkstra search.
+    /// Backward Dijkstra search. Returns, for each abstract state, the minimum of the path cost to
+    /// a target plus the value of the target; `None` if no target is reachable.
     fn distances(
         &self,
         cost: impl Fn(usize) -> Int,
@@ -302,13 +298,14 @@ impl Projection {
         self.to_go[state as usize]
     }
 
-    /// Returns the transitions of an operator; empty if the operator neither reads nor changes the pattern.
+    /// Returns the transitions of an operator; empty if it neither requires a fact of the pattern
+    /// nor changes it.
     pub fn transitions(&self, operator: OperatorId) -> &[Transition] {
         &self.operators[operator.index()].1
     }
 
-    /// Returns the minimum cost of reaching each abstract state with one more step; `None` if it is
-    /// unreachable. `costs` are the minimum costs before this step.
+    /// Returns the minimum cost of each abstract state after one more step; `None` if it is
+    /// unreachable.
     fn advance(&self, costs: &[Option<Int>]) -> Vec<Option<Int>> {
         let improve =
             |slot: &mut Option<Int>, cost: Int| *slot = Some(slot.map_or(cost, |least| least.min(cost)));

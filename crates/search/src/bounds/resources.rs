@@ -18,8 +18,8 @@ use crate::bounds::pattern_database::Projection;
 
 pub(super) struct Resource {
     pub(super) variable: NumericId,
-    /// Index of a projection, with the amount of the resource that is required in each of its abstract
-    /// states; `None` means that no amount suffices.
+    /// For projections, given by index: the amount that is required in each abstract state. `None`
+    /// means that no amount suffices.
     pub(super) needs: Vec<(usize, Vec<Option<Int>>)>,
 }
 
@@ -35,8 +35,8 @@ impl Resource {
     }
 }
 
-/// Returns the resources of a task, with their lower bounds in each projection. A projection is omitted if an
-/// operator that may replenish the resource neither reads nor changes its pattern.
+/// Returns the resources of a task. A projection is omitted if an operator may replenish the
+/// resource in each of its abstract states.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "numbers of a task are above the least number of their type"

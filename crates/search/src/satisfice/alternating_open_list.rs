@@ -8,7 +8,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-/// An entry of an open list: a state, and the range of its untried steps in `AlternatingOpenList::steps`.
+/// A state, and the range of its untried steps in `AlternatingOpenList::steps`.
 #[derive(Debug, Clone, Copy)]
 struct Entry {
     state: u32,
@@ -84,7 +84,7 @@ impl<K: Ord> AlternatingOpenList<K> {
         Some(step)
     }
 
-    /// Returns the approximate memory use in 64-bit words.
+    /// Returns the approximate memory use in 64-bit words. The entries are not counted.
     pub fn size(&self) -> usize {
         self.steps.len() / 2
     }

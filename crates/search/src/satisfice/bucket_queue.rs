@@ -1,6 +1,6 @@
 //! Bucket queue: a priority queue for items with small integer costs.
 
-/// Number of buckets. Items with a cost of at least this number are stored in a heap.
+/// Items with a cost of at least this number are stored in a heap.
 const BUCKET_COUNT: usize = 1 << 16;
 
 /// Monotone bucket queue: every added item must cost at least as much as the item that was removed last.

@@ -51,7 +51,7 @@ pub(super) struct Achiever {
 #[derive(Debug, Clone)]
 pub(super) enum Gain {
     Constant(f64),
-    /// A linear expression over the numbers of the state before the operator: constant and terms.
+    /// Constant and terms over the numbers of the state before the operator.
     Linear(f64, Vec<(NumericId, f64)>),
     /// A single application is assumed to suffice.
     Unlimited,
@@ -69,7 +69,7 @@ pub(super) struct Relaxation<N> {
     pub(super) supports: Vec<Vec<Achiever>>,
     /// For each proposition: the nodes that have it as a condition.
     pub(super) waiting: Lists,
-    /// For each node: `true` if it represents the unconditional part of an operator.
+    /// `true` for the unconditional part of an operator.
     pub(super) is_base: Vec<bool>,
     pub(super) goal: Proposition,
     pub(super) goals: Vec<Proposition>,
@@ -99,8 +99,8 @@ impl<N: TaskNumber> Relaxation<N> {
 }
 
 impl<N: TaskNumber> Relaxation<N> {
-    /// Returns `true` if the proposition is a fact or a numeric comparison that holds in a state. Returns
-    /// `false` for disjunctions and the artificial goal, and if the value of a comparison overflows.
+    /// Returns `false` for disjunctions and the artificial goal, and if the value of a comparison
+    /// overflows.
     pub(super) fn holds(&self, proposition: Proposition, state: &State<N>) -> bool {
         if let Some(fact) = self.fact_of(proposition) {
             return fact.holds(&state.values);

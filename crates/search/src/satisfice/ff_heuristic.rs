@@ -19,7 +19,7 @@ const MAX_COST: u32 = 1 << 30;
 /// Upper limit on the assumed number of repetitions of an operator until a numeric comparison holds.
 const MAX_REPETITIONS: f64 = 10_000.0;
 
-/// Cheapest achiever of a proposition, and the number of its applications until the proposition holds.
+/// Achiever of a proposition, and the number of its applications until the proposition holds.
 #[derive(Debug, Clone, Copy)]
 struct Supporter {
     node: u32,
@@ -39,7 +39,8 @@ pub(super) struct FfHeuristic {
     numbers: Vec<f64>,
     pub(super) applicable: Vec<u32>,
     pub(super) preferred: Vec<u32>,
-    /// Preferred operators that the relaxed plan repeats, with the number of applications.
+    /// Operators that the relaxed plan repeats and that may be applicable in the state, with the
+    /// number of applications.
     pub(super) repeated: Vec<(u32, u32)>,
     marked: Vec<bool>,
     marks: Vec<Proposition>,
@@ -70,10 +71,10 @@ impl FfHeuristic {
         }
     }
 
-    /// Returns the cost of a relaxed plan that achieves all `targets`, capped at `MAX_COST`. `prices` are the
-    /// operator costs, each at least 1. Returns `None` if there is no relaxed plan. Afterwards `applicable`
-    /// contains the operators that may be applicable in the state, and `preferred` contains those of them
-    /// that belong to the relaxed plan.
+    /// Returns the cost of a relaxed plan that achieves all `targets`, capped at `MAX_COST`; `None`
+    /// if there is no relaxed plan. `prices` are the operator costs, each at least 1. Afterwards,
+    /// `applicable` contains the operators that may be applicable in the state, and `preferred`
+    /// contains some of them that belong to the relaxed plan.
     pub(super) fn estimate<N: TaskNumber>(
         &mut self,
         relaxation: &Relaxation<N>,
@@ -192,7 +193,6 @@ impl FfHeuristic {
         }
     }
 
-    /// Returns the increase of an expression by one application in the evaluated state.
     fn gain(&self, gain: &Gain) -> f64 {
         match gain {
             Gain::Constant(gain) => *gain,

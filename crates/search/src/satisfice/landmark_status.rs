@@ -78,8 +78,8 @@ impl LandmarkStatus {
         reached
     }
 
-    /// Returns the bitset of the landmarks that are reached in `state`, if the landmarks `before` were
-    /// reached in its predecessor.
+    /// Returns the landmarks that are reached in `state`, if `before` were reached in its
+    /// predecessor.
     pub(super) fn progress<N: TaskNumber>(
         &mut self,
         relaxation: &Relaxation<N>,
@@ -99,8 +99,8 @@ impl LandmarkStatus {
         reached
     }
 
-    /// Returns the number of landmarks that are unreached or required again in the state of the last call of
-    /// `progress`. `reached` is the bitset of the reached landmarks.
+    /// Returns the number of landmarks that are unreached or required again in the state of the
+    /// last call of `progress`.
     pub(super) fn remaining(&self, reached: &[u64]) -> u32 {
         let mut count: u32 = 0;
         for (landmark, index) in self.landmarks.all.iter().zip(0_u32..) {
@@ -115,8 +115,7 @@ impl LandmarkStatus {
         count
     }
 
-    /// Marks the propositions of all unreached landmarks whose predecessors are reached as wanted, and no
-    /// others.
+    /// Marks the propositions of all unreached landmarks whose predecessors are reached as wanted.
     pub(super) fn request_landmark(&mut self, reached: &[u64]) {
         self.request_none();
         for (landmark, index) in self.landmarks.all.iter().zip(0_u32..) {
@@ -129,7 +128,6 @@ impl LandmarkStatus {
         }
     }
 
-    /// Marks no propositions as wanted.
     pub(super) fn request_none(&mut self) {
         for mark in self.marks.drain(..) {
             self.wanted[mark as usize] = false;

@@ -27,8 +27,8 @@ pub(super) struct Landmark {
     pub(super) any_of: Vec<Proposition>,
     /// Landmarks ordered before this landmark, by sound or reasonable orders.
     pub(super) after: Vec<u32>,
-    /// Landmarks that require this landmark directly before they are first achieved (greedy-necessary
-    /// orders).
+    /// Landmarks that require this landmark directly before they are first achieved
+    /// (greedy-necessary orders).
     pub(super) needed_by: Vec<u32>,
     pub(super) is_goal: bool,
 }
@@ -52,8 +52,6 @@ struct LandmarkFactory<'a, N> {
 }
 
 impl Landmarks {
-    /// Finds landmarks of a task for its initial state, and their orders. The number of landmarks is limited,
-    /// so the result need not contain all landmarks.
     pub(super) fn new<N: TaskNumber>(
         task: &Task<N>,
         relaxation: &Relaxation<N>,
@@ -210,9 +208,9 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
         }
     }
 
-    /// Computes relaxed reachability if the propositions `excluded` are never true. All other numeric
-    /// comparisons count as reached. Returns for each proposition whether it is reached, and for each node
-    /// whether all its conditions are reached.
+    /// Computes relaxed reachability if the propositions `excluded` are never true. Returns for
+    /// each proposition whether it is reached, and for each node whether all its conditions are
+    /// reached.
     fn reach_without(&self, excluded: &[Proposition]) -> (Vec<bool>, Vec<bool>) {
         let relaxation = self.relaxation;
         let mut reached = vec![false; relaxation.propositions];
@@ -279,8 +277,8 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
         for pair in limits.watch(pairs.chain(indirect)) {
             let (sooner, later) = pair?;
             if sooner == later
-                || has(&reach[later as usize], sooner)
                 // An order that would close a cycle is not added.
+                || has(&reach[later as usize], sooner)
                 || self.orders.contains(&(sooner, later))
             {
                 continue;
@@ -294,9 +292,9 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
         Ok(())
     }
 
-    /// Returns propositions that are true when a landmark is achieved or directly before: the landmark, the
-    /// common effects of all its achievers, and the single facts that must be true directly before. Returns an
-    /// empty list for a disjunctive landmark.
+    /// Returns propositions that are true when a landmark is achieved or directly before: the
+    /// landmark, the common effects of all its achievers, and its single facts of greedy-necessary
+    /// orders. Empty for a disjunctive landmark.
     fn side(&self, landmark: u32) -> Vec<Proposition> {
         let [proposition] = self.all[landmark as usize].any_of[..] else { return Vec::new() };
         let mut achievers = self.adders[proposition as usize].iter();
@@ -316,7 +314,7 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
         side
     }
 
-    /// Returns the effects of a node, including the unconditional effects of its operator.
+    /// Includes the unconditional effects of the operator of the node.
     fn all_effects(&self, node: u32) -> Vec<Proposition> {
         let mut effects = self.relaxation.effects.of(node).to_vec();
         let operator = self.relaxation.operators[node as usize];
@@ -353,8 +351,7 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
     }
 }
 
-/// Returns the transitive closure of the orders: for each landmark, a bitset of the landmarks ordered after
-/// it.
+/// Transitive closure: for each landmark, a bitset of the landmarks ordered after it.
 fn closure(count: usize, orders: &FxHashSet<(u32, u32)>) -> Vec<Vec<u64>> {
     let mut reach = vec![vec![0_u64; count.div_ceil(64)]; count];
     for (sooner, later) in orders {
@@ -389,7 +386,6 @@ fn connect(reach: &mut [Vec<u64>], sooner: u32, later: u32) {
     join(reach, sooner, &further);
 }
 
-/// Returns the predicate name of a fact, i.e. the first word in the name of its value.
 fn predicate<N>(task: &Task<N>, fact: Fact) -> &str {
     let name = &task.variables[fact.variable.index()].values[fact.value as usize];
     name.split([' ', '(', ')']).find(|word| !word.is_empty()).unwrap_or(name)

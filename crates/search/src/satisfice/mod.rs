@@ -35,8 +35,8 @@ use plan_improvement::PlanImprovement;
 use search::{HeuristicWeight, Outcome, Search, SearchGoal};
 use search_context::{MEMORY_SHARE, SearchContext};
 
-/// Configurations of the searches that run one after another: whether operator costs are used, and the weight
-/// of the heuristic.
+/// Searches that run one after another: whether operator costs are used, and the weight of the
+/// heuristic.
 const SEARCH_SEQUENCE: [(bool, HeuristicWeight); 6] = [
     (false, HeuristicWeight::Greedy),
     (true, HeuristicWeight::Greedy),

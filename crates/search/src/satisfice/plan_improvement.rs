@@ -29,33 +29,26 @@ use crate::satisfice::segment_goal::SegmentGoal;
 use crate::satisfice::step_order::StepOrder;
 use crate::search::SearchStatistics;
 
-/// Number of steps of the shortest segments.
 const MIN_STEPS: usize = 4;
-/// Number of states that the search of a segment may evaluate, before the limit is doubled for the first time.
+/// Number of states that the search of a segment may evaluate, before the limit is first doubled.
 const MIN_EVALUATIONS: u64 = 100;
-/// Maximum number of times that the limit on evaluated states is doubled.
 const MAX_DOUBLINGS: u32 = 8;
-/// Weight of the heuristic in every second pass; in the others it is 1.
+/// Weight of the heuristic in every second pass. In the other passes it is 1.
 const GREEDY_WEIGHT: u64 = 2;
-/// Maximum number of segments whose unsuccessful search is remembered.
 const MAX_FAILURES: usize = 1 << 18;
 
-/// A resumable search for segments of a plan that can be replaced by cheaper steps.
 pub(super) struct PlanImprovement<N> {
     plan: GroundPlan<N>,
-    /// States of the plan, beginning with the initial state.
     states: Vec<State<N>>,
     order: StepOrder,
     random: Random,
     /// Number of steps of the segments of the current pass.
     segment: usize,
-    /// Position of the next segment in the plan.
+    /// Index of the first step of the current or next segment.
     next: usize,
     doublings: u32,
-    /// `true` if the current pass uses [`GREEDY_WEIGHT`].
     is_greedy: bool,
     has_improved: bool,
-    /// Current segment and its search; `None` before the next segment begins.
     current: Option<SegmentSearch<N>>,
     /// Unsuccessful searches, by the hash of first state, goal facts and weight: the number of times that the
     /// limit on evaluated states was doubled.
@@ -89,17 +82,14 @@ impl<N: TaskNumber> PlanImprovement<N> {
         })
     }
 
-    /// Returns the cost of the best plan that the search has received or found.
     pub(super) fn cost(&self) -> &N {
         &self.plan.cost
     }
 
-    /// Returns `true` if all segments were searched with the greatest limit.
     pub(super) fn has_ended(&self) -> bool {
         self.doublings > MAX_DOUBLINGS
     }
 
-    /// Replaces the plan, and discards the search of the current segment.
     fn replace(&mut self, context: &SearchContext<'_, N>, plan: GroundPlan<N>, states: Vec<State<N>>) {
         self.order = StepOrder::new(context.task, &plan.steps);
         (self.plan, self.states, self.current) = (plan, states, None);
@@ -142,8 +132,8 @@ impl<N: TaskNumber> PlanImprovement<N> {
         Ok(None)
     }
 
-    /// Replaces the steps of the current segment by the steps `part`. Returns the new plan, or `None` if it
-    /// would not be a cheaper plan.
+    /// Replaces the steps of the current segment by `part`. Returns `None` if this is not a cheaper
+    /// plan.
     fn adopt(&mut self, context: &SearchContext<'_, N>, part: &[GroundStep]) -> Option<GroundPlan<N>> {
         let segment = self.current.take()?;
         let (before, after) = (&self.plan.steps[..self.next], &self.plan.steps[segment.end..]);
@@ -194,7 +184,6 @@ impl<N: TaskNumber> PlanImprovement<N> {
         }
     }
 
-    /// Chooses the length of the segments and the order of the steps for the next pass.
     fn end_pass(&mut self, context: &SearchContext<'_, N>) {
         let count = self.plan.steps.len();
         self.is_greedy = !self.is_greedy;

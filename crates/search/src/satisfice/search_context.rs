@@ -21,7 +21,6 @@ use crate::search::{MutexPairs, SearchStatistics, is_monotone};
 pub(super) const MEMORY_SHARE: usize = 16;
 /// Work units charged for generating a successor and looking it up in the store.
 pub(super) const GENERATION_COST: u64 = 200;
-/// Cost of an operator that is never useful according to the h² mutexes.
 pub(super) const USELESS_OPERATOR_COST: u32 = 1 << 20;
 
 struct Step<N> {
@@ -41,12 +40,12 @@ pub(super) struct SearchContext<'a, N> {
     /// computed.
     prices: [Option<Arc<[u32]>>; 2],
     steps: Vec<Step<N>>,
-    /// Index of the first step of each operator, followed by the total number of steps.
+    /// Index of the first step of each operator, followed by the number of steps.
     first: Vec<u32>,
 }
 
 impl<'a, N: TaskNumber> SearchContext<'a, N> {
-    /// Computes the shared data. Returns `None` if an operator has too many combinations of designs.
+    /// Returns `None` if an operator has too many combinations of designs.
     pub(super) fn new(context: Context<'a, N>) -> Result<Option<Self>, Interrupted> {
         let Context { task, limits } = context;
         let monotone = is_monotone(task);
@@ -66,7 +65,7 @@ impl<'a, N: TaskNumber> SearchContext<'a, N> {
         Ok(Some(Self { task, relaxation, explorer, status, pairs: None, prices: [None, None], steps, first }))
     }
 
-    /// Sets the h² mutexes. They change the operator costs.
+    /// The h² mutexes change the operator costs, which are computed again.
     pub(super) fn set_pairs(&mut self, pairs: Option<MutexPairs>) {
         self.pairs = pairs;
         self.prices = [None, None];
@@ -87,12 +86,10 @@ impl<'a, N: TaskNumber> SearchContext<'a, N> {
         Arc::clone(self.prices[usize::from(priced)].insert(prices.into()))
     }
 
-    /// Returns the number of work units charged for the evaluation of a state.
     pub(super) fn size(&self) -> u64 {
         self.relaxation.propositions.saturating_add(self.relaxation.operators.len()) as u64
     }
 
-    /// Returns the number of work units done between two readings of the counters of a search.
     pub(super) fn work(&self, before: SearchStatistics, after: SearchStatistics) -> u64 {
         let evaluated = after.evaluated.saturating_sub(before.evaluated);
         let generated = after.generated.saturating_sub(before.generated);

@@ -22,7 +22,6 @@ pub(super) struct SegmentGoal {
 }
 
 impl SegmentGoal {
-    /// Returns the goal of a segment that ends in the state `end`, followed by the steps `suffix`.
     pub(super) fn new<N: TaskNumber>(task: &Task<N>, end: &State<N>, suffix: &[GroundStep]) -> Self {
         let operators = || suffix.iter().map(|step| &task.operators[step.operator.index()]);
         let conditions = || operators().map(|operator| &operator.condition).chain([&task.goal]);

@@ -28,8 +28,6 @@ pub(super) struct StepOrder {
 type VariableKey = (bool, u32);
 
 impl StepOrder {
-    /// Computes which steps of a plan interfere. With derived variables, and in long plans, all steps count
-    /// as interfering.
     pub(super) fn new<N: TaskNumber>(task: &Task<N>, steps: &[GroundStep]) -> Self {
         let count = steps.len();
         if !task.axioms.is_empty() || count > MAX_STEPS {
@@ -102,7 +100,7 @@ impl StepOrder {
     }
 }
 
-/// Returns the variables that a step reads and the variables that it assigns.
+/// Returns the variables that a step reads, and those that it assigns.
 fn accesses<N: TaskNumber>(task: &Task<N>, step: &GroundStep) -> (Vec<VariableKey>, Vec<VariableKey>) {
     let operator = &task.operators[step.operator.index()];
     let condition = &operator.condition;
@@ -132,7 +130,6 @@ mod tests {
     use super::*;
     use crate::satisfice::{Satisficer, StepResult};
 
-    /// Number of random orders of each plan.
     const ORDERS: usize = 20;
 
     #[test]

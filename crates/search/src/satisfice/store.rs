@@ -48,7 +48,6 @@ impl<N: Clone + Eq + std::hash::Hash> Store<N> {
         }
     }
 
-    /// Adds a state if it is not stored yet. Returns its index, and `true` if the state is new.
     pub(super) fn insert(&mut self, state: &State<N>) -> (u32, bool) {
         let mut key = vec![0_u64; self.stride];
         for (field, value) in self.fields.iter().zip(&state.values) {

@@ -87,8 +87,9 @@ pub(super) enum OutOfMemoryPolicy {
     Needed,
 }
 
-/// Sort key of an open node: f value (heuristic value in greedy search), lower bound on steps (of the plan or
-/// to the goal, see `OpenListOrder`; 0 in greedy search), and a tie-breaker that prefers deep nodes.
+/// Sort key of an open node: f value (heuristic value in greedy search), lower bound on steps (of
+/// the plan or to the goal, see `OpenListOrder`; 0 in greedy search), and a tie-breaker for deep
+/// nodes.
 type NodeKey<N> = (N, u32, u32);
 
 fn later(steps: u32) -> u32 {
@@ -103,13 +104,13 @@ pub struct AStar<'a, N, E> {
     prepared: &'a SearchTask<N>,
     pub(super) store: StateRegistry<N>,
     open: OpenList<NodeKey<N>>,
-    /// `true` if states were dropped because their numbers overflow. The search then proves nothing.
+    /// `true` if states were dropped because a number overflowed. The search then proves nothing.
     states_dropped: bool,
     order: OpenListOrder,
     /// More accurate heuristic that is evaluated only when a node is about to be expanded (lazy A\*).
     pub(super) lazy_heuristic: Option<Box<dyn LazyHeuristic<N>>>,
     pub(super) pruning: Option<StubbornSetPruning>,
-    /// Work units already done, without those of the lazy heuristic.
+    /// Work units without those of the lazy heuristic.
     own_work: u64,
     sharing: usize,
     /// Lower bound on the cost of every plan; `None` before the first expansion. Meaningless in greedy search.
@@ -186,8 +187,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         search
     }
 
-    /// Searches until more than `max_states` states are stored or the memory limit is reached. Returns `None`
-    /// if the search has not finished before.
+    /// Returns `None` if more than `max_states` states are stored, or the memory limit is reached,
+    /// before the search has finished.
     pub(super) fn run_until_states(
         &mut self,
         max_states: usize,
@@ -196,8 +197,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         self.resume(max_states, u64::MAX, hear)
     }
 
-    /// Searches until the total work exceeds `work` units. Returns `None` if the search is not finished and
-    /// can be resumed. If the memory limit is reached, the outcome is `Unknown` with the best plan.
+    /// Searches until the total work exceeds `work` units. Returns `None` if the search can be
+    /// resumed. If the memory limit is reached, the outcome is `Unknown` with the best plan.
     pub(super) fn run_for_work(
         &mut self,
         work: u64,
@@ -288,14 +289,13 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         None
     }
 
-    /// Returns the work units already done. They are deterministic and do not measure time.
     pub(super) fn work(&self) -> u64 {
         self.own_work.saturating_add(self.lazy_heuristic.as_ref().map_or(0, |sharper| sharper.work()))
     }
 
-    /// Returns `true` if neither a node with the f value `cost` and the lower bound `steps` on the number of
-    /// steps nor any later node can improve the plan that this search has found. A greedy search stops at its
-    /// first plan.
+    /// Returns `true` if neither a node with this f value and this lower bound on the number of
+    /// steps nor any later node can improve the plan that this search has found. A greedy search
+    /// stops at its first plan.
     fn can_stop_at(&self, cost: &N, steps: u32) -> bool {
         if self.order == OpenListOrder::Greedy {
             return self.best.is_some();
@@ -316,8 +316,9 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         }
     }
 
-    /// Sets the cost of an incumbent that another component found, if it is below the current upper bound.
-    /// The plan of this search is then discarded. The search ends once the lower bound reaches the cost.
+    /// Sets the cost of an incumbent that another component found, if it is below the upper bound.
+    /// The plan of this search is then discarded. The search ends once the lower bound reaches the
+    /// cost.
     pub(crate) fn set_upper_bound(&mut self, cost: N) {
         if self.limit.as_ref().is_none_or(|limit| cost < *limit) {
             self.limit = Some(cost);
@@ -327,7 +328,6 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         }
     }
 
-    /// Returns `true` if the lower bound has reached the cost of the external incumbent.
     pub(super) fn proves_upper_bound(&self) -> bool {
         self.incumbent_is_external && self.limit == self.bound
     }
@@ -344,9 +344,9 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         self.bound.as_ref()
     }
 
-    /// Returns the expected lower bound after `times` further doublings of the number of states. Assumes that
-    /// each doubling raises the bound as much as the last doubling did. Returns `None` before the second
-    /// sample, or if a sum overflows.
+    /// Returns the expected lower bound after `times` further doublings of the number of states, if
+    /// each of them raises the bound as much as the last doubling did. Returns `None` before the
+    /// second sample, or if a sum overflows.
     #[expect(clippy::arithmetic_side_effects, reason = "sums of costs that fit")]
     pub(super) fn forecast_lower_bound(&self, times: u32) -> Option<N> {
         let [.., before, now] = &self.progress[..] else { return None };
@@ -362,10 +362,10 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         self.store.bytes().saturating_add(self.open.bytes()) <= self.room()
     }
 
-    /// Returns `true` if the lower bound is expected to reach the upper bound on the plan cost before the
-    /// memory limit is reached. Assumes that each doubling of the number of states raises the lower bound as
-    /// much as the last doubling did. Also returns `true` if there is nothing to forecast from: no upper
-    /// bound, fewer than two samples, or a lower bound that does not rise.
+    /// Returns `false` if the lower bound is not expected to reach the upper bound on the plan cost
+    /// before the memory limit is reached. The forecast assumes that each doubling of the number of
+    /// states raises the lower bound as much as the last doubling did. There is no forecast without
+    /// an upper bound or two samples, or if the lower bound does not rise.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "sums of costs that fit, and less than what is limited by memory"
@@ -397,8 +397,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         self.best.map(|goal| self.plan(goal))
     }
 
-    /// Returns the operators whose propositional conditions hold in `self.state`, in ascending order.
-    /// Stubborn sets may remove operators.
+    /// Operators in ascending order. Stubborn sets may remove operators.
     fn applicable(&mut self) -> Vec<OperatorId> {
         let mut applicable = self.prepared.index.applicable(self.task, &self.state);
         if let Some(choosing) = &mut self.pruning {
@@ -496,8 +495,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         (limit, fewest) <= (cost, steps)
     }
 
-    /// Evaluates the derived variables of `self.next` if necessary. Returns `true` if this state satisfies
-    /// the goal.
+    /// Evaluates the derived variables of `self.next` if necessary.
     fn is_goal(&mut self) -> bool {
         let values = &self.next.values[..self.task.basic];
         let is_basic = |fact: &&Fact| fact.variable.index() < values.len();

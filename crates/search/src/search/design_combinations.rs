@@ -11,15 +11,15 @@ use task::task::Operator;
 use task::task::number::TaskNumber;
 use task::task::quantity::{Quantity, SlotSet};
 
-/// Maximum number of combinations of designs that are enumerated for one group of slots, i.e. slots that
-/// tables or forbidden combinations connect.
+/// Maximum number of enumerated combinations for one group of slots, i.e. slots that tables or
+/// forbidden combinations connect.
 const COMBINATION_LIMIT: usize = 2_000_000;
 /// Maximum number of non-dominated combinations for one group of slots, and of pairs when the combinations of
 /// another group are added.
 const CHOICE_LIMIT: usize = 100_000;
 
-/// A combination of designs for some slots. `cost` is its contribution to the operator's cost, and `profile`
-/// its contributions to the numeric conditions and effects.
+/// A combination of designs for some slots, and its contributions to the operator's cost and to its
+/// numeric conditions and effects.
 struct Partial<N> {
     choice: Vec<u32>,
     cost: N,
@@ -76,8 +76,8 @@ pub fn pareto_optimal_combinations<N: TaskNumber>(
     Ok(Some(front.into_iter().map(|Partial { choice, cost, .. }| (choice, cost)).collect()))
 }
 
-/// Returns the non-dominated combinations of designs for the slots of one group, or `None` if there are too
-/// many. The other slots have design 0.
+/// Non-dominated combinations for the slots of one group; `None` if there are too many. The other
+/// slots have design 0.
 fn own_front<N: TaskNumber>(
     operator: &Operator<N>,
     quantities: &[&Quantity<N>],
@@ -131,8 +131,8 @@ impl<N: TaskNumber> Partial<N> {
     }
 }
 
-/// Returns the candidates that no other candidate dominates (see [`pareto_optimal_combinations`]), in
-/// lexicographic order of their designs.
+/// Returns the candidates that no other candidate dominates, in lexicographic order of their
+/// designs.
 fn best<N: TaskNumber>(
     mut candidates: Vec<Partial<N>>,
     monotone: bool,
@@ -182,8 +182,7 @@ fn best<N: TaskNumber>(
     Ok(front)
 }
 
-/// Divides the slots of an operator into groups, such that no table and no forbidden combination connects two
-/// groups.
+/// Groups of slots such that no table and no forbidden combination connects two groups.
 fn independent<N>(operator: &Operator<N>, quantities: &[&Quantity<N>]) -> Vec<Vec<u32>> {
     let tables = quantities.iter().copied().chain([&operator.cost]).flat_map(|quantity| &quantity.tables);
     let joined = tables.map(|table| &table.slots).chain(operator.forbidden.iter().map(|rule| &rule.slots));

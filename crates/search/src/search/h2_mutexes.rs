@@ -21,15 +21,12 @@ const MAX_WORK: usize = 400_000_000;
 /// Maximum number of rounds of forward and backward h² analysis, which prune with each other's results.
 const MAX_ROUNDS: usize = 4;
 
-/// A bitset of facts, or one such bitset for each fact.
 type Words = Vec<u64>;
 
-/// An operator in terms of numbered facts of basic variables.
 struct Rule {
     before: Vec<u32>,
     /// Facts that are known to hold after the operator.
     after: Vec<u32>,
-    /// Facts that the operator may make true.
     adds: Vec<u32>,
     /// All facts of the variables that the operator certainly sets.
     set: Words,
@@ -60,7 +57,7 @@ impl Table {
         has(self.row(one), other)
     }
 
-    /// Marks two facts as compatible. Returns `true` if they were not marked before.
+    /// Returns `true` if the two facts were not marked as compatible before.
     fn insert(&mut self, one: u32, other: u32) -> bool {
         let is_new = !self.has(one, other);
         for (row, fact) in [(one, other), (other, one)] {
@@ -70,7 +67,8 @@ impl Table {
         is_new
     }
 
-    /// Marks a fact as compatible with all facts of a set. Returns `true` if a pair was not marked before.
+    /// Marks `fact` as compatible with all `others`. Returns `true` if a pair was not marked
+    /// before.
     fn join(&mut self, fact: u32, others: &[u64]) -> bool {
         let mut is_new = false;
         for (index, word) in others.iter().enumerate() {
@@ -86,7 +84,7 @@ impl Table {
         is_new
     }
 
-    /// Returns the facts in `all` that are compatible with each fact in `facts`. Returns `None` if `facts`
+    /// Returns the facts in `all` that are compatible with each fact in `facts`; `None` if `facts`
     /// are not pairwise compatible.
     fn beside(&self, facts: &[u32], all: &[u64]) -> Option<Words> {
         let mut common = all.to_vec();
@@ -124,14 +122,13 @@ fn without(words: &[u64], others: &[u64]) -> Words {
 /// The h² mutexes of a task, from forward and backward analysis.
 pub struct MutexPairs {
     first: Vec<u32>,
-    /// Compatible pairs: pairs that a state on a path from the initial state to the goal may contain.
+    /// Pairs that a state on a path from the initial state to the goal may contain.
     alive: Table,
     useless: Vec<bool>,
 }
 
 impl MutexPairs {
-    /// Computes the mutexes of a task. Returns `None` if there are too many facts, or the work limit is
-    /// reached in the first round.
+    /// Returns `None` if there are too many facts, or the work limit is reached in the first round.
     pub(crate) fn new<N: TaskNumber>(task: &Task<N>, limits: &Limits) -> Result<Option<Self>, Interrupted> {
         let mut first = Vec::with_capacity(task.basic);
         let mut variables = Vec::new();
@@ -247,8 +244,8 @@ impl<N: TaskNumber> H2Builder<'_, N> {
         }
     }
 
-    /// Computes the pairs of facts that a reachable state may contain if `useless` operators are not applied.
-    /// Returns `None` if the work limit is reached.
+    /// Computes the pairs of facts that a reachable state may contain. Returns `None` if the work
+    /// limit is reached.
     fn forwards(
         &mut self,
         rules: &[Rule],
@@ -306,9 +303,8 @@ impl<N: TaskNumber> H2Builder<'_, N> {
         }
     }
 
-    /// Computes the pairs of facts that a state from which the goal is reachable may contain if `useless`
-    /// operators are not applied. Only pairs in `forwards` are considered. Returns `None` if the work limit
-    /// is reached.
+    /// Computes the pairs in `forwards` that a state may contain from which the goal is reachable.
+    /// Returns `None` if the work limit is reached.
     fn backwards(
         &mut self,
         rules: &[Rule],
@@ -376,8 +372,8 @@ mod tests {
     use testing::random::Random;
     use testing::{depot, ground_text};
 
-    /// Checks that no state on a path to the goal counts as a dead end, and no operator on such a path as
-    /// useless. Returns the numbers of dead ends and of useless operators that were found.
+    /// Returns the numbers of dead ends and of useless operators that were found. Checks that none
+    /// of them is on a path to the goal.
     fn check(text: &(String, String)) -> Option<[usize; 2]> {
         let task = ground_text(text.clone());
         let (states, steps) = reachable(&task).filter(|_| task.unreachable.is_none())?;

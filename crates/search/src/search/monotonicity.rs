@@ -91,7 +91,7 @@ impl<N: TaskNumber> PolarityAnalysis<'_, N> {
         }
     }
 
-    /// Adds a polarity to the variable of a fact. Value 0 of a derived variable means true.
+    /// Value 0 of a derived variable means true.
     fn fact(&mut self, fact: Fact, polarity: Polarity) {
         let polarity = if fact.value == 0 { polarity } else { polarity.flipped() };
         let current = &mut self.facts[fact.variable.index()];
@@ -112,8 +112,8 @@ impl<N: TaskNumber> PolarityAnalysis<'_, N> {
     }
 }
 
-/// Returns the polarities by which certificates compare states: either a higher value is never worse for all numeric
-/// variables, or all of them must be equal.
+/// Returns the polarities by which certificates compare states: a higher value is never worse for
+/// all numeric variables, or all of them must be equal.
 pub(super) fn uniform_directions<N: TaskNumber>(task: &Task<N>) -> Vec<Polarity> {
     vec![if is_monotone(task) { UP } else { BOTH }; task.initial.numbers.len()]
 }

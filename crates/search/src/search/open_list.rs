@@ -31,7 +31,6 @@ impl<K: Ord + Clone> OpenList<K> {
         }
     }
 
-    /// Returns the approximate memory use in bytes.
     pub(super) fn bytes(&self) -> usize {
         let nodes = self.length.saturating_mul(size_of::<u32>());
         nodes.saturating_add(self.buckets.len().saturating_mul(size_of::<(K, Vec<u32>)>()))

@@ -10,18 +10,17 @@
 
 use task::number::dense;
 
-/// Comparison of labels (search nodes) by several criteria. A label has one number for each criterion. Labels
-/// and numbers are given by their indices.
+/// Comparison of labels (search nodes) by several criteria. A label has one number for each
+/// criterion. Both are given by their indices.
 pub(super) trait Criteria {
-    /// Returns `true` if, by the criterion, the number with index `one` is at least as good as the number
-    /// with index `other`.
+    /// Returns `true` if number `one` is at least as good as number `other` by the criterion.
     fn is_as_good(&self, criterion: usize, one: u32, other: u32) -> bool;
 
     /// Returns `true` if label `one` is at least as good as label `other` by every criterion. Implementations
     /// may break ties by further criteria.
     fn dominates(&self, one: u32, other: u32) -> bool;
 
-    /// Replaces the contents of `to` by the indices of the numbers of a label, one for each criterion.
+    /// Replaces the contents of `to` by the numbers of a label, one for each criterion.
     fn numbers(&self, label: u32, to: &mut Vec<u32>);
 }
 
@@ -63,8 +62,8 @@ impl Front {
         self.regions.len().saturating_mul(region.saturating_add(size_of::<Region>()))
     }
 
-    /// Returns `true` if `dominates` returns `true` for some label. Boxes whose best values are worse than
-    /// `numbers` by some criterion are skipped.
+    /// Returns `true` if `dominates` returns `true` for some label. Only labels in boxes whose best
+    /// values are at least as good as `numbers` are tested.
     pub(super) fn any(
         &self,
         numbers: &[u32],
@@ -92,8 +91,8 @@ impl Front {
         false
     }
 
-    /// Adds a label that is not dominated. Removes all labels that it dominates, and calls `leaves` with each
-    /// of them.
+    /// Adds a label that is not dominated. Removes all labels that it dominates, and passes each of
+    /// them to `leaves`.
     pub(super) fn insert(&mut self, label: u32, criteria: &impl Criteria, mut leaves: impl FnMut(u32)) {
         let mut numbers = Vec::new();
         criteria.numbers(label, &mut numbers);
@@ -190,8 +189,8 @@ fn widen(region: &mut Region, numbers: &[u32], criteria: &impl Criteria) {
     }
 }
 
-/// Returns the criterion and the number that split the labels most evenly, or `None` if all labels have equal
-/// numbers.
+/// Returns the criterion and the number that split the labels most evenly; `None` if all labels
+/// have equal numbers.
 fn middle(labels: &[u32], criteria: &impl Criteria) -> Option<(usize, u32)> {
     let mut label_numbers = Vec::new();
     let mut columns: Vec<Vec<u32>> = Vec::new();
@@ -216,8 +215,8 @@ fn middle(labels: &[u32], criteria: &impl Criteria) -> Option<(usize, u32)> {
     best.map(|(_, criterion, number)| (criterion, number))
 }
 
-/// Returns the median of the labels' numbers for one criterion. If the median equals the worst number,
-/// returns the worst of the better numbers, or `None` if all numbers are equal.
+/// Returns the median of the numbers in `column`. If it equals the worst number, returns the worst
+/// of the better numbers, or `None` if all numbers are equal.
 fn median(criterion: usize, mut column: Vec<u32>, criteria: &impl Criteria) -> Option<u32> {
     column.sort_by(|one, other| {
         match (criteria.is_as_good(criterion, *one, *other), criteria.is_as_good(criterion, *other, *one)) {

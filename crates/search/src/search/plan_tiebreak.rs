@@ -50,8 +50,8 @@ struct Label {
 }
 
 impl Label {
-    /// Writes the key of the Pareto front to which the label belongs: the values of the basic variables, the
-    /// last design of each function, and the numbers that must be equal for dominance.
+    /// Writes the values that labels of one Pareto front share: basic variables, last designs, and
+    /// numbers that must be equal for dominance.
     fn write_front_key(&self, task: &Task, monotone: bool, key: &mut Vec<u32>) {
         key.clear();
         key.extend(&self.state.values[..task.basic]);
@@ -75,7 +75,6 @@ impl Label {
     }
 }
 
-/// The parts of a label by which labels of one Pareto front are compared.
 struct Merits {
     cost: Int,
     steps: usize,
@@ -84,8 +83,8 @@ struct Merits {
 }
 
 impl Merits {
-    /// Returns `true` if a label with these merits is at least as good as another label of its Pareto front.
-    /// If `monotone`, higher values of all numeric variables are never worse; otherwise they must be equal.
+    /// If `monotone`, higher values of all numeric variables are never worse; otherwise they must
+    /// be equal.
     fn is_no_worse(&self, other: &Self, monotone: bool) -> bool {
         self.cost <= other.cost
             && self.steps <= other.steps
@@ -109,19 +108,20 @@ pub type Changes = (usize, usize);
 struct Choice {
     designs: Vec<u32>,
     cost: Int,
-    /// Functions used by the operator (as positions in `TieBreakContext::functions`), with their designs.
+    /// Functions used by the operator (as positions in `TieBreakContext::functions`), with their
+    /// designs.
     configuration: Vec<(usize, ObjectId)>,
-    /// `true` if the step is part of the reference plan, or there is no reference plan.
+    /// Also `true` if there is no reference plan.
     is_kept: bool,
 }
 
-/// Combinations of designs of an operator, in ascending order; `None` if there are too many.
+/// In ascending order; `None` if there are too many combinations.
 type Choices = Option<Vec<Choice>>;
 
 #[derive(Default)]
 struct Labels {
     all: Vec<Label>,
-    /// Pareto fronts of the labels by key, see [`Label::write_front_key`].
+    /// By the key of [`Label::write_front_key`].
     fronts: FxHashMap<Box<[u32]>, Vec<Merits>>,
 }
 
@@ -137,8 +137,8 @@ pub struct PlanPrefix<'a> {
 
 /// Tie-breaking data of a task that does not depend on the initial state.
 pub struct TieBreakContext {
-    /// Lower bounds on the number of steps to the goal, by projection and abstract state; `None` if the goal
-    /// is unreachable.
+    /// For each projection and abstract state: a lower bound on the number of steps to the goal;
+    /// `None` if the goal is unreachable.
     steps_to_go: Vec<Vec<Option<Int>>>,
     index: SuccessorGenerator,
     monotone: bool,
@@ -173,8 +173,8 @@ impl TieBreakContext {
         })
     }
 
-    /// Returns the Pareto-optimal combinations of designs of an operator, and the combinations of its steps
-    /// in the reference plan, in ascending order. Returns `None` if there are too many combinations.
+    /// Returns the Pareto-optimal combinations of designs, and those of the reference plan, in
+    /// ascending order. Returns `None` if there are too many combinations.
     fn choices_of(
         &self,
         context: Context<'_>,
@@ -211,7 +211,7 @@ struct Ties<'a> {
     bounds: &'a Bounds,
     prepared: &'a TieBreakContext,
     limits: &'a Limits,
-    /// Combinations of designs by operator if there is a reference plan. Otherwise the shared combinations in
+    /// Combinations of designs by operator if there is a reference plan; otherwise those in
     /// `prepared` are used.
     choices: Option<Vec<OnceLock<Choices>>>,
     close_to: &'a FxHashSet<GroundStep>,
@@ -220,15 +220,14 @@ struct Ties<'a> {
     made: Cell<usize>,
     compared: Cell<usize>,
     pulse: RefCell<LimitPoll<'a>>,
-    /// Buffer for the state of a successor, most of which are rejected.
+    /// Scratch buffer for successors, most of which are rejected.
     next: RefCell<State>,
-    /// Buffer for the key of a Pareto front.
     key: RefCell<Vec<u32>>,
 }
 
-/// Returns the canonical plan among all plans with the cost and the number of steps of `plan`. Returns `plan`
-/// if a limit on labels, comparisons, combinations of designs or time is reached, or if operator costs are
-/// only a part of the metric.
+/// Returns the canonical plan among all plans with the cost and the number of steps of `plan`.
+/// Returns `plan` if the search fails, for example at a limit, or if operator costs are only a part
+/// of the metric.
 pub fn select_canonical_plan(context: Context<'_>, bounds: &Bounds, plan: GroundPlan) -> GroundPlan {
     let _span = info_span!("canonical plan").entered();
     if !context.task.objective.rest.is_empty() {
@@ -241,10 +240,11 @@ pub fn select_canonical_plan(context: Context<'_>, bounds: &Bounds, plan: Ground
     choose_from((context, bounds, &prepared), plan, max_changes, &beginning).0
 }
 
-/// Selects the canonical plan (see the head of this file) among the plans from the situation `beginning` that
-/// have the cost and the number of steps of the known plan `plan`. The situation may be the one after steps that
-/// are already executed. Also returns the [`Changes`] of the selected plan. If more than `max_changes` are
-/// necessary or the search reaches a limit, returns `plan` and `None`.
+/// Selects the canonical plan (see the head of this file) among the plans from the situation
+/// `beginning` that have the cost and the number of steps of `plan`. The situation may be the one
+/// after steps that are already executed. Also returns the [`Changes`] of the selected plan. If
+/// more than `max_changes` are necessary or the search fails, for example at a limit, returns
+/// `plan` and `None`.
 pub fn choose_from(
     (context, bounds, prepared): (Context<'_>, &Bounds, &TieBreakContext),
     plan: GroundPlan,
@@ -284,22 +284,22 @@ pub fn choose_from(
 struct Branch<'a> {
     label: usize,
     operators: std::vec::IntoIter<OperatorId>,
-    /// Current operator, the lower bound on the cost after it (see [`Ties::cost_to_go_after`]), and its untried
+    /// Current operator, the result of [`Ties::cost_to_go_after`] for it, and its untried
     /// combinations of designs.
     current: Option<(OperatorId, Int, std::slice::Iter<'a, Choice>)>,
 }
 
 impl Ties<'_> {
-    /// Returns the canonical plan and its changes, or `None` if more than `max_changes` are necessary or a
-    /// limit on labels, comparisons, combinations of designs or time is reached.
+    /// Returns the canonical plan and its changes. Returns `None` if more than `max_changes` are
+    /// necessary, a limit is reached, or the search ends with a shorter plan.
     fn first(&self, start: Label, max_changes: Changes) -> Option<(Vec<GroundStep>, Changes)> {
         let (changes, first_labels) = self.fewest_changes(start.clone(), max_changes)?;
         let steps = self.first_in_order(start, changes, &first_labels)?;
         (steps.len() == self.steps).then_some((steps, changes))
     }
 
-    /// Returns the combinations of designs of an operator. Returns `None` if there are too many, or the
-    /// computation was interrupted; only the former result is cached.
+    /// Returns `None` if there are too many combinations, or the computation was interrupted; only
+    /// the former result is cached.
     fn choices(&self, operator: OperatorId) -> Option<&[Choice]> {
         let choices = &self.choices.as_ref().unwrap_or(&self.prepared.choices)[operator.index()];
         if choices.get().is_none() {
@@ -313,8 +313,9 @@ impl Ties<'_> {
         choices.get()?.as_deref()
     }
 
-    /// Returns a lower bound on the cost from the states after an operator to the goal, for any of its
-    /// designs. Returns `None` if the goal is unreachable within the number of steps of the known plan.
+    /// Lower bound on the cost from the states after an operator to the goal, for any of its
+    /// designs. Returns `None` if the goal is unreachable within the number of steps of the known
+    /// plan.
     ///
     /// The finite-domain variables of all these states are equal unless the operator has conditional effects,
     /// in which case the bound is 0.
@@ -343,9 +344,8 @@ impl Ties<'_> {
         self.bounds.projections.iter().zip(&self.prepared.steps_to_go).all(in_time)
     }
 
-    /// Returns the label (partial plan) after a step. Returns `None` if the step is inapplicable or cannot
-    /// lead to a plan within the cost and number of steps of the known plan. `to_go` is the result of
-    /// [`Self::cost_to_go_after`].
+    /// Returns `None` if the step is inapplicable or cannot lead to a plan within the cost and
+    /// number of steps of the known plan. `to_go` is the result of [`Self::cost_to_go_after`].
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "costs are not negative and those of labels at most that of a known plan, so that sums with an operator and an estimate fit"
@@ -377,10 +377,9 @@ impl Ties<'_> {
         Some(next)
     }
 
-    /// Returns the fewest [`Changes`] of a plan that begins with the partial plan `from` and has at most the
-    /// cost and the number of steps of the known plan. Also returns all labels (partial plans) that were
-    /// stored. Returns `None` if there is no such plan with at most `max_changes`, or if a limit on labels,
-    /// comparisons, combinations of designs or time is reached.
+    /// Returns the fewest [`Changes`] of a plan that begins with `from` and has at most the cost
+    /// and the number of steps of the known plan. Also returns all stored labels. Returns `None` if
+    /// there is no such plan with at most `max_changes`, or a limit is reached.
     fn fewest_changes(&self, from: Label, max_changes: Changes) -> Option<(Changes, Labels)> {
         let mut open = BinaryHeap::from([Reverse((from.changes, Reverse(from.steps), 0))]);
         let mut labels = Labels { all: vec![from], ..Labels::default() };
@@ -407,15 +406,14 @@ impl Ties<'_> {
         None
     }
 
-    /// Returns the first plan in model order with at most `changes`, which must be the minimum. Uses
-    /// depth-first search. Returns `None` if a limit on labels, comparisons, combinations of designs or time
-    /// is reached.
+    /// Returns the first plan in model order with at most `changes`, which must be the minimum.
+    /// Uses depth-first search. Returns `None` if a limit is reached.
     ///
-    /// A label (partial plan) is pruned if a visited label is at least as good. If the visited label has led
-    /// to no plan, the new label leads to none either. If the visited label is an ancestor of the new label,
-    /// a plan from the new label would imply a shorter plan from the ancestor, which cannot exist. A label is
-    /// also pruned if a label in `first_labels`, from the search for the minimum changes, is strictly better
-    /// in cost, steps or changes, because the minimum values of all three are known.
+    /// A label is pruned if a visited label is at least as good. If the visited label has led to no
+    /// plan, the new label leads to none either. If the visited label is an ancestor of the new
+    /// label, a plan from the new label would imply a shorter plan from the ancestor, which cannot
+    /// exist. A label is also pruned if a label in `first_labels` is strictly better in cost, steps
+    /// or changes, because the minimum values of all three are known.
     fn first_in_order(
         &self,
         start: Label,
@@ -467,8 +465,8 @@ impl Ties<'_> {
         None
     }
 
-    /// Returns `true` if a stored label of the Pareto front of `next` is at least as good as `next`. If
-    /// `strictly`, the label must also be better in cost, steps or changes.
+    /// Returns `true` if a stored label of the Pareto front of `next` is at least as good as `next`
+    /// and, if `strictly`, better in cost, steps or changes.
     fn is_beaten(&self, labels: &Labels, next: &Label, strictly: bool) -> bool {
         let (merits, monotone) = (next.merits(), self.prepared.monotone);
         let mut key = self.key.borrow_mut();
@@ -485,7 +483,7 @@ impl Ties<'_> {
         self.pulse.borrow_mut().beat().ok()
     }
 
-    /// Stores a label (partial plan). Returns `None` if the limit on labels or comparisons is reached.
+    /// Returns `None` if the limit on labels or comparisons is reached.
     #[expect(clippy::arithmetic_side_effects, reason = "labels are counted up to their limit")]
     fn keep(&self, labels: &mut Labels, label: Label) -> Option<()> {
         let (merits, monotone) = (label.merits(), self.prepared.monotone);
@@ -515,10 +513,8 @@ mod tests {
     use testing::ground_text;
     use testing::missions::Mission;
 
-    /// Maximum number of partial plans that are enumerated for one task.
     const ENUMERATION_LIMIT: usize = 300_000;
 
-    /// Enumerates all plans with the cost and the number of steps of a known plan in model order.
     struct Enumeration<'a> {
         task: &'a Task,
         choices: Vec<Vec<(Vec<u32>, Int)>>,

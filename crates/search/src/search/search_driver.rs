@@ -133,8 +133,8 @@ fn search_within<N: TaskNumber, E: Heuristic<N>>(
     }
 }
 
-/// Runs a greedy best-first search from `initial` and returns the plan that it finds, if any. The number of
-/// stored states is limited to the threshold `states` (but at least [`LEAST`]) and to `max_states`.
+/// Stores at most as many states as the threshold `states` (but at least [`LEAST`]) and
+/// `max_states` allow.
 fn greedy_best_first<N: TaskNumber, E: Heuristic<N>>(
     space: &SearchProblem<'_, N, E>,
     initial: &State<N>,
@@ -155,7 +155,6 @@ pub struct InterleavedSearch<'a, N, E> {
     has_begun: bool,
     /// `true` if searches continue although memory is forecast to run out.
     is_patient: bool,
-    /// Greatest proved lower bound on the cost of every plan.
     bound: Option<N>,
     best: Option<GroundPlan<N>>,
     figures: SearchStatistics,
@@ -207,10 +206,10 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
         plans.fold(self.best.clone(), |best, plan| cheaper(best, Some(plan)))
     }
 
-    /// Resumes all searches until each has done the work of `max_states` states. The first call runs a single
-    /// search until it has stored `max_states` states. While `max_states` is at most `STATE_LIMIT`, the
-    /// LM-cut search gets a quarter of the work. Otherwise, a search gets half if it lags behind or is
-    /// forecast to run out of memory.
+    /// Resumes all searches until each has done the work of `max_states` states. The first call
+    /// runs a single search until it has stored `max_states` states. While `max_states` is at most
+    /// `STATE_LIMIT`, the LM-cut search gets a quarter of the work. In all other cases, a search
+    /// gets half if it lags behind or is forecast to run out of memory.
     ///
     /// Returns `None` if the searches are not finished. `SearchOutcome::Unknown(None)` also means that no
     /// plan is cheaper than the cost set by `set_upper_bound`.
@@ -277,8 +276,9 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
         self.searches.is_empty().then(|| SearchOutcome::Unknown(self.best.clone()))
     }
 
-    /// Adds the LM-cut search, if LM-cut is available, and enables symmetry reduction and stubborn sets. If
-    /// there are symmetries, the first search restarts, because its stored states are not canonical.
+    /// Adds the LM-cut search, symmetry reduction and stubborn sets, as far as they are available.
+    /// If there are symmetries, the first search restarts, because its stored states are not
+    /// canonical.
     fn begin(&mut self) {
         self.has_begun = true;
         let SearchProblem { context, bounds, .. } = self.space;
@@ -306,9 +306,9 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
     }
 }
 
-/// Returns the index of the search that lags behind: its lower bound, extrapolated over two doublings of its
-/// states, stays below the current lower bound of the other search. Returns `None` if neither does, or unless
-/// there are two searches.
+/// Returns the index of the search that lags behind: its lower bound, extrapolated over two
+/// doublings of its states, stays below the current lower bound of the other search. Returns `None`
+/// if no search lags behind, or if there is only one search.
 fn lagging_search<N: TaskNumber, E: Heuristic<N>>(searches: &[AStar<'_, N, E>]) -> Option<usize> {
     let [first, second] = searches else { return None };
     let is_behind = |search: &AStar<'_, N, E>, other: &AStar<'_, N, E>| {

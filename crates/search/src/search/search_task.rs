@@ -15,8 +15,8 @@ use crate::search::successor_generator::SuccessorGenerator;
 /// Precomputed operator data of a task, independent of the initial state.
 pub struct SearchTask<N = Int> {
     pub(super) choices: Vec<CostedCombinations<N>>,
-    /// For each operator: the index of its first combination among all combinations. The last element is the
-    /// total number of combinations.
+    /// For each operator: the index of its first combination among all combinations. The last
+    /// element is the number of combinations.
     pub(super) numbers: Vec<u32>,
     pub(super) index: SuccessorGenerator,
     /// Highest cost of a combination of any operator.
@@ -58,8 +58,7 @@ impl<N: TaskNumber> SearchTask<N> {
         GroundStep { operator: OperatorId(dense(operator)), choice }
     }
 
-    /// Returns a lower bound on the number of steps that together have this cost; 0 if no operator has a
-    /// positive cost.
+    /// The result is 0 if no operator has a positive cost.
     pub(super) fn steps_at_least(&self, cost: &N) -> u32 {
         if self.dearest > N::zero() { cost.times_at_least(&self.dearest) } else { 0 }
     }

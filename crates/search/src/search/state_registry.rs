@@ -19,7 +19,7 @@ use crate::search::monotonicity::Polarity;
 use crate::search::pareto_front::{Criteria, Front};
 use crate::search::symmetry::Orbits;
 
-/// Represents a missing index: no next node of a front, no parent, or no step.
+/// Missing index: no next node of a front, no parent, or no step.
 pub(super) const NONE: u32 = u32::MAX;
 
 const WORD: u32 = u32::BITS;
@@ -31,8 +31,7 @@ struct BitField {
     mask: u32,
 }
 
-/// A numeric variable that is not part of the key. States with equal keys are compared by ≥ or ≤ of this
-/// variable, or the variable is ignored.
+/// A numeric variable that is not part of the key. It is compared by ≥ or ≤, or ignored.
 struct ComparedVariable {
     variable: usize,
     asked: Polarity,
@@ -41,7 +40,7 @@ struct ComparedVariable {
 /// Bit that marks an entry of `fronts` as an index in `trees` instead of the index of a node.
 const TREE_FLAG: u32 = 1 << 31;
 
-/// Interned numbers: equal numbers have equal indices.
+/// Equal numbers have equal indices.
 struct Numbers<N> {
     all: Vec<N>,
     table: HashTable<u32>,
@@ -58,7 +57,7 @@ pub(super) struct ParentLink {
 struct Node {
     place: u32,
     origin: ParentLink,
-    /// Path cost, as the index of an interned number.
+    /// Index of the path cost in `numbers`.
     cost: u32,
     next: u32,
     state: NodeStatus,
@@ -76,28 +75,25 @@ pub(super) struct StateRegistry<N> {
     fields: Vec<BitField>,
     exact: Vec<usize>,
     compared: Vec<ComparedVariable>,
-    /// Number of 32-bit words of a key.
     width: usize,
-    /// Keys of all places (sets of states with equal keys), with `width` words for each place.
+    /// `width` words for each place.
     keys: Vec<u32>,
-    /// For each place (set of states with equal keys), where its non-dominated nodes are stored: the first
-    /// node of a linked list or, for a long front, the index in `trees` combined with `TREE_FLAG`.
+    /// For each place: the first node of its Pareto front, which is a linked list. For a long
+    /// front: the index in `trees` combined with `TREE_FLAG`.
     fronts: Vec<u32>,
     trees: Vec<Front>,
-    /// Maximum number of nodes in a front (non-dominated nodes of a place) that is stored as a linked list. A
-    /// longer front is stored as a tree.
+    /// Maximum length of a linked list. A longer front is stored as a tree.
     longest: usize,
     tree_bytes: usize,
     table: HashTable<u32>,
     nodes: Vec<Node>,
-    /// For each node: the indices (in `numbers`) of the values of its compared variables, which are not part
-    /// of the key.
+    /// For each node: the indices (in `numbers`) of the values of its compared variables.
     others: Vec<u32>,
     numbers: Numbers<N>,
     key: Vec<u32>,
-    /// Scratch buffer: indices of the compared numbers of the state that is looked up.
+    /// Compared numbers of the state that is looked up.
     own: Vec<u32>,
-    /// Symmetries, if symmetric states count as equal. The keys are then canonical.
+    /// Symmetric states count as equal. The keys are then canonical.
     orbits: Option<Arc<Orbits>>,
     /// With symmetries: the packed original values of each node.
     plain: Vec<u32>,
@@ -107,7 +103,7 @@ pub(super) struct StateRegistry<N> {
     image: Vec<u32>,
 }
 
-/// Result of a lookup if no stored state dominates the state: the data needed to insert it.
+/// Data needed to insert a state that no stored state dominates.
 pub(super) struct VacantEntry {
     hash: u64,
     place: Option<u32>,
@@ -134,8 +130,8 @@ impl<N: TaskNumber> Numbers<N> {
     }
 }
 
-/// Assigns bit fields to variables with the given domain sizes, by first-fit decreasing on their number of
-/// bits. Returns the fields and the number of words.
+/// Assigns bit fields by first-fit decreasing on the number of bits. Returns the fields and the
+/// number of words.
 #[expect(clippy::arithmetic_side_effects, reason = "bits of a word, and words that are held in memory")]
 fn fields(sizes: &[usize]) -> (Vec<BitField>, usize) {
     let bits = |size: &usize| WORD - dense(size.saturating_sub(1)).leading_zeros();
@@ -284,8 +280,7 @@ impl<N: TaskNumber> StateRegistry<N> {
         std::iter::successors(some(first), move |node| some(self.nodes[*node as usize].next))
     }
 
-    /// Stores the state of the last lookup and returns its node index. Marks the stored nodes that it
-    /// dominates.
+    /// Stores the state of the last lookup, and marks the stored nodes that it dominates.
     pub(super) fn insert(&mut self, vacancy: &VacantEntry, origin: ParentLink) -> u32 {
         let place = vacancy.place.unwrap_or_else(|| self.add_place(vacancy.hash));
         let id = dense(self.nodes.len());
@@ -369,8 +364,7 @@ impl<N: TaskNumber> StateRegistry<N> {
         self.nodes[node as usize].state == NodeStatus::Dominated
     }
 
-    /// Marks that the lazy heuristic was evaluated for a node. Returns `false` if the node was marked before
-    /// or is dominated.
+    /// Returns `false` if the node was marked before or is dominated.
     pub(super) fn mark_reevaluated(&mut self, node: u32) -> bool {
         let state = &mut self.nodes[node as usize].state;
         let is_first = *state == NodeStatus::Open;

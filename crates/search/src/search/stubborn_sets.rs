@@ -41,12 +41,9 @@ use task::task::{Condition, Fact, Literal, Operator, OperatorId, Task};
 /// Pruning stays enabled if, on average, at least one in this number of applicable operators is pruned.
 const MIN_PRUNED_FRACTION: u64 = 5;
 
-/// Indices of a task: the operators that require, set or read each fact or variable.
 pub struct Stubborn {
     first: Vec<u32>,
-    /// For each fact: operators that require it.
     requiring: Lists,
-    /// For each fact: operators that may set it.
     setting: Lists,
     /// For each variable: operators that may set it and require no value of it.
     blind: Lists,
@@ -69,14 +66,13 @@ pub(super) struct StubbornSetPruning {
     out: usize,
     /// Number of expansions after which pruning is disabled if it has pruned too little.
     trial: u64,
-    /// Number of states that were expanded with pruning.
     looked: u64,
     applicable: u64,
     left_out: u64,
 }
 
 impl Stubborn {
-    /// Builds the indices. Returns `None` if the task has numeric or derived variables.
+    /// Returns `None` if the task has numeric or derived variables.
     pub(crate) fn new<N>(task: &Task<N>) -> Option<Self> {
         if !task.axioms.is_empty() || !task.initial.numbers.is_empty() || task.basic < task.variables.len() {
             return None;
@@ -350,7 +346,7 @@ pub(super) mod tests {
         Some((states, steps))
     }
 
-    /// Returns, for each state, the cost and length of a cheapest plan with the fewest steps. Uses a backward
+    /// Cost and length of a cheapest plan with the fewest steps for each state, by a backward
     /// Dijkstra search.
     pub(in crate::search) fn to_go(
         task: &Task,
@@ -381,9 +377,8 @@ pub(super) mod tests {
         best
     }
 
-    /// Checks that, in each state, the operators that are not pruned include the first operator of a cheapest
-    /// plan with the fewest steps. Returns the number of pruned operators, or `None` if stubborn sets do not
-    /// apply to the task.
+    /// Returns the number of pruned operators, or `None` if stubborn sets do not apply to the task.
+    /// Checks that the first operator of a cheapest plan with the fewest steps is not pruned.
     fn check(text: &(String, String)) -> Option<usize> {
         let task = ground_text(text.clone());
         let stubborn = Arc::new(Stubborn::new(&task).filter(|_| task.unreachable.is_none())?);

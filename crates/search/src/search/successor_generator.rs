@@ -13,7 +13,7 @@ const NONE: u32 = u32::MAX;
 
 #[derive(Default)]
 struct Node {
-    /// Operators whose preconditions have all been tested at this node, as a range of `operators`.
+    /// Operators without further preconditions, as a range of `operators`.
     complete: (u32, u32),
     variable: u32,
     /// Children by ascending value, as a range of `children`.
@@ -32,8 +32,8 @@ pub struct SuccessorGenerator {
 /// Required values as pairs (variable, value) in ascending order, and the operator.
 type Precondition = (Vec<(u32, u32)>, OperatorId);
 
-/// A subtree to be built: the range of operators with equal first `depth` preconditions, and the link that
-/// will point to its root.
+/// A subtree to be built: a range of operators with equal first `depth` preconditions, and the link
+/// to its root.
 struct PendingSubtree {
     from: usize,
     to: usize,

@@ -14,7 +14,7 @@ use task::limits::Interrupted;
 use task::number::Int;
 use task::task::object_symmetry::symmetry_generators;
 
-/// Part of an exchange: the value of variable `target` in the image is computed from variable `source`.
+/// Part of an exchange: variable `target` of the image is computed from variable `source`.
 struct Move {
     target: usize,
     source: usize,
@@ -28,8 +28,8 @@ pub struct Orbits {
 }
 
 impl Orbits {
-    /// Computes symmetries of a task. Returns `None` if no interchangeable objects are found; the number of
-    /// comparisons is limited.
+    /// Returns `None` if no interchangeable objects are found; the number of comparisons is
+    /// limited.
     pub(crate) fn new(context: Context<'_, Int>) -> Result<Option<Self>, Interrupted> {
         let mut exchanges = Vec::new();
         for exchange in symmetry_generators(context, false)? {
@@ -49,8 +49,8 @@ impl Orbits {
         Ok((!exchanges.is_empty()).then_some(Self { exchanges }))
     }
 
-    /// Replaces the values of a state by a canonical representative: applies exchanges as long as the values
-    /// become lexicographically smaller. `image` is a scratch buffer.
+    /// Applies exchanges as long as the values become lexicographically smaller. `image` is a
+    /// scratch buffer.
     pub(crate) fn canonicalize(&self, values: &mut [u32], image: &mut Vec<u32>) {
         let mut changed = true;
         while std::mem::take(&mut changed) {
