@@ -81,7 +81,6 @@ impl Naming {
         Some(self.object.replacen('*', middle, 1))
     }
 
-    /// Describes the syntax error of the entry, if there is one.
     pub(crate) fn fault(&self) -> Option<&'static str> {
         let stars = |text: &str| text.matches('*').count();
         match (stars(&self.individual), stars(&self.object)) {

@@ -153,7 +153,6 @@ impl Limits {
     }
 }
 
-/// Converts limits to the interrupt callback of the Datalog engine.
 impl From<&Limits> for Interrupt {
     fn from(limits: &Limits) -> Self {
         let limits = limits.clone();

@@ -33,7 +33,6 @@ enum WitnessKind<'t> {
 }
 
 impl Witness<'_> {
-    /// Returns the rows of a table that belong to the design at a position.
     fn rows<'v>(&self, values: &'v [Int], stride: usize, position: usize) -> impl Iterator<Item = &'v [Int]> {
         values.chunks(stride).skip(position).step_by(self.designs.len())
     }

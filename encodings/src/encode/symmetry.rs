@@ -74,8 +74,6 @@ impl Symmetry {
 
 type Pairs = Vec<(Vec<OperatorId>, Vec<OperatorId>)>;
 
-/// Returns the pairs of consecutive objects in each class of interchangeable objects, as lists of operators that use
-/// them.
 fn equal_objects(context: Context<'_>) -> Result<Pairs, Interrupted> {
     let task = context.task;
     let pairs = symmetry_generators(context, true)?.into_iter().map(

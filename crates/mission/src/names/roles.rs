@@ -27,7 +27,6 @@ pub(super) struct Object {
     pub(super) in_domain: bool,
 }
 
-/// A class with its individuals in the knowledge base and its objects in the PDDL files.
 #[derive(Debug)]
 pub(super) struct Role {
     /// The local name of the class.
@@ -99,7 +98,6 @@ impl Roles {
         self.roles.iter().find(|role| role.class == class).expect("invariant: TOMASys' own roles are there")
     }
 
-    /// Assigns to each object whose type is bound to a class the role of this class.
     fn place(&mut self, domain: &Domain, problem: &Problem) {
         let types = TypeHierarchy::of(domain);
         let constants = domain.constants.iter().map(|constant| (constant, true));
@@ -112,8 +110,6 @@ impl Roles {
         }
     }
 
-    /// Assigns to objects the roles that follow from facts, such as that a design solves a function. Considers only
-    /// classes to which no type of the domain is bound.
     fn place_by_facts(&mut self, domain: &Domain, problem: &Problem, bindings: &Bindings) {
         let constants = domain.constants.iter().map(|constant| (constant, true));
         let declared: Vec<_> =

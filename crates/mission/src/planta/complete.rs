@@ -97,8 +97,6 @@ impl Terms {
         }
     }
 
-    /// Declares the predicates of classes and properties, for asserted and for inferred facts, and
-    /// the predicates of numeric comparisons.
     pub(super) fn declare_predicates(&self, domain: &mut Domain) {
         let mut declared: BTreeSet<Name> =
             domain.predicates.iter().map(|predicate| predicate.identifier.name.clone()).collect();

@@ -109,7 +109,6 @@ fn conjunction(literals: &mut Vec<GroundLiteral>, known: &FxHashMap<AtomId, bool
     !fails
 }
 
-/// Removes literals with known truth values from a condition. Returns `false` if the condition is then false.
 fn substitute(condition: &mut GroundCondition, known: &FxHashMap<AtomId, bool>) -> bool {
     if !conjunction(&mut condition.literals, known) {
         return false;

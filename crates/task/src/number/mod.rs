@@ -70,8 +70,6 @@ impl Rational {
         Self(decimal.to_small().map_or(Repr::Decimal(decimal), Repr::Small))
     }
 
-    /// Converts to a decimal. Returns `None` if the number has no finite decimal expansion or too many
-    /// digits.
     fn to_decimal(&self) -> Option<Decimal> {
         match &self.0 {
             Repr::Small(small) => Decimal::from_small(small),

@@ -161,7 +161,6 @@ impl Join<'_> {
         self.guards.iter().enumerate().filter_map(open_variables).min().map(|(_, position)| position)
     }
 
-    /// Applies the next option of a level to the binding. Returns `false` if no option remains.
     fn advance(
         &self,
         world: &mut World<'_>,

@@ -70,8 +70,6 @@ pub(super) fn add_schema(
     Ok((number, core))
 }
 
-/// Adds rules that derive the added atoms from the applicability of the schema. All unconditional effects
-/// share one rule.
 fn add_effects(
     relaxed: &mut ReachabilityProgramBuilder<'_>,
     schema: &Schema,

@@ -58,7 +58,6 @@ impl<'a> World<'a> {
         }
     }
 
-    /// Counts an enumeration step, and checks the limits every `BETWEEN_LOOKS` steps.
     pub(crate) fn visit(&mut self) -> Result<(), Interrupted> {
         self.visited += 1;
         if self.visited.0.is_multiple_of(BETWEEN_LOOKS) {
@@ -144,8 +143,6 @@ impl<'a> World<'a> {
         (function, arguments)
     }
 
-    /// Returns the initial value of a numeric fluent or the value of a static function; `None` if it is
-    /// undefined.
     pub(crate) fn value(&self, function: FunctionId, arguments: &[ObjectId]) -> Option<Rational> {
         self.values.get(&Key(function, arguments)).cloned()
     }
