@@ -91,7 +91,6 @@ impl Naming {
         }
     }
 
-    /// Creates an error about this entry, at its place if it has one.
     pub(crate) fn wrong(&self, code: &str, text: &str) -> Message {
         match &self.place {
             Some((file, place)) => Message::at(code, file, *place, format!("`[bindings.names]`: {text}")),
@@ -99,7 +98,6 @@ impl Naming {
         }
     }
 
-    /// Creates a warning about this entry, at its place if it has one.
     pub(crate) fn questionable(&self, code: &str, text: &str) -> Message {
         match &self.place {
             Some((file, Some(place))) => {

@@ -87,7 +87,6 @@ fn equal_objects(context: Context<'_>) -> Result<Pairs, Interrupted> {
     Ok(pairs.collect())
 }
 
-/// Returns the operators with an object among their arguments, ascending.
 fn uses_of(task: &Task, object: ObjectId) -> Vec<OperatorId> {
     let operators = task.operators.iter().zip(OperatorId::all(task.operators.len()));
     let users = operators.filter(|(operator, _)| operator.arguments.contains(&Argument::Object(object)));

@@ -251,7 +251,6 @@ mod system {
         file.nlink() > 1
     }
 
-    /// Gives `file` the owner, the group and the mode of the file with the metadata `other`.
     pub(super) fn adopt(file: &File, other: &Metadata) -> io::Result<()> {
         let current = file.metadata()?;
         if (current.uid(), current.gid()) != (other.uid(), other.gid()) {

@@ -97,8 +97,6 @@ struct Comparison<'a> {
 }
 
 impl Comparison<'_> {
-    /// Returns the facts of the problem which state that a design solves a function: design, function, and
-    /// position.
     fn stated(&self) -> Vec<(&Name, &Name, Span)> {
         let solves = self.bindings.solves();
         let pair = |atom| match arguments(atom)[..] {

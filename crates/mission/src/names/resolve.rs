@@ -64,7 +64,6 @@ struct Resolving<'a> {
     types: TypeHierarchy,
     individuals: BTreeSet<&'a Individual>,
     objects: BTreeMap<&'a Name, &'a TypedName>,
-    /// Object name by the IRI of the individual, with the entry that gives this name.
     called: BTreeMap<&'a str, (String, &'a Naming)>,
     errors: Vec<Message>,
     warnings: Vec<Message>,

@@ -31,7 +31,6 @@ pub(super) struct Object {
 pub(super) struct Role {
     /// The local name of the class.
     pub(super) class: String,
-    /// The types of the domain that are bound to the class.
     pub(super) types: TypeExpression,
     pub(super) individuals: Vec<Individual>,
     /// Objects with this role, each once, in the order of the files.
@@ -92,8 +91,6 @@ impl Roles {
         &self.roles
     }
 
-    /// Returns the role (individuals and objects) of a class, given by local name. The class must have a
-    /// role.
     pub(super) fn of(&self, class: &str) -> &Role {
         self.roles.iter().find(|role| role.class == class).expect("invariant: TOMASys' own roles are there")
     }

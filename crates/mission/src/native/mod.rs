@@ -155,8 +155,6 @@ impl CoAdaptation {
         errors
     }
 
-    /// Returns the functions bound to `reconfigured:ATTRIBUTE` that an action uses where reconfigurations cannot be
-    /// counted, e.g. in a condition.
     fn not_counted(&self, action: &Action) -> BTreeSet<Name> {
         let uncounted = RefCell::new(BTreeSet::new());
         let see = |part: &mut Expression| {

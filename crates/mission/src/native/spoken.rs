@@ -23,7 +23,6 @@ impl CoAdaptation {
         text
     }
 
-    /// Returns `true` if `name` is a predicate or function that co-adaptation has added to the user's domain.
     pub(crate) fn is_added(&self, name: &Name) -> bool {
         self.predicates().into_iter().chain(self.functions()).any(|own| own.identifier.name == *name)
     }

@@ -41,8 +41,6 @@ pub(super) fn mark_fluents(lifted: &mut Lifted) {
     }
 }
 
-/// Returns `true` if the condition contains a numeric comparison below a universal quantifier. `below` is
-/// `true` if the condition itself is below one.
 fn compares_for_all(formula: &Formula, below: bool) -> bool {
     match formula {
         Formula::And(parts) | Formula::Or(parts) => parts.iter().any(|part| compares_for_all(part, below)),

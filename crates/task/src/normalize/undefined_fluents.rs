@@ -100,8 +100,6 @@ fn add(condition: &mut Formula, more: Vec<Formula>) {
     }
 }
 
-/// Returns an effect that makes the guard true under the condition of `effect`, or `None` unless `effect` is an
-/// `assign` to a function with a guard.
 fn gives_value(effect: &Effect, guards: &Guards) -> Option<Effect> {
     let Change::Assign { assignment: Assignment::Assign, function, terms, .. } = &effect.change else {
         return None;

@@ -140,8 +140,6 @@ impl Rational {
         }
     }
 
-    /// Applies an operation to two integers of up to 128 bits. Returns `None` if one of the numbers is not
-    /// such an integer or the result overflows.
     fn integers(&self, other: &Self, operation: impl Fn(i128, i128) -> Option<i128>) -> Option<Self> {
         let (a, b) = (self.to_int()?, other.to_int()?);
         operation(a, b).filter(|result| *result > i128::MIN).map(Self::from_integer)

@@ -85,7 +85,6 @@ pub fn each_binding<'a>(
 }
 
 struct Join<'j> {
-    /// Variables with their candidates, in ascending order of the variables.
     bound: &'j [Bound],
     guards: &'j [Guard<'j>],
     /// For each guard (necessary atom): `true` while the enumeration is inside a loop over its rows.

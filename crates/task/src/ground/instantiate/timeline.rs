@@ -156,8 +156,6 @@ impl Timeline {
     }
 }
 
-/// Returns the atoms that a sequence of changes makes true, and those that it makes false. The last change of
-/// an atom counts.
 fn prevailing(changes: &[(AtomId, bool)]) -> (Vec<AtomId>, Vec<AtomId>) {
     let (mut adds, mut deletes) = (Vec::new(), Vec::new());
     for (atom, holds) in changes {

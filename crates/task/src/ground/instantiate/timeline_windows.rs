@@ -202,8 +202,6 @@ impl<'t> TimelineWindow<'t> {
         (self.end == End::AtEvent).then(|| &self.timeline.events[self.to - 1].1[..])
     }
 
-    /// Returns the changes of the auxiliary time atoms: the phase of the start is replaced by the phase of
-    /// the end, and `waited` (the last step was a wait) becomes false.
     pub(super) fn changes(&self) -> Vec<(AtomId, bool)> {
         let phases = &self.timeline.phases;
         let mut changes = vec![(self.timeline.waited, false)];

@@ -66,8 +66,6 @@ impl<'a> World<'a> {
         Ok(())
     }
 
-    /// Returns the tuples of a predicate: the true tuples if the predicate is static, and the reachable
-    /// tuples if it is a fluent.
     fn relation(&self, predicate: PredicateId) -> Vec<Arguments> {
         let facts =
             if self.lifted.predicates[predicate.index()].fluent { &self.reached.atoms } else { &self.facts };
