@@ -16,7 +16,7 @@ use task::task::Task;
 use testing::missions::Mission;
 use testing::{costs_by_steps, depot, fleet, ground_text, optimum};
 
-/// Number of steps up to which formulas are tested at least.
+/// Minimum number of steps up to which formulas are tested.
 const STEPS: usize = 6;
 
 const MOST_STEPS: usize = 16;

@@ -205,7 +205,6 @@ fn answers_do_not_depend_on_earlier_calls() {
     let holes = 6;
     for backend in backends() {
         let mut clauses = pigeons(holes);
-        // One pigeon may stay outside.
         clauses[0].push(100);
         let mut solver = solver(&backend, &clauses);
         for _ in 0..2 {

@@ -56,7 +56,6 @@ enum Query {
 #[derive(Debug, Clone, Default)]
 pub struct Bindings {
     own: BTreeMap<Name, Query>,
-    /// Explicit bindings as text, for reports.
     written: BTreeMap<String, String>,
     names: Names,
 }
@@ -105,8 +104,7 @@ impl Bindings {
         bound.chain(SOLVES.map(Name::new)).collect()
     }
 
-    /// Returns the class that a type is bound to explicitly or by default, as local name or IRI. `None` if
-    /// the type is not bound to a class.
+    /// Returns the class of a bound type, as local name or IRI.
     pub(super) fn class(&self, name: &Name) -> Option<String> {
         match self.r#type(name) {
             Some(Query::Class(class)) => Some(class),
@@ -114,12 +112,10 @@ impl Bindings {
         }
     }
 
-    /// Returns `true` if a predicate is bound to the required functions of actions.
     pub(super) fn is_requirement(&self, predicate: &Name) -> bool {
         matches!(self.predicate(predicate), Some(Query::Requires(_)))
     }
 
-    /// Returns `true` if a type is bound to the class of function designs.
     pub(super) fn is_design(&self, name: &Name) -> bool {
         self.r#type(name) == Some(Query::Class("FunctionDesign".to_owned()))
     }
@@ -147,8 +143,6 @@ impl Bindings {
         }
     }
 
-    /// Returns the attribute whose sum over the chosen designs is the value of the numeric function `name`,
-    /// according to an explicit binding.
     pub(super) fn chosen(&self, name: &Name) -> Option<String> {
         match self.own.get(name) {
             Some(Query::Chosen(attribute)) => Some(attribute.clone()),
@@ -156,8 +150,6 @@ impl Bindings {
         }
     }
 
-    /// Returns the attribute whose sum over the newly chosen designs (those that replace another design) is the
-    /// value of the numeric function `name`, according to an explicit binding.
     pub(super) fn reconfigured(&self, name: &Name) -> Option<String> {
         match self.own.get(name) {
             Some(Query::Reconfigured(attribute)) => Some(attribute.clone()),
@@ -170,8 +162,6 @@ impl Bindings {
         self.predicate(predicate) == Some(Query::Available)
     }
 
-    /// Returns `true` if the numeric function `declared` has no parameters and is bound to the
-    /// measured value of `attribute`.
     pub(super) fn is_measured(&self, declared: &Declaration, attribute: &str) -> bool {
         let query = self.function(declared);
         declared.parameters.is_empty() && matches!(query, Query::Measured(name) if name == attribute)
@@ -213,7 +203,6 @@ impl Bindings {
     }
 }
 
-/// Returns the two names of an individual: object name and local name.
 fn both(known: &Individual) -> [&str; 2] {
     [&known.name, local_name(&known.iri)]
 }
@@ -296,7 +285,6 @@ struct Fill<'a> {
     /// `false` if inference has failed, so that the derived facts are unknown and no design counts
     /// as available.
     is_known: bool,
-    /// Designs whose availability is stated by the problem instead of the knowledge base.
     own: &'a BTreeSet<Name>,
     warnings: Vec<Message>,
 }
@@ -330,7 +318,6 @@ impl Fill<'_> {
         }
     }
 
-    /// Returns the argument lists of the problem's facts with this predicate.
     fn stated(&self, predicate: &Name) -> HashSet<Vec<Name>> {
         let arguments = |element: &InitialElement| match element {
             InitialElement::Fact(atom) if atom.predicate.name == *predicate => Some(names(&atom.arguments)),

@@ -81,7 +81,6 @@ impl Naming {
         Some(self.object.replacen('*', middle, 1))
     }
 
-    /// Describes the syntax error of the entry, if there is one.
     pub(crate) fn fault(&self) -> Option<&'static str> {
         let stars = |text: &str| text.matches('*').count();
         match (stars(&self.individual), stars(&self.object)) {
@@ -92,7 +91,6 @@ impl Naming {
         }
     }
 
-    /// Creates an error about this entry, at its place if it has one.
     pub(crate) fn wrong(&self, code: &str, text: &str) -> Message {
         match &self.place {
             Some((file, place)) => Message::at(code, file, *place, format!("`[bindings.names]`: {text}")),
@@ -100,7 +98,6 @@ impl Naming {
         }
     }
 
-    /// Creates a warning about this entry, at its place if it has one.
     pub(crate) fn questionable(&self, code: &str, text: &str) -> Message {
         match &self.place {
             Some((file, Some(place))) => {

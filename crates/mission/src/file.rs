@@ -20,10 +20,7 @@ pub(crate) const CODE: &str = "M131";
 /// Limit on the size of the files that `read` reads, in bytes. The limit does not apply to standard input.
 const LARGEST: u64 = 1 << 28;
 
-/// Reads a regular file.
-///
-/// # Errors
-/// The file cannot be read, is not regular, or exceeds the size limit.
+/// Reads a regular file of at most `LARGEST` bytes.
 pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
     let metadata = std::fs::metadata(path)?;
     if metadata.is_dir() {
@@ -74,7 +71,6 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Detects the kind of a text by its first words. Returns `None` if the kind is unknown.
     fn of(text: &str) -> Option<Self> {
         let mut lines = text.lines().map(str::trim_start);
         let first = lines.find(|line| !line.is_empty() && !line.starts_with([';', '#']))?;

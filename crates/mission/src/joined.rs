@@ -234,8 +234,8 @@ impl Mission {
             .map_or_else(|| condition.to_owned(), |adaptation| adaptation.spoken(condition))
     }
 
-    /// Returns the additions of the knowledge base to the actions of a plain domain (without a type
-    /// of designs). `None` for other missions.
+    /// Returns the additions of the knowledge base to the actions of a plain domain (without a type of designs). `None`
+    /// if the mission has no such additions.
     pub fn adaptation(&self) -> Option<&CoAdaptation> {
         self.adaptation.as_ref()
     }
@@ -281,13 +281,9 @@ impl Mission {
     }
 }
 
-/// Renames individuals according to `[bindings.names]`, and compares the names in the PDDL files with those
-/// in the knowledge base. Returns the designs whose availability is stated by the problem, and the warning
-/// about designs that the problem never names.
-///
-/// # Errors
-/// Invalid entries of `[bindings.names]`, and required functions without a design that occurs in
-/// both the problem and the knowledge base.
+/// Renames individuals according to `[bindings.names]`, and compares the names in the PDDL files with those in the
+/// knowledge base. Returns the designs whose availability is stated by the problem, and the warning about designs that
+/// the problem never names.
 fn joined_names(
     (domain, problem): ((&Domain, &Source), (&Problem, &Source)),
     knowledge: &mut Knowledge,

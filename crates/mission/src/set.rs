@@ -123,8 +123,6 @@ impl Mission {
         true
     }
 
-    /// Returns `true` if the initial state has elements that fit `is_target`, and all these elements fit
-    /// `is_equal`.
     fn has_only(
         &self,
         is_target: impl Fn(&InitialElement) -> bool,
@@ -134,7 +132,6 @@ impl Mission {
         targets.peek().is_some() && targets.all(is_equal)
     }
 
-    /// Removes the elements of the initial state that fit `is_target`, and appends the replacement.
     fn replace(&mut self, is_target: impl Fn(&InitialElement) -> bool, replacement: Option<InitialElement>) {
         self.current.take();
         self.problem.init.retain(|element| !is_target(element));

@@ -30,7 +30,6 @@ pub fn pretty(answer: &impl Serialize) -> String {
     serde_json::to_string_pretty(answer).unwrap_or_default() + "\n"
 }
 
-/// Returns `true` if a character is invisible or changes the display of other characters.
 fn hides(character: char) -> bool {
     let is_unseen = matches!(
         character,

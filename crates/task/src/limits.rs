@@ -19,8 +19,6 @@ pub struct Limits {
     deadline: Option<Instant>,
     time: Duration,
     interrupt: Arc<AtomicBool>,
-    /// Interrupt flag of the whole computation, if these limits are for a part with its own flag (see
-    /// [`Limits::with_own_interrupt`]).
     outer: Option<Arc<AtomicBool>>,
     room: Option<usize>,
     thresholds: Thresholds,
@@ -153,7 +151,6 @@ impl Limits {
     }
 }
 
-/// Converts limits to the interrupt callback of the Datalog engine.
 impl From<&Limits> for Interrupt {
     fn from(limits: &Limits) -> Self {
         let limits = limits.clone();

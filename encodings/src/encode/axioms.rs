@@ -59,8 +59,7 @@ pub(super) fn axioms(builder: &mut Builder<'_>, step: usize, numbers: &[Bits]) -
     Some(())
 }
 
-/// Adds level constraints for a recursive layer: each true variable is derived in a round after the variables
-/// of the layer that support it. So variables that support only each other are false.
+/// Adds level constraints for a recursive layer, so that variables that support only each other are false.
 #[expect(clippy::arithmetic_side_effects, reason = "rounds count from 1")]
 fn levels(
     builder: &mut Builder<'_>,
@@ -87,8 +86,6 @@ fn levels(
         }
         later.insert(*variable, literals);
     }
-    // Each true variable needs a supporting rule whose body variables from this layer were derived
-    // in earlier rounds.
     debug_assert!(layer.recursive);
     for (variable, bodies) in bodies {
         let head = builder.variables.values[step][variable.index()][0];

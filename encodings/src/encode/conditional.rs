@@ -22,8 +22,6 @@ pub(super) struct ConditionalEffectVar<'a> {
 pub(super) struct FiredEffects<'a>(Vec<ConditionalEffectVar<'a>>);
 
 impl<'a> FiredEffects<'a> {
-    /// Creates the variables of the conditional effects at a step, and adds the clauses for their
-    /// conditions and effects.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "steps are fewer than the horizon, whose formula is in memory"

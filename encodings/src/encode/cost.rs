@@ -78,9 +78,8 @@ enum Spent {
 
 impl Cost {
     /// Encodes the costs of all steps. Excludes sums above the cost limit; with `CostEncoding::Apart`, excludes only
-    /// amounts that alone exceed the gap between the limit and the lower bound. Without `interference` there is one
-    /// operator per step. Returns `None` if the deadline passes or the run is interrupted, or there are too many
-    /// clauses.
+    /// amounts that alone exceed the gap between the limit and the lower bound. Without `interference` there is at most
+    /// one operator per step. Returns `None` if a limit is reached or there are too many clauses.
     pub(super) fn new(
         builder: &mut Builder<'_>,
         cost: &CostLimit<'_>,
@@ -151,8 +150,7 @@ struct Sum<'s, 'a> {
 }
 
 impl Sum<'_, '_> {
-    /// Returns all sources of cost in the order of steps, or `None` if the deadline passes or the run is
-    /// interrupted, or there are too many clauses.
+    /// Returns all sources of cost in the order of steps, or `None` if [`Builder::check`] fails.
     fn sources(&mut self) -> Option<Vec<Source>> {
         let mut sources = Vec::new();
         for step in 0..self.builder.variables.horizon() {
@@ -167,8 +165,6 @@ impl Sum<'_, '_> {
         Some(sources)
     }
 
-    /// Returns the possible contributions to the cost of a step, grouped by source: operators, and
-    /// design tables.
     fn increments(&mut self, step: usize) -> Vec<Increments> {
         // Each source contributes at most one amount. So operators that can be executed at the same
         // step are separate sources.

@@ -146,8 +146,8 @@ impl<'a> Encoding<'a> {
     }
 }
 
-/// Adds all families of clauses except symmetry breaking. Returns `None` if the deadline passes or the run is
-/// interrupted, there are too many clauses, or numbers are too large.
+/// Adds all families of clauses except symmetry breaking. Returns `None` if a limit is reached, there are too many
+/// clauses, or numbers are too large.
 fn build<'a>(context: Context<'a>, plans: PlanConstraints<'_>) -> Option<(Builder<'a>, Option<Cost>)> {
     let PlanConstraints { allowed, cost, semantics, max_clauses: max_clause_count } = plans;
     let potential = cost.as_ref().and_then(|cost| cost.bounds.projections.first());

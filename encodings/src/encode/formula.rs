@@ -171,7 +171,6 @@ impl Formula {
         self.clauses.push((dense(self.literals.len()), family));
     }
 
-    /// Removes the literals from `start` on, which belong to an incomplete clause, and their marks.
     fn forget(&mut self, start: usize) {
         for literal in self.literals.drain(start..) {
             self.last[literal.index()] = 0;

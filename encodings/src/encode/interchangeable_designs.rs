@@ -33,7 +33,6 @@ enum WitnessKind<'t> {
 }
 
 impl Witness<'_> {
-    /// Returns the rows of a table that belong to the design at a position.
     fn rows<'v>(&self, values: &'v [Int], stride: usize, position: usize) -> impl Iterator<Item = &'v [Int]> {
         values.chunks(stride).skip(position).step_by(self.designs.len())
     }
@@ -142,8 +141,6 @@ fn witnesses(context: Context<'_>, slot: SlotId) -> Result<Vec<Witness<'_>>, Int
     Ok(witnesses)
 }
 
-/// Returns the numeric expressions of an operator that may depend on designs: effects, conditions
-/// and cost.
 fn quantities(operator: &Operator) -> impl Iterator<Item = &Quantity<Int>> {
     let effects = operator.numeric_effects.iter().map(|effect| &effect.value.quantity);
     let comparisons = operator.condition.comparisons.iter().map(|comparison| &comparison.quantity);

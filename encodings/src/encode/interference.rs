@@ -218,8 +218,6 @@ impl Uses {
     }
 }
 
-/// Basic and numeric variables on which derived variables depend, directly or through other derived
-/// variables.
 struct Support {
     basic: usize,
     /// For each derived variable: basic variables and numeric variables on which it depends.

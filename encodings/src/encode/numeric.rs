@@ -29,16 +29,14 @@ type Shape = Vec<(NumericId, Int)>;
 /// of each.
 type TableKey = (Vec<Vec<(usize, usize)>>, Arc<[Int]>);
 
-/// Interval that contains all possible values of a number at a step.
 #[derive(Debug, Clone, Copy)]
 struct Range {
     low: Int,
     high: Int,
 }
 
-/// Encodes all numeric variables. Returns their bits before each step and after the last step. Returns `None`
-/// if the deadline passes or the run is interrupted, there are too many clauses, or a number can exceed the
-/// available bits.
+/// Encodes all numeric variables. Returns their bits before each step and after the last step. Returns `None` if a
+/// limit is reached, there are too many clauses, or a number can exceed the available bits.
 pub(super) fn numeric(builder: &mut Builder<'_>) -> Option<Vec<Vec<Bits>>> {
     let initial = &builder.task.initial.numbers;
     let mut ranges: Vec<Range> = initial.iter().map(|n| Range { low: *n, high: *n }).collect();
@@ -62,8 +60,6 @@ struct Transition<'s, 'a> {
 }
 
 impl Transition<'_, '_> {
-    /// Returns the bits of the numbers after the step, and their intervals. Returns `None` if a
-    /// number can grow too large.
     fn encode(&mut self) -> Option<(Vec<Bits>, Vec<Range>)> {
         let ranges = self.next_ranges()?;
         let mut next = Vec::with_capacity(self.numbers.len());

@@ -37,8 +37,6 @@ pub(super) fn sequence(builder: &mut Builder<'_>, step: usize, is_alone: bool) {
     builder.variables.busy.push(busy);
 }
 
-/// Adds clauses for the conditions of the operators at a step, except conditions on numbers and
-/// designs.
 pub(super) fn conditions(builder: &mut Builder<'_>, step: usize) {
     for index in 0..builder.variables.operators[step].len() {
         let (id, literal) = builder.variables.operators[step][index];

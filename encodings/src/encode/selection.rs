@@ -14,8 +14,6 @@ use crate::encode::designs::task_slot;
 use crate::encode::formula::{Family, Formula};
 use crate::sat::Lit;
 
-/// Adds clauses by which each slot that an operator uses at the step has exactly one admitted design, and
-/// forbidden combinations of designs are excluded.
 pub(super) fn selection(builder: &mut Builder<'_>, step: usize) -> Result<(), Interrupted> {
     for slot in 0..builder.task.slots.len() {
         let uses = builder.partition(step, |operator| {

@@ -29,8 +29,6 @@ pub(super) fn domain(builder: &mut Builder<'_>, step: usize) {
     }
 }
 
-/// Adds the frame axioms of a step: a value that holds after the step held before the step, or an
-/// operator at the step sets it.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "steps are fewer than the horizon, whose formula is in memory"

@@ -74,8 +74,6 @@ impl Symmetry {
 
 type Pairs = Vec<(Vec<OperatorId>, Vec<OperatorId>)>;
 
-/// Returns the pairs of consecutive objects in each class of interchangeable objects, as lists of operators that use
-/// them.
 fn equal_objects(context: Context<'_>) -> Result<Pairs, Interrupted> {
     let task = context.task;
     let pairs = symmetry_generators(context, true)?.into_iter().map(
@@ -89,7 +87,6 @@ fn equal_objects(context: Context<'_>) -> Result<Pairs, Interrupted> {
     Ok(pairs.collect())
 }
 
-/// Returns the operators with an object among their arguments, ascending.
 fn uses_of(task: &Task, object: ObjectId) -> Vec<OperatorId> {
     let operators = task.operators.iter().zip(OperatorId::all(task.operators.len()));
     let users = operators.filter(|(operator, _)| operator.arguments.contains(&Argument::Object(object)));

@@ -89,15 +89,12 @@ impl Variables {
         if literal.positive { fact } else { !fact }
     }
 
-    /// Returns the literal of an operator at a step, or `None` if the operator is impossible there.
     pub(super) fn operator(&self, step: usize, id: OperatorId) -> Option<Lit> {
         let candidates = &self.operators[step];
         candidates.binary_search_by_key(&id, |(id, _)| *id).ok().map(|index| candidates[index].1)
     }
 }
 
-/// Creates the variables for the values of state variables before a step. Impossible values are the constant
-/// false, and a value that is the only possible one is the constant true.
 fn values(formula: &mut Formula, possible: &[Vec<bool>], step: usize) -> Vec<Vec<Lit>> {
     let mut literals_by_variable = Vec::with_capacity(possible.len());
     for (variable, values) in possible.iter().enumerate() {
@@ -119,8 +116,6 @@ fn values(formula: &mut Formula, possible: &[Vec<bool>], step: usize) -> Vec<Vec
     literals_by_variable
 }
 
-/// Creates the variables for the designs that operators may use at a step. Other designs are the
-/// constant false.
 fn designs(task: &Task, formula: &mut Formula, present: &[(OperatorId, Lit)], step: usize) -> Vec<Vec<Lit>> {
     let mut used: Vec<Vec<bool>> = task.slots.iter().map(|slot| vec![false; slot.designs.len()]).collect();
     for slot in present.iter().flat_map(|(id, _)| task.operators[id.index()].slots.iter()) {

@@ -14,8 +14,6 @@ pub(super) struct Cadical {
     core: Vec<Lit>,
 }
 
-/// Solver callbacks: count conflicts, and stop the solver at the deadline, at an interruption, or beyond the
-/// conflict budget.
 struct Watch {
     limits: Limits,
     budget: u64,

@@ -98,7 +98,6 @@ struct InPlace {
 }
 
 impl Pending {
-    /// Creates the value for an output that is written directly; [`Pending::commit`] then has no effect.
     fn written() -> Self {
         Self(None)
     }
@@ -129,8 +128,6 @@ fn pending(file: NamedTempFile, target: PathBuf, old: Option<InPlace>) -> (File,
     (file, Pending(Some((temporary, target, old))))
 }
 
-/// Overwrites a file with the content of `source`. On failure the former content is restored, if it could be
-/// read.
 fn overwrite(mut file: File, source: &Path) -> io::Result<()> {
     let mut former = Vec::new();
     let is_kept = file.read_to_end(&mut former).is_ok();
@@ -165,8 +162,6 @@ fn directory(path: &Path) -> &Path {
     path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Creates a temporary file in the directory of `path`, with the default permissions of the
-/// process.
 fn temporary(path: &Path) -> io::Result<NamedTempFile> {
     let mut temporary = tempfile::Builder::new();
     // Temporary files are private by default. The umask of the process still applies to this mode.
@@ -247,7 +242,6 @@ mod system {
         io::stderr().as_fd().try_clone_to_owned().map(File::from)
     }
 
-    /// Returns `true` if the metadata belong to the open file `open`.
     pub(super) fn is_same(named: &Metadata, open: Option<File>) -> bool {
         let open = open.and_then(|file| file.metadata().ok());
         open.is_some_and(|open| (named.dev(), named.ino()) == (open.dev(), open.ino()))
@@ -257,7 +251,6 @@ mod system {
         file.nlink() > 1
     }
 
-    /// Gives `file` the owner, the group and the mode of the file with the metadata `other`.
     pub(super) fn adopt(file: &File, other: &Metadata) -> io::Result<()> {
         let current = file.metadata()?;
         if (current.uid(), current.gid()) != (other.uid(), other.gid()) {

@@ -22,31 +22,26 @@ use crate::knowledge::waiting::Waiting;
 use crate::message::{Errors, Message};
 use crate::planta::Terms;
 
-/// Upper limit on the number of equal names of an individual up to which all pairs of names are listed.
+/// Number of equal names of an individual up to which all pairs of names are listed.
 const MANY_NAMES: usize = 32;
 
 /// Knowledge about a robot: assertions and the facts inferred from them.
 #[derive(Debug, Clone)]
 pub struct Knowledge {
     pub(super) runtime: Runtime,
-    /// Cached results of the queries that planning makes, kept consistent with `runtime`.
     pub(super) catalogue: OnceLock<Arc<Catalogue>>,
     pub(super) waiting: Waiting,
-    /// State after reading the documents. Shares all unchanged data with `runtime`.
+    /// State of the documents as read and revised, without reports. Shares all unchanged data with `runtime`.
     origin: Runtime,
     rule_count: usize,
     warnings: Vec<Message>,
     pub(super) sources: Sources,
-    /// Object names that replace the local names of individuals, by IRI.
     pub(super) called: Arc<CalledNames>,
     entities: Arc<[(EntityKind, Iri)]>,
-    /// Names of all documents, including imported ones.
     documents: Arc<[String]>,
     annotations: Arc<[(Iri, Annotation)]>,
-    /// Translation of the ontology to PDDL, if the documents were read for a domain in PLANTA's
-    /// form, which uses undeclared names of the ontology.
     terms: Option<Arc<Terms>>,
-    /// Assertions and axioms of the documents and rule files.
+    /// Contents of the documents and rule files.
     documented: Arc<ontology::Stated>,
     /// Asserted facts. Set only for an engine that was created from all facts of a proof, and therefore does not
     /// distinguish asserted from inferred facts.
@@ -138,7 +133,7 @@ impl Knowledge {
         self.terms.as_ref()
     }
 
-    /// Returns the currently asserted facts.
+    /// Returns the asserted facts.
     pub(crate) fn stated(&self) -> Vec<Fact> {
         let engine = self.engine();
         match &self.stated {
@@ -238,8 +233,6 @@ impl Knowledge {
         self.catalogue.get_or_init(|| Arc::new(Catalogue::new(&self.view())))
     }
 
-    /// Updates the cached designs, actions and measured values after a change of facts. Discards
-    /// the cache if the change cannot be applied to it.
     pub(super) fn follow(&mut self, delta: &Delta) {
         let engine = self.runtime.engine();
         if self.catalogue.get_mut().is_some_and(|own| !Arc::make_mut(own).follow(delta, engine)) {

@@ -23,12 +23,9 @@ pub struct Catalogue {
     classes: Arc<Mutex<BTreeMap<String, Arc<[Individual]>>>>,
 }
 
-/// Properties that determine the availability of a design.
 const AVAILABILITY: [&str; 3] =
     [tomasys::FD_REALISABILITY, pddl_tomasys::FD_REALISABILITY, tomasys::FD_AVAILABLE];
-/// Properties that assign a literal to an attribute value.
 const VALUES: [&str; 2] = [tomasys::HAS_VALUE, pddl_tomasys::QA_HAS_VALUE];
-/// Properties that link a design to an estimated attribute value.
 const ESTIMATIONS: [&str; 2] = [tomasys::HAS_QA_ESTIMATION, pddl_tomasys::HAS_QA_ESTIMATION];
 /// Properties whose facts do not affect the cache.
 const OTHERS: [&str; 12] = [
@@ -150,7 +147,6 @@ mod tests {
 
     use crate::knowledge::{COADAPTATION, Knowledge, Sources};
 
-    /// Applies random reports and objectives; after each event, compares the cache with the view.
     #[test]
     fn the_query_cache_equals_the_view_after_every_event() {
         for name in ["ugv", "uuv", "camara_like"] {

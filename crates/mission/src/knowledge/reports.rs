@@ -14,7 +14,7 @@ use crate::message::Message;
 
 impl Knowledge {
     /// Returns the reason why the consequences of pending reports are unknown. `None` unless inference has failed.
-    /// While they are unknown, no design counts as available.
+    /// While the consequences are unknown, no design counts as available.
     pub fn fault(&self) -> Option<&Fault> {
         self.waiting.fault.as_ref()
     }
@@ -23,7 +23,7 @@ impl Knowledge {
     /// inference fails, the report is kept as pending and the returned change is empty.
     ///
     /// # Errors
-    /// There is no such component, attribute or design.
+    /// There is no such component, attribute or design, or a pending objective has an unknown function or design.
     pub fn take(&mut self, name: &str, report: RobotReport) -> Result<Delta, Message> {
         let component = self.component(name);
         let name = if matches!(report, RobotReport::Component(_)) { component.as_str() } else { name };
@@ -80,8 +80,8 @@ impl Knowledge {
         Ok(Delta { insert: insert.into_iter().collect(), delete: delete.into_iter().collect() })
     }
 
-    /// Sets the objectives as [`Knowledge::pursue`] does. While the consequences of reports are
-    /// unknown, the objectives are stored and set later.
+    /// Sets the objectives as [`Knowledge::pursue`] does. If reports are pending or inference exceeds its limits, the
+    /// objectives are stored and set later.
     ///
     /// # Errors
     /// There is no such function or design.

@@ -16,14 +16,14 @@ pub enum RobotReport {
     Measured(Literal),
     /// The value of an attribute is unknown.
     Unmeasured,
-    /// Whether a design is realisable, reported for the design itself and independent of its components.
+    /// Realisability of a design, reported for the design itself and independent of its components.
     Design(bool),
 }
 
 /// Reason why the consequences of reports are unknown.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Fault {
-    /// `R301` or `R304`, from the rules crate.
+    /// Error code, usually `R301` or `R304` of the rules crate.
     pub code: String,
     /// Description in a sentence.
     pub message: String,

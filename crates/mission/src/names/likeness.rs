@@ -104,7 +104,6 @@ fn ending(one: &str, other: &str) -> usize {
     common
 }
 
-/// Formats names as a list for messages; an empty list becomes `none`.
 pub(super) fn list(names: &[&str]) -> String {
     let listed = names.iter().take(SHOWN).map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
     match names.len() {

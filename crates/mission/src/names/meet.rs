@@ -21,7 +21,6 @@ use crate::binding::Bindings;
 use crate::knowledge::{Catalogue, Knowledge};
 use crate::message::Message;
 
-/// Result of comparing the names in the problem with those in the knowledge base.
 #[derive(Debug, Default)]
 pub(crate) struct Meeting {
     /// Designs whose availability is stated by the problem.
@@ -29,7 +28,6 @@ pub(crate) struct Meeting {
     /// Errors: required functions without a design that occurs in both the problem and the
     /// knowledge base.
     pub(crate) errors: Vec<Message>,
-    /// Warnings about names that occur only in the problem or only in the knowledge base.
     pub(crate) warnings: Vec<Message>,
     pub(crate) never_named: NeverNamed,
 }
@@ -99,8 +97,6 @@ struct Comparison<'a> {
 }
 
 impl Comparison<'_> {
-    /// Returns the facts of the problem which state that a design solves a function: design, function, and
-    /// position.
     fn stated(&self) -> Vec<(&Name, &Name, Span)> {
         let solves = self.bindings.solves();
         let pair = |atom| match arguments(atom)[..] {
@@ -158,8 +154,8 @@ impl Comparison<'_> {
         required
     }
 
-    /// Returns an error for each required function that no design can solve because the names in the problem
-    /// and the knowledge base differ. Empty if no predicate of the domain expresses availability.
+    /// Returns an error for each required function that no design can solve because the names in the problem and the
+    /// knowledge base differ.
     fn unsolved(&self, own: &BTreeSet<Name>) -> Vec<Finding> {
         let is_availability =
             |declared: &Declaration| self.bindings.is_availability(&declared.identifier.name);
@@ -235,16 +231,13 @@ impl Comparison<'_> {
         Some(Finding { in_domain, span, text, help })
     }
 
-    /// Returns `true` if the problem decides on the availability of a design and states that the
-    /// design is available. `own` contains the designs on which the problem decides.
     fn is_usable(&self, object: &Object, own: &BTreeSet<Name>) -> bool {
         let mut available =
             facts(self.problem).filter(|atom| self.bindings.is_availability(&atom.predicate.name));
         own.contains(&object.name) && available.any(|atom| arguments(atom) == [&object.name])
     }
 
-    /// Compares the members of a role (such as design or function) in the problem and in the
-    /// knowledge base. Finds objects without an individual, and designs that the problem never
+    /// Finds objects of a role (such as design or function) without an individual, and designs that the problem never
     /// names.
     fn one_sided(&self, role: &Role, own: &BTreeSet<Name>) -> OneSided {
         let always = [FUNCTION, DESIGN].contains(&role.class.as_str());

@@ -14,16 +14,9 @@ use crate::called::Naming;
 use crate::knowledge::Knowledge;
 use crate::message::{Errors, Message, did_you_mean};
 
-/// Object names of individuals, by IRI, and warnings.
 pub(crate) type Resolved = (CalledNames, Vec<Message>);
 
-/// Computes the object names that `[bindings.names]` gives to individuals. Exact entries take
-/// precedence over patterns.
-///
-/// # Errors
-/// All malformed entries; entries without a matching individual; entries without an object, or with an object of
-/// another type (for a pattern: only if this holds for all its individuals); individuals that would have two object
-/// names; and objects that several individuals would share.
+/// Computes the object names that `[bindings.names]` gives to individuals. Exact entries take precedence over patterns.
 pub(crate) fn resolve(
     domain: &Domain,
     problem: &Problem,
@@ -71,7 +64,6 @@ struct Resolving<'a> {
     types: TypeHierarchy,
     individuals: BTreeSet<&'a Individual>,
     objects: BTreeMap<&'a Name, &'a TypedName>,
-    /// Object name by the IRI of the individual, with the entry that gives this name.
     called: BTreeMap<&'a str, (String, &'a Naming)>,
     errors: Vec<Message>,
     warnings: Vec<Message>,
@@ -193,7 +185,6 @@ impl<'a> Resolving<'a> {
         }
     }
 
-    /// Reports object names that several individuals would share.
     fn clashes(&mut self) {
         let mut by_name: BTreeMap<Name, Vec<&Individual>> = BTreeMap::new();
         for individual in &self.individuals {

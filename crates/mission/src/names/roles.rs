@@ -27,12 +27,10 @@ pub(super) struct Object {
     pub(super) in_domain: bool,
 }
 
-/// A class with its individuals in the knowledge base and its objects in the PDDL files.
 #[derive(Debug)]
 pub(super) struct Role {
     /// The local name of the class.
     pub(super) class: String,
-    /// The types of the domain that are bound to the class.
     pub(super) types: TypeExpression,
     pub(super) individuals: Vec<Individual>,
     /// Objects with this role, each once, in the order of the files.
@@ -93,13 +91,10 @@ impl Roles {
         &self.roles
     }
 
-    /// Returns the role (individuals and objects) of a class, given by local name. The class must have a
-    /// role.
     pub(super) fn of(&self, class: &str) -> &Role {
         self.roles.iter().find(|role| role.class == class).expect("invariant: TOMASys' own roles are there")
     }
 
-    /// Assigns to each object whose type is bound to a class the role of this class.
     fn place(&mut self, domain: &Domain, problem: &Problem) {
         let types = TypeHierarchy::of(domain);
         let constants = domain.constants.iter().map(|constant| (constant, true));
@@ -112,8 +107,6 @@ impl Roles {
         }
     }
 
-    /// Assigns to objects the roles that follow from facts, such as that a design solves a function. Considers only
-    /// classes to which no type of the domain is bound.
     fn place_by_facts(&mut self, domain: &Domain, problem: &Problem, bindings: &Bindings) {
         let constants = domain.constants.iter().map(|constant| (constant, true));
         let declared: Vec<_> =

@@ -47,7 +47,6 @@ const CONFIGURED: &str = "f_configured";
 /// Additions of a knowledge base to the actions of a plain domain (see the head of this file).
 #[derive(Debug, Clone)]
 pub struct CoAdaptation {
-    /// Requirements of each action, by the name of its schema.
     actions: BTreeMap<Name, Needs>,
     /// Maps each numeric function to the attribute whose sum over the chosen designs replaces it.
     chosen: BTreeMap<Name, String>,
@@ -56,7 +55,6 @@ pub struct CoAdaptation {
     changed: BTreeMap<Name, String>,
 }
 
-/// Required functions and quality bounds of an action, and the number of its parameters in the plain domain.
 #[derive(Debug, Clone)]
 struct Needs {
     functions: Vec<Needed>,
@@ -72,13 +70,8 @@ struct Needed {
 }
 
 impl CoAdaptation {
-    /// Determines the additions to a domain. Returns `None` if the domain declares a type of designs, or if
-    /// the knowledge base requires no function for the domain's actions.
-    ///
-    /// # Errors
-    /// Function names that PDDL does not admit. Contexts of quality bounds that are not predicates of the domain
-    /// with fitting parameters. Reserved names that the domain declares. Uses of functions where newly chosen
-    /// designs cannot be counted.
+    /// Determines the additions to a domain. Returns `None` if the domain declares a type of designs, or if the
+    /// knowledge base requires no function for the domain's actions.
     pub(super) fn new(
         domain: &Domain,
         problem: &Problem,
@@ -162,8 +155,6 @@ impl CoAdaptation {
         errors
     }
 
-    /// Returns the functions bound to `reconfigured:ATTRIBUTE` that an action uses where reconfigurations cannot be
-    /// counted, e.g. in a condition.
     fn not_counted(&self, action: &Action) -> BTreeSet<Name> {
         let uncounted = RefCell::new(BTreeSet::new());
         let see = |part: &mut Expression| {
@@ -193,14 +184,10 @@ impl CoAdaptation {
         uncounted.into_inner()
     }
 
-    /// Returns the number of parameters of an action in the plain domain. `None` if the action has
-    /// no additions.
     pub(super) fn parameters(&self, action: &str) -> Option<usize> {
         self.actions.get(&Name::new(action)).map(|needs| needs.parameters)
     }
 
-    /// Returns the explicit form of a plain domain: actions with parameters, conditions and effects for their
-    /// designs, and the types, constants, predicates and numeric functions that these use.
     pub(super) fn explicit(&self, domain: &Domain) -> Domain {
         let mut explicit = domain.clone();
         for own in [FUNCTION, DESIGN] {
@@ -253,7 +240,6 @@ impl CoAdaptation {
         self.actions.values().flat_map(|needs| &needs.functions)
     }
 
-    /// Returns the quality bounds of all actions, without duplicates.
     fn quality(&self) -> Vec<&Quality> {
         let mut bounds: Vec<_> = self.actions.values().flat_map(|needs| &needs.quality).collect();
         bounds.sort_by(|a, b| a.individual.cmp(&b.individual));
@@ -280,7 +266,6 @@ impl CoAdaptation {
         attributes.into_iter().map(|attribute| declaration(&value_of(attribute), &[("fd", DESIGN)])).collect()
     }
 
-    /// Adds the parameters, conditions and effects for the designs of an action.
     fn adapt(&self, action: &mut Action, needs: &Needs, domain: &Domain) {
         let designs: Vec<(Identifier, &Needed)> = needs
             .functions
@@ -345,8 +330,8 @@ impl CoAdaptation {
         }
     }
 
-    /// Appends to `out`, for each `increase` and `decrease` effect whose amount contains a sum over the newly
-    /// chosen designs, a conditional effect for each design. This effect adds the design's share of the sum if the
+    /// For each `increase` or `decrease` effect whose amount contains a sum over the newly chosen designs, appends a
+    /// conditional effect per design to `out`. The conditional effect applies the design's share of the sum if the
     /// design replaces another one.
     fn changes(&self, effect: &Effect, designs: &[(Identifier, &Needed)], out: &mut Vec<Effect>) {
         match effect {
@@ -444,8 +429,8 @@ fn changed(design: &Identifier, function: &str) -> Condition {
     Condition::And(vec![configured, Condition::Not(Box::new(at_work))])
 }
 
-/// Returns two maps from numeric functions to attributes: functions that are sums over the chosen designs,
-/// and functions that are sums over the newly chosen designs (those that replace another design).
+/// Returns the numeric functions that are sums over the chosen designs, and those that are sums over the newly chosen
+/// designs, each with its attribute.
 fn attributes(
     domain: &Domain,
     problem: &Problem,
@@ -485,7 +470,6 @@ fn has_parameter(action: &Action, name: &Name) -> bool {
     action.parameters.iter().any(|parameter| parameter.identifier.name == *name)
 }
 
-/// Returns the name of the predicate that states which designs meet a quality bound.
 fn meets(quality: &Quality) -> Name {
     Name::new(&format!("fd_meets_{}", quality.individual.name))
 }
@@ -507,8 +491,6 @@ fn declaration(name: &str, parameters: &[(&str, &str)]) -> Declaration {
     Declaration { identifier: identifier(&Name::new(name)), parameters }
 }
 
-/// Builds an atom whose first argument is a design variable, and whose second argument is a
-/// function if one is given.
 fn of_design(symbol: &str, design: &Identifier, function: Option<&str>) -> pddl::ast::Atom {
     let mut atom = atom(&Name::new(symbol), function.as_slice());
     atom.arguments.insert(0, Term::Variable(design.clone()));

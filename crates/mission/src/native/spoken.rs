@@ -6,14 +6,10 @@ use pddl::ast::Name;
 use super::{CoAdaptation, meets};
 
 impl CoAdaptation {
-    /// Returns `true` if a numeric function is replaced by a sum over the chosen or the newly
-    /// chosen designs.
     pub(crate) fn stands_for_designs(&self, function: &Name) -> bool {
         self.chosen.contains_key(function) || self.changed.contains_key(function)
     }
 
-    /// Rewrites a condition for display: an atom which states that a design meets a quality bound becomes `(meets
-    /// DESIGN BOUND)`.
     pub(crate) fn spoken(&self, condition: &str) -> String {
         let mut text = condition.to_owned();
         for quality in self.quality() {
@@ -27,7 +23,6 @@ impl CoAdaptation {
         text
     }
 
-    /// Returns `true` if `name` is a predicate or function that co-adaptation has added to the user's domain.
     pub(crate) fn is_added(&self, name: &Name) -> bool {
         self.predicates().into_iter().chain(self.functions()).any(|own| own.identifier.name == *name)
     }

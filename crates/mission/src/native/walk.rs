@@ -2,7 +2,6 @@
 
 use pddl::ast::{Assignment, Effect, Expression, Name};
 
-/// Returns `true` if the expression reads a numeric function that `wanted` accepts.
 pub(super) fn mentions(expression: &Expression, wanted: &dyn Fn(&Name) -> bool) -> bool {
     let mut is_mentioned = false;
     expression.walk_fluents(&mut |fluent| is_mentioned |= wanted(&fluent.predicate.name));

@@ -13,7 +13,6 @@ use super::terms::{Terms, is_annotation, is_bottom, is_top};
 use crate::message::Message;
 
 impl Terms {
-    /// Translates the terminology of an ontology: signature, axioms and rules.
     pub(crate) fn new(ontology: &Ontology) -> Self {
         let mut terms = Self::default();
         terms.signature(ontology);
@@ -56,10 +55,8 @@ impl Terms {
         terms
     }
 
-    /// Translates an axiom and adds the resulting derived predicates.
-    ///
-    /// # Errors
-    /// The kind of the axiom, if it has no translation.
+    /// Translates an axiom and adds the resulting derived predicates. If the axiom has no translation, returns its kind
+    /// as an error.
     fn axiom(&mut self, stated: &Axiom) -> Result<(), &'static str> {
         let [x, y, z] = [variable("x"), variable("y"), variable("z")];
         match stated {
@@ -183,7 +180,6 @@ impl Terms {
     }
 }
 
-/// Returns the name of an axiom's kind in the OWL specification, or a description of several kinds.
 fn kind(axiom: &Axiom) -> &'static str {
     match axiom {
         Axiom::EquivalentClasses(_) => "EquivalentClasses",

@@ -25,8 +25,6 @@ impl Terms {
         self.literals.prefer(literals);
     }
 
-    /// Declares the types of individuals and numbers, and types that occur only as types of
-    /// objects.
     pub(super) fn declare_types(
         &self,
         domain: &mut Domain,
@@ -65,8 +63,6 @@ impl Terms {
         }
     }
 
-    /// Declares constants for individuals and values, and for the numbers that occur in rules and
-    /// in the PDDL files.
     pub(super) fn declare_constants(
         &self,
         domain: &mut Domain,
@@ -97,8 +93,6 @@ impl Terms {
         }
     }
 
-    /// Declares the predicates of classes and properties, for asserted and for inferred facts, and
-    /// the predicates of numeric comparisons.
     pub(super) fn declare_predicates(&self, domain: &mut Domain) {
         let mut declared: BTreeSet<Name> =
             domain.predicates.iter().map(|predicate| predicate.identifier.name.clone()).collect();

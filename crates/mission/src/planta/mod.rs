@@ -47,7 +47,6 @@ pub(crate) fn wanted(ontology: &Ontology, domain: &str) -> Option<Terms> {
     missing.iter().any(|name| inferred(name) || terms.has(name)).then_some(terms)
 }
 
-/// A domain and a problem in PLANTA's form, completed from a knowledge base.
 #[derive(Debug, Clone)]
 pub(crate) struct Planta {
     terms: Arc<Terms>,
@@ -90,8 +89,6 @@ impl Planta {
         &self.known
     }
 
-    /// Returns an error for each predicate that the completed domain uses but that neither the
-    /// domain nor the knowledge base declares.
     pub(crate) fn unknown(completed: &Domain) -> Vec<Message> {
         let declared: Vec<&str> =
             completed.predicates.iter().map(|declared| declared.identifier.name.as_str()).collect();
@@ -105,8 +102,8 @@ impl Planta {
         errors.collect()
     }
 
-    /// Adds the asserted facts `stated`, their objects, and the comparisons of numbers to a problem. Removes values
-    /// of functional data properties that contradict them. Returns warnings.
+    /// Adds the asserted facts `stated`, their objects, and the comparisons of numbers to a problem. Removes the
+    /// problem's values of functional data properties that contradict these facts. Returns warnings.
     pub(crate) fn fill(
         &self,
         domain: &Domain,
@@ -176,8 +173,6 @@ impl Planta {
         stated.filter_map(|fact| self.fact(&fact, engine))
     }
 
-    /// Translates an asserted fact to PDDL. Returns `None` if its predicate is not part of the
-    /// ontology.
     fn fact(&self, fact: &Fact, engine: &Engine) -> Option<PddlFact> {
         let symbols = engine.symbols();
         let predicate = self.terms.symbols.get(symbols.value(fact.predicate).as_name()?)?.clone();

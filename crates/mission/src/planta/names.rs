@@ -11,9 +11,7 @@ use ontology::vocab::{local_name, xsd};
 use pddl::ast::Name;
 use rules::Literal;
 
-/// Predicate: the first number is less than the second.
 pub(super) const LESS: &str = "lessThan";
-/// Predicate: two numbers are equal.
 pub(super) const EQUAL: &str = "equalTo";
 /// Derived predicate that holds if an axiom is violated.
 pub(super) const INCONSISTENT: &str = "inferred-Inconsistent";
@@ -25,20 +23,16 @@ pub(super) const UNGROUND: &str = "fd_unground";
 /// that use it and not the first.
 pub(super) const NUMBER_TYPES: [&str; 2] = ["numerical-object", "owl-number"];
 
-/// Returns the PDDL name of an individual, a class or a property.
 pub(super) fn plain(iri: &str) -> Name {
     Name::new(&spelled(local_name(iri)))
 }
 
-/// Returns the PDDL name of the inferred predicate of a class or property, given its plain
-/// predicate.
 pub(super) fn inferred(plain: &Name) -> Name {
     let mut letters = plain.as_str().chars();
     let first = letters.next().map(|first| first.to_uppercase().collect::<String>()).unwrap_or_default();
     Name::new(&format!("inferred-{first}{}", letters.as_str()))
 }
 
-/// Returns the PDDL name of a literal, for example `0.25_decimal`.
 pub(super) fn literal(lexical: &str, datatype: Option<&str>) -> Name {
     let datatype = local_name(datatype.unwrap_or(xsd::STRING));
     Name::new(&format!("{}_{datatype}", spelled(lexical)))

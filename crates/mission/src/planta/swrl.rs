@@ -36,9 +36,6 @@ impl Variables {
 }
 
 /// Translates a rule to derived predicates, one for each atom of the rule's head.
-///
-/// # Errors
-/// The reason why the rule has no translation.
 pub(super) fn derived(rule: &Rule, terms: &mut Terms) -> Result<Vec<Derived>, String> {
     if rule.head.is_empty() {
         return Err("it concludes nothing".to_owned());
@@ -151,7 +148,6 @@ fn condition(
     Ok(Some(condition))
 }
 
-/// Translates a SWRL built-in that compares two numbers. Returns an error for any other built-in.
 fn comparison(iri: &str, left: &Term, right: &Term) -> Result<Condition, String> {
     let relation = |name: &str, left: &Term, right: &Term| {
         Condition::Atom(atom(Name::new(name), vec![left.clone(), right.clone()]))

@@ -36,7 +36,6 @@ pub struct Terms {
 }
 
 impl Terms {
-    /// Returns `true` if a class or property has this plain or inferred predicate.
     pub(crate) fn has(&self, predicate: &Name) -> bool {
         self.predicates.contains_key(predicate)
     }
@@ -57,10 +56,8 @@ impl Terms {
         }
     }
 
-    /// Returns the plain predicate of a class or property, and declares it if necessary.
-    ///
-    /// # Errors
-    /// Another entity with the same name has another arity.
+    /// Returns the plain predicate of a class or property, and declares it if necessary. Fails if the name already has
+    /// another arity.
     pub(super) fn plain(&mut self, iri: &Iri, arity: usize) -> Result<Name, String> {
         let name = names::plain(iri);
         let declared_arity = *self.predicates.entry(name.clone()).or_insert(arity);
@@ -113,7 +110,6 @@ impl Terms {
         }
     }
 
-    /// Returns the constant of an individual, and declares it unless the individual is anonymous.
     pub(super) fn individual(&mut self, iri: &Iri) -> Name {
         let name = names::plain(iri);
         if !iri.starts_with(ANONYMOUS) {
@@ -154,12 +150,10 @@ pub(super) fn is_annotation(iri: &str) -> bool {
     iri.starts_with(annotation::NS)
 }
 
-/// Returns `true` for `owl:Thing`, to which every individual belongs. The class has no predicate.
 pub(super) fn is_top(iri: &str) -> bool {
     iri == owl::THING
 }
 
-/// Returns `true` for `owl:Nothing`, to which no individual belongs. The class has no predicate.
 pub(super) fn is_bottom(iri: &str) -> bool {
     iri == owl::NOTHING
 }

@@ -30,12 +30,9 @@ impl Deadline {
     }
 }
 
-/// Atom that the auxiliary actions add, because actions without effects would be pruned. It is never true,
-/// because these actions are never executed.
+/// Atom that the auxiliary actions add. It is never true, because these actions are never executed.
 pub(super) const LOOKED_AT: &str = "a deadline was looked at";
 
-/// Adds two auxiliary actions to the domain for each deadline. Returns the deadlines without their conditions
-/// and effects.
 pub(super) fn install(
     domain: &mut Domain,
     problem: &Problem,

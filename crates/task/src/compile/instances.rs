@@ -57,8 +57,6 @@ impl<'t> Objects<'t> {
     }
 }
 
-/// Returns the position tuple after `positions` in lexicographic order, or `None` after the last tuple. Each
-/// position is less than its size.
 fn following(positions: &[usize], sizes: &[usize]) -> Option<Vec<usize>> {
     let mut next = positions.to_vec();
     for (position, size) in next.iter_mut().zip(sizes).rev() {

@@ -181,7 +181,6 @@ fn preferences_in(objectives: &[Metric]) -> Vec<Name> {
     preferences
 }
 
-/// Replaces each `(is-violated NAME)` by the numeric function that counts the violations of the preference.
 fn name_violations(expression: &mut Expression) {
     if let Some(name) = violation(expression).cloned() {
         *expression = Expression::Fluent(preferences::count(&name));

@@ -27,8 +27,7 @@ const GOING_ON: &str = "the plan goes on";
 
 pub(super) const VIOLATION: &str = " is violated";
 
-/// Atom that the hidden actions add, because actions without effects would be pruned. It is never true, because
-/// these actions are never executed: only their preconditions are evaluated.
+/// Atom that hidden actions add if actions may overlap. It is never true, because these actions are never executed.
 const VIOLATED: &str = "a preference is violated";
 
 pub(super) fn count(preference: &Name) -> Atom {
@@ -40,9 +39,8 @@ fn violate(preference: &Name) -> Effect {
     Effect::Assign(Assignment::Increase, count(preference), unit, Span::default())
 }
 
-/// Adds hidden actions, violation counts and counting effects to the task, for the preferences `used_preferences` that
-/// the objectives mention. `wanted` holds the instances of preferences on the goal and on trajectories, with their
-/// conditions on the last state.
+/// Adds hidden actions, violation counts and counting effects for the preferences `used_preferences`. `wanted` holds
+/// the instances of preferences on the goal and on trajectories.
 pub(super) fn install(
     domain: &mut Domain,
     problem: &mut Problem,
@@ -64,8 +62,8 @@ pub(super) fn install(
     }
 }
 
-/// Adds hidden actions that are executed after a sequential plan and evaluate the preferences in a fixed order.
-/// The new goal requires that all preferences are evaluated.
+/// Adds hidden actions that evaluate the preferences in a fixed order. The new goal requires that all preferences are
+/// evaluated.
 fn follow(domain: &mut Domain, problem: &mut Problem, wanted: Vec<PreferenceInstance>) {
     declare(domain, GOING_ON);
     problem.init.push(InitialElement::Fact(flag(GOING_ON)));
@@ -96,8 +94,8 @@ fn follow(domain: &mut Domain, problem: &mut Problem, wanted: Vec<PreferenceInst
     problem.goal = holds(&before);
 }
 
-/// Adds one hidden action for each preference instance. Its precondition is the violation of the instance; it
-/// is never executed.
+/// Adds one hidden action for each preference instance. The action is never executed; its precondition is the violation
+/// of the instance.
 fn look_up(domain: &mut Domain, span: Span, wanted: Vec<PreferenceInstance>) {
     if !wanted.is_empty() {
         declare(domain, VIOLATED);

@@ -8,8 +8,6 @@ use pddl::ast::{
 
 use super::simplify::{all, any, equal, exists, falsity, is_false, not};
 
-/// Limit on the number of cases of a regressed comparison. A case fixes which effects on the compared functions
-/// occur.
 const MAX_CASES: usize = 64;
 
 pub(super) struct Happening {
@@ -26,12 +24,9 @@ struct Change {
 /// function after the happening.
 type Way = (Condition, Vec<(Atom, Expression)>);
 
-/// Reason why a condition cannot be regressed, as a noun phrase for the error message.
 pub(super) struct NotRegressable(pub(super) &'static str);
 
 impl Happening {
-    /// Collects the effects of an action at its start or end. An instantaneous action has effects at its
-    /// start only.
     pub(super) fn of(action: &Action, time: EffectTime) -> Self {
         let mut changes = Vec::new();
         match &action.body {
@@ -146,7 +141,7 @@ impl Happening {
         })
     }
 
-    /// Returns the condition under which an effect of the kind that `is_kind` selects changes the atom.
+    /// Returns the condition under which an effect selected by `is_kind` applies to the atom.
     fn occurs(&self, atom: &Atom, is_kind: impl Fn(&Effect) -> bool) -> Condition {
         let changes = self.changes.iter().filter(|change| is_kind(&change.effect));
         any(changes.map(|change| {
@@ -160,8 +155,7 @@ impl Happening {
     }
 
     /// Returns all cases of a case distinction over the effects on the functions. In each case, every function has one
-    /// new value. Fails if a quantified effect may change one of the functions, or there are more than `MAX_CASES`
-    /// cases.
+    /// new value.
     fn ways(&self, functions: &[Atom]) -> Result<Vec<Way>, NotRegressable> {
         let mut ways = vec![(super::simplify::truth(), Vec::new())];
         for function in functions {
@@ -230,7 +224,6 @@ fn flatten(effect: &Effect, bound: &[TypedName], conditions: &[Condition], out: 
     }
 }
 
-/// Returns the atom or function that an effect changes. The second part is `true` for a numeric function.
 fn target(effect: &Effect) -> (&Atom, bool) {
     match effect {
         Effect::Assign(_, target, ..) => (target, true),

@@ -79,7 +79,6 @@ pub(super) fn exists(variables: &[TypedName], body: Condition) -> Condition {
     Condition::Exists(variables.to_vec(), Box::new(body))
 }
 
-/// Returns the disjuncts of a disjunction. A condition that is no disjunction is its only disjunct.
 pub(super) fn ways(condition: Condition) -> Vec<Condition> {
     if let Condition::Or(parts) = condition { parts } else { vec![condition] }
 }

@@ -20,8 +20,6 @@ use super::syntax_edits::unsupported;
 use super::trajectory_monitors::{Addition, Monitors, decided};
 
 impl Monitors<'_> {
-    /// Returns the minimum time between interfering happenings. Sequential plans have no times, so they cause
-    /// an error.
     fn separation(&self, place: (File, Span)) -> Result<BigRational, Error> {
         match self.course {
             PlanSemantics::Overlapping(separation) => Ok(separation.clone()),

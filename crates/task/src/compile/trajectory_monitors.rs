@@ -29,7 +29,7 @@ pub(super) struct Monitors<'t> {
     problem: &'t Problem,
     objects: &'t Objects<'t>,
     pub(super) initial: Initial<'t>,
-    /// Additional conditions and effects of each action: at its start, and at its end.
+    /// Additional conditions and effects of each action at its start and at its end.
     additions: Vec<[Addition; 2]>,
     memory: Vec<(String, bool)>,
     goals: Vec<Condition>,
@@ -81,8 +81,6 @@ impl<'t> Monitors<'t> {
         self.initial.is_defined(condition, place)
     }
 
-    /// Adds monitors for all instances of a constraint. Their conditions on the last state become goals, or
-    /// preference instances if the constraint has a preference name.
     pub(super) fn add_constraint(&mut self, file: File, constraint: &Constraint) -> Result<(), Error> {
         for binding in self.objects.bindings(&constraint.variables, &Vec::new()) {
             let place = (file, constraint.span);
@@ -252,8 +250,7 @@ impl<'t> Monitors<'t> {
         !self.narrows && self.deadlines.is_empty() && self.additions.iter().flatten().all(is_plain)
     }
 
-    /// Checks that only effects of actions can change a condition. Returns an error if it contains a derived
-    /// predicate or an atom that timed initial literals change.
+    /// Returns an error if a condition contains a derived predicate or an atom that timed initial literals change.
     pub(super) fn can_be_watched(&self, condition: &Condition, place: (File, Span)) -> Result<(), Error> {
         let mut predicates = FxHashSet::default();
         predicates_of(condition, &mut predicates);

@@ -61,8 +61,8 @@ pub struct Generality {
     /// If set to n, numeric fluents are scaled such that all multiples of 1/n become integers, in addition to the
     /// numbers of the problem.
     pub precision: Option<Int>,
-    /// If set, the metric may contain fluents that effects change by state-dependent amounts. Optimality is
-    /// then not provable.
+    /// If set, the metric may contain fluents that effects change by state-dependent amounts. The operator costs alone
+    /// then do not determine the metric.
     pub measures_ends: bool,
     /// If set, fluents with changes that improve the metric are treated like fluents with state-dependent changes:
     /// their final values are added to the cost at the end of the plan.

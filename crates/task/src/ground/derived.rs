@@ -63,8 +63,6 @@ fn retain<T>(
     outcome
 }
 
-/// Finds derived atoms whose truth value is constant, and substitutes the value: in the rules until a
-/// fixpoint, then in the operators and the goal.
 fn fold(task: &mut GroundTask<'_>, axioms: &mut Vec<GroundAxiom>) -> Result<(), Interrupted> {
     let (world, limits) = (&task.world, task.world.limits);
     let derived: Vec<AtomId> =
@@ -109,7 +107,6 @@ fn conjunction(literals: &mut Vec<GroundLiteral>, known: &FxHashMap<AtomId, bool
     !fails
 }
 
-/// Removes literals with known truth values from a condition. Returns `false` if the condition is then false.
 fn substitute(condition: &mut GroundCondition, known: &FxHashMap<AtomId, bool>) -> bool {
     if !conjunction(&mut condition.literals, known) {
         return false;
@@ -181,7 +178,6 @@ fn inline(condition: &mut GroundCondition, bodies: &FxHashMap<AtomId, GroundCond
     condition.tidy()
 }
 
-/// Replaces a literal if the only rule of its atom has exactly one literal and no comparison as its body.
 fn rename(literal: &mut GroundLiteral, bodies: &FxHashMap<AtomId, GroundCondition>) {
     if let Some(body) = bodies.get(&literal.0)
         && let [(atom, positive)] = body.literals[..]

@@ -73,11 +73,8 @@ fn attach(task: &mut GroundTask<'_>, metric: &Metric, generality: &Generality) -
     Ok(())
 }
 
-/// Removes the fluents with state-dependent changes from a metric and returns them with their factors. If
-/// `generality` measures rewards, also removes the fluents with changes that improve the metric.
-///
-/// # Errors
-/// A fluent has state-dependent changes, but `generality` requires costs that are exact.
+/// Removes the fluents with state-dependent changes from a metric and returns them with their factors. If `generality`
+/// measures rewards, also removes the fluents with changes that improve the metric.
 fn rest(
     task: &GroundTask<'_>,
     linear: &mut Linear<Rational>,
@@ -110,7 +107,6 @@ fn rest(
     Ok(rest)
 }
 
-/// Returns `true` if the change of a fluent, multiplied by `factor`, may decrease the metric.
 fn lowers(value: &Linear<Rational>, factor: &Rational) -> bool {
     let mut change = value.quantity.clone();
     change.scale(factor);

@@ -104,8 +104,6 @@ pub fn ground_for<N: TaskNumber>(
     }
 }
 
-/// Grounds a normalized task. Before grounding, splits actions that may have duration 0, and applies timed events at or
-/// before time 0.
 fn ground_normal<N: TaskNumber>(
     mut lifted: Lifted,
     config: &GroundConfig,

@@ -121,7 +121,7 @@ pub struct Schema {
 pub struct Joint {
     pub(crate) start: Formula,
     pub(crate) end: Formula,
-    /// Number of effects that belong to the start; they precede those of the end in `end_effects`.
+    /// Number of effects of the start, which come first in `end_effects`.
     pub(crate) start_effects: usize,
 }
 

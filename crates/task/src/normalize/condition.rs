@@ -65,8 +65,6 @@ fn quantified(universal: bool, mut bound: Vec<Bound>, body: Formula) -> Formula 
     }
 }
 
-/// Flattens an effect into single changes and appends them to `out`, each with its quantified variables and
-/// its condition.
 pub(super) fn effect(names: &mut Names, written: &ast::Effect, scope: &mut Scope, out: &mut Vec<Effect>) {
     let change = match written {
         ast::Effect::And(parts) => return parts.iter().for_each(|part| effect(names, part, scope, out)),

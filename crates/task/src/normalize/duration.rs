@@ -135,8 +135,7 @@ pub(super) fn duration(
     (chosen, conditions)
 }
 
-/// Creates the auxiliary numeric function for the chosen duration of an action, and returns the expression
-/// that reads it.
+/// Creates the auxiliary numeric function for the chosen duration of an action.
 fn chosen(names: &mut Names, (action, parameters): (&Name, usize), place: Place) -> Expression {
     let id = FunctionId(dense(names.functions.len()));
     let name = Name::new(&format!("{CHOSEN}{action}"));

@@ -4,8 +4,6 @@
 use crate::lifted::configuration::{is_static, recursive_through_forall};
 use crate::lifted::{Axiom, Change, Formula, Lifted};
 
-/// Marks as fluents: predicates and functions that actions or timed events change, derived predicates that
-/// depend on fluents, and derived predicates whose rules the Datalog engine cannot evaluate exactly.
 pub(super) fn mark_fluents(lifted: &mut Lifted) {
     for effect in
         lifted.schemas.iter().flat_map(|schema| schema.start_effects.iter().chain(&schema.end_effects))
@@ -43,8 +41,6 @@ pub(super) fn mark_fluents(lifted: &mut Lifted) {
     }
 }
 
-/// Returns `true` if the condition contains a numeric comparison below a universal quantifier. `below` is
-/// `true` if the condition itself is below one.
 fn compares_for_all(formula: &Formula, below: bool) -> bool {
     match formula {
         Formula::And(parts) | Formula::Or(parts) => parts.iter().any(|part| compares_for_all(part, below)),

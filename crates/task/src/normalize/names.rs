@@ -64,7 +64,6 @@ pub(super) struct Names {
     predicate_ids: FxHashMap<Name, PredicateId>,
     pub(super) functions: Vec<Function>,
     function_ids: FxHashMap<Name, FunctionId>,
-    /// `true` if actions may overlap, so that the planner chooses variable durations.
     pub(super) is_free: bool,
     pub(super) errors: Vec<Error>,
 }

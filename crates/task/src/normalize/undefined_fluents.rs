@@ -32,7 +32,7 @@ pub fn guard(lifted: &mut Lifted) {
     super::fluents::mark_fluents(lifted);
 }
 
-/// Declares the guard predicates and their initial facts. Returns the guard predicate of each guarded function.
+/// Declares the guard predicates and their initial facts.
 fn declare(lifted: &mut Lifted) -> Guards {
     let mut measured = Vec::new();
     for metric in &lifted.metrics {
@@ -100,8 +100,6 @@ fn add(condition: &mut Formula, more: Vec<Formula>) {
     }
 }
 
-/// Returns an effect that makes the guard true under the condition of `effect`, or `None` unless `effect` is an
-/// `assign` to a function with a guard.
 fn gives_value(effect: &Effect, guards: &Guards) -> Option<Effect> {
     let Change::Assign { assignment: Assignment::Assign, function, terms, .. } = &effect.change else {
         return None;

@@ -10,7 +10,6 @@ use crate::error::{Error, Errors};
 use crate::lifted::{Expression, Formula, FunctionId, Joint, Lifted, Rational, Schema};
 use pddl::ast::Comparison;
 
-/// Lower and upper bound on the value of an expression, or `None` if they are unknown.
 type Range = Option<(Rational, Rational)>;
 
 /// Splits every schema whose duration may be 0 into two schemas. The schemas for duration 0 are appended. A schema

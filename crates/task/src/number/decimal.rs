@@ -47,7 +47,6 @@ fn fits(mantissa: I256) -> bool {
 }
 
 fn exponent_of_five(power: u128) -> Option<u32> {
-    // Powers of 5 are sorted, so the exponent is found by binary search.
     FIVES.binary_search(&power).ok().and_then(|exponent| u32::try_from(exponent).ok())
 }
 
@@ -88,8 +87,6 @@ impl Decimal {
         Self::new(mantissa, places)
     }
 
-    /// Converts a fraction of big integers. Returns `None` if it has no finite decimal expansion or too many
-    /// digits.
     pub(super) fn from_big(big: &BigRational) -> Option<Self> {
         let bits = |integer: &BigInt| integer.bits();
         if bits(big.numer()) > BITS.into() || bits(big.denom()) > U256::BITS.into() {
@@ -147,8 +144,6 @@ impl Decimal {
         self.mantissa.is_positive()
     }
 
-    /// Returns both mantissas for a common number of decimal places, and this number. Returns `None` on
-    /// overflow.
     fn aligned(self, other: Self) -> Option<(I256, I256, u32)> {
         let widen =
             |own: Self, places: u32| own.mantissa.checked_mul(power_of_ten(places.checked_sub(own.places)?)?);

@@ -70,8 +70,6 @@ impl Rational {
         Self(decimal.to_small().map_or(Repr::Decimal(decimal), Repr::Small))
     }
 
-    /// Converts to a decimal. Returns `None` if the number has no finite decimal expansion or too many
-    /// digits.
     fn to_decimal(&self) -> Option<Decimal> {
         match &self.0 {
             Repr::Small(small) => Decimal::from_small(small),
@@ -142,8 +140,6 @@ impl Rational {
         }
     }
 
-    /// Applies an operation to two integers of up to 128 bits. Returns `None` if one of the numbers is not
-    /// such an integer or the result overflows.
     fn integers(&self, other: &Self, operation: impl Fn(i128, i128) -> Option<i128>) -> Option<Self> {
         let (a, b) = (self.to_int()?, other.to_int()?);
         operation(a, b).filter(|result| *result > i128::MIN).map(Self::from_integer)

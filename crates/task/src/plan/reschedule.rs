@@ -41,8 +41,6 @@ pub fn earliest<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) ->
     plan
 }
 
-/// Returns the other operators that represent the same action with the same arguments, for other timeline windows
-/// (positions relative to the events) or other truth values of effect conditions.
 fn same_action<N: TaskNumber>(task: &Task<N>, id: OperatorId) -> impl Iterator<Item = OperatorId> + '_ {
     let operator = &task.operators[id.index()];
     let is_same_action = move |other: &Operator<N>| {

@@ -133,7 +133,7 @@ pub struct Statistics {
     pub expanded: u64,
     /// Number of generated successors.
     pub generated: u64,
-    /// Number of evaluated states: new successors that are not dominated.
+    /// Number of states for which a heuristic was evaluated.
     pub evaluated: u64,
     /// Number of restarts of the satisficing search.
     pub restarts: usize,

@@ -13,7 +13,6 @@ use crate::task::quantity::Quantity;
 
 /// Accumulates the least common denominator of numbers.
 pub struct CommonDenominator {
-    /// Least common denominator of the added numbers; `None` if it exceeds `most_bits` bits.
     common: Option<BigInt>,
     most_bits: u64,
     /// Visited tables by address, because operators share tables.

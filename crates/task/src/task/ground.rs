@@ -299,7 +299,6 @@ impl<N: TaskNumber> Linear<N> {
         sum_of_products(self.quantity.at(choice, sizes), self.terms(numbers))
     }
 
-    /// Returns `true` if the value of the expression is ≥ 0, or > 0 if `strict`.
     fn compares(&self, numbers: &[N], choice: &[u32], sizes: &[usize], strict: bool) -> bool {
         N::compare(self.quantity.at(choice, sizes), self.terms(numbers), strict)
     }

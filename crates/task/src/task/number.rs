@@ -6,7 +6,7 @@ use num_traits::{Signed, ToPrimitive as _};
 use crate::number::{GROWTH_LIMIT, Int, LIMIT, Rational};
 use crate::task::quantity::{Number, Quantity, Table};
 
-/// Limit on the sum of the magnitudes of the numbers in a quantity.
+/// Limit on the magnitude of the constant of a quantity plus the greatest magnitude in each of its tables.
 pub const QUANTITY_LIMIT: Int = 1 << 123;
 
 /// Number of summands (constant and tables) up to which [`LIMIT`] alone keeps a quantity below
@@ -19,8 +19,8 @@ const BIT_LIMIT: u64 = 4_096;
 
 /// Number type of a ground task: scaled integers, or exact rationals if integers would overflow.
 pub trait TaskNumber: Number + std::fmt::Debug + std::hash::Hash + Default {
-    /// Whether numbers of this type are multiplied by a common factor of the task that makes them integers.
-    /// If `false`, the factor is always 1.
+    /// `true` if numbers of this type are multiplied by a common factor of the task that makes them integers.
+    /// Otherwise, the factor is always 1.
     const SCALED: bool;
 
     /// Converts `number * scale`. For integers, returns `None` if the result is not an integer or exceeds [`LIMIT`] in

@@ -93,8 +93,8 @@ impl<N: Number> Quantity<N> {
         }
     }
 
-    /// Adds a table. If there is already a table over the same slots, the values are added to those of this
-    /// table. A table whose values are all equal is added to the constant instead.
+    /// Adds a table. If there is already a table over the same slots, the values are added to its values. A table whose
+    /// values are all equal is added to the constant instead.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"

@@ -85,7 +85,6 @@ pub fn each_binding<'a>(
 }
 
 struct Join<'j> {
-    /// Variables with their candidates, in ascending order of the variables.
     bound: &'j [Bound],
     guards: &'j [Guard<'j>],
     /// For each guard (necessary atom): `true` while the enumeration is inside a loop over its rows.
@@ -161,7 +160,6 @@ impl Join<'_> {
         self.guards.iter().enumerate().filter_map(open_variables).min().map(|(_, position)| position)
     }
 
-    /// Applies the next option of a level to the binding. Returns `false` if no option remains.
     fn advance(
         &self,
         world: &mut World<'_>,

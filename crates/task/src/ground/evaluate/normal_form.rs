@@ -77,8 +77,6 @@ impl Definitions {
         clause
     }
 
-    /// Returns a literal that is equivalent to the residual condition. This is the condition itself if it is
-    /// a literal, and otherwise an auxiliary atom.
     pub(crate) fn literal(&mut self, world: &mut World<'_>, residual: &Residual) -> GroundLiteral {
         if let Residual::Literal { atom, positive } = residual {
             return (*atom, *positive);

@@ -1,5 +1,5 @@
-//! Evaluates expressions with unbound slots (parameters whose designs are not grounded) to tables: one value
-//! for each combination of those designs that are still possible for the slots.
+//! Evaluates expressions with unbound slots (parameters whose designs are not grounded) to tables. A table has one
+//! value for each combination of the designs that are possible for its slots.
 
 use crate::error::Error;
 use crate::ground::evaluate::expression::ground;
@@ -23,9 +23,9 @@ impl Slots<'_> {
     }
 }
 
-/// Evaluates an expression with unbound slot parameters. Each summand becomes a separate table over the slots
-/// that it mentions. Design combinations with undefined values are passed to `undefined` as (slots, designs)
-/// and count as 0.
+/// Evaluates an expression with unbound slot parameters. Each summand becomes a separate table over the slots that it
+/// mentions. Design combinations with undefined values count as 0, and are passed to `undefined` as (slots, design
+/// indices).
 ///
 /// # Errors
 /// The expression is not linear, a part that mentions no slot is undefined, the deadline has passed, or the run
@@ -72,8 +72,6 @@ pub fn open(
     }
 }
 
-/// Evaluates an expression for each combination of designs of the slots in `mentioned`, and returns the
-/// values as a table.
 fn table(
     world: &mut World<'_>,
     expression: &Expression,

@@ -13,14 +13,13 @@ use crate::task::number::TaskNumber;
 use crate::task::quantity::Quantity;
 use crate::task::table_map::TableMap;
 
-/// Accumulates the least common denominator of all numbers of one kind, for example of all durations.
 #[derive(Debug)]
 pub(super) struct Denominator {
     what: &'static str,
     /// Least common denominator of the visited numbers; `None` on overflow.
     common: Option<Int>,
     culprit: Option<(String, Option<Place>)>,
-    /// Visited tables by address. The values are stored so that the address stays unique.
+    /// Visited tables by address.
     seen: FxHashMap<*const Rational, Arc<[Rational]>>,
 }
 
@@ -56,11 +55,7 @@ impl Denominator {
         }
     }
 
-    /// Returns the conversion of this kind of number to the number type `N`. For integers, the scale is the
-    /// accumulated denominator; for rationals, it is 1.
-    ///
-    /// # Errors
-    /// `Error::Overflow` if `N` is an integer type and the common denominator is too large.
+    /// Returns the conversion to `N`. Integers are scaled by the accumulated denominator; rationals are not scaled.
     pub(super) fn integers<N: TaskNumber>(self) -> Result<Integers<N>, Error> {
         let common = if N::SCALED { self.common } else { Some(1) };
         let overflow = || {
@@ -72,8 +67,6 @@ impl Denominator {
     }
 }
 
-/// Converts rational numbers of a kind to the number type of the task. For integers, each number is
-/// multiplied by `scale`.
 #[derive(Debug)]
 pub(super) struct Integers<N> {
     what: &'static str,

@@ -29,12 +29,8 @@ use crate::task::quantity::Quantity;
 use crate::task::timing::Timing;
 use crate::task::{Condition, Objective, Operator, State, Task};
 
-/// Converts the ground task over atoms to the final task over finite-domain variables. `unreachable` is the
-/// reason why no plan exists, if known.
-///
-/// # Errors
-/// `Error::Overflow` if numbers exceed exact integers, `Error::Interrupted` if the deadline passes or the run
-/// is interrupted.
+/// Converts the ground task over atoms to the final task over finite-domain variables. `unreachable` is the reason why
+/// no plan exists, if known.
 pub fn finish<N: TaskNumber>(
     mut task: GroundTask<'_>,
     unreachable: Option<String>,

@@ -38,7 +38,6 @@ type Key = SmallVec<[ObjectId; 4]>;
 
 const CANDIDATE_LIMIT: usize = 500;
 
-/// A mutex group, and those of its atoms that become the values of a finite-domain variable.
 pub struct Group {
     /// Values of the variable: at least two atoms that belong to no other variable.
     pub(crate) atoms: Vec<AtomId>,
@@ -102,8 +101,6 @@ fn sorted(atoms: &FxHashSet<AtomId>) -> Vec<AtomId> {
     atoms_in_order
 }
 
-/// Returns the objects at the key positions of an atom, or `None` if the candidate does not contain the
-/// atom's predicate.
 fn key_of(task: &GroundTask<'_>, candidate: &Candidate, atom: AtomId) -> Option<Key> {
     let ((predicate, arguments), ()) = task.world.atoms.get_index(atom.index())?;
     let part = candidate.iter().find(|part| part.predicate == *predicate)?;
@@ -156,8 +153,6 @@ fn invariants(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Result<Vec
     Ok(accepted)
 }
 
-/// An unconditional or conditional effect: the conditions of the operator and of the effect, and the added and
-/// deleted atoms.
 struct Change<'o> {
     conditions: [&'o [GroundLiteral]; 2],
     adds: &'o [AtomId],

@@ -134,9 +134,9 @@ impl<N: TaskNumber> Numbers<N> {
     }
 }
 
-/// Computes a multiple for each numeric variable such that fractional coefficients in effects become
-/// integers. For `(increase (x) (* 0.5 (y)))`, twice the value of x is stored. Returns an empty map if no
-/// multiples are needed or none suffice.
+/// Computes a multiple for each numeric variable such that fractional coefficients in effects become integers. For
+/// `(increase (x) (* 0.5 (y)))`, twice the value of x is stored. Returns an empty map if no multiples are needed or
+/// none are found.
 fn multiples(task: &GroundTask<'_>) -> FxHashMap<NumericId, Int> {
     let mut factors: Vec<(NumericId, NumericId, &Rational)> = Vec::new();
     for (variable, value) in task.operators.iter().flat_map(|operator| operator.numeric_effects.iter()) {

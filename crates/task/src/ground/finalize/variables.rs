@@ -15,7 +15,7 @@ pub(super) struct Atoms {
     pub(super) variables: Vec<Variable>,
     pub(super) basic: usize,
     pub(super) initial: Vec<u32>,
-    /// Variable and value of each atom; `None` for an atom that nothing reads.
+    /// Fact of each atom; `None` if nothing reads the atom.
     facts: Vec<Option<Fact>>,
     /// For each variable, the value for "none of these atoms".
     pub(super) none: Vec<u32>,

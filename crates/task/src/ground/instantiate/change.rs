@@ -15,7 +15,6 @@ use pddl::ast::Assignment;
 
 #[derive(Clone)]
 pub(super) enum GroundChange {
-    /// Makes the atom true or false.
     Atom(AtomId, bool),
     Number {
         variable: NumericId,
@@ -36,7 +35,6 @@ impl GroundChange {
         }
     }
 
-    /// Returns `true` if `reads` contains the changed atom or numeric variable.
     pub(super) fn disturbs(&self, world: &World<'_>, reads: &Reads) -> bool {
         match self {
             Self::Atom(atom, _) => {
@@ -51,8 +49,7 @@ impl GroundChange {
     }
 }
 
-/// Returns the atoms that the changes add, and the atoms that they delete. An atom that is both added and
-/// deleted counts as added.
+/// Returns the added and the deleted atoms. An atom that is both added and deleted counts as added.
 pub(super) fn atoms<'c>(changes: impl Iterator<Item = &'c GroundChange>) -> (Vec<AtomId>, Vec<AtomId>) {
     let (mut adds, mut deletes) = (Vec::new(), Vec::new());
     for change in changes {

@@ -57,7 +57,6 @@ impl Start {
     }
 }
 
-/// The over-all and at-end conditions of an instance, and the timed events between its start and end.
 pub(super) struct Middle<'m> {
     pub(super) over_all: &'m [Residual],
     pub(super) at_end: &'m [Residual],
@@ -147,7 +146,6 @@ pub(super) fn cases(
     Ok(cases)
 }
 
-/// Returns `true` if a conjunct of the parts is false, or if two conjuncts are an atom and its negation.
 fn contradictory(parts: &[Residual]) -> bool {
     fn note(parts: &[Residual], known: &mut FxHashMap<AtomId, bool>) -> bool {
         parts.iter().any(|part| match part {
@@ -196,8 +194,8 @@ fn split<'r>(
 }
 
 impl Case {
-    /// Returns the forbidden combinations of designs of this case (combination of truth values of the effect
-    /// conditions). Returns `Failure::Undefined` if no combination remains allowed.
+    /// Returns the forbidden combinations of designs of this case, including those of `template`. Returns
+    /// `Failure::Undefined` if no combination remains allowed.
     fn forbidden(
         &self,
         template: &GroundOperator,
@@ -219,9 +217,8 @@ impl Case {
         if admit_some(&forbidden, &sizes, limits)? { Ok(forbidden.into()) } else { Err(Failure::Undefined) }
     }
 
-    /// Returns the operator of this case (combination of truth values of the effect conditions). Conditions and
-    /// effects come from the case, and all other fields from `template`. The forbidden combinations of the case
-    /// are added to those of `template`.
+    /// Returns the operator of this case. Its conditions and effects come from the case, and all other fields from
+    /// `template`. The forbidden combinations of the case are added to those of `template`.
     #[expect(clippy::arithmetic_side_effects, reason = "something was pushed before")]
     pub(super) fn operator(
         self,

@@ -25,8 +25,8 @@ use crate::task::ForbiddenCombinations;
 use crate::task::quantity::{Linear, Quantity};
 
 /// Data that all instances of an action schema share if they have the same objects for the key parameters. These
-/// are the parameters in the duration, in the functions of the slots (design parameters that selection
-/// assigns), and in conditions and numeric effects that mention slots.
+/// parameters occur in the duration, the functions of the slots (design parameters that selection assigns), or
+/// conditions and numeric effects that mention slots.
 pub(super) struct SharedInstanceData<'a> {
     pub(super) designs: Slots<'a>,
     pub(super) slots: Arc<GroundSlots>,

@@ -27,7 +27,6 @@ use crate::task::{Argument, ForbiddenCombinations};
 pub(super) struct Instantiation<'a> {
     pub(super) world: World<'a>,
     pub(super) definitions: Definitions,
-    /// Timed events of the task; `None` for a task without timed events.
     pub(super) timeline: Option<Timeline>,
 }
 
@@ -37,9 +36,8 @@ impl<'a> Instantiation<'a> {
         Self { world, definitions: Definitions::default(), timeline }
     }
 
-    /// Returns the operators of an instance: one for each possible combination of a timeline window (position
-    /// between timed events) and a case (truth values of the effect conditions). The list may be empty. Returns
-    /// `Failure::Undefined` if the instance is never applicable.
+    /// Returns one operator for each possible combination of a timeline window and a case. Returns `Failure::Undefined`
+    /// if the instance is never applicable.
     pub(super) fn operators(
         &mut self,
         outline: &SplitSchema<'_>,
@@ -82,8 +80,6 @@ impl<'a> Instantiation<'a> {
     }
 }
 
-/// Returns the forbidden combinations of designs of an instance, including the shared ones. Returns `None` if
-/// every combination is forbidden.
 fn forbidden(
     build: &Build<'_, '_>,
     frame: &SharedInstanceData,
@@ -101,8 +97,6 @@ fn forbidden(
     Ok(is_admissible.then(|| forbidden.into()))
 }
 
-/// Returns an operator with the fields that all operators of an instance have in common; its conditions and
-/// effects are empty.
 fn template(
     build: &Build<'_, '_>,
     outline: &SplitSchema<'_>,
@@ -158,7 +152,6 @@ fn joint_clashes(
     Ok(clashes(build.world, (&first_reads, &first), (&second_reads, &second)))
 }
 
-/// Returns the conditions under which the start or the end of an instance interferes with a timed event.
 fn conflicts(
     world: &World<'_>,
     timeline: &Timeline,

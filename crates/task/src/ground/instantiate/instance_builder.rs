@@ -20,7 +20,7 @@ use pddl::ast::Span;
 
 /// Value of an expression in a conditional effect, computed before it is known whether the effect occurs.
 pub(super) struct Apart {
-    /// Value of the expression; `None` if it is undefined for every design.
+    /// Value of the expression; `None` if a part without slots is undefined.
     pub(super) operand: Option<Linear<Rational>>,
     pub(super) undefined: Arc<[ForbiddenCombinations]>,
 }
@@ -33,8 +33,6 @@ pub(super) struct Build<'w, 'a> {
 }
 
 impl Build<'_, '_> {
-    /// Returns the residuals in `open`, followed by the residuals of the conjuncts in `closed`, which mention
-    /// no slots.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(super) fn conditions(
         &mut self,
@@ -127,7 +125,6 @@ impl Build<'_, '_> {
         self.forbid_where(&slots.into_iter().collect(), &|choice| duration.at(choice, &sizes) < zero)
     }
 
-    /// Forbids the combinations of designs for which a static condition over several slots is false.
     fn forbid_unless(&mut self, conjunct: &Formula, mentioned: &SlotSet) -> Result<(), Failure> {
         let (world, forbidden) = (&mut *self.world, &mut self.forbidden);
         let limits = world.limits;

@@ -82,11 +82,7 @@ pub fn instantiate<'a>(
     Ok(GroundTask { world, operators, axioms: definitions.axioms, goal, objectives: Vec::new() })
 }
 
-/// Returns the operators of all reached instances. For each schema, only the first error is added to
-/// `errors`.
-///
-/// # Errors
-/// `Error::Interrupted` if the deadline passes or the run is interrupted.
+/// Returns the operators of all reached instances. For each schema, only the first error is added to `errors`.
 fn operators(
     instantiation: &mut Instantiation<'_>,
     designs: &[Vec<SlotParameter>],

@@ -25,7 +25,6 @@ impl SimultaneousEffects {
         Self { changes: Vec::new() }
     }
 
-    /// Evaluates simultaneous effects under a binding. Quantified effects are expanded.
     pub(super) fn new(
         build: &mut Build<'_, '_>,
         effects: &[Effect],

@@ -7,12 +7,10 @@ use crate::lifted::configuration::{
 use crate::lifted::{Change, Effect, Expression, Formula, Lifted, Schema, Term};
 use crate::task::quantity::SlotSet;
 
-/// An action schema whose conjuncts are separated by whether they mention slots (design parameters that
-/// selection assigns).
 pub(super) struct SplitSchema<'a> {
     pub(super) schema: &'a Schema,
     pub(super) designs: &'a [SlotParameter],
-    /// The design parameters that are slots, i.e. that selection assigns instead of grounding.
+    /// The design parameters that are slots.
     pub(super) parameters: &'a [SlotParameter],
     /// Key parameters, in ascending order: those in the duration, in the functions of the slots, and in conditions and
     /// numeric effects that mention slots. Instances with equal objects for these parameters share data.
@@ -23,8 +21,7 @@ pub(super) struct SplitSchema<'a> {
 }
 
 pub(super) struct Conjuncts<'a> {
-    /// Conjuncts that mention no slot. Literals of static predicates that are not derived are omitted, because
-    /// relaxed reachability has already decided them.
+    /// Conjuncts that mention no slot, except literals that relaxed reachability has already decided.
     pub(super) closed: Vec<&'a Formula>,
     /// Conjuncts that mention slots, each with the positions of its slots.
     pub(super) open: Vec<(&'a Formula, SlotSet)>,
@@ -46,8 +43,7 @@ impl<'a> Conjuncts<'a> {
     }
 }
 
-/// Returns `true` if relaxed reachability decides the conjunct exactly, i.e. if it is a literal of a static
-/// predicate that is not derived.
+/// Returns `true` if relaxed reachability decides the conjunct exactly.
 fn settled(lifted: &Lifted, conjunct: &Formula) -> bool {
     match conjunct {
         Formula::Literal { predicate, .. } => {
@@ -113,8 +109,6 @@ impl<'a> SplitSchema<'a> {
     }
 }
 
-/// Returns the operand of a numeric effect if the operand mentions slots and the effect has no quantified
-/// variables.
 pub(super) fn open_operand<'a>(effect: &'a Effect, parameters: &[SlotParameter]) -> Option<&'a Expression> {
     match &effect.change {
         Change::Assign { expression, .. }

@@ -38,8 +38,6 @@ use crate::number::dense;
 use crate::task::quantity::{Linear, NumericId, Quantity};
 use crate::task::timing::Timing;
 
-/// The timed events of a task, and the auxiliary atoms and numeric variables that represent time. The
-/// auxiliary symbols have no names in PDDL files.
 #[derive(Debug, Clone)]
 pub(super) struct Timeline {
     pub(super) clock: NumericId,
@@ -82,8 +80,7 @@ impl Timeline {
         Some(Self { clock, moment, phases, waited, events, first })
     }
 
-    /// Returns an additional goal: the last step of a plan must not be a wait, i.e. an operator that advances
-    /// the clock to the next event.
+    /// Returns an additional goal: the last step of a plan must not be a wait.
     pub(super) fn at_rest(&self) -> Residual {
         Residual::Literal { atom: self.waited, positive: false }
     }
@@ -159,8 +156,6 @@ impl Timeline {
     }
 }
 
-/// Returns the atoms that a sequence of changes makes true, and those that it makes false. The last change of
-/// an atom counts.
 fn prevailing(changes: &[(AtomId, bool)]) -> (Vec<AtomId>, Vec<AtomId>) {
     let (mut adds, mut deletes) = (Vec::new(), Vec::new());
     for (atom, holds) in changes {

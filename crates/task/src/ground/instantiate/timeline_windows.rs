@@ -14,8 +14,6 @@ use crate::lifted::Rational;
 use crate::task::quantity::{Linear, NumericId, Quantity};
 use crate::task::timing::Timing;
 
-/// A possible position of an action relative to the timed events: the phases of its start and end. A phase is
-/// the time from one event to the next.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TimelineWindow<'t> {
     timeline: &'t Timeline,
@@ -42,7 +40,6 @@ enum Start {
     LaterByEnd,
 }
 
-/// Position of the end of an action relative to the event that begins the phase of the end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum End {
     /// Later than the event that begins the phase, or in the phase of the start.
@@ -52,8 +49,7 @@ enum End {
 }
 
 impl<'t> TimelineWindow<'t> {
-    /// Returns all windows that are possible for an action of this duration, each with its interference
-    /// conditions.
+    /// Returns the windows to consider for an action of this duration, each with its interference conditions.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
@@ -145,15 +141,13 @@ impl<'t> TimelineWindow<'t> {
         }
     }
 
-    /// Returns the time one moment after `time`; the moment is a very short time whose length is not known
-    /// yet.
+    /// Returns the time one moment after `time`.
     fn later(&self, time: &Rational) -> Linear<Rational> {
         let mut later = Linear::variable(self.timeline.moment);
         later.quantity.constant = time.clone();
         later
     }
 
-    /// Returns the conditions on phase and clock under which the action can use this window.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
@@ -200,7 +194,6 @@ impl<'t> TimelineWindow<'t> {
         self.timeline.events[self.from..last].iter().map(|(_, changes)| &changes[..])
     }
 
-    /// Returns the changes of the event at the time of the end, or `None` if the action ends at no event.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
@@ -209,8 +202,6 @@ impl<'t> TimelineWindow<'t> {
         (self.end == End::AtEvent).then(|| &self.timeline.events[self.to - 1].1[..])
     }
 
-    /// Returns the changes of the auxiliary time atoms: the phase of the start is replaced by the phase of
-    /// the end, and `waited` (the last step was a wait) becomes false.
     pub(super) fn changes(&self) -> Vec<(AtomId, bool)> {
         let phases = &self.timeline.phases;
         let mut changes = vec![(self.timeline.waited, false)];
@@ -259,8 +250,6 @@ pub(super) struct Conflicts {
 }
 
 impl Conflicts {
-    /// Computes the conflicts of all events. The two pairs contain the symbols that the start and the end
-    /// read, and the effects of each.
     pub(super) fn new(
         world: &World<'_>,
         timeline: &Timeline,
@@ -275,8 +264,6 @@ impl Conflicts {
     }
 }
 
-/// Returns the conditions under which a start or end interferes with an event, evaluated in the state before
-/// the start or end.
 fn interference(
     world: &World<'_>,
     event: &[(AtomId, bool)],

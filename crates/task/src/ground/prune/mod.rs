@@ -55,7 +55,6 @@ fn never_true(atom: &str) -> String {
     format!("no action can make {atom} true, even if nothing is ever deleted")
 }
 
-/// Returns the reason why a goal is false in all states: its first unreachable atom, or a general message.
 fn why_goal_is_false(task: &GroundTask<'_>) -> String {
     for conjunct in conjuncts(&task.world.lifted.goal) {
         if let Formula::Literal { positive: true, predicate, terms } = conjunct {

@@ -37,8 +37,7 @@ pub(super) fn drop_unread_numerics(task: &mut GroundTask<'_>) {
     }
 }
 
-/// Removes rules of unread atoms, effects on unread atoms, and operators that neither change the state nor
-/// reduce the cost. Repeats this until no more operators can be removed.
+/// Removes irrelevant rules, effects and operators until no more operators can be removed.
 pub(super) fn backward(task: &mut GroundTask<'_>) -> Result<(), Interrupted> {
     // A removed operator reads no atoms, so further effects may become unread.
     loop {
@@ -62,7 +61,7 @@ pub(super) fn backward(task: &mut GroundTask<'_>) -> Result<(), Interrupted> {
     }
 }
 
-/// Returns `true` if the operator never changes the state and its cost is never negative.
+/// Returns `true` if the operator certainly never changes the state and never has a negative cost.
 fn is_idle(operator: &GroundOperator) -> bool {
     let is_required =
         |atom: AtomId, value: bool| operator.condition.literals.binary_search(&(atom, value)).is_ok();

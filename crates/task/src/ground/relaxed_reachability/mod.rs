@@ -27,12 +27,8 @@ use crate::lifted::configuration::SlotParameter;
 use crate::lifted::{Arguments, Lifted, ObjectId, PredicateId};
 use crate::limits::{Interrupted, Limits};
 
-/// Computes the reachable instances of all schemas, the reachable fluent atoms, and the facts of static
-/// derived predicates.
-///
-/// # Errors
-/// `Error::Rules` if the rule engine rejects the program, `Error::Interrupted` if the deadline passes or the
-/// run is interrupted.
+/// Computes the reachable instances of all schemas, the reachable fluent atoms, and the facts of static derived
+/// predicates.
 #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
 pub fn reach(
     lifted: &Lifted,

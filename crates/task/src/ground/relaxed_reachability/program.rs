@@ -10,8 +10,6 @@ use crate::lifted::{Axiom, Change, Effect, Formula, Lifted, PredicateId, Schema,
 use crate::limits::Interrupted;
 use crate::number::dense;
 
-/// Adds the rule for an axiom of a derived predicate. The rule is exact if the predicate is static, and
-/// relaxed otherwise.
 pub(super) fn add_axiom(
     relaxed: &mut ReachabilityProgramBuilder<'_>,
     axiom: &Axiom,
@@ -70,8 +68,6 @@ pub(super) fn add_schema(
     Ok((number, core))
 }
 
-/// Adds rules that derive the added atoms from the applicability of the schema. All unconditional effects
-/// share one rule.
 fn add_effects(
     relaxed: &mut ReachabilityProgramBuilder<'_>,
     schema: &Schema,
@@ -123,7 +119,6 @@ fn needs<'a>(lifted: &Lifted, schema: &'a Schema) -> Vec<&'a Formula> {
     conjuncts(&schema.start_condition).into_iter().chain(middle).collect()
 }
 
-/// Returns `true` if a condition mentions one of the given predicates or any derived predicate.
 fn mentions_fluent(lifted: &Lifted, formula: &Formula, predicates: &[PredicateId]) -> bool {
     let mut is_mentioned = false;
     atoms(formula, &mut |predicate| {

@@ -209,8 +209,6 @@ impl<'a> ReachabilityProgramBuilder<'a> {
         }
     }
 
-    /// Creates a relation over the free variables of a static comparison that contains the satisfying
-    /// bindings.
     fn comparison(&mut self, formula: &Formula, candidates: &Candidates) -> Result<Symbol, Interrupted> {
         let relation = self.fresh("comparison");
         let variables = free(formula);

@@ -6,7 +6,7 @@ use crate::limits::Interrupted;
 /// Reason why a condition or expression cannot be evaluated.
 #[derive(Debug)]
 pub enum Failure {
-    /// A fluent has no value, a divisor is zero, or a condition is false. The instance then has no operator.
+    /// A fluent has no value, a divisor is zero, or a condition is false.
     Undefined,
     /// The expression or condition is not supported, or the deadline has passed or the run was interrupted.
     Error(Error),

@@ -36,7 +36,6 @@ impl Numbers {
         self.changes.iter_mut().for_each(|(_, value)| change(value));
     }
 
-    /// Adds the changes in `earlier` for all variables that have no change yet.
     pub(crate) fn complete(&mut self, earlier: Self) {
         for (variable, value) in earlier.changes {
             if self.get(variable).is_none() {

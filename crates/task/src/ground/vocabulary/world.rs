@@ -58,7 +58,6 @@ impl<'a> World<'a> {
         }
     }
 
-    /// Counts an enumeration step, and checks the limits every `BETWEEN_LOOKS` steps.
     pub(crate) fn visit(&mut self) -> Result<(), Interrupted> {
         self.visited += 1;
         if self.visited.0.is_multiple_of(BETWEEN_LOOKS) {
@@ -67,8 +66,6 @@ impl<'a> World<'a> {
         Ok(())
     }
 
-    /// Returns the tuples of a predicate: the true tuples if the predicate is static, and the reachable
-    /// tuples if it is a fluent.
     fn relation(&self, predicate: PredicateId) -> Vec<Arguments> {
         let facts =
             if self.lifted.predicates[predicate.index()].fluent { &self.reached.atoms } else { &self.facts };
@@ -144,8 +141,6 @@ impl<'a> World<'a> {
         (function, arguments)
     }
 
-    /// Returns the initial value of a numeric fluent or the value of a static function; `None` if it is
-    /// undefined.
     pub(crate) fn value(&self, function: FunctionId, arguments: &[ObjectId]) -> Option<Rational> {
         self.values.get(&Key(function, arguments)).cloned()
     }
