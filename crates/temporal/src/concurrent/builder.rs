@@ -56,7 +56,6 @@ type InstanceKey = (usize, Vec<ObjectId>);
 pub(super) struct Builder<'a> {
     footprints: Footprints<'a>,
     split: &'a Split,
-    /// Write set of each operator.
     written: Vec<Footprint>,
     /// Operators of duration 0 that combine a start and an end, with the write sets of start and
     /// end.
@@ -248,7 +247,7 @@ impl<'a> Builder<'a> {
     /// Durations that do not depend on the state, and divisors of those that do.
     ///
     /// # Errors
-    /// A divisor is not positive, a duration cannot be computed, or a limit is reached.
+    /// Fails if a divisor is not positive, a duration cannot be computed, or a limit is reached.
     pub(super) fn static_durations(
         &mut self,
         Context { task, limits }: Context<'_>,

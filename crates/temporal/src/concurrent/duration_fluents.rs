@@ -19,7 +19,6 @@ use task::number::dense;
 /// Prefix of the ground names of duration fluents. Names in PDDL files contain no blanks, so no
 /// clash is possible.
 pub(super) const DURATION_PREFIX: &str = "(duration of ";
-/// Prefix of the ground names of duration fluents whose values the planner chooses.
 pub(super) const FLEXIBLE_DURATION_PREFIX: &str = "(chosen duration of ";
 
 /// Returns `true` if an expression mentions a fluent that some action changes.

@@ -66,7 +66,7 @@ const MEMORY_FRACTION: usize = 8;
 /// A happening, and whether it takes place at the time of the previous one.
 type Link = (OperatorId, bool);
 
-/// State in which a goal holds, and the happenings that lead there.
+/// A state, and the happenings that lead to it.
 type Achieved<T> = (TemporalState<T>, Vec<Link>);
 
 /// Temporal state before a goal of an order is achieved, and the number of happenings up to there.
@@ -247,8 +247,8 @@ impl<'a, T: TimeNumber> GoalOrders<'a, T> {
         order
     }
 
-    /// Next order, its first position that differs from the current order, and the worst acceptable value
-    /// (`None` if any value is acceptable).
+    /// Next order, its first position that may differ from the current order, and the worst
+    /// acceptable value (`None` if any value is acceptable).
     fn next_order(&mut self) -> (Vec<usize>, usize, Option<(T, T)>) {
         if let Some(order) = self.initial.pop() {
             return (order, 0, None);

@@ -48,7 +48,6 @@ const NOISE_DIVISOR: u64 = 20;
 type Link = (OperatorId, bool);
 pub(super) type Links = SmallVec<[Link; 2]>;
 
-/// Modes of the search: treatment of starts and ends, and of duplicate states.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Mode {
     /// The end of an action directly follows its start in the sequence; only timed initial literals can come
@@ -226,8 +225,9 @@ impl<'a, T: TimeNumber> Greedy<'a, T> {
         }
     }
 
-    /// Returns the successor of a node by a happening or, in sequential mode, by a start and its end, and the
-    /// list of applied happenings. Timed initial literals that must precede a happening are applied first.
+    /// Returns the successor of a node by a happening or, in sequential mode, by a start and its
+    /// end, and the list of applied happenings. Timed initial literals that must precede a
+    /// happening are applied first. Returns `None` if a happening is not applicable.
     fn follow(&mut self, parent: u32, operator: OperatorId) -> Option<(TemporalState<T>, Links)> {
         let cached = self.latest.take().filter(|(id, _)| *id == parent);
         let unpack = || (parent, self.packing.unpack(&self.nodes[parent as usize].packed));

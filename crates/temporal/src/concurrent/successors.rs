@@ -17,7 +17,6 @@ const MAX_PARALLEL_RUNS: u32 = 16;
 /// known.
 const UNBOUNDED_RUNS: u32 = 4;
 
-/// State after a sequence of happenings, with the temporal network of the sequence.
 #[derive(Debug, Clone)]
 pub(super) struct TemporalState<T: TimeNumber = Int> {
     pub(super) state: State,
@@ -81,7 +80,6 @@ impl<'a, T: TimeNumber> Expansion<'a, T> {
         events.get(events.partition_point(|(time, _)| *time <= clocks.floor())).copied()
     }
 
-    /// Returns `true` if a plan can end in this temporal state.
     pub(super) fn is_goal(&self, TemporalState { state, clocks, .. }: &TemporalState<T>) -> bool {
         let concurrent = self.concurrent;
         // All timed initial literals up to the end of the plan have taken place, no later ones

@@ -10,7 +10,7 @@ pub(super) type Column = u32;
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 pub(super) struct Affine {
     pub(super) constant: Rational,
-    /// Columns with their factors, sorted by column.
+    /// Sorted by column.
     pub(super) terms: Vec<(Column, Rational)>,
 }
 

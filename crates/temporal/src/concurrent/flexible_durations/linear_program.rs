@@ -13,7 +13,6 @@ use task::number::Rational;
 
 use crate::concurrent::flexible_durations::affine::{Affine, Column};
 
-/// First column that represents the slack of a constraint.
 const FIRST_SLACK_COLUMN: Column = 1 << 30;
 
 /// A linear program at the optimum of its objective.

@@ -49,9 +49,8 @@ pub(super) struct RunningAction {
     last: Option<Affine>,
 }
 
-/// A happening of a partial plan, with its time, the duration of an action that it starts, and the
-/// metric after it as far as numbers contribute to it. The values are expressions over the columns
-/// of the linear program.
+/// Times, durations and metric contributions are expressions over the columns of the linear
+/// program.
 #[derive(Debug, Clone)]
 pub(super) struct Passed {
     pub(super) operator: OperatorId,

@@ -44,7 +44,6 @@ pub(super) enum Outcome {
     Stopped,
 }
 
-/// Kind of a search, with its data for duplicate detection and guidance.
 enum Kind<'a> {
     Greedy { guidance: Box<RelaxedPlanHeuristic<'a>>, seen: FxHashMap<u64, Rational> },
     Exhaustive { traces: Traces<'a>, seen: FxHashSet<Vec<(OperatorId, u32)>> },
