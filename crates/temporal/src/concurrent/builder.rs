@@ -166,7 +166,6 @@ impl<'a> Builder<'a> {
         task.operators.len() > before
     }
 
-    /// Creates the executable instances, and sets the roles of their starts and ends in `roles`.
     pub(super) fn instances<T: TimeNumber>(
         &self,
         context: Context<'_>,

@@ -36,7 +36,6 @@ pub(super) struct CriticalPath<'a, T: TimeNumber = Int> {
     concurrent: &'a TemporalTask<T>,
     relaxation: TemporalRelaxation,
     readers: Vec<Vec<Reader<T>>>,
-    /// Number of entries of each rule in `readers`.
     conditions: Vec<u32>,
     end_rules: Vec<Vec<u32>>,
     // The remaining fields but the last one describe the evaluated state.
@@ -44,15 +43,12 @@ pub(super) struct CriticalPath<'a, T: TimeNumber = Int> {
     times: Vec<Option<T>>,
     /// Whether the state itself satisfies each proposition.
     holds: Vec<bool>,
-    /// Whether the readers of each proposition were visited.
     is_settled: Vec<bool>,
-    /// Number of conditions of each rule that are not settled.
     unmet: Vec<u32>,
     /// Earliest time of each rule because of its settled conditions.
     rule_times: Vec<T>,
     /// Earliest end of each instance. `None` unless the instance is running or its start is reached.
     ends: Vec<Option<T>>,
-    /// Time of the latest access of each kind.
     accesses: Vec<Option<T>>,
     queue: BinaryHeap<Reverse<(T, Proposition)>>,
     /// Number of conditions, effects and interference constraints visited in all evaluations.
@@ -154,7 +150,6 @@ impl<'a, T: TimeNumber> CriticalPath<'a, T> {
         Some(makespan)
     }
 
-    /// Resets the evaluation, and makes the propositions true that hold in the state.
     fn begin(&mut self, TemporalState { state, clocks, .. }: &TemporalState<T>) {
         self.times.fill(None);
         self.holds.fill(false);

@@ -78,7 +78,6 @@ struct Stage<T: TimeNumber = Int> {
 
 #[derive(Clone)]
 struct Decoded<T: TimeNumber = Int> {
-    /// Indices of goals.
     order: Vec<usize>,
     stages: Vec<Stage<T>>,
     links: Vec<Link>,

@@ -126,12 +126,10 @@ pub(super) struct Greedy<'a, T: TimeNumber = Int> {
     guidance: RelaxedPlanHeuristic<'a>,
     packing: Packing<'a, T>,
     nodes: Vec<Node>,
-    /// Id and unpacked state of the node that was expanded last.
     latest: Option<(u32, TemporalState<T>)>,
     /// Lower bound on the makespan of each visited state, by a hash of the state: that of the first
     /// visit or, in mode `Sooner`, the least one.
     seen: FxHashMap<u64, T>,
-    /// Approximate memory use of the nodes in bytes.
     bytes: usize,
     /// Three queues: all happenings and preferred happenings by heuristic value, and all happenings
     /// with successors of novel states first.
@@ -139,7 +137,6 @@ pub(super) struct Greedy<'a, T: TimeNumber = Int> {
     /// Facts that held in some visited state, by the number of unsatisfied goals in that state.
     known: Vec<FxHashSet<(u32, u32)>>,
     pub(super) mode: Mode,
-    /// Source of noise in the heuristic values; `None` for no noise.
     noise: Option<Random>,
     nearest: u64,
     pub(super) figures: SearchStatistics,

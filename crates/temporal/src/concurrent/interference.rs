@@ -41,7 +41,6 @@ pub(super) struct InterferenceConstraints<T: TimeNumber = Int> {
 /// function.
 pub(super) type Designs = Vec<(ObjectId, ObjectId)>;
 
-/// Assigns dense numbers ([`Key`]s) to kinds of access.
 pub(super) struct Keys<T: TimeNumber = Int> {
     known: IndexMap<Access, (), FxBuildHasher>,
     separation: T,

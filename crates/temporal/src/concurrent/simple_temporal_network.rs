@@ -159,7 +159,6 @@ impl<T: TimeNumber> SimpleTemporalNetwork<T> {
         self.latest.base.max(T::ZERO)
     }
 
-    /// Earliest possible start of a running action.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "sums of fewer than 2^32 times fit, see `TimeNumber::TIME_BITS`"

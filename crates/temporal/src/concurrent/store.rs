@@ -22,7 +22,6 @@ struct Field {
     mask: u32,
 }
 
-/// The step that created a search node from its parent.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Origin {
     pub(super) parent: u32,

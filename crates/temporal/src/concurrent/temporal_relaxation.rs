@@ -61,7 +61,6 @@ pub(super) struct TemporalRelaxation {
 struct RelaxationBuilder<'a> {
     task: &'a Task,
     is_admissible: bool,
-    /// Numbers that hold durations chosen by the planner.
     chosen: FxHashSet<NumericId>,
     first: Vec<Proposition>,
     propositions: u32,

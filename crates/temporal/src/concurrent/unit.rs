@@ -13,7 +13,6 @@ use task::task::{OperatorId, Task};
 use crate::concurrent::split::Split;
 use crate::concurrent::time_number::TimeNumber;
 
-/// Static parts of the durations of actions, by start operator.
 #[derive(Default)]
 pub(super) struct StaticDurations {
     /// Durations that do not depend on the state, in PDDL time units.

@@ -254,7 +254,6 @@ impl Course {
         Some(())
     }
 
-    /// Value of a linear expression of the task, as an expression over durations.
     pub(super) fn value(&self, linear: &Linear<Int>) -> Affine {
         let constant = Affine::constant(linear.quantity.at(&[], &[]).to_rational());
         let terms = linear.coefficients.iter();

@@ -38,7 +38,6 @@ type QueueEntry = Reverse<(u64, Rational, Reverse<u32>, u32, u32, (OperatorId, u
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Outcome {
     Found,
-    /// The open list is empty: all sequences were expanded or pruned.
     Exhausted,
     /// Stopped by an interrupt, or at a limit of time, memory or work.
     Stopped,
@@ -224,7 +223,6 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Returns `true` if plans with the lower bound `least` cannot be better than the incumbent.
 fn is_lost(concurrent: &TemporalTask, least: &Rational, best: &Answer) -> bool {
     concurrent.is_whole && *least >= best.value
 }
