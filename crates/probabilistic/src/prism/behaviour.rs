@@ -26,7 +26,6 @@ const CACHE_LIMITS: [usize; 2] = [1 << 16, 1 << 20];
 /// Cache entry of a local state in which the evaluation of a command fails.
 const FAILED: u32 = u32::MAX - 1;
 
-/// A module: its actions and its cached behaviours, i.e. the evaluated commands of local states.
 #[derive(Debug)]
 pub struct Module<N> {
     /// The actions of the module: number of the action, and position of the module's command group
@@ -51,7 +50,6 @@ pub struct Module<N> {
 pub type Chosen = u32;
 
 impl<N: Number> Module<N> {
-    /// Creates the cache for the module with this index; no behaviour is cached yet.
     pub fn new(program: &Program<N>, number: usize) -> Self {
         let mut actions = Vec::new();
         for (action, groups) in program.synchronised.iter().enumerate() {
@@ -175,8 +173,6 @@ impl<N: Number> Module<N> {
         Ok(())
     }
 
-    /// Returns the actions of the module that are disabled in the local state to which the
-    /// behaviour belongs, as a bit set.
     pub fn prevented(&self, behaviour: usize) -> u128 {
         self.prevented[behaviour]
     }
