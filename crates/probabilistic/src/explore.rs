@@ -226,7 +226,6 @@ impl<S: Clone + Eq + Hash, N: Number> Exploration<S, N> {
 /// Number of states that are expanded together. Their target states are looked up together, so that memory
 /// latencies overlap.
 const BATCH: usize = 32;
-/// Number of expanded states between two progress reports.
 const REPORT_INTERVAL: usize = 65_536;
 
 struct Batch<S, N> {
@@ -300,7 +299,6 @@ impl<S: Clone + Eq + Hash, N: Number> Explored<S, N> {
 }
 
 impl<S: Clone> Exploration<S, Fraction> {
-    /// Converts all numbers to doubles. Returns `None` if the magnitude of a number is too small or too large.
     pub fn rounded(&self) -> Option<Exploration<S, f64>> {
         Some(Exploration {
             explored: self.explored.rounded()?,

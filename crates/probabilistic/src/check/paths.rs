@@ -39,7 +39,6 @@ pub fn opposite(direction: Direction) -> Direction {
 }
 
 impl<N: Number> Query<'_, N> {
-    /// Computes for each state the minimal or maximal probability of a path formula.
     pub fn path(&self, direction: Direction, path: &Path) -> Checked<Valued<N>> {
         let n = self.mdp().states();
         match path {
@@ -83,8 +82,6 @@ impl<N: Number> Query<'_, N> {
         }
     }
 
-    /// Computes for each state the minimal or maximal probability of reaching `right` through
-    /// states of `left`, within the bounds on steps or on an accumulated reward.
     fn until(
         &self,
         direction: Direction,
@@ -159,7 +156,6 @@ impl<N: Number> Query<'_, N> {
         })?)
     }
 
-    /// Computes for each state the minimal or maximal expected reward of a reward formula.
     pub fn reward(&self, direction: Direction, name: Option<&str>, path: &RewardPath) -> Checked<Valued<N>> {
         let n = self.mdp().states();
         let no_states = FixedBitSet::with_capacity(n);
@@ -246,7 +242,6 @@ fn complement<N: Number>(values: Valued<N>) -> Valued<N> {
     Valued { vector: values.vector.complement(), policy: values.policy }
 }
 
-/// The complement of a set of states.
 pub fn inverse(mut set: FixedBitSet) -> FixedBitSet {
     set.toggle_range(..);
     set

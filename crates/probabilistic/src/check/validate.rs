@@ -67,7 +67,6 @@ fn of_path(path: &Path) -> Vec<&Expr> {
     }
 }
 
-/// Returns the bounds on steps or rewards of a path formula, if there are any.
 pub fn steps_of(path: &Path) -> Option<&Steps> {
     match path {
         Path::Not(inner) => steps_of(inner),

@@ -159,7 +159,6 @@ impl Names {
         self.declare(name, Meaning::Variable(number, kind), place, problems);
     }
 
-    /// Returns the index and type of a variable, or `None` if the name is no variable.
     pub fn find_variable(&self, name: &str) -> Option<(u32, Type)> {
         match self.meanings.get(name)? {
             Meaning::Variable(number, kind) => Some((*number, *kind)),
@@ -167,7 +166,6 @@ impl Names {
         }
     }
 
-    /// Returns the expression that defines a label, or `None` if the label is not declared.
     pub fn label(&self, name: &str) -> Option<&Expr> {
         self.labels.get(name)
     }

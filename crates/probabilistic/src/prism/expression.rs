@@ -36,7 +36,6 @@ pub struct PropertySyntax {
     pub parse_infix: fn(&mut Cursor<'_>, Expr) -> Read<Expr>,
 }
 
-/// The result of a parsing function: a syntax element or a syntax error.
 pub type Read<T> = Result<T, Diagnostic>;
 
 impl<'a> Cursor<'a> {
@@ -45,12 +44,10 @@ impl<'a> Cursor<'a> {
         Self { tokens, at: 0, depth: 0, operators: [0; 2], property_syntax: None }
     }
 
-    /// Creates a cursor that also accepts the syntax of property expressions.
     pub fn for_properties(tokens: &'a [Token], property_syntax: PropertySyntax) -> Self {
         Self { property_syntax: Some(property_syntax), ..Self::new(tokens) }
     }
 
-    /// Returns the number of consumed tokens.
     pub fn position(&self) -> usize {
         self.at
     }
@@ -66,7 +63,6 @@ impl<'a> Cursor<'a> {
         self.depth = 0;
     }
 
-    /// Returns the next token without consuming it.
     pub fn peek(&self) -> &'a Kind {
         &self.tokens[self.at].kind
     }
@@ -76,7 +72,6 @@ impl<'a> Cursor<'a> {
         self.tokens.get(self.at.saturating_add(offset)).map_or(&Kind::End, |token| &token.kind)
     }
 
-    /// Returns the position of the next token in the text.
     pub fn place(&self) -> Place {
         self.tokens[self.at].place
     }
@@ -89,12 +84,10 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// Returns `true` if the next token is the symbol `sign`.
     pub fn is(&self, sign: &str) -> bool {
         matches!(self.peek(), Kind::Sign(found) if *found == sign)
     }
 
-    /// Returns `true` if the next token is the identifier or keyword `word`.
     pub fn is_word(&self, word: &str) -> bool {
         matches!(self.peek(), Kind::Name(found) if found == word)
     }
@@ -108,7 +101,6 @@ impl<'a> Cursor<'a> {
         is_next
     }
 
-    /// Consumes the next token if it is the identifier or keyword `word`. Returns `true` if it was consumed.
     pub fn take_word(&mut self, word: &str) -> bool {
         let is_next = self.is_word(word);
         if is_next {
@@ -126,12 +118,10 @@ impl<'a> Cursor<'a> {
         )
     }
 
-    /// Consumes the symbol `sign`. Returns an error if the next token is another one.
     pub fn need(&mut self, sign: &str) -> Read<()> {
         if self.take(sign) { Ok(()) } else { Err(self.expected(&format!("`{sign}`"))) }
     }
 
-    /// Consumes the identifier or keyword `word`. Returns an error if the next token is another one.
     pub fn need_word(&mut self, word: &str) -> Read<()> {
         if self.take_word(word) { Ok(()) } else { Err(self.expected(&format!("`{word}`"))) }
     }

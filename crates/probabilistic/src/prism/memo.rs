@@ -74,7 +74,6 @@ pub struct Memo<T> {
 const MAX_VALUES: usize = 1 << 16;
 
 impl<T> Memo<T> {
-    /// Creates an empty cache.
     pub fn new(layout: &Layout, variables: &BTreeSet<u32>) -> Self {
         Self { numbers: Numbers::new(layout, variables), values: Vec::new() }
     }

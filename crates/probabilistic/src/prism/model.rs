@@ -46,7 +46,6 @@ pub(super) struct Structure<N> {
     pub states: Vec<RewardItem<N>>,
     /// The items for commands without an action.
     pub unnamed: Vec<RewardItem<N>>,
-    /// For each action, the items for commands with this action.
     pub actions: Vec<Vec<RewardItem<N>>>,
 }
 

@@ -10,7 +10,6 @@ use crate::solve::Direction;
 
 const PROPERTY: &str = "a property (`Pmax=? [ F … ]`, `R{\"name\"}min=? [ F … ]`)";
 
-/// The parsers that extend expressions by the syntax of properties.
 pub const PROPERTY_SYNTAX: PropertySyntax = PropertySyntax { parse_prefix, parse_infix };
 
 /// The names of the filters. The last entry is another name for `avg`.
