@@ -4,7 +4,6 @@ use crate::error::{Diagnostic, Error, Place};
 
 #[derive(Debug)]
 pub enum Stop {
-    /// The input is invalid, or a limit is exceeded.
     Wrong(Error),
     /// Exact arithmetic exceeds its budget, so the caller solves the property in floating-point arithmetic.
     TooMuchWork,

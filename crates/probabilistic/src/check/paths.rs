@@ -14,7 +14,6 @@ use crate::solve::{Direction, Problem, Solution, draft, solve_within};
 
 const MAX_STEPS: u32 = 1_000_000_000;
 
-/// Values in all states, with a memoryless policy that attains them if one was computed.
 #[derive(Debug)]
 pub struct Valued<N> {
     pub vector: Vector<N>,

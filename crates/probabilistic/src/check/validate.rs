@@ -41,7 +41,6 @@ pub fn properties_in<'a>(expression: &'a Expr, nested: &mut Vec<&'a Property>) {
     }
 }
 
-/// Returns the state expressions of a property, such as the goal of `F` or the states of a filter.
 pub fn expressions_of(property: &Property) -> Vec<&Expr> {
     match property {
         Property::Probability(_, path) => of_path(path),

@@ -27,7 +27,6 @@ pub struct Vector<N> {
 }
 
 impl<N: Number> Vector<N> {
-    /// Creates a vector of error-free, finite values.
     pub fn exactly(values: Vec<N>, span: Span) -> Self {
         let errors = if N::EXACT { Vec::new() } else { vec![0.0; values.len()] };
         Self { infinite: FixedBitSet::with_capacity(values.len()), values, errors, span }

@@ -194,7 +194,6 @@ impl<N: Number> Module<N> {
         self.slots[at]..self.slots[at.saturating_add(1)]
     }
 
-    /// Iterates over the updates of a command: probability and edits of the state.
     pub fn updates(&self, command: Chosen) -> impl ExactSizeIterator<Item = (&N, &[Edit])> {
         let range = self.range(command);
         // Only ends are stored: the edits of an update begin at the end of the previous update's edits.

@@ -83,7 +83,6 @@ impl Code {
         })
     }
 
-    /// Evaluates an integer or Boolean expression.
     pub fn whole(&self, values: &[i64]) -> Result<i64> {
         Ok(match self {
             Self::Whole(value) => *value,

@@ -60,7 +60,6 @@ impl<N: Number> Command<N> {
 pub struct RewardItem<N> {
     pub guard: Guard,
     pub reward: Code,
-    /// The reward, if it is a constant and valid.
     pub certain: Option<N>,
     pub place: Place,
 }

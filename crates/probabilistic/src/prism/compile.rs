@@ -19,7 +19,6 @@ enum Meaning {
     Formula(usize),
 }
 
-/// The declared names of a model, with the values of its constants.
 #[derive(Debug, Clone)]
 pub struct Names {
     meanings: FxHashMap<String, Meaning>,
@@ -170,7 +169,6 @@ impl Names {
         self.labels.get(name)
     }
 
-    /// Returns the names of all declared labels, sorted.
     pub fn labels(&self) -> Vec<&str> {
         let mut labels: Vec<_> = self.labels.keys().map(String::as_str).collect();
         labels.sort_unstable();

@@ -13,7 +13,6 @@ const MAX_OPERATORS: [usize; 2] = [500, 20_000];
 /// Additional upper limit on each of the two numbers in [`MAX_OPERATORS`], in an expression of a property.
 const MAX_PROPERTY_OPERATORS: usize = 2_000;
 
-/// A parser state: a position in a list of tokens, with counters for the size limits.
 #[derive(Debug)]
 pub struct Cursor<'a> {
     tokens: &'a [Token],
@@ -25,7 +24,6 @@ pub struct Cursor<'a> {
     property_syntax: Option<PropertySyntax>,
 }
 
-/// Parsers for the syntax that is allowed in expressions of properties, but not in those of models.
 #[derive(Debug, Clone, Copy)]
 pub struct PropertySyntax {
     /// Parses an expression that begins with a property operator. Returns `None` if the next token is not such an
@@ -52,7 +50,6 @@ impl<'a> Cursor<'a> {
         self.at
     }
 
-    /// Resets the nesting depth after an error.
     pub fn reset(&mut self) {
         self.depth = 0;
     }

@@ -96,7 +96,6 @@ fn compared(variable: u32, op: BinaryOp, value: i64) -> Test {
     }
 }
 
-/// Returns the comparison operator that is equivalent to `op` after an exchange of the operands.
 fn mirrored(op: BinaryOp) -> BinaryOp {
     match op {
         BinaryOp::Less => BinaryOp::Greater,

@@ -60,7 +60,6 @@ pub struct Edit {
 }
 
 impl Edit {
-    /// Returns `true` if both edits change the same word and can thus be joined.
     pub const fn joins(&self, other: &Self) -> bool {
         self.word == other.word
     }
@@ -87,7 +86,6 @@ impl Packed {
 #[derive(Debug, Clone, Default)]
 pub struct Key {
     pieces: Vec<Piece>,
-    /// Number of bits of all selected variables together.
     pub bits: u32,
 }
 

@@ -129,14 +129,12 @@ impl<'a, T: TimeNumber> Index<'a, T> {
         operators.filter(move |id| ![start, end].contains(id))
     }
 
-    /// Happenings other than the start and end of `own` that change a number.
     pub(super) fn changing(&self, own: &Instance<T>, number: NumericId) -> impl Iterator<Item = OperatorId> {
         let [start, end] = [own.start, own.end];
         let operators = self.changing.get(&number).into_iter().flatten().copied();
         operators.filter(move |id| ![start, end].contains(id))
     }
 
-    /// Returns `true` if an effect of the happening, possibly conditional, may make `fact` false.
     pub(super) fn changes(&self, id: OperatorId, fact: Fact) -> bool {
         let operator = &self.task.operators[id.index()];
         let conditional = operator.conditional.iter().flat_map(|effect| &effect.effects);
@@ -209,7 +207,6 @@ impl<'a, T: TimeNumber> Index<'a, T> {
         self.instances[instance as usize].duration
     }
 
-    /// Pairs of the start operator and the over-all operator, for all instances with an over-all condition.
     pub(super) fn holding(&self) -> impl Iterator<Item = (OperatorId, OperatorId)> {
         self.instances.iter().filter_map(|instance| Some((instance.start, instance.over_all?)))
     }

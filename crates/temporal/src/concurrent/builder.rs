@@ -80,8 +80,6 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Groups the starts, ends and over-all conditions of instances, and collects the write sets of
-    /// all operators.
     pub(super) fn collect(&mut self, context: Context<'_>) -> Result<(), Errors> {
         let Context { task, limits } = context;
         let mut errors = Vec::new();

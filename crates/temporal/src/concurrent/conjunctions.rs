@@ -37,7 +37,6 @@ struct Index {
     needs: Lists,
     adding: Lists,
     needing: Lists,
-    /// Rules that set each variable, ascending.
     setting: Vec<Vec<u32>>,
 }
 
@@ -180,8 +179,6 @@ mod tests {
         (:durative-action lock :parameters () :duration (= ?duration 1)
           :condition (and (at start (key)) (at start (open))) :effect (at end (locked))))";
 
-    /// Names of the preferred happenings of the initial state. Returns `None` if no relaxed plan
-    /// exists.
     fn guide(facts: &str, goal: &str) -> Option<Vec<String>> {
         let problem = format!("(define (problem p) (:domain d) (:init {facts}) (:goal {goal}))");
         let (domain, problem, _) =

@@ -39,7 +39,6 @@ pub(super) struct CriticalPath<'a, T: TimeNumber = Int> {
     conditions: Vec<u32>,
     end_rules: Vec<Vec<u32>>,
     // The remaining fields but the last one describe the evaluated state.
-    /// Earliest time of each proposition. `None` if it is not reached.
     times: Vec<Option<T>>,
     /// Whether the state itself satisfies each proposition.
     holds: Vec<bool>,
@@ -281,7 +280,6 @@ fn common_marks<T: TimeNumber>(
     common.into_iter().map(Option::unwrap_or_default).collect()
 }
 
-/// Greatest distance that a happening keeps to accesses of the kinds in `marks`.
 fn distance<T: TimeNumber>(marks: &[Key], after: &[(Key, T)]) -> T {
     let distances = after.iter().filter(|(key, _)| marks.binary_search(key).is_ok()).map(|(_, by)| *by);
     distances.max().unwrap_or(T::ZERO)

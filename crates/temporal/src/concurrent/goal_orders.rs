@@ -66,7 +66,6 @@ const MEMORY_FRACTION: usize = 8;
 /// A happening, and whether it takes place at the time of the previous one.
 type Link = (OperatorId, bool);
 
-/// A state, and the happenings that lead to it.
 type Achieved<T> = (TemporalState<T>, Vec<Link>);
 
 /// Temporal state before a goal of an order is achieved, and the number of happenings up to there.
@@ -108,7 +107,6 @@ pub(super) struct GoalOrders<'a, T: TimeNumber = Int> {
     /// Number of neighbours tried since the last perturbation or the last best plan.
     rejected: usize,
     failures: usize,
-    /// Work at the last improvement of `best`.
     improved_at: u64,
     decoded: u64,
     random: Random,

@@ -114,7 +114,6 @@ pub(super) enum Outcome {
     Found,
     /// The open list is empty or the memory share is used up.
     Exhausted,
-    /// Stopped by an interrupt, or at a limit of time or work.
     Stopped,
 }
 

@@ -28,7 +28,6 @@ pub(super) struct Origin {
     pub(super) operator: OperatorId,
     /// Whether the same step also applied the end of the started action.
     pub(super) compressed: bool,
-    /// Whether the happening takes place at the same time as the previous one.
     pub(super) together: bool,
     /// Number of happenings on the path from the root.
     pub(super) depth: u32,

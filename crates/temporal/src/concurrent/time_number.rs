@@ -37,7 +37,6 @@ pub(super) trait TimeNumber:
     /// Factors of the metric have at most this number of bits.
     const FACTOR_BITS: u64;
 
-    /// Returns `None` if the number is not representable.
     fn from_big(number: &BigInt) -> Option<Self>;
 
     fn to_big(self) -> BigInt;
@@ -55,7 +54,6 @@ pub(super) trait TimeNumber:
     /// Appends an encoding in which small magnitudes take few bytes.
     fn write(self, bytes: &mut Vec<u8>);
 
-    /// Reads a number that [`TimeNumber::write`] has written.
     fn read(bytes: &mut impl Iterator<Item = u8>) -> Self;
 
     fn to_rational(self) -> Rational {

@@ -78,7 +78,6 @@ pub(super) struct TimedRelaxation<'a, T: TimeNumber = Int> {
     sums: Vec<u32>,
     /// For each rule: its position in the order in which rules fire.
     order: Vec<u32>,
-    /// For each rule: the latest time at which it may fire.
     latest: Vec<Time>,
     is_used: Vec<bool>,
     fired: u32,

@@ -23,7 +23,6 @@ impl Affine {
         Self { constant: Rational::zero(), terms: vec![(column, Rational::one())] }
     }
 
-    /// Value of the expression if it contains no column; otherwise `None`.
     pub(super) fn known(&self) -> Option<&Rational> {
         self.terms.is_empty().then_some(&self.constant)
     }

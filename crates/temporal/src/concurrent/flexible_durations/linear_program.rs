@@ -40,7 +40,6 @@ impl Program {
         self.rows.iter().fold(self.objective.bytes(), |sum, (_, row)| sum.saturating_add(row.bytes()))
     }
 
-    /// Value of an expression at the current optimum.
     pub(super) fn value(&self, expression: &Affine) -> Rational {
         self.reduced(expression).constant
     }
@@ -117,7 +116,6 @@ impl Program {
         }
     }
 
-    /// Exchanges the basic column `leaving` with the nonbasic column `entering`.
     fn pivot(&mut self, leaving: Column, entering: Column) {
         let position = self.rows.binary_search_by_key(&leaving, |(candidate, _)| *candidate);
         let (_, mut row) = self.rows.remove(position.expect("invariant: a row of the dictionary"));

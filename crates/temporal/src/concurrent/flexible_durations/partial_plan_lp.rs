@@ -60,7 +60,6 @@ pub(super) struct Passed {
     pub(super) time: Affine,
     /// For a start: duration of the action. Otherwise 0.
     pub(super) duration: Affine,
-    /// Contribution of the numbers to the metric after this happening, in the task's cost unit.
     pub(super) measured: Affine,
 }
 

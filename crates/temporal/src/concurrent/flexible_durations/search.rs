@@ -212,8 +212,6 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Removes an entry from the queue whose turn it is. Returns the lower bound, the parent node
-    /// and the happening.
     fn pop(&mut self) -> Option<(Rational, u32, (OperatorId, u32))> {
         let filled = (0..self.queues.len()).filter(|queue| !self.queues[*queue].is_empty());
         let queue = filled.min_by_key(|queue| self.priorities[*queue])?;
