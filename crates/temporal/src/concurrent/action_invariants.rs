@@ -173,10 +173,10 @@ impl<'a, T: TimeNumber> Index<'a, T> {
         operator.conditional.is_empty() && required.any(contradicts)
     }
 
-    /// Like [`Self::excludes`], but also `true` for the end of an action whose over-all condition contradicts
-    /// the invariant, because both would hold right before an end inside the run. An end at the time of the
-    /// start of `own` must be impossible, too: either the end and the start must keep a distance, or the
-    /// start requires the fact of the invariant that the condition contradicts.
+    /// Like [`Self::excludes`], but also `true` for an end whose over-all condition contradicts the
+    /// invariant: right before an end inside the run, both would hold. The end must also be
+    /// impossible at the very start of the run. This is certain if the end and the start of `own`
+    /// keep a distance, or if the start requires the contradicted fact.
     pub(super) fn is_outside(&self, invariant: &Invariant, own: &Instance<T>, id: OperatorId) -> bool {
         if self.excludes(invariant, own, id) {
             return true;

@@ -112,9 +112,10 @@ impl Index {
         Self { needs, adding, needing, setting }
     }
 
-    /// Propositions that are needed together with `fact`, directly or for achieving another needed
-    /// proposition, and that a rule in `deleting` may help to achieve. Ascending; empty if the work
-    /// limit `looks` is used up while the needed propositions are collected.
+    /// Propositions that are needed at the same time as `fact` and that a rule in `deleting` may
+    /// help to achieve. Needed are the conditions of the rules that require `fact`, and the
+    /// conditions for achieving these. Ascending. Empty if the work limit `looks` is used up while
+    /// the needed propositions are collected.
     fn together(
         &self,
         fact: Proposition,

@@ -66,10 +66,10 @@ pub(super) struct TemporalTask<T: TimeNumber = Int> {
     pub(super) instances: Vec<Instance<T>>,
     /// Time (in internal units) and operator of each group of simultaneous timed initial literals, ascending.
     pub(super) events: Vec<(T, OperatorId)>,
-    /// For each key of an access kind (such as deleting a certain atom): its guard, if there is one. Every
-    /// happening that must wait for such an access, except timed initial literals, requires a value of this
-    /// variable. Accesses that are at least the separation before the latest change of their guard delay no
-    /// later happening.
+    /// By key of an access kind (such as deleting a certain atom): its guard, if there is one.
+    /// Every happening that must wait for such an access, except timed initial literals, requires a
+    /// value of the guard variable. Accesses that are at least the separation before the latest
+    /// change of their guard delay no later happening.
     pub(super) guards: Vec<Option<u32>>,
     pub(super) measure: Measure<T>,
     /// Per preference that can be violated: operators of which at least one is applicable in the
