@@ -32,7 +32,7 @@ pub trait Generator<N: Number> {
     fn rewards(&self) -> usize;
 
     /// Returns the number of state codes if [`code`](Self::code) numbers all conceivable states,
-    /// otherwise `None`. With codes, states are indexed by a table instead of a hash map.
+    /// otherwise `None`. Up to 2^29 codes, states are indexed by a table instead of a hash map.
     fn codes(&self) -> Option<usize> {
         None
     }

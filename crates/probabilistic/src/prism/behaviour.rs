@@ -177,8 +177,6 @@ impl<N: Number> Module<N> {
         self.prevented[behaviour]
     }
 
-    /// Returns the enabled commands without an action in the local state to which the behaviour
-    /// belongs.
     pub fn free(&self, behaviour: usize) -> std::ops::Range<Chosen> {
         self.slot(behaviour, 0)
     }

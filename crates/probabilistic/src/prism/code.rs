@@ -283,7 +283,6 @@ fn number_call(function: Function, arguments: &[Code], values: &[i64]) -> Result
     }
 }
 
-/// Converts a power or logarithm that was approximated in doubles to a rational.
 fn irrational(value: f64) -> Result<BigRational> {
     BigRational::from_float(value).ok_or(Fault("a number that is not finite"))
 }

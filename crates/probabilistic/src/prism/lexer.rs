@@ -9,7 +9,6 @@ pub enum Kind {
     Number(String),
     /// A text in quotation marks, stored without the quotation marks.
     Quoted(String),
-    /// An operator or a punctuation mark.
     Sign(&'static str),
     End,
 }

@@ -49,7 +49,6 @@ pub fn parse(text: &str) -> Result<Property, Error> {
     result.map_err(|problem| Error::Property(problem.into()))
 }
 
-/// Parses a property and stops at the first token that does not belong to the property.
 pub fn property(cursor: &mut Cursor<'_>) -> Read<Property> {
     if !matches!(
         cursor.peek(),

@@ -139,7 +139,6 @@ pub struct Solved<N> {
 /// Products of doubles below this value may have lost digits by underflow.
 const UNDERFLOW_LIMIT: f64 = 1e-290;
 
-/// A Markov chain: a policy selects one row for each state.
 pub struct Chain<'a, N> {
     pub rows: &'a Rows<N>,
     /// The row of each state, or [`NONE`] if the state has no successors and no cost.

@@ -45,7 +45,6 @@ impl<N: Number> Local<N> {
         }
     }
 
-    /// Removes the contents, but keeps the allocated memory.
     pub fn clear(&mut self) {
         self.states.clear();
         self.first.truncate(1);

@@ -43,8 +43,6 @@ fn designs(task: &Task, operator: OperatorId) -> Designs {
     designs
 }
 
-/// Binding of the schema's variables: the operator's arguments, then `None` for each quantified
-/// variable.
 fn binding(operator: &Operator, variables: usize) -> Binding {
     let mut binding: Binding = operator.arguments.iter().copied().map(object).collect();
     binding.resize(variables, None);
@@ -229,8 +227,6 @@ impl<'a> Builder<'a> {
         Ok(instances)
     }
 
-    /// Records the separate write sets of the start and the end of a durative action that has
-    /// duration 0.
     fn join(&mut self, id: OperatorId, schema: usize, binding: &Binding) -> Result<(), Error> {
         let schema = &self.split.schemas[schema];
         if schema.duration.is_some() {

@@ -63,7 +63,6 @@ const KICK: usize = 3;
 /// The states of an order may take at most 1/`MEMORY_FRACTION` of the memory limit.
 const MEMORY_FRACTION: usize = 8;
 
-/// A happening, and whether it takes place at the time of the previous one.
 type Link = (OperatorId, bool);
 
 type Achieved<T> = (TemporalState<T>, Vec<Link>);
@@ -80,7 +79,6 @@ struct Decoded<T: TimeNumber = Int> {
     order: Vec<usize>,
     stages: Vec<Stage<T>>,
     links: Vec<Link>,
-    /// Metric (scaled to an integer) and makespan (in internal time units).
     value: (T, T),
 }
 

@@ -344,8 +344,6 @@ impl<'a, T: TimeNumber> Greedy<'a, T> {
         }
     }
 
-    /// Plan that leads to a goal state. Returns `None` if the metric overflows or the plan violates
-    /// a hard deadline.
     fn sequence(&self, situation: &TemporalState<T>, parent: u32, links: &Links) -> Option<Sequence<T>> {
         let value = self.concurrent.value(situation)?;
         let mut sequence_links: Vec<Link> = links.iter().rev().copied().collect();

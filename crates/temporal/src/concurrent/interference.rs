@@ -44,7 +44,6 @@ pub(super) type Designs = Vec<(ObjectId, ObjectId)>;
 pub(super) struct Keys<T: TimeNumber = Int> {
     known: IndexMap<Access, (), FxBuildHasher>,
     separation: T,
-    /// All pairs of a function and a design that some action uses for the function.
     designs: FxHashSet<(ObjectId, ObjectId)>,
 }
 

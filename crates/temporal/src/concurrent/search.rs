@@ -37,7 +37,6 @@ pub(super) struct Sequence<T: TimeNumber = Int> {
     /// Metric (scaled to an integer) and makespan (in internal time units).
     pub(super) value: (T, T),
     pub(super) happenings: Vec<OperatorId>,
-    /// Per happening: whether it takes place at the time of the previous one.
     pub(super) together: Vec<bool>,
 }
 
@@ -76,7 +75,6 @@ pub(super) struct Search<'a, T: TimeNumber = Int> {
     /// Lower bound on the metric of plans through dropped nodes, e.g. nodes in which a number
     /// overflowed. `None` if no node was dropped.
     left_out: Option<T>,
-    /// Lower bound on the makespan of every plan.
     floor: T,
     figures: SearchStatistics,
 }
@@ -333,7 +331,6 @@ impl<'a, T: TimeNumber> Search<'a, T> {
         (is_better.then_some((value.0, value.1, sum, depth, id, true)), work)
     }
 
-    /// Plan that leads to a goal node. Returns `None` if its metric overflows or it violates a hard deadline.
     fn sequence(&self, goal: u32, situation: &TemporalState<T>) -> Option<Sequence<T>> {
         let value = self.concurrent.value(situation)?;
         let (mut happenings, mut together) = (Vec::new(), Vec::new());

@@ -21,7 +21,6 @@ use crate::concurrent::time_number::TimeNumber;
 /// Maximum number of iterations of the analysis: a bound for one instance can improve the bounds of others.
 const FIXPOINT_ROUNDS: usize = 2;
 
-/// Sets `most`, `under_way` and `counts_by_end` of each instance.
 pub(super) fn bound_self_overlap<T: TimeNumber>(
     task: &Task,
     happenings: &[Happening<T>],

@@ -74,7 +74,6 @@ impl<'a, T: TimeNumber> Expansion<'a, T> {
         self.index.applicable(&self.concurrent.task, state)
     }
 
-    /// Time and operator of the next timed initial literals. Returns `None` if none are pending.
     pub(super) fn next_event(&self, clocks: &SimpleTemporalNetwork<T>) -> Option<(T, OperatorId)> {
         let events = &self.concurrent.events;
         events.get(events.partition_point(|(time, _)| *time <= clocks.floor())).copied()

@@ -66,7 +66,6 @@ fn best(program: &Program, objectives: &[&Affine]) -> Program {
     best
 }
 
-/// Constrains each duration to its value at the optimum of `program`.
 fn fix(program: &Program, durations: &[Affine]) -> Program {
     let mut fixed = program.clone();
     for duration in durations {

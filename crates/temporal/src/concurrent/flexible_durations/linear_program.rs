@@ -20,7 +20,6 @@ const FIRST_SLACK_COLUMN: Column = 1 << 30;
 pub(super) struct Program {
     /// Dictionary: basic columns in ascending order, each as an expression over nonbasic columns.
     rows: Vec<(Column, Affine)>,
-    /// Objective to minimise, over the nonbasic columns.
     objective: Affine,
     slacks: Column,
 }

@@ -39,7 +39,6 @@ type QueueEntry = Reverse<(u64, Rational, Reverse<u32>, u32, u32, (OperatorId, u
 pub(super) enum Outcome {
     Found,
     Exhausted,
-    /// Stopped by an interrupt, or at a limit of time, memory or work.
     Stopped,
 }
 
