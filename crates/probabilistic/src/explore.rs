@@ -32,7 +32,7 @@ pub trait Generator<N: Number> {
     fn rewards(&self) -> usize;
 
     /// Returns the number of state codes if [`code`](Self::code) numbers all conceivable states,
-    /// otherwise `None`. With codes, states are indexed by a table instead of a hash map.
+    /// otherwise `None`. Up to 2^29 codes, states are indexed by a table instead of a hash map.
     fn codes(&self) -> Option<usize> {
         None
     }
@@ -226,7 +226,6 @@ impl<S: Clone + Eq + Hash, N: Number> Exploration<S, N> {
 /// Number of states that are expanded together. Their target states are looked up together, so that memory
 /// latencies overlap.
 const BATCH: usize = 32;
-/// Number of expanded states between two progress reports.
 const REPORT_INTERVAL: usize = 65_536;
 
 struct Batch<S, N> {
@@ -300,7 +299,6 @@ impl<S: Clone + Eq + Hash, N: Number> Explored<S, N> {
 }
 
 impl<S: Clone> Exploration<S, Fraction> {
-    /// Converts all numbers to doubles. Returns `None` if the magnitude of a number is too small or too large.
     pub fn rounded(&self) -> Option<Exploration<S, f64>> {
         Some(Exploration {
             explored: self.explored.rounded()?,

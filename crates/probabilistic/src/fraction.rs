@@ -20,7 +20,6 @@ use crate::number::{Number, rounded};
 pub enum Fraction {
     /// Numerator and denominator, if both fit into a signed 64-bit word.
     Short(i64, NonZeroU64),
-    /// All other fractions.
     Long(Box<BigRational>),
 }
 

@@ -2,10 +2,8 @@
 
 use crate::error::{Diagnostic, Error, Place};
 
-/// The reason for ending a computation without a result.
 #[derive(Debug)]
 pub enum Stop {
-    /// The input is invalid, or a limit is exceeded.
     Wrong(Error),
     /// Exact arithmetic exceeds its budget, so the caller solves the property in floating-point arithmetic.
     TooMuchWork,
@@ -17,15 +15,13 @@ impl From<Error> for Stop {
     }
 }
 
-/// The result of a step of a check. The error is the reason for ending the check without a result.
 pub type Checked<T> = Result<T, Stop>;
 
-/// Converts `None`, which reports an exceeded budget of exact arithmetic, to [`Stop::TooMuchWork`].
+/// `None` reports an exceeded budget of exact arithmetic.
 pub fn within_budget<T>(result: Option<T>) -> Checked<T> {
     result.ok_or(Stop::TooMuchWork)
 }
 
-/// Creates an error with a code and a text at a place in a property.
 pub fn property_error(code: &'static str, place: Place, text: &str) -> Error {
     Error::Property(Diagnostic::new(code, place, text).into())
 }

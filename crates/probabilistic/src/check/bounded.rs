@@ -60,15 +60,13 @@ impl<N: Number> Query<'_, N> {
         let n = self.mdp().states();
         let greatest = earned.iter().max().copied().unwrap_or(0);
         // Values for the last budgets (remaining rewards), the smallest budget first. No choice has
-        // a reward above `greatest`, so older values are not read.
+        // a reward above `greatest`, so at most `greatest` older vectors are read.
         let mut previous: Vec<Vec<N>> = Vec::new();
         let mut vector = Vector::exactly(vec![N::zero(); n], Span::Probability);
         let mut error = 0.0_f64;
         let sweep = Sweep::new(&layers, problem, &earned);
         for budget in 0..=budgets {
-            // A choice with reward r reads the values for the budget (remaining reward) that is
-            // smaller by r, and r is at most `greatest`. The oldest vector is therefore no longer
-            // read and is reused.
+            // The oldest vector is no longer read, so its memory is reused.
             let mut values = if previous.len() > greatest { previous.remove(0) } else { vec![N::zero(); n] };
             if let Some(sweep) = &sweep {
                 within_budget(sweep.layer(&mut values, &previous, budget, &mut self.work.borrow_mut()))?;

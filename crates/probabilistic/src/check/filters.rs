@@ -11,16 +11,12 @@ use crate::check::vector::Vector;
 use crate::number::{Number, count};
 use crate::prism::ast::{Expr, Filter, Type};
 
-/// The result of a filter.
 #[derive(Debug, Clone)]
 pub enum Filtered {
-    /// A number.
     Number(Answer),
-    /// A truth value.
     Truth(bool),
     /// The least and the greatest number.
     Range(Answer, Answer),
-    /// The values of the selected states.
     States(Vec<Listed>),
 }
 

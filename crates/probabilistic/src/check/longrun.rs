@@ -62,7 +62,6 @@ impl<N: Number> Query<'_, N> {
         }
     }
 
-    /// Computes for each state the optimal expected total reward over an infinite path.
     pub fn total(&self, direction: Direction, rewards: &[N]) -> Checked<Valued<N>> {
         self.no_given_policy()?;
         if direction == Direction::Min || self.program.kind == ModelKind::Dtmc {

@@ -21,7 +21,7 @@ use crate::solve::Direction;
 pub type Attained = (Outcome, Option<Vec<u32>>);
 
 impl<N: Number> Query<'_, N> {
-    /// Evaluates a property. Returns `None` if exact arithmetic exceeds its budget.
+    /// Returns `None` if exact arithmetic exceeds its budget.
     pub fn answer(&self, property: &Property) -> Result<Option<Attained>, Error> {
         match self.outcome(property) {
             Ok(answer) => Ok(Some(answer)),
@@ -84,7 +84,6 @@ impl<N: Number> Query<'_, N> {
         }
     }
 
-    /// Computes the value of a nested numeric property in all states.
     pub fn property_numbers(&self, property: &Property) -> Checked<Vector<N>> {
         match property {
             Property::Expression(inner) => self.numbers(inner),
@@ -114,7 +113,6 @@ impl<N: Number> Query<'_, N> {
         vector
     }
 
-    /// Returns the states in which a nested Boolean property holds.
     pub fn property_truth(&self, property: &Property) -> Checked<FixedBitSet> {
         let n = self.mdp().states();
         match property {

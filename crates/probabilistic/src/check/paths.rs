@@ -14,7 +14,6 @@ use crate::solve::{Direction, Problem, Solution, draft, solve_within};
 
 const MAX_STEPS: u32 = 1_000_000_000;
 
-/// Values in all states, with a memoryless policy that attains them if one was computed.
 #[derive(Debug)]
 pub struct Valued<N> {
     pub vector: Vector<N>,
@@ -39,7 +38,6 @@ pub fn opposite(direction: Direction) -> Direction {
 }
 
 impl<N: Number> Query<'_, N> {
-    /// Computes for each state the minimal or maximal probability of a path formula.
     pub fn path(&self, direction: Direction, path: &Path) -> Checked<Valued<N>> {
         let n = self.mdp().states();
         match path {
@@ -83,8 +81,6 @@ impl<N: Number> Query<'_, N> {
         }
     }
 
-    /// Computes for each state the minimal or maximal probability of reaching `right` through
-    /// states of `left`, within the bounds on steps or on an accumulated reward.
     fn until(
         &self,
         direction: Direction,
@@ -159,7 +155,6 @@ impl<N: Number> Query<'_, N> {
         })?)
     }
 
-    /// Computes for each state the minimal or maximal expected reward of a reward formula.
     pub fn reward(&self, direction: Direction, name: Option<&str>, path: &RewardPath) -> Checked<Valued<N>> {
         let n = self.mdp().states();
         let no_states = FixedBitSet::with_capacity(n);
@@ -246,7 +241,6 @@ fn complement<N: Number>(values: Valued<N>) -> Valued<N> {
     Valued { vector: values.vector.complement(), policy: values.policy }
 }
 
-/// The complement of a set of states.
 pub fn inverse(mut set: FixedBitSet) -> FixedBitSet {
     set.toggle_range(..);
     set

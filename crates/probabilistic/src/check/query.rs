@@ -15,7 +15,6 @@ use crate::policy::choices_of;
 use crate::prism::{Packed, Program};
 use crate::solve::Work;
 
-/// The context for evaluating properties on an explored model in number type `N`.
 pub struct Query<'a, N> {
     pub program: &'a Program<N>,
     pub explored: &'a Explored<Packed, N>,
@@ -25,7 +24,6 @@ pub struct Query<'a, N> {
     /// The process in doubles, from which an initial policy for exact policy iteration is computed. `None` if
     /// the arithmetic is not exact.
     pub doubles: Option<Mdp<f64>>,
-    /// The remaining work budget of exact arithmetic.
     pub work: RefCell<Work>,
     /// The choices of the given policy; `None` if no policy is given.
     pub evaluated: Option<FixedBitSet>,

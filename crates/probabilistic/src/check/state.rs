@@ -51,7 +51,6 @@ fn is_comparison(op: BinaryOp) -> bool {
     !op.is_arithmetic() && !matches!(op, BinaryOp::And | BinaryOp::Or | BinaryOp::Implies | BinaryOp::Iff)
 }
 
-/// The predefined labels of the PRISM language.
 pub const BUILT_IN: [&str; 2] = ["init", "deadlock"];
 
 /// Returns `true` if a label is predefined and no declaration with this name replaces it.
@@ -110,21 +109,18 @@ fn mentions_built_in(expression: &Expr, names: &Names) -> bool {
 }
 
 impl<N: Number> Query<'_, N> {
-    /// Returns the type of an expression that may contain properties.
     pub fn kind_of(&self, expression: &Expr) -> Checked<Type> {
         let names = &self.program.names;
         let compiled = names.clone().compile(&with_placeholders(expression, names));
         compiled.map(|(_, kind)| kind).map_err(|problem| Stop::Wrong(Error::Property(problem.into())))
     }
 
-    /// Returns the set of all states.
     pub fn every(&self) -> FixedBitSet {
         let mut states = FixedBitSet::with_capacity(self.mdp().states());
         states.insert_range(..);
         states
     }
 
-    /// Returns the set of states in which a Boolean expression holds.
     pub fn truth(&self, expression: &Expr) -> Checked<FixedBitSet> {
         let (code, sets) = self.prepared(expression, Type::Bool)?;
         let n = self.mdp().states();

@@ -7,9 +7,7 @@ use crate::solve::{Direction, Problem, Work};
 /// by such a loss is also less than the threshold.
 const UNDERFLOW_THRESHOLD: f64 = 1e-280;
 
-/// Values after a bounded number of steps, with bounds on their rounding errors.
 pub struct Stepped<N> {
-    /// The value of each state.
     pub values: Vec<N>,
     /// Upper limit on the rounding error of each value, relative to the value.
     pub relative: f64,
@@ -18,7 +16,6 @@ pub struct Stepped<N> {
 }
 
 impl<N: Number> Stepped<N> {
-    /// Returns an upper limit on the absolute error of the value of a state.
     pub fn error(&self, state: usize) -> f64 {
         let value = self.values[state].to_f64();
         value * self.relative + if self.lost { UNDERFLOW_THRESHOLD } else { 0.0 }

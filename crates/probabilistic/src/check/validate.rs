@@ -41,7 +41,6 @@ pub fn properties_in<'a>(expression: &'a Expr, nested: &mut Vec<&'a Property>) {
     }
 }
 
-/// Returns the state expressions of a property, such as the goal of `F` or the states of a filter.
 pub fn expressions_of(property: &Property) -> Vec<&Expr> {
     match property {
         Property::Probability(_, path) => of_path(path),
@@ -67,7 +66,6 @@ fn of_path(path: &Path) -> Vec<&Expr> {
     }
 }
 
-/// Returns the bounds on steps or rewards of a path formula, if there are any.
 pub fn steps_of(path: &Path) -> Option<&Steps> {
     match path {
         Path::Not(inner) => steps_of(inner),

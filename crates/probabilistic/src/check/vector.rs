@@ -8,50 +8,40 @@ use crate::check::steps::Stepped;
 use crate::number::{Number, enclosing};
 use crate::solve::Solution;
 
-/// The range in which values lie.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Span {
-    /// Value between 0 and 1.
     Probability,
     /// At least 0.
     Positive,
-    /// Unrestricted.
     Any,
 }
 
-/// The values of a property in all states.
 #[derive(Debug, Clone)]
 pub struct Vector<N> {
     /// The value of each state; 0 for a state in `infinite`.
     pub values: Vec<N>,
     /// Upper limit on the absolute error of each value; empty if arithmetic is exact.
     pub errors: Vec<f64>,
-    /// The states with an infinite value.
     pub infinite: FixedBitSet,
-    /// The range of the values.
     pub span: Span,
 }
 
 impl<N: Number> Vector<N> {
-    /// Creates a vector of error-free, finite values.
     pub fn exactly(values: Vec<N>, span: Span) -> Self {
         let errors = if N::EXACT { Vec::new() } else { vec![0.0; values.len()] };
         Self { infinite: FixedBitSet::with_capacity(values.len()), values, errors, span }
     }
 
-    /// Creates the indicator function of a set: 1 for each state in `set`, 0 for the others.
     pub fn indicator(set: &FixedBitSet, states: usize) -> Self {
         let values = (0..states).map(|state| if set.contains(state) { N::one() } else { N::zero() });
         Self::exactly(values.collect(), Span::Probability)
     }
 
-    /// Converts the solution of an optimisation problem to a vector.
     pub fn solved(solution: Solution<N>, span: Span) -> Self {
         let Solution { values, errors, infinite, .. } = solution;
         Self { values, errors, infinite, span }
     }
 
-    /// Converts step-bounded values to a vector.
     pub fn stepped(source: Stepped<N>, span: Span) -> Self {
         let states = source.values.len();
         let errors =
@@ -59,12 +49,10 @@ impl<N: Number> Vector<N> {
         Self { values: source.values, errors, infinite: FixedBitSet::with_capacity(states), span }
     }
 
-    /// Returns an upper limit on the absolute error of the value of a state.
     pub fn error(&self, state: usize) -> f64 {
         self.errors.get(state).copied().unwrap_or(0.0)
     }
 
-    /// Replaces each probability by 1 minus the probability.
     #[must_use]
     pub fn complement(mut self) -> Self {
         for (state, value) in self.values.iter_mut().enumerate() {
@@ -80,7 +68,6 @@ impl<N: Number> Vector<N> {
         self
     }
 
-    /// Returns the value of a state with its lower and upper bound.
     pub fn answer(&self, state: usize) -> Answer {
         if self.infinite.contains(state) {
             return Answer::Infinite;
@@ -118,7 +105,6 @@ impl<N: Number> Vector<N> {
         }
     }
 
-    /// Creates a vector with the same value in all states.
     pub fn everywhere(value: &BigRational, states: usize) -> Self {
         let rounded = N::from_rational(value);
         let (lower, upper) = enclosing(value);

@@ -26,7 +26,6 @@ const CACHE_LIMITS: [usize; 2] = [1 << 16, 1 << 20];
 /// Cache entry of a local state in which the evaluation of a command fails.
 const FAILED: u32 = u32::MAX - 1;
 
-/// A module: its actions and its cached behaviours, i.e. the evaluated commands of local states.
 #[derive(Debug)]
 pub struct Module<N> {
     /// The actions of the module: number of the action, and position of the module's command group
@@ -51,7 +50,6 @@ pub struct Module<N> {
 pub type Chosen = u32;
 
 impl<N: Number> Module<N> {
-    /// Creates the cache for the module with this index; no behaviour is cached yet.
     pub fn new(program: &Program<N>, number: usize) -> Self {
         let mut actions = Vec::new();
         for (action, groups) in program.synchronised.iter().enumerate() {
@@ -175,14 +173,10 @@ impl<N: Number> Module<N> {
         Ok(())
     }
 
-    /// Returns the actions of the module that are disabled in the local state to which the
-    /// behaviour belongs, as a bit set.
     pub fn prevented(&self, behaviour: usize) -> u128 {
         self.prevented[behaviour]
     }
 
-    /// Returns the enabled commands without an action in the local state to which the behaviour
-    /// belongs.
     pub fn free(&self, behaviour: usize) -> std::ops::Range<Chosen> {
         self.slot(behaviour, 0)
     }
@@ -198,7 +192,6 @@ impl<N: Number> Module<N> {
         self.slots[at]..self.slots[at.saturating_add(1)]
     }
 
-    /// Iterates over the updates of a command: probability and edits of the state.
     pub fn updates(&self, command: Chosen) -> impl ExactSizeIterator<Item = (&N, &[Edit])> {
         let range = self.range(command);
         // Only ends are stored: the edits of an update begin at the end of the previous update's edits.

@@ -10,7 +10,6 @@ use crate::prism::command::{Command, RewardItem, Update, Variable, probabilities
 use crate::prism::compile::Names;
 use crate::prism::guard::Guard;
 
-/// Resolves the declaration of a variable by evaluating its range and its initial value.
 pub fn declare(names: &mut Names, variable: &ast::Variable) -> Result<Variable, Diagnostic> {
     let whole = |names: &mut Names, expression: &ast::Expr, kind| match names.constant(expression, kind)? {
         Code::Whole(value) => Ok(value),

@@ -15,31 +15,23 @@ use crate::prism::ast::{BinaryOp, Function, Type};
 pub enum Code {
     /// An integer or a truth value.
     Whole(i64),
-    /// A number of type `double`.
     Number(BigRational),
-    /// A variable, given by its index.
     Variable(u32),
-    /// `!`: negation.
     Not(Box<Self>),
     /// `-`: unary minus, with the type of the result.
     Negative(Box<Self>, Type),
-    /// Conjunction.
     All(Vec<Self>),
-    /// Disjunction.
     Any(Vec<Self>),
-    /// Equivalence.
     Iff(Box<Self>, Box<Self>),
     /// A comparison of two operands, with their common type.
     Compare(BinaryOp, Type, Box<Self>, Box<Self>),
     /// An arithmetic operation, with the type of its result.
     Arithmetic(BinaryOp, Type, Box<Self>, Box<Self>),
-    /// `condition ? then : otherwise`.
     If(Box<Self>, Box<Self>, Box<Self>),
     /// A function call, with the type of its result.
     Call(Function, Type, Vec<Self>),
 }
 
-/// The reason why an expression cannot be evaluated.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Fault(pub &'static str);
 
@@ -52,7 +44,6 @@ const MAX_OPERAND_BITS: u64 = 100_000;
 const OVERFLOW: Fault = Fault("an integer exceeds its range");
 
 impl Code {
-    /// Evaluates a Boolean expression; `values` are the values of the variables.
     pub fn holds(&self, values: &[i64]) -> Result<bool> {
         Ok(match self {
             Self::Whole(value) => *value != 0,
@@ -92,7 +83,6 @@ impl Code {
         })
     }
 
-    /// Evaluates an integer or Boolean expression; `values` are the values of the variables.
     pub fn whole(&self, values: &[i64]) -> Result<i64> {
         Ok(match self {
             Self::Whole(value) => *value,
@@ -120,8 +110,8 @@ impl Code {
         })
     }
 
-    /// Evaluates a numeric expression; `values` are the values of the variables. The result is
-    /// exact, except for logarithms, powers with fractional exponents and very large powers.
+    /// Evaluates a numeric expression. The result is exact, except for logarithms, powers with
+    /// fractional exponents and very large powers.
     pub fn number(&self, values: &[i64]) -> Result<BigRational> {
         Ok(match self {
             Self::Number(value) => value.clone(),
@@ -158,7 +148,6 @@ impl Code {
         below
     }
 
-    /// Returns `true` if the expression contains no variable.
     pub fn is_constant(&self) -> bool {
         self.variables_below() == 0
     }
@@ -189,7 +178,6 @@ impl Code {
     }
 }
 
-/// Converts an integer to a rational.
 pub fn from_whole(value: i64) -> BigRational {
     BigRational::from(BigInt::from(value))
 }
@@ -295,7 +283,6 @@ fn number_call(function: Function, arguments: &[Code], values: &[i64]) -> Result
     }
 }
 
-/// Converts a power or logarithm that was approximated in doubles to a rational.
 fn irrational(value: f64) -> Result<BigRational> {
     BigRational::from_float(value).ok_or(Fault("a number that is not finite"))
 }

@@ -14,10 +14,8 @@ use crate::prism::guard::Guard;
 /// limit are scaled to the sum 1.
 const SUM_TOLERANCE: f64 = 1e-5;
 
-/// A variable with evaluated range and initial value.
 #[derive(Debug, Clone)]
 pub struct Variable {
-    /// The name.
     pub name: String,
     /// Whether the variable is Boolean; its range is then 0 to 1.
     pub is_bool: bool,
@@ -42,7 +40,6 @@ pub struct Command<N> {
 }
 
 impl<N: Number> Command<N> {
-    /// Calls `visit` with each occurrence of a variable in the guard, the probabilities and the assigned values.
     pub fn each_variable(&self, visit: &mut impl FnMut(u32)) {
         self.guard.each_variable(visit);
         for update in &self.updates {
@@ -51,7 +48,6 @@ impl<N: Number> Command<N> {
         }
     }
 
-    /// Returns the probabilities of the updates in a state, given by the values of the variables.
     pub fn probabilities(&self, values: &[i64]) -> Result<Cow<'_, [N]>, Error> {
         Ok(match &self.certain {
             Some(certain) => Cow::Borrowed(certain),
@@ -64,13 +60,11 @@ impl<N: Number> Command<N> {
 pub struct RewardItem<N> {
     pub guard: Guard,
     pub reward: Code,
-    /// The reward, if it is a constant and valid.
     pub certain: Option<N>,
     pub place: Place,
 }
 
 impl<N> RewardItem<N> {
-    /// Calls `visit` with each occurrence of a variable in the guard and the reward.
     pub fn each_variable(&self, visit: &mut impl FnMut(u32)) {
         self.guard.each_variable(visit);
         self.reward.each_variable(visit);

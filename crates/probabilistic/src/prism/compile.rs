@@ -19,7 +19,6 @@ enum Meaning {
     Formula(usize),
 }
 
-/// The declared names of a model, with the values of its constants.
 #[derive(Debug, Clone)]
 pub struct Names {
     meanings: FxHashMap<String, Meaning>,
@@ -159,7 +158,6 @@ impl Names {
         self.declare(name, Meaning::Variable(number, kind), place, problems);
     }
 
-    /// Returns the index and type of a variable, or `None` if the name is no variable.
     pub fn find_variable(&self, name: &str) -> Option<(u32, Type)> {
         match self.meanings.get(name)? {
             Meaning::Variable(number, kind) => Some((*number, *kind)),
@@ -167,12 +165,10 @@ impl Names {
         }
     }
 
-    /// Returns the expression that defines a label, or `None` if the label is not declared.
     pub fn label(&self, name: &str) -> Option<&Expr> {
         self.labels.get(name)
     }
 
-    /// Returns the names of all declared labels, sorted.
     pub fn labels(&self) -> Vec<&str> {
         let mut labels: Vec<_> = self.labels.keys().map(String::as_str).collect();
         labels.sort_unstable();

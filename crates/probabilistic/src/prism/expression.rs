@@ -13,7 +13,6 @@ const MAX_OPERATORS: [usize; 2] = [500, 20_000];
 /// Additional upper limit on each of the two numbers in [`MAX_OPERATORS`], in an expression of a property.
 const MAX_PROPERTY_OPERATORS: usize = 2_000;
 
-/// A parser state: a position in a list of tokens, with counters for the size limits.
 #[derive(Debug)]
 pub struct Cursor<'a> {
     tokens: &'a [Token],
@@ -25,7 +24,6 @@ pub struct Cursor<'a> {
     property_syntax: Option<PropertySyntax>,
 }
 
-/// Parsers for the syntax that is allowed in expressions of properties, but not in those of models.
 #[derive(Debug, Clone, Copy)]
 pub struct PropertySyntax {
     /// Parses an expression that begins with a property operator. Returns `None` if the next token is not such an
@@ -36,7 +34,6 @@ pub struct PropertySyntax {
     pub parse_infix: fn(&mut Cursor<'_>, Expr) -> Read<Expr>,
 }
 
-/// The result of a parsing function: a syntax element or a syntax error.
 pub type Read<T> = Result<T, Diagnostic>;
 
 impl<'a> Cursor<'a> {
@@ -45,17 +42,14 @@ impl<'a> Cursor<'a> {
         Self { tokens, at: 0, depth: 0, operators: [0; 2], property_syntax: None }
     }
 
-    /// Creates a cursor that also accepts the syntax of property expressions.
     pub fn for_properties(tokens: &'a [Token], property_syntax: PropertySyntax) -> Self {
         Self { property_syntax: Some(property_syntax), ..Self::new(tokens) }
     }
 
-    /// Returns the number of consumed tokens.
     pub fn position(&self) -> usize {
         self.at
     }
 
-    /// Resets the nesting depth after an error.
     pub fn reset(&mut self) {
         self.depth = 0;
     }
@@ -66,7 +60,6 @@ impl<'a> Cursor<'a> {
         self.depth = 0;
     }
 
-    /// Returns the next token without consuming it.
     pub fn peek(&self) -> &'a Kind {
         &self.tokens[self.at].kind
     }
@@ -76,7 +69,6 @@ impl<'a> Cursor<'a> {
         self.tokens.get(self.at.saturating_add(offset)).map_or(&Kind::End, |token| &token.kind)
     }
 
-    /// Returns the position of the next token in the text.
     pub fn place(&self) -> Place {
         self.tokens[self.at].place
     }
@@ -89,12 +81,10 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// Returns `true` if the next token is the symbol `sign`.
     pub fn is(&self, sign: &str) -> bool {
         matches!(self.peek(), Kind::Sign(found) if *found == sign)
     }
 
-    /// Returns `true` if the next token is the identifier or keyword `word`.
     pub fn is_word(&self, word: &str) -> bool {
         matches!(self.peek(), Kind::Name(found) if found == word)
     }
@@ -108,7 +98,6 @@ impl<'a> Cursor<'a> {
         is_next
     }
 
-    /// Consumes the next token if it is the identifier or keyword `word`. Returns `true` if it was consumed.
     pub fn take_word(&mut self, word: &str) -> bool {
         let is_next = self.is_word(word);
         if is_next {
@@ -126,12 +115,10 @@ impl<'a> Cursor<'a> {
         )
     }
 
-    /// Consumes the symbol `sign`. Returns an error if the next token is another one.
     pub fn need(&mut self, sign: &str) -> Read<()> {
         if self.take(sign) { Ok(()) } else { Err(self.expected(&format!("`{sign}`"))) }
     }
 
-    /// Consumes the identifier or keyword `word`. Returns an error if the next token is another one.
     pub fn need_word(&mut self, word: &str) -> Read<()> {
         if self.take_word(word) { Ok(()) } else { Err(self.expected(&format!("`{word}`"))) }
     }

@@ -4,7 +4,6 @@
 use crate::prism::ast::{BinaryOp, Type};
 use crate::prism::code::{Code, Fault};
 
-/// A condition as a conjunction of tests and other expressions.
 #[derive(Debug, Clone)]
 pub struct Guard {
     /// The leading conjuncts that test whether a single variable is inside or outside of a range. Evaluating
@@ -25,7 +24,6 @@ struct Test {
 }
 
 impl Guard {
-    /// Splits a condition into its conjuncts.
     pub fn new(code: Code) -> Self {
         let mut parts = Vec::new();
         flatten(code, &mut parts);
@@ -40,13 +38,12 @@ impl Guard {
         &self.fixed
     }
 
-    /// Calls `visit` with each occurrence of a variable in the guard.
     pub fn each_variable(&self, visit: &mut impl FnMut(u32)) {
         self.tests.iter().for_each(|test| visit(test.variable));
         self.remainder.iter().for_each(|part| part.each_variable(visit));
     }
 
-    /// Returns `true` if the guard holds for the values of the variables. Fails if a conjunct cannot be evaluated.
+    /// Fails if a conjunct cannot be evaluated.
     pub fn holds(&self, values: &[i64]) -> Result<bool, Fault> {
         for test in &self.tests {
             let value = values[test.variable as usize];
@@ -99,7 +96,6 @@ fn compared(variable: u32, op: BinaryOp, value: i64) -> Test {
     }
 }
 
-/// Returns the comparison operator that is equivalent to `op` after an exchange of the operands.
 fn mirrored(op: BinaryOp) -> BinaryOp {
     match op {
         BinaryOp::Less => BinaryOp::Greater,

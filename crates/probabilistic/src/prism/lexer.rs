@@ -2,23 +2,18 @@
 
 use crate::error::{Diagnostic, Place};
 
-/// The kind of a token.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Kind {
     /// A name or a keyword.
     Name(String),
-    /// A number, as it is written in the text.
     Number(String),
     /// A text in quotation marks, stored without the quotation marks.
     Quoted(String),
-    /// An operator or a punctuation mark.
     Sign(&'static str),
-    /// The end of the text.
     End,
 }
 
 impl Kind {
-    /// Returns a description of the token for error messages.
     pub fn describe(&self) -> String {
         match self {
             Self::Name(name) | Self::Number(name) => format!("`{name}`"),
@@ -29,12 +24,9 @@ impl Kind {
     }
 }
 
-/// A token with its position in the text.
 #[derive(Debug, Clone)]
 pub struct Token {
-    /// The kind.
     pub kind: Kind,
-    /// Position of the first character.
     pub place: Place,
 }
 

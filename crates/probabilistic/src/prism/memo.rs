@@ -10,7 +10,6 @@ use crate::prism::state::{Key, Layout, Packed};
 /// the table's memory on first access.
 const MAX_TABLE_BITS: u32 = 20;
 
-/// A map from the values of selected variables in a state to numbers.
 #[derive(Debug)]
 pub struct Numbers {
     key: Key,
@@ -36,7 +35,6 @@ impl Numbers {
         Some(Self { key, entries })
     }
 
-    /// Returns the number stored for the variables' values in `state`, or `None`.
     pub fn get(&self, state: &Packed) -> Option<u32> {
         let key = self.key.of(state);
         match &self.entries {
@@ -61,7 +59,6 @@ impl Numbers {
     }
 }
 
-/// A cache for a function whose value depends only on selected variables of a state.
 #[derive(Debug)]
 pub struct Memo<T> {
     /// Maps the variables' values to positions in `values`. `None` if the variables need more than 64 bits; then
@@ -74,7 +71,6 @@ pub struct Memo<T> {
 const MAX_VALUES: usize = 1 << 16;
 
 impl<T> Memo<T> {
-    /// Creates an empty cache.
     pub fn new(layout: &Layout, variables: &BTreeSet<u32>) -> Self {
         Self { numbers: Numbers::new(layout, variables), values: Vec::new() }
     }

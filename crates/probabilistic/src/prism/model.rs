@@ -44,9 +44,7 @@ pub(super) struct Mask {
 #[derive(Debug, Clone)]
 pub(super) struct Structure<N> {
     pub states: Vec<RewardItem<N>>,
-    /// The items for commands without an action.
     pub unnamed: Vec<RewardItem<N>>,
-    /// For each action, the items for commands with this action.
     pub actions: Vec<Vec<RewardItem<N>>>,
 }
 
@@ -65,7 +63,6 @@ pub struct Program<N> {
     pub(super) layout: Layout,
     /// For each action, the command groups of the modules that synchronise on the action.
     pub(super) synchronised: Vec<Vec<Group<N>>>,
-    /// For each module, the commands without an action.
     pub(super) free: Vec<Group<N>>,
     pub(super) masks: Vec<Mask>,
     pub(super) rewards: Vec<Structure<N>>,

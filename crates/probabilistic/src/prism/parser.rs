@@ -162,7 +162,6 @@ fn named(cursor: &mut Cursor<'_>, model: &mut Model) -> Read<()> {
     Ok(())
 }
 
-/// Parses a named expression: `label "name" = expression;` or `formula name = expression;`.
 pub fn named_expression(cursor: &mut Cursor<'_>) -> Read<Named> {
     let is_label = cursor.is_word("label");
     cursor.advance();

@@ -60,7 +60,6 @@ const MORE_RESERVED: [&str; 10] =
 /// Names of functions. PRISM accepts them as identifiers if no parenthesis follows; other tools may not.
 const FUNCTIONS: [&str; 6] = ["floor", "ceil", "round", "pow", "mod", "log"];
 
-/// Returns `true` if a word is reserved, i.e. cannot be an identifier.
 pub fn is_keyword(word: &str) -> bool {
     RESERVED.contains(&word) || MORE_RESERVED.contains(&word)
 }

@@ -36,7 +36,6 @@ struct JointStep<N> {
     commands: SmallVec<[u32; 8]>,
     /// For each update, its probability (not 0) and the end of its assignments in `changes`.
     updates: SmallVec<[(N, u32); 8]>,
-    /// The assignments: variable and new value.
     changes: SmallVec<[(u32, i64); 16]>,
 }
 

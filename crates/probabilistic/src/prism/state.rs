@@ -60,7 +60,6 @@ pub struct Edit {
 }
 
 impl Edit {
-    /// Returns `true` if both edits change the same word and can thus be joined.
     pub const fn joins(&self, other: &Self) -> bool {
         self.word == other.word
     }
@@ -87,7 +86,6 @@ impl Packed {
 #[derive(Debug, Clone, Default)]
 pub struct Key {
     pieces: Vec<Piece>,
-    /// Number of bits of all selected variables together.
     pub bits: u32,
 }
 
@@ -102,7 +100,6 @@ struct Piece {
 }
 
 impl Key {
-    /// Concatenates the values of the selected variables to a number.
     pub fn of(&self, packed: &Packed) -> u64 {
         let words = packed.words();
         self.pieces.iter().fold(0, |number, piece| {
@@ -120,7 +117,6 @@ pub fn above_least(value: i64, least: i64) -> usize {
     if value < least { usize::MAX } else { usize::try_from(value.abs_diff(least)).unwrap_or(usize::MAX) }
 }
 
-/// The bit positions of all variables in packed states.
 #[derive(Debug, Clone, Default)]
 pub struct Layout {
     fields: Vec<Field>,
@@ -141,7 +137,6 @@ struct Field {
 }
 
 impl Layout {
-    /// Appends a variable with the range `least..=greatest`.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "used is at most 64 and so is bits; words counts variables"
@@ -173,7 +168,6 @@ impl Layout {
         packed
     }
 
-    /// Returns the values of all variables in a state.
     pub fn values(&self, packed: &Packed) -> impl Iterator<Item = i64> {
         self.fields.iter().map(|field| field.least.wrapping_add_unsigned(field.raw(packed)))
     }
@@ -184,12 +178,10 @@ impl Layout {
         values.extend(self.values(packed));
     }
 
-    /// Sets the value of one variable in a state.
     pub fn set(&self, packed: &mut Packed, variable: u32, value: i64) {
         packed.edit(&[self.edit(variable, value)]);
     }
 
-    /// Returns the edit that sets one variable to a value.
     pub fn edit(&self, variable: u32, value: i64) -> Edit {
         let field = &self.fields[variable as usize];
         let set = value.abs_diff(field.least) << field.shift;

@@ -90,7 +90,6 @@ fn variable(variable: &Variable) -> String {
     format!("{} : {range}{};", variable.name, initial.unwrap_or_default())
 }
 
-/// Formats an expression, with parentheses where the precedence of operators requires them.
 pub fn expression(expression: &Expr) -> String {
     operand(expression, 0)
 }

@@ -124,7 +124,6 @@ fn skip_property(cursor: &mut Cursor<'_>) {
     }
 }
 
-/// Converts a position (line and column) in a text to a byte offset.
 fn position(text: &str, place: Place) -> usize {
     let lines = text.split_inclusive('\n').take(place.line.saturating_sub(1));
     let before = lines.map(str::len).fold(0, usize::saturating_add);

@@ -10,7 +10,6 @@ use crate::solve::Direction;
 
 const PROPERTY: &str = "a property (`Pmax=? [ F … ]`, `R{\"name\"}min=? [ F … ]`)";
 
-/// The parsers that extend expressions by the syntax of properties.
 pub const PROPERTY_SYNTAX: PropertySyntax = PropertySyntax { parse_prefix, parse_infix };
 
 /// The names of the filters. The last entry is another name for `avg`.
@@ -50,7 +49,6 @@ pub fn parse(text: &str) -> Result<Property, Error> {
     result.map_err(|problem| Error::Property(problem.into()))
 }
 
-/// Parses a property and stops at the first token that does not belong to the property.
 pub fn property(cursor: &mut Cursor<'_>) -> Read<Property> {
     if !matches!(
         cursor.peek(),

@@ -92,8 +92,6 @@ pub fn certify<N: Number>(
     vec![f64::INFINITY; blocks]
 }
 
-/// Returns the expected number of further steps after a row (choice) is taken; `steps` contains the
-/// expected number from each block (merged end component).
 fn steps_after<N: Number>(quotient: &Quotient<N>, row: usize, steps: &[f64]) -> f64 {
     let range = quotient.rows.range(row);
     let transitions = quotient.rows.columns[range.clone()].iter().zip(&quotient.rows.probabilities[range]);

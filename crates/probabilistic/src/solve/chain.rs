@@ -28,18 +28,15 @@ pub const NONE: u32 = u32::MAX;
 pub struct Rows<N> {
     /// Start of each row in `columns`, followed by the length of `columns`.
     pub first: Vec<u32>,
-    /// Target states of the transitions.
     pub columns: Vec<u32>,
     /// Probabilities of the transitions, parallel to `columns`.
     pub probabilities: Vec<N>,
     /// Cost of each row, plus the expected value of its successors outside the set.
     pub constants: Vec<N>,
-    /// Probability of leaving the set, for each row.
     pub leaving: Vec<N>,
 }
 
 impl<N: Number> Rows<N> {
-    /// Creates an empty list of rows.
     pub fn new() -> Self {
         Self {
             first: vec![0],
@@ -53,7 +50,6 @@ impl<N: Number> Rows<N> {
         }
     }
 
-    /// Returns the number of rows.
     pub fn len(&self) -> usize {
         self.constants.len()
     }
@@ -67,7 +63,6 @@ impl<N: Number> Rows<N> {
         self.first[row] as usize..self.first[row + 1] as usize
     }
 
-    /// Ends the current row and sets its constant and its probability of leaving the set.
     pub fn end(&mut self, constant: N, leaving: N) {
         self.first.push(dense(self.columns.len()));
         self.constants.push(constant);
@@ -112,7 +107,6 @@ impl<N: Number> Rows<N> {
         true
     }
 
-    /// Removes all rows from index `rows` on.
     pub fn truncate(&mut self, rows: usize) {
         let end = self.first[rows] as usize;
         self.first.truncate(rows.saturating_add(1));
@@ -134,7 +128,6 @@ impl<N: Number> Rows<N> {
 /// many entries in chains like grids, which iteration solves faster.
 const MAX_ELIMINATION: u64 = 300_000_000;
 
-/// The solution of a Markov chain.
 pub struct Solved<N> {
     /// Value (expected cost) of each state.
     pub values: Vec<N>,
@@ -146,9 +139,7 @@ pub struct Solved<N> {
 /// Products of doubles below this value may have lost digits by underflow.
 const UNDERFLOW_LIMIT: f64 = 1e-290;
 
-/// A Markov chain: a policy selects one row for each state.
 pub struct Chain<'a, N> {
-    /// The rows of all states.
     pub rows: &'a Rows<N>,
     /// The row of each state, or [`NONE`] if the state has no successors and no cost.
     pub policy: &'a [u32],

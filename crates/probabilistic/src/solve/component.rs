@@ -310,7 +310,6 @@ fn component_part(states: &[u32], members: &[bool], include_sure: bool, only_sur
     states.iter().zip(members).filter(|(_, sure)| is_selected(**sure)).map(|(state, _)| *state).collect()
 }
 
-/// Returns a choice that stays in the end component of a state, or [`NONE`] outside end components.
 fn stay<N: Number>(local: &Local<N>, ends: &EndComponents, state: usize) -> u32 {
     let mut choices = local.range(state);
     choices.find(|choice| ends.alive[*choice]).map_or(NONE, |choice| local.choices[choice])

@@ -33,7 +33,6 @@ pub struct Local<N> {
 }
 
 impl<N: Number> Local<N> {
-    /// Creates an empty set of states.
     pub fn new() -> Self {
         Self {
             states: vec![],
@@ -46,7 +45,6 @@ impl<N: Number> Local<N> {
         }
     }
 
-    /// Removes the contents, but keeps the allocated memory.
     pub fn clear(&mut self) {
         self.states.clear();
         self.first.truncate(1);
@@ -60,7 +58,6 @@ impl<N: Number> Local<N> {
         (self.widest, self.tiny) = (0, false);
     }
 
-    /// Returns the local choices of a local state.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "the start of the next one is there, because the end is listed, too"
@@ -74,7 +71,6 @@ impl<N: Number> Local<N> {
         self.rows.leaving[choice].is_zero()
     }
 
-    /// Returns the local state to which each local choice belongs.
     pub fn owners(&self) -> Vec<u32> {
         owners(&self.first)
     }
@@ -87,7 +83,6 @@ pub struct EndComponents {
     /// Block of each local state. The states of an end component form a block; each other state is
     /// a block by itself.
     pub block: Vec<u32>,
-    /// Number of blocks.
     pub blocks: usize,
     /// For each local state, whether it belongs to an end component.
     pub inside: Vec<bool>,

@@ -123,11 +123,9 @@ pub(super) const UNDERFLOW_BOUND: f64 = 1e-280;
 pub(crate) struct Run<'a, N> {
     pub problem: Problem<'a, N>,
     pub solution: Solution<N>,
-    /// An initial policy for policy iteration, if one is given.
     pub hint: Option<&'a [u32]>,
     /// The local number of each state in the current component, or [`NONE`] outside the component.
     pub position: Vec<u32>,
-    /// The remaining budget of exact arithmetic.
     pub work: Work,
     /// Whether only a good policy is needed; errors are then not bounded.
     pub draft: bool,

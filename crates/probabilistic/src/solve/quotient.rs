@@ -13,12 +13,11 @@ pub struct Quotient<N> {
     pub rows: Rows<N>,
     /// The local choice from which each row was built.
     pub choices: Vec<u32>,
-    /// Greatest number of transitions of a choice from which a row was built.
+    /// Greatest number of transitions of a local choice.
     pub widest: usize,
 }
 
 impl<N: Number> Quotient<N> {
-    /// Returns the number of blocks (merged end components and other states).
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "the end is listed, too, so that the list is never empty"
@@ -27,7 +26,6 @@ impl<N: Number> Quotient<N> {
         self.first.len() - 1
     }
 
-    /// Returns the range of the rows of a block.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "the start of the next one is there, because the end is listed, too"

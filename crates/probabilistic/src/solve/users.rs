@@ -11,7 +11,6 @@ pub struct Users {
 }
 
 impl Users {
-    /// Creates the index of `rows` for the columns `0..columns`.
     pub fn new<N>(rows: &Rows<N>, columns: usize) -> Self {
         let mut starts = vec![0_u32; columns.saturating_add(1)];
         for column in &rows.columns {
@@ -35,7 +34,6 @@ impl Users {
         Self { starts, rows: users }
     }
 
-    /// Returns the rows with an entry in a column.
     pub fn of(&self, column: u32) -> &[u32] {
         let next = (column as usize).saturating_add(1);
         &self.rows[self.starts[column as usize] as usize..self.starts[next] as usize]

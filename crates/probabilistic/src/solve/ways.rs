@@ -16,7 +16,6 @@ use crate::solve::problem::{Direction, Run};
 /// is found by linear search.
 const MAX_STATES: usize = 64;
 
-/// The working memory of the shortest-path algorithm, reused for all components.
 #[derive(Debug)]
 pub struct PathBuffers<N> {
     /// For each state of the component, the best known value with its choice.

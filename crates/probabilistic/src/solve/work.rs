@@ -27,7 +27,6 @@ const SHORT_BITS: u64 = 126;
 const SPARE_BUDGET: u64 = 1_000_000_000;
 
 impl Work {
-    /// Creates a budget of `remaining` work units.
     pub const fn new(remaining: u64) -> Self {
         Self { remaining, tight: TIGHT, spare: SPARE_BUDGET, touched: 0 }
     }
@@ -52,7 +51,6 @@ impl Work {
         if self.is_spent() { None } else { Some(()) }
     }
 
-    /// Adds to the number of entries that elimination has visited.
     pub const fn touch(&mut self, entries: u64) {
         self.touched = self.touched.saturating_add(entries);
     }
@@ -72,7 +70,6 @@ impl Work {
         result
     }
 
-    /// Returns `true` if the budget is exhausted.
     pub const fn is_spent(self) -> bool {
         self.remaining == 0
     }

@@ -129,14 +129,12 @@ impl<'a, T: TimeNumber> Index<'a, T> {
         operators.filter(move |id| ![start, end].contains(id))
     }
 
-    /// Happenings other than the start and end of `own` that change a number.
     pub(super) fn changing(&self, own: &Instance<T>, number: NumericId) -> impl Iterator<Item = OperatorId> {
         let [start, end] = [own.start, own.end];
         let operators = self.changing.get(&number).into_iter().flatten().copied();
         operators.filter(move |id| ![start, end].contains(id))
     }
 
-    /// Returns `true` if an effect of the happening, possibly conditional, may make `fact` false.
     pub(super) fn changes(&self, id: OperatorId, fact: Fact) -> bool {
         let operator = &self.task.operators[id.index()];
         let conditional = operator.conditional.iter().flat_map(|effect| &effect.effects);
@@ -175,10 +173,10 @@ impl<'a, T: TimeNumber> Index<'a, T> {
         operator.conditional.is_empty() && required.any(contradicts)
     }
 
-    /// Like [`Self::excludes`], but also `true` for the end of an action whose over-all condition contradicts
-    /// the invariant, because both would hold right before an end inside the run. An end at the time of the
-    /// start of `own` must be impossible, too: either the end and the start must keep a distance, or the
-    /// start requires the fact of the invariant that the condition contradicts.
+    /// Like [`Self::excludes`], but also `true` for an end whose over-all condition contradicts the
+    /// invariant: right before an end inside the run, both would hold. The end must also be
+    /// impossible at the very start of the run. This is certain if the end and the start of `own`
+    /// keep a distance, or if the start requires the contradicted fact.
     pub(super) fn is_outside(&self, invariant: &Invariant, own: &Instance<T>, id: OperatorId) -> bool {
         if self.excludes(invariant, own, id) {
             return true;
@@ -209,7 +207,6 @@ impl<'a, T: TimeNumber> Index<'a, T> {
         self.instances[instance as usize].duration
     }
 
-    /// Pairs of the start operator and the over-all operator, for all instances with an over-all condition.
     pub(super) fn holding(&self) -> impl Iterator<Item = (OperatorId, OperatorId)> {
         self.instances.iter().filter_map(|instance| Some((instance.start, instance.over_all?)))
     }

@@ -43,8 +43,6 @@ fn designs(task: &Task, operator: OperatorId) -> Designs {
     designs
 }
 
-/// Binding of the schema's variables: the operator's arguments, then `None` for each quantified
-/// variable.
 fn binding(operator: &Operator, variables: usize) -> Binding {
     let mut binding: Binding = operator.arguments.iter().copied().map(object).collect();
     binding.resize(variables, None);
@@ -56,7 +54,6 @@ type InstanceKey = (usize, Vec<ObjectId>);
 pub(super) struct Builder<'a> {
     footprints: Footprints<'a>,
     split: &'a Split,
-    /// Write set of each operator.
     written: Vec<Footprint>,
     /// Operators of duration 0 that combine a start and an end, with the write sets of start and
     /// end.
@@ -81,8 +78,6 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Groups the starts, ends and over-all conditions of instances, and collects the write sets of
-    /// all operators.
     pub(super) fn collect(&mut self, context: Context<'_>) -> Result<(), Errors> {
         let Context { task, limits } = context;
         let mut errors = Vec::new();
@@ -167,7 +162,6 @@ impl<'a> Builder<'a> {
         task.operators.len() > before
     }
 
-    /// Creates the executable instances, and sets the roles of their starts and ends in `roles`.
     pub(super) fn instances<T: TimeNumber>(
         &self,
         context: Context<'_>,
@@ -233,8 +227,6 @@ impl<'a> Builder<'a> {
         Ok(instances)
     }
 
-    /// Records the separate write sets of the start and the end of a durative action that has
-    /// duration 0.
     fn join(&mut self, id: OperatorId, schema: usize, binding: &Binding) -> Result<(), Error> {
         let schema = &self.split.schemas[schema];
         if schema.duration.is_some() {
@@ -248,7 +240,7 @@ impl<'a> Builder<'a> {
     /// Durations that do not depend on the state, and divisors of those that do.
     ///
     /// # Errors
-    /// A divisor is not positive, a duration cannot be computed, or a limit is reached.
+    /// Fails if a divisor is not positive, a duration cannot be computed, or a limit is reached.
     pub(super) fn static_durations(
         &mut self,
         Context { task, limits }: Context<'_>,

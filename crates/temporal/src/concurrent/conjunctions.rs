@@ -37,7 +37,6 @@ struct Index {
     needs: Lists,
     adding: Lists,
     needing: Lists,
-    /// Rules that set each variable, ascending.
     setting: Vec<Vec<u32>>,
 }
 
@@ -113,9 +112,10 @@ impl Index {
         Self { needs, adding, needing, setting }
     }
 
-    /// Propositions that are needed together with `fact`, directly or for achieving another needed
-    /// proposition, and that a rule in `deleting` may help to achieve. Ascending; empty if the work
-    /// limit `looks` is used up while the needed propositions are collected.
+    /// Propositions that are needed at the same time as `fact` and that a rule in `deleting` may
+    /// help to achieve. Needed are the conditions of the rules that require `fact`, and the
+    /// conditions for achieving these. Ascending. Empty if the work limit `looks` is used up while
+    /// the needed propositions are collected.
     fn together(
         &self,
         fact: Proposition,
@@ -180,8 +180,6 @@ mod tests {
         (:durative-action lock :parameters () :duration (= ?duration 1)
           :condition (and (at start (key)) (at start (open))) :effect (at end (locked))))";
 
-    /// Names of the preferred happenings of the initial state. Returns `None` if no relaxed plan
-    /// exists.
     fn guide(facts: &str, goal: &str) -> Option<Vec<String>> {
         let problem = format!("(define (problem p) (:domain d) (:init {facts}) (:goal {goal}))");
         let (domain, problem, _) =

@@ -23,7 +23,6 @@ use crate::concurrent::temporal_relaxation::TemporalRelaxation;
 use crate::concurrent::temporal_task::TemporalTask;
 use crate::concurrent::time_number::TimeNumber;
 
-/// A rule that requires a proposition.
 #[derive(Debug, Clone, Copy)]
 struct Reader<T: TimeNumber> {
     rule: u32,
@@ -36,29 +35,22 @@ struct Reader<T: TimeNumber> {
 pub(super) struct CriticalPath<'a, T: TimeNumber = Int> {
     concurrent: &'a TemporalTask<T>,
     relaxation: TemporalRelaxation,
-    /// Rules that require each proposition.
     readers: Vec<Vec<Reader<T>>>,
-    /// Number of entries of each rule in `readers`.
     conditions: Vec<u32>,
-    /// Rules for the end of each instance.
     end_rules: Vec<Vec<u32>>,
     // The remaining fields but the last one describe the evaluated state.
-    /// Earliest time of each proposition. `None` if it is not reached.
     times: Vec<Option<T>>,
     /// Whether the state itself satisfies each proposition.
     holds: Vec<bool>,
-    /// Whether the readers of each proposition were visited.
     is_settled: Vec<bool>,
-    /// Number of conditions of each rule that are not settled.
     unmet: Vec<u32>,
     /// Earliest time of each rule because of its settled conditions.
     rule_times: Vec<T>,
     /// Earliest end of each instance. `None` unless the instance is running or its start is reached.
     ends: Vec<Option<T>>,
-    /// Time of the latest access of each kind.
     accesses: Vec<Option<T>>,
     queue: BinaryHeap<Reverse<(T, Proposition)>>,
-    /// Number of conditions, effects and interference constraints looked at in all evaluations.
+    /// Number of conditions, effects and interference constraints visited in all evaluations.
     pub(super) work: usize,
 }
 
@@ -157,7 +149,6 @@ impl<'a, T: TimeNumber> CriticalPath<'a, T> {
         Some(makespan)
     }
 
-    /// Resets the evaluation, and makes the propositions true that hold in the state.
     fn begin(&mut self, TemporalState { state, clocks, .. }: &TemporalState<T>) {
         self.times.fill(None);
         self.holds.fill(false);
@@ -202,7 +193,6 @@ impl<'a, T: TimeNumber> CriticalPath<'a, T> {
         self.queue.push(Reverse((T::ZERO, proposition)));
     }
 
-    /// Records a run of an instance that starts at a time.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "sums of fewer than 2^32 times fit, see `TimeNumber::TIME_BITS`"
@@ -213,7 +203,6 @@ impl<'a, T: TimeNumber> CriticalPath<'a, T> {
         *earliest = Some(earliest.map_or(end, |earliest| earliest.min(end)));
     }
 
-    /// Applies a rule whose conditions are all satisfied.
     fn fire(&mut self, rule: u32, clocks: &SimpleTemporalNetwork<T>) {
         let mut time = self.rule_times[rule as usize];
         self.work = self.work.saturating_add(self.relaxation.adds.of(rule).len());
@@ -269,8 +258,8 @@ impl<'a, T: TimeNumber> CriticalPath<'a, T> {
     }
 }
 
-/// Returns, for each proposition, the access kinds that all happenings which add it have in common, ascending. They are
-/// empty for propositions that follow from others.
+/// Returns, for each proposition, the access kinds that all happenings adding it have in common,
+/// ascending. Empty for propositions that follow from others.
 fn common_marks<T: TimeNumber>(
     concurrent: &TemporalTask<T>,
     relaxation: &TemporalRelaxation,
@@ -291,7 +280,6 @@ fn common_marks<T: TimeNumber>(
     common.into_iter().map(Option::unwrap_or_default).collect()
 }
 
-/// Greatest distance that a happening keeps to accesses of the kinds in `marks`.
 fn distance<T: TimeNumber>(marks: &[Key], after: &[(Key, T)]) -> T {
     let distances = after.iter().filter(|(key, _)| marks.binary_search(key).is_ok()).map(|(_, by)| *by);
     distances.max().unwrap_or(T::ZERO)

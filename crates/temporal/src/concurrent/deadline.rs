@@ -7,9 +7,9 @@ use task::task::{OperatorId, State, Task};
 
 use crate::concurrent::time_number::TimeNumber;
 
-/// A deadline: each state in which an operator of `begins` is applicable must be followed, within a
-/// time limit, by a state in which an operator of `ends` is applicable. The operators only encode
-/// conditions and never occur in a plan.
+/// A deadline: in each state that satisfies a begin condition, or in a later state within a time
+/// limit, an end condition must hold. Both conditions are encoded as operators that never occur in
+/// a plan.
 #[derive(Debug, Clone)]
 pub(super) struct Deadline<T: TimeNumber = Int> {
     /// Time limit in internal time units.
@@ -35,8 +35,7 @@ impl<T: TimeNumber> Deadline<T> {
         Self { within: within.unwrap_or(T::MAX), is_hard: deadline.is_hard, begins, ends }
     }
 
-    /// Returns `true` if a plan meets the deadline. `trajectory` contains the states of the plan
-    /// with their times, ascending.
+    /// `trajectory` contains the states of a plan with their times, ascending.
     #[expect(clippy::arithmetic_side_effects, reason = "times are not negative")]
     pub(super) fn is_kept(&self, task: &Task, trajectory: &[(T, State)]) -> bool {
         let holds = |ways: &[OperatorId], state: &State| {

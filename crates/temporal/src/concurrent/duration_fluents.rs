@@ -19,10 +19,8 @@ use task::number::dense;
 /// Prefix of the ground names of duration fluents. Names in PDDL files contain no blanks, so no
 /// clash is possible.
 pub(super) const DURATION_PREFIX: &str = "(duration of ";
-/// Prefix of the ground names of duration fluents whose values the planner chooses.
 pub(super) const FLEXIBLE_DURATION_PREFIX: &str = "(chosen duration of ";
 
-/// Returns `true` if an expression mentions a fluent that some action changes.
 pub(super) fn depends_on_state(lifted: &Lifted, expression: &Expression) -> bool {
     let any = |parts: &[Expression]| parts.iter().any(|part| depends_on_state(lifted, part));
     match expression {
@@ -36,8 +34,6 @@ pub(super) fn depends_on_state(lifted: &Lifted, expression: &Expression) -> bool
     }
 }
 
-/// Function that holds the chosen duration. Returns `None` if the planner does not choose the
-/// duration.
 pub(super) fn chosen(lifted: &Lifted, duration: &Expression) -> Option<FunctionId> {
     let Expression::Function(function, ..) = duration else { return None };
     lifted.functions[function.index()].name.as_str().starts_with(CHOSEN).then_some(*function)
@@ -88,8 +84,6 @@ impl Timer {
         }
     }
 
-    /// Effect of the start that sets the fluent. Returns `None` if the planner chooses the
-    /// duration.
     pub(super) fn set(&self, schema: &Schema) -> Option<Effect> {
         Some(self.assign(schema, Assignment::Assign, self.numerator.clone()?))
     }

@@ -30,7 +30,6 @@ use crate::concurrent::happening::Role;
 use crate::concurrent::temporal_task::TemporalTask;
 use crate::concurrent::time_number::TimeNumber;
 
-/// Upper limit on the number of groups of resources for which a bound is computed.
 const MAX_GROUPS: usize = 6;
 /// Costs are divided by a power of two, so that their maximum has at most this number of bits. LM-cut does
 /// not support much higher costs.

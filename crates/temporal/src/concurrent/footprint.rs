@@ -63,8 +63,7 @@ impl Footprint {
     }
 }
 
-/// Collects the write sets of all happenings, and indexes the written atoms and numbers for
-/// matching with reads.
+/// Computes the write sets of happenings, and indexes the written atoms and numbers.
 pub(super) struct Footprints<'a> {
     world: World<'a>,
     /// Whether some write set contains an effect that does not apply in every state.

@@ -63,10 +63,8 @@ const KICK: usize = 3;
 /// The states of an order may take at most 1/`MEMORY_FRACTION` of the memory limit.
 const MEMORY_FRACTION: usize = 8;
 
-/// A happening, and whether it takes place at the time of the previous one.
 type Link = (OperatorId, bool);
 
-/// State in which a goal holds, and the happenings that lead there.
 type Achieved<T> = (TemporalState<T>, Vec<Link>);
 
 /// Temporal state before a goal of an order is achieved, and the number of happenings up to there.
@@ -78,11 +76,9 @@ struct Stage<T: TimeNumber = Int> {
 
 #[derive(Clone)]
 struct Decoded<T: TimeNumber = Int> {
-    /// Indices of goals.
     order: Vec<usize>,
     stages: Vec<Stage<T>>,
     links: Vec<Link>,
-    /// Metric (scaled to an integer) and makespan (in internal time units).
     value: (T, T),
 }
 
@@ -109,7 +105,6 @@ pub(super) struct GoalOrders<'a, T: TimeNumber = Int> {
     /// Number of neighbours tried since the last perturbation or the last best plan.
     rejected: usize,
     failures: usize,
-    /// Work at the last improvement of `best`.
     improved_at: u64,
     decoded: u64,
     random: Random,
@@ -247,8 +242,8 @@ impl<'a, T: TimeNumber> GoalOrders<'a, T> {
         order
     }
 
-    /// Next order, its first position that differs from the current order, and the worst acceptable value
-    /// (`None` if any value is acceptable).
+    /// Next order, its first position that may differ from the current order, and the worst
+    /// acceptable value (`None` if any value is acceptable).
     fn next_order(&mut self) -> (Vec<usize>, usize, Option<(T, T)>) {
         if let Some(order) = self.initial.pop() {
             return (order, 0, None);

@@ -48,7 +48,6 @@ const NOISE_DIVISOR: u64 = 20;
 type Link = (OperatorId, bool);
 pub(super) type Links = SmallVec<[Link; 2]>;
 
-/// Modes of the search: treatment of starts and ends, and of duplicate states.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Mode {
     /// The end of an action directly follows its start in the sequence; only timed initial literals can come
@@ -115,7 +114,6 @@ pub(super) enum Outcome {
     Found,
     /// The open list is empty or the memory share is used up.
     Exhausted,
-    /// Stopped by an interrupt, or at a limit of time or work.
     Stopped,
 }
 
@@ -127,12 +125,10 @@ pub(super) struct Greedy<'a, T: TimeNumber = Int> {
     guidance: RelaxedPlanHeuristic<'a>,
     packing: Packing<'a, T>,
     nodes: Vec<Node>,
-    /// Id and unpacked state of the node that was expanded last.
     latest: Option<(u32, TemporalState<T>)>,
     /// Lower bound on the makespan of each visited state, by a hash of the state: that of the first
     /// visit or, in mode `Sooner`, the least one.
     seen: FxHashMap<u64, T>,
-    /// Approximate memory use of the nodes in bytes.
     bytes: usize,
     /// Three queues: all happenings and preferred happenings by heuristic value, and all happenings
     /// with successors of novel states first.
@@ -140,7 +136,6 @@ pub(super) struct Greedy<'a, T: TimeNumber = Int> {
     /// Facts that held in some visited state, by the number of unsatisfied goals in that state.
     known: Vec<FxHashSet<(u32, u32)>>,
     pub(super) mode: Mode,
-    /// Source of noise in the heuristic values; `None` for no noise.
     noise: Option<Random>,
     nearest: u64,
     pub(super) figures: SearchStatistics,
@@ -226,8 +221,9 @@ impl<'a, T: TimeNumber> Greedy<'a, T> {
         }
     }
 
-    /// Returns the successor of a node by a happening or, in sequential mode, by a start and its end, and the
-    /// list of applied happenings. Timed initial literals that must precede a happening are applied first.
+    /// Returns the successor of a node by a happening or, in sequential mode, by a start and its
+    /// end, and the list of applied happenings. Timed initial literals that must precede a
+    /// happening are applied first. Returns `None` if a happening is not applicable.
     fn follow(&mut self, parent: u32, operator: OperatorId) -> Option<(TemporalState<T>, Links)> {
         let cached = self.latest.take().filter(|(id, _)| *id == parent);
         let unpack = || (parent, self.packing.unpack(&self.nodes[parent as usize].packed));
@@ -348,8 +344,6 @@ impl<'a, T: TimeNumber> Greedy<'a, T> {
         }
     }
 
-    /// Plan that leads to a goal state. Returns `None` if the metric overflows or the plan violates
-    /// a hard deadline.
     fn sequence(&self, situation: &TemporalState<T>, parent: u32, links: &Links) -> Option<Sequence<T>> {
         let value = self.concurrent.value(situation)?;
         let mut sequence_links: Vec<Link> = links.iter().rev().copied().collect();

@@ -6,8 +6,7 @@ use task::task::{Fact, NumericId, OperatorId};
 use crate::concurrent::interference::{Designs, InterferenceConstraints};
 use crate::concurrent::time_number::TimeNumber;
 
-/// Role of an operator of the split task, in which the start and the end of an action are separate operators:
-/// the part of an action that the operator executes.
+/// Part of an action that an operator of the split task executes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Role {
     /// Start of the durative action with this instance index.
@@ -23,7 +22,6 @@ pub(super) enum Role {
     Never,
 }
 
-/// Temporal properties of an operator: its role, its interference constraints, and what it writes.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Happening<T: TimeNumber = Int> {
     pub(super) role: Role,
@@ -51,7 +49,6 @@ pub(super) struct Instance<T: TimeNumber = Int> {
     /// Numeric variable that holds the duration while the action runs, and the factor from its value to
     /// internal time units. `None` if the duration is constant.
     pub(super) timer: Option<(NumericId, T)>,
-    /// Whether the planner chooses the duration.
     pub(super) is_chosen: bool,
     pub(super) designs: Designs,
     /// Atoms and numbers that the over-all condition reads, numbered as in `Happening::writes`.

@@ -41,12 +41,9 @@ pub(super) struct InterferenceConstraints<T: TimeNumber = Int> {
 /// function.
 pub(super) type Designs = Vec<(ObjectId, ObjectId)>;
 
-/// Assigns dense numbers ([`Key`]s) to kinds of access.
 pub(super) struct Keys<T: TimeNumber = Int> {
     known: IndexMap<Access, (), FxBuildHasher>,
-    /// Least distance between interfering happenings, in internal time units.
     separation: T,
-    /// All pairs of a function and a design that some action uses for the function.
     designs: FxHashSet<(ObjectId, ObjectId)>,
 }
 

@@ -187,7 +187,8 @@ fn claimed<T: TimeNumber>(
     }
 }
 
-/// Returns `true` if an incomplete search has found a plan that reaches the initial lower bound.
+/// Returns `true` if the exact search is incomplete, but the incumbent reaches the lower bound
+/// `root`.
 fn is_best<T: TimeNumber>(concurrent: &TemporalTask<T>, search: &Search<'_, T>, root: T) -> bool {
     !concurrent.is_exact
         && concurrent.is_whole

@@ -35,7 +35,6 @@ type Edge<T> = (Option<u32>, u32, T);
 
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RemainingTime<T: TimeNumber = Int> {
-    /// Lower bound on the makespan.
     pub(super) makespan: T,
     /// Sum of the remaining times of the goal variables; not a lower bound.
     pub(super) sum: T,
@@ -107,7 +106,7 @@ fn path<T: TimeNumber>(concurrent: &TemporalTask<T>, goal: Fact, setting: &[Oper
     Path { variable: variable.index(), left: distances }
 }
 
-/// Operators that set each variable, in ascending order.
+/// By variable, in ascending order.
 fn setting(task: &Task) -> Vec<Vec<OperatorId>> {
     let mut setting: Vec<Vec<OperatorId>> = vec![Vec::new(); task.variables.len()];
     for (operator, id) in task.operators.iter().zip((0..).map(OperatorId)) {

@@ -59,7 +59,6 @@ impl<T: TimeNumber> Measure<T> {
         self.time.checked_mul(makespan)?.checked_add(self.cost.checked_mul(cost.into())?)
     }
 
-    /// Converts an integer value to the metric of the PDDL problem.
     pub(super) fn metric(&self, total: &Rational) -> Exact {
         let sum = (total.clone() + self.offset.to_rational()) / self.scale.to_rational();
         Exact::scaled(&if self.maximize { -sum } else { sum }, 1)

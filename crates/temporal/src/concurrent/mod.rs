@@ -113,7 +113,7 @@ pub fn ground_concurrent(
 }
 
 impl<T: TimeNumber> TemporalTask<T> {
-    /// Adds the source files, and the deadlines and the exactness of compiled trajectory
+    /// Adds the source files, the deadlines, and the exactness of the compilation of trajectory
     /// constraints.
     fn completed(mut self, plain: &CompiledTask<'_>, source: Option<&SourceTask>) -> Self {
         let shortest = self.shortest.take().map(|shortest| {
@@ -137,9 +137,10 @@ impl<T: TimeNumber> TemporalTask<T> {
     }
 }
 
-/// Grounds a task whose trajectory constraints were compiled away. If the planner can choose durations, the
-/// variant with the shortest durations is kept in `shortest`. With compiled constraints (hidden actions), or
-/// if chosen durations are not supported, only the shortest durations are possible.
+/// Grounds a task whose trajectory constraints were compiled away. If the planner can choose
+/// durations, `shortest` holds the variant with the shortest durations, if it can be grounded. With
+/// hidden actions (compiled constraints), or if chosen durations are not supported, only the
+/// shortest durations are possible.
 fn ground_plain(files: Files<'_>) -> Result<ConcurrentTask, Errors> {
     let shortest = ground_with(files, &normalize);
     let is_judged = files.0.actions.iter().any(|action| is_hidden(action.identifier.name.as_str()));
@@ -259,7 +260,7 @@ fn is_fixed(domain: &Domain) -> bool {
     })
 }
 
-/// Returns `true` if an effect at the end of an action mentions `?duration`.
+/// Returns `true` if an end effect of the action assigns a value that mentions `?duration`.
 fn mentions_duration(domain: &Domain, action: u32) -> bool {
     let Some(action) = domain.actions.get(action as usize) else { return false };
     let ActionBody::Durative { effects, .. } = &action.body else { return false };
@@ -282,9 +283,10 @@ fn measures(effect: &ast::Effect) -> bool {
     }
 }
 
-/// Searches for an optimal plan with overlapping actions, until optimality is proved or a limit is reached.
-/// Among optimal plans it returns one with the least makespan, if the search proves it and no duration is
-/// chosen. Calls `report` for every better plan, unless only a part of the metric is minimised.
+/// Searches for an optimal plan with overlapping actions, until optimality is proved, no search can
+/// continue, or a limit is reached. If the exact search proves optimality and no duration is
+/// chosen, the plan has the least makespan among the optimal plans. Calls `report` for every better
+/// plan, unless only a part of the metric is minimised.
 pub fn optimize_concurrent(
     concurrent: &ConcurrentTask,
     limits: &Limits,
@@ -300,7 +302,6 @@ pub fn optimize_concurrent(
     }
 }
 
-/// Finds an optimal plan of a task in which the planner chooses no duration.
 fn optimize_fixed<T: TimeNumber>(
     concurrent: &TemporalTask<T>,
     limits: &Limits,

@@ -22,12 +22,11 @@ use crate::concurrent::time_number::TimeNumber;
 
 const UNREACHABLE: u32 = u32::MAX;
 const MAX_COST: u32 = 1 << 30;
-/// Cap on the number of applications of one rule.
 const MAX_REPETITIONS: u32 = 1 << 20;
 
 #[derive(Debug, Clone)]
 pub(super) struct HeuristicValue {
-    /// Sum over the happenings of the relaxed plan: weight times number of applications.
+    /// Cost of the relaxed plan: sum over its happenings of weight times number of applications.
     pub(super) left: u64,
     /// Happenings of the relaxed plan without unsatisfied conditions, ascending.
     pub(super) preferred: Vec<OperatorId>,
@@ -36,9 +35,8 @@ pub(super) struct HeuristicValue {
 pub(super) struct RelaxedPlanHeuristic<'a> {
     relaxed: &'a TemporalRelaxation,
     costs: Vec<u32>,
-    /// Cheapest rule that adds each proposition, and its number of applications.
+    /// For each proposition: cheapest rule that adds it, and number of its applications.
     supporters: Vec<Option<(u32, u32)>>,
-    /// For each rule: number of its unreached conditions.
     unmet: Vec<u32>,
     /// For each rule: sum of the costs of its reached conditions.
     sums: Vec<u32>,
@@ -66,7 +64,7 @@ impl<'a> RelaxedPlanHeuristic<'a> {
         }
     }
 
-    /// Evaluates a state. Returns `None` if the goal or the end of a running action is unreachable.
+    /// Returns `None` if the goal or the end of a running action is unreachable.
     pub(super) fn guide<T: TimeNumber>(
         &mut self,
         TemporalState { state, clocks, .. }: &TemporalState<T>,
@@ -204,8 +202,8 @@ impl<'a> RelaxedPlanHeuristic<'a> {
     }
 }
 
-/// Number of applications that add the missing amount, at most [`MAX_REPETITIONS`]; 1 if an amount is
-/// unknown.
+/// Number of applications that add the missing amount, from 1 to [`MAX_REPETITIONS`]; 1 if an
+/// amount is unknown.
 pub(super) fn repetitions(missing: Option<Int>, by: Option<Int>) -> u32 {
     let (Some(missing), Some(by)) = (missing, by) else { return 1 };
     let times = missing.checked_add(by.saturating_sub(1)).and_then(|sum| sum.checked_div(by));

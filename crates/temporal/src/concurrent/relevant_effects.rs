@@ -8,7 +8,6 @@ use task::task::{Fact, NumericEffect, NumericId, Task};
 use crate::concurrent::happening::Instance;
 use crate::concurrent::time_number::TimeNumber;
 
-/// Input of the relevance analysis: which facts and number changes can be useful.
 pub(super) struct RelevanceContext<'k, T: TimeNumber = Int> {
     /// Upper bound on the useful simultaneous runs of each instance; `u32::MAX` if no bound is
     /// known.
@@ -47,7 +46,7 @@ impl<T: TimeNumber> RelevanceContext<'_, T> {
         effects.iter().filter(is_relevant).copied().collect()
     }
 
-    /// Returns `true` if adding `by` to a number is never an improvement.
+    /// Returns `true` if it is proved that adding `by` to a number is never an improvement.
     fn is_no_better(&self, number: NumericId, by: Int) -> bool {
         by == 0
             || self.asked.get(number.index()).is_some_and(|asked| !if by < 0 { asked.down } else { asked.up })

@@ -11,19 +11,19 @@ pub(super) type Proposition = u32;
 
 #[derive(Debug, Clone, Default)]
 pub(super) struct Rule {
-    /// Conditions of the rule, ascending.
+    /// Ascending.
     pub(super) needs: Vec<Proposition>,
     pub(super) adds: Vec<Proposition>,
-    /// Conditions that must hold from the start of the action on, ascending. Only the ends of actions have some,
-    /// and only in [`TemporalRelaxation::admissible`](super::temporal_relaxation::TemporalRelaxation::admissible).
+    /// Over-all conditions of the action, ascending. Empty except for ends of actions in
+    /// [`TemporalRelaxation::admissible`](super::temporal_relaxation::TemporalRelaxation::admissible).
     pub(super) over_all: Vec<Proposition>,
     /// Facts to which the happening certainly sets their variables, so that other values are
     /// deleted. Empty for clauses and derived facts.
     pub(super) sets: Vec<Proposition>,
-    /// Numeric conditions whose expressions the rule increases.
+    /// Numeric conditions whose expressions the rule may increase.
     pub(super) raises: Vec<NumericEffect>,
     pub(super) weight: u32,
-    /// Happening that the rule represents. `None` for clauses and derived facts.
+    /// `None` for clauses and derived facts.
     pub(super) origin: Option<OperatorId>,
 }
 

@@ -32,13 +32,11 @@ const COMPARED: usize = 4;
 /// Work of the critical-path heuristic that counts as one expanded node.
 const EVALUATED: usize = 100;
 
-/// A plan as a sequence of happenings.
 #[derive(Debug, Clone)]
 pub(super) struct Sequence<T: TimeNumber = Int> {
     /// Metric (scaled to an integer) and makespan (in internal time units).
     pub(super) value: (T, T),
     pub(super) happenings: Vec<OperatorId>,
-    /// Per happening: whether it takes place at the time of the previous one.
     pub(super) together: Vec<bool>,
 }
 
@@ -50,35 +48,33 @@ impl<T: TimeNumber> Sequence<T> {
     }
 }
 
-/// Outcome of a search.
 pub(super) enum SearchEnd<T: TimeNumber = Int> {
-    /// No open node can be better than the incumbent.
+    /// No open or dropped node can lead to a better plan than the incumbent, or the incumbent
+    /// reaches a lower bound on the metric.
     Exhausted,
     /// Stopped at a limit, or nodes were dropped. The value is a lower bound on the metric of plans not found
     /// yet, scaled to an integer.
     Stopped(T),
 }
 
-/// Sort key of an open node: metric, makespan, remaining work estimate, depth, and node; and whether the critical path of
-/// the node was evaluated.
+/// Sort key of an open node: lower bounds on metric and makespan, sum of remaining times, depth,
+/// node id, and whether the critical path of the node was evaluated.
 type Priority<T> = (T, T, T, u32, u32, bool);
 
 pub(super) struct Search<'a, T: TimeNumber = Int> {
     concurrent: &'a TemporalTask<T>,
     estimate: &'a Estimate<T>,
-    /// `None` unless its bound for the initial state exceeds that of `estimate`.
+    /// `None` if its bound for the initial state is no better than that of `estimate`.
     critical_path: Option<CriticalPath<'a, T>>,
-    /// Lower bounds on costs and resources. `None` if neither costs nor numbers occur, or if the bounds
-    /// could not be computed.
+    /// Lower bounds on costs and resources; `None` if they are not needed or could not be computed.
     bounds: Option<&'a Bounds>,
     expansion: &'a Expansion<'a, T>,
     store: Store<'a, T>,
     open: BinaryHeap<Reverse<Priority<T>>>,
     pub(super) incumbent: Option<Sequence<T>>,
-    /// Lower bound on the metric of plans through nodes that were dropped: numbers overflowed, or a hard
-    /// deadline was violated. `None` if no node was dropped.
+    /// Lower bound on the metric of plans through dropped nodes, e.g. nodes in which a number
+    /// overflowed. `None` if no node was dropped.
     left_out: Option<T>,
-    /// Lower bound on the makespan of every plan.
     floor: T,
     figures: SearchStatistics,
 }
@@ -136,9 +132,9 @@ impl<'a, T: TimeNumber> Search<'a, T> {
         (total.max(floor), makespan.max(self.floor))
     }
 
-    /// Searches until the open list is exhausted, the work reaches `max_nodes` (expanded nodes and their
-    /// successors), or a limit is reached. The search can be resumed. Better plans and lower bounds are
-    /// reported to `record`.
+    /// Searches until the open list is empty, `max_nodes` units of work are done, or a limit is
+    /// reached. The work is about the number of expanded and generated nodes. The search can be
+    /// resumed. Better plans and lower bounds are reported to `record`.
     pub(super) fn run(
         &mut self,
         limits: &Limits,
@@ -223,7 +219,7 @@ impl<'a, T: TimeNumber> Search<'a, T> {
         self.store.bytes().saturating_add(open) > limits.room() / 2
     }
 
-    /// Lower bound on the metric of plans not found yet, in integers.
+    /// Lower bound on the metric of plans not found yet, scaled to an integer.
     pub(super) fn lower(&self) -> T {
         self.known(self.open.peek().map_or(T::ZERO, |Reverse(priority)| priority.0))
     }
@@ -311,8 +307,9 @@ impl<'a, T: TimeNumber> Search<'a, T> {
         }
     }
 
-    /// Evaluates the critical path of a node, and returns its sort key with the raised lower bounds on metric and
-    /// makespan. Also returns the work. The key is `None` if no plan through the node is better than the incumbent.
+    /// Evaluates the critical path of a node, and returns its sort key with the raised lower bounds
+    /// on metric and makespan. Also returns the work. The key is `None` if no plan through the node
+    /// is better than the incumbent.
     #[expect(clippy::arithmetic_side_effects, reason = "the makespan is at most the bound")]
     fn evaluate(
         &mut self,
@@ -334,7 +331,6 @@ impl<'a, T: TimeNumber> Search<'a, T> {
         (is_better.then_some((value.0, value.1, sum, depth, id, true)), work)
     }
 
-    /// Plan that leads to a goal node. Returns `None` if its metric overflows or it violates a hard deadline.
     fn sequence(&self, goal: u32, situation: &TemporalState<T>) -> Option<Sequence<T>> {
         let value = self.concurrent.value(situation)?;
         let (mut happenings, mut together) = (Vec::new(), Vec::new());

@@ -17,7 +17,7 @@ pub(super) struct Record<'r, T: TimeNumber = Int> {
     concurrent: &'r TemporalTask<T>,
     report: &'r mut dyn FnMut(Improvement),
     started: Instant,
-    /// Last recorded integer metric of the best plan, and last recorded integer lower bound.
+    /// Cost of the incumbent and lower bound at the last entry of the history, as integer metrics.
     noted: Option<(Option<Rational>, Rational)>,
     cost: Option<Rational>,
     /// Initial lower bound if the search is incomplete; later lower bounds are capped at this

@@ -21,8 +21,6 @@ use crate::concurrent::time_number::TimeNumber;
 /// Maximum number of iterations of the analysis: a bound for one instance can improve the bounds of others.
 const FIXPOINT_ROUNDS: usize = 2;
 
-/// Sets `most`, `under_way` and `counts_by_end` of each instance: the bound on useful simultaneous
-/// runs, the fact that the action is running, and whether only ends count.
 pub(super) fn bound_self_overlap<T: TimeNumber>(
     task: &Task,
     happenings: &[Happening<T>],
@@ -78,13 +76,10 @@ fn under_way<T: TimeNumber>(task: &Task, own: &Instance<T>) -> Option<Fact> {
     required.iter().find(|fact| name(fact).starts_with(UNDER_WAY)).copied()
 }
 
-/// Returns `true` if another fact requires another value of the variable of `fact`.
 fn clashes(fact: Fact, others: &[Fact]) -> bool {
     others.iter().any(|other| other.variable == fact.variable && other.value != fact.value)
 }
 
-/// Data for analysing the happenings during a run of `own`: facts that hold during the run, and the
-/// relevance of effects.
 #[derive(Clone, Copy)]
 struct Inside<'i, T: TimeNumber> {
     own: &'i Instance<T>,
@@ -229,8 +224,9 @@ impl<T: TimeNumber> Index<'_, T> {
     }
 
     /// Upper bound on the total number of useful occurrences of the operators `happenings` during a
-    /// run. Returns `None` if there is no bound. Among happenings that only serve the same facts,
-    /// only the first one is useful, and one more after each happening that undoes these facts.
+    /// run. Returns `None` if there is no bound or the work limit is used up. Among happenings that
+    /// only serve the same facts, only the first one is useful, and one more after each happening
+    /// that undoes these facts.
     fn times_together(
         &self,
         inside: Inside<'_, T>,

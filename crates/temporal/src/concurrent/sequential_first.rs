@@ -147,7 +147,6 @@ pub(super) struct SequentialPlanner<'w> {
     exact: Exact<'w>,
     /// Number of states that the optimal search may store up to the current turn.
     stored: usize,
-    /// Cost of the cheapest sequential plan that the satisficing search has found.
     known: Option<Int>,
 }
 

@@ -47,7 +47,6 @@ struct Start<T: TimeNumber = Int> {
     upper: T,
 }
 
-/// The simple temporal network of a search node: the times that constrain future happenings.
 #[derive(Debug, Clone)]
 pub(super) struct SimpleTemporalNetwork<T: TimeNumber = Int> {
     /// Time of the latest access of each kind, sorted by key.
@@ -62,9 +61,9 @@ pub(super) struct SimpleTemporalNetwork<T: TimeNumber = Int> {
     /// Time point and offset at which all further happenings take place until every over-all
     /// condition holds again. `None` if all these conditions hold.
     group: Option<(TimePoint, T)>,
-    /// Time of the last happening; negative before the first one.
+    /// Time of the latest happening, not counting timed initial literals; -1 before the first one.
     latest: TimeExpression<T>,
-    /// Time of the last timed initial literals that were applied; negative before the first ones.
+    /// Time of the last timed initial literals that were applied; -1 before the first ones.
     floor: T,
 }
 
@@ -94,14 +93,11 @@ pub(super) struct Happening<'h, T: TimeNumber = Int> {
     pub(super) settled: bool,
 }
 
-/// Temporal constraints and accesses of timed initial literals.
 pub(super) struct Event<'h, T: TimeNumber = Int> {
     pub(super) time: T,
-    /// Access kinds that the literals must follow, each with the required distance.
     pub(super) after: &'h [(Key, T)],
     pub(super) marks: &'h [Key],
     pub(super) changes: &'h [u32],
-    /// Whether the over-all conditions of all running actions hold after the literals.
     pub(super) settled: bool,
 }
 
@@ -130,8 +126,8 @@ impl<T: TimeNumber> SimpleTemporalNetwork<T> {
         self.opens.is_empty() && self.floor > self.latest()
     }
 
-    /// Returns `true` if timed initial literals at `time` are far enough behind the earliest times of the
-    /// accesses that they must follow. `after` lists these kinds of access, each with the required distance.
+    /// Returns `true` if timed initial literals at `time` keep the required distances to the
+    /// earliest times of previous accesses. `after` lists kinds of access, each with its distance.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "sums of fewer than 2^32 times fit, see `TimeNumber::TIME_BITS`"
@@ -158,12 +154,11 @@ impl<T: TimeNumber> SimpleTemporalNetwork<T> {
         }
     }
 
-    /// Earliest possible time of the last happening.
+    /// Earliest possible time of the latest happening; 0 before the first one.
     pub(super) fn latest(&self) -> T {
         self.latest.base.max(T::ZERO)
     }
 
-    /// Earliest possible start of a running action.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "sums of fewer than 2^32 times fit, see `TimeNumber::TIME_BITS`"

@@ -6,7 +6,6 @@ use pddl::ast::{Domain, Problem};
 
 use task::ground::GroundConfig;
 
-/// Upper limit on the number of initial facts and values of a kept problem.
 const MAX_INITIAL_FACTS: usize = 20_000;
 
 #[derive(Debug, Clone)]

@@ -49,18 +49,16 @@ pub(super) struct Origin {
     pub(super) half: Half,
 }
 
-/// A lifted task whose schemas are happenings, with the data to relate them to the original
-/// actions.
 pub(super) struct Split {
     pub(super) lifted: Lifted,
     /// Schemas of the original domain.
     pub(super) schemas: Vec<Schema>,
-    /// Origin of each schema of the split task.
+    /// By schema of the split task.
     pub(super) origins: Vec<Origin>,
-    /// Design parameters of each schema of the split task.
+    /// By schema of the split task.
     pub(super) designs: Vec<Vec<SlotParameter>>,
     pub(super) events: Vec<Event>,
-    /// Functions that hold durations that depend on the state or are chosen.
+    /// Functions whose values are state-dependent or chosen durations.
     pub(super) durations: Vec<FunctionId>,
     /// Per schema of the domain: whether the planner chooses its duration.
     pub(super) chosen: Vec<bool>,
@@ -241,7 +239,7 @@ fn timed(lifted: &Lifted, index: u32, event: &Event) -> Schema {
     }
 }
 
-/// Declares a new predicate. `running` is set for predicates that mark running actions.
+/// `running` is set for predicates that mark running actions.
 fn symbol(lifted: &mut Lifted, name: &str, arity: usize, running: bool) -> PredicateId {
     let id = PredicateId(dense(lifted.predicates.len()));
     let name = Name::new(name);

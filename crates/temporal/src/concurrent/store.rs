@@ -16,21 +16,18 @@ use crate::concurrent::successors::TemporalState;
 use crate::concurrent::temporal_task::TemporalTask;
 use crate::concurrent::time_number::TimeNumber;
 
-/// Position of a finite-domain variable in a packed key: word, and bits within the word.
 struct Field {
     word: usize,
     shift: u32,
     mask: u32,
 }
 
-/// Parent link of a search node: the step that created the node.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Origin {
     pub(super) parent: u32,
     pub(super) operator: OperatorId,
     /// Whether the same step also applied the end of the started action.
     pub(super) compressed: bool,
-    /// Whether the happening takes place at the same time as the previous one.
     pub(super) together: bool,
     /// Number of happenings on the path from the root.
     pub(super) depth: u32,
@@ -40,7 +37,6 @@ struct Node<T> {
     place: u32,
     origin: Option<Origin>,
     cost: Int,
-    /// Earliest possible time of the last happening.
     latest: T,
     numbers: Box<[Int]>,
     clocks: Box<[u8]>,
@@ -82,7 +78,7 @@ pub(super) struct Store<'a, T: TimeNumber = Int> {
     table: HashTable<u32>,
     nodes: Vec<Node<T>>,
     bytes: usize,
-    /// Number of pairs of nodes that were compared for dominance.
+    /// Total number of stored nodes with which new nodes were compared for dominance.
     pub(super) compared: usize,
 }
 
@@ -244,7 +240,6 @@ impl<'a, T: TimeNumber> Store<'a, T> {
         key
     }
 
-    /// Returns `true` if a stored node dominates a new temporal state of the same place.
     fn dominates(&self, node: &Node<T>, TemporalState { state, clocks, cost }: &TemporalState<T>) -> bool {
         let (guards, separation) = (&self.concurrent.guards, self.concurrent.separation);
         node.cost <= *cost
@@ -261,7 +256,6 @@ impl<'a, T: TimeNumber> Store<'a, T> {
             }
     }
 
-    /// Returns `true` if a new temporal state dominates a stored node of the same place.
     fn is_worse(&self, node: &Node<T>, TemporalState { state, clocks, cost }: &TemporalState<T>) -> bool {
         let (guards, separation) = (&self.concurrent.guards, self.concurrent.separation);
         node.cost >= *cost

@@ -17,7 +17,6 @@ const MAX_PARALLEL_RUNS: u32 = 16;
 /// known.
 const UNBOUNDED_RUNS: u32 = 4;
 
-/// State after a sequence of happenings, with the temporal network of the sequence.
 #[derive(Debug, Clone)]
 pub(super) struct TemporalState<T: TimeNumber = Int> {
     pub(super) state: State,
@@ -75,13 +74,11 @@ impl<'a, T: TimeNumber> Expansion<'a, T> {
         self.index.applicable(&self.concurrent.task, state)
     }
 
-    /// Time and operator of the next timed initial literals. Returns `None` if none are pending.
     pub(super) fn next_event(&self, clocks: &SimpleTemporalNetwork<T>) -> Option<(T, OperatorId)> {
         let events = &self.concurrent.events;
         events.get(events.partition_point(|(time, _)| *time <= clocks.floor())).copied()
     }
 
-    /// Returns `true` if a plan can end in this temporal state.
     pub(super) fn is_goal(&self, TemporalState { state, clocks, .. }: &TemporalState<T>) -> bool {
         let concurrent = self.concurrent;
         // All timed initial literals up to the end of the plan have taken place, no later ones

@@ -29,31 +29,27 @@ pub(super) struct Numeric {
     pub(super) proposition: Proposition,
 }
 
-/// The delete relaxation of a temporal task, as lists indexed by rule or proposition.
 pub(super) struct TemporalRelaxation {
     /// Proposition of the first value of each variable; the other values have the following
     /// numbers.
     pub(super) first: Vec<Proposition>,
     pub(super) propositions: usize,
-    /// Propositions that each rule requires (its conditions), ascending.
     pub(super) needs: Lists,
     /// Propositions that must hold from the start of the action to this rule, which is its end; see [`Rule`].
     pub(super) over_all: Lists,
     /// Number of conditions of each rule.
     pub(super) unmet: Vec<u32>,
-    /// Indices of the rules without conditions.
+    /// Rules without entries in `needs`.
     pub(super) free: Vec<u32>,
     pub(super) adds: Lists,
-    /// Numeric conditions that each rule makes easier to satisfy, with the amounts by which their
-    /// linear expressions grow. An amount is `None` if it depends on the state.
+    /// Numeric conditions whose linear expressions each rule increases, with the amounts. An amount
+    /// is `None` if it depends on the state.
     pub(super) raises: Vec<Box<[NumericEffect]>>,
     pub(super) weights: Vec<u32>,
-    /// Operator (start, end or instantaneous action) of each rule. `None` for the rules of clauses
-    /// and derived facts.
+    /// `None` for the rules of clauses and derived facts.
     pub(super) origins: Vec<Option<OperatorId>>,
     pub(super) needing: Lists,
     pub(super) numeric: Vec<Numeric>,
-    /// Propositions that the goal requires, ascending.
     pub(super) goal: Vec<Proposition>,
     /// Index of the rule for the end of each instance.
     pub(super) ends: Vec<u32>,
@@ -65,7 +61,6 @@ pub(super) struct TemporalRelaxation {
 struct RelaxationBuilder<'a> {
     task: &'a Task,
     is_admissible: bool,
-    /// Numbers that hold durations chosen by the planner.
     chosen: FxHashSet<NumericId>,
     first: Vec<Proposition>,
     propositions: u32,
@@ -76,14 +71,14 @@ struct RelaxationBuilder<'a> {
 }
 
 impl TemporalRelaxation {
-    /// Relaxation that guides a search. It has conjunctions of facts, and simultaneous happenings cannot reach an over-all
-    /// condition jointly.
+    /// Inadmissible relaxation that guides a search. It has conjunctions of facts, and over-all
+    /// facts are conditions of starts.
     pub(super) fn new<T: TimeNumber>(concurrent: &TemporalTask<T>) -> Self {
         Self::build(concurrent, false)
     }
 
-    /// Relaxation in which every plan is executable: without conjunctions, and over-all conditions are conditions of the
-    /// ends only.
+    /// Relaxation that admits every executable plan. It has no conjunctions, and over-all
+    /// conditions are conditions of the ends only.
     pub(super) fn admissible<T: TimeNumber>(concurrent: &TemporalTask<T>) -> Self {
         Self::build(concurrent, true)
     }
@@ -188,8 +183,6 @@ impl<'a> RelaxationBuilder<'a> {
         needs
     }
 
-    /// Proposition that holds if any of the literals holds. Creates the proposition and its rules
-    /// on first use.
     fn clause(&mut self, literals: &[Literal]) -> Proposition {
         if let Some(clause) = self.clauses.get(literals) {
             return *clause;
@@ -306,8 +299,7 @@ impl<'a> RelaxationBuilder<'a> {
         add_conjunctions(&mut Scope { rules, goal, variables: &variables, propositions })
     }
 
-    /// Determines `raises`: for each rule, the numeric conditions whose linear expressions can
-    /// grow, with the amounts.
+    /// Computes `raises` of all rules.
     fn raise(&mut self, task: &Task) {
         let mut mentioning: FxHashMap<u32, Vec<u32>> = FxHashMap::default();
         for (index, numeric) in (0..).zip(&self.numeric) {

@@ -45,14 +45,13 @@ impl ConcurrentTask {
 
 #[cfg(test)]
 impl ConcurrentTask {
-    /// The task with times of 128 bits. Panics if the times are wide.
+    /// Panics if the times are wide.
     pub(super) fn narrow(self) -> TemporalTask {
         let Width::Narrow(task) = self.0 else { panic!("the times are wide") };
         *task
     }
 }
 
-/// A temporal task with times of sufficient width.
 #[derive(Debug, Clone)]
 pub(super) enum Width {
     Narrow(Box<TemporalTask>),
@@ -60,25 +59,23 @@ pub(super) enum Width {
     Wide(Box<TemporalTask<Wide>>),
 }
 
-/// A ground temporal task with times of type `T`.
 #[derive(Debug, Clone)]
 pub(super) struct TemporalTask<T: TimeNumber = Int> {
     pub(super) task: Task,
-    /// Temporal properties of each operator, by operator id.
     pub(super) happenings: Vec<Happening<T>>,
     pub(super) instances: Vec<Instance<T>>,
     /// Time (in internal units) and operator of each group of simultaneous timed initial literals, ascending.
     pub(super) events: Vec<(T, OperatorId)>,
-    /// For each key of an access kind (such as deleting a certain atom): its guard, if there is one. Every
-    /// happening that must wait for such an access, except timed initial literals, requires a value of this
-    /// variable. Accesses that are at least the separation before the latest change of their guard delay no
-    /// later happening.
+    /// By key of an access kind (such as deleting a certain atom): its guard, if there is one.
+    /// Every happening that must wait for such an access, except timed initial literals, requires a
+    /// value of the guard variable. Accesses that are at least the separation before the latest
+    /// change of their guard delay no later happening.
     pub(super) guards: Vec<Option<u32>>,
     pub(super) measure: Measure<T>,
     /// Per preference that can be violated: operators of which at least one is applicable in the
     /// final state if the preference is violated. These operators never occur in a plan.
     pub(super) violations: Vec<Vec<OperatorId>>,
-    /// Deadlines of hard and soft trajectory constraints, checked on complete plans.
+    /// Checked on complete plans.
     pub(super) deadlines: Vec<Deadline<T>>,
     /// Whether the search covers every plan with all its possible times, so that exhausting the
     /// search is a proof.
@@ -233,7 +230,6 @@ fn keep_runs_apart<T: TimeNumber>(
 }
 
 impl<T: TimeNumber> TemporalTask<T> {
-    /// Returns `true` if the planner chooses the duration of an action.
     pub(super) fn chooses_durations(&self) -> bool {
         self.instances.iter().any(|instance| instance.is_chosen)
     }

@@ -6,7 +6,8 @@ use task::number::Int;
 
 use crate::concurrent::time_number::TimeNumber;
 
-/// Index of a time point of the network: the start of a running action, which can still be delayed.
+/// Index of a time point of the network that can still be delayed, such as the start of a running
+/// action.
 pub(super) type TimePoint = u32;
 
 pub(super) fn place(float: TimePoint) -> usize {

@@ -37,7 +37,6 @@ pub(super) trait TimeNumber:
     /// Factors of the metric have at most this number of bits.
     const FACTOR_BITS: u64;
 
-    /// Returns `None` if the number is not representable.
     fn from_big(number: &BigInt) -> Option<Self>;
 
     fn to_big(self) -> BigInt;
@@ -55,14 +54,12 @@ pub(super) trait TimeNumber:
     /// Appends an encoding in which small magnitudes take few bytes.
     fn write(self, bytes: &mut Vec<u8>);
 
-    /// Reads a number that [`TimeNumber::write`] has written.
     fn read(bytes: &mut impl Iterator<Item = u8>) -> Self;
 
     fn to_rational(self) -> Rational {
         Rational::from_big(BigRational::from_integer(self.to_big()))
     }
 
-    /// Number of bits of the magnitude.
     fn bits(self) -> u64 {
         self.to_big().bits()
     }
@@ -158,7 +155,6 @@ impl TimeNumber for Int {
 
 /// Number of 64-bit words of a wide integer.
 const WORDS: usize = 8;
-/// Number of bytes of a wide integer.
 const BYTES: usize = WORDS * 8;
 
 /// A 512-bit integer in two's complement, least significant word first.
@@ -387,7 +383,6 @@ mod tests {
         (any_magnitude, any::<bool>()).prop_map(|(number, negative)| if negative { -number } else { number })
     }
 
-    /// Compares the operations of `T` with those of big integers.
     fn check<T: TimeNumber>(a: &BigInt, b: &BigInt, fits: impl Fn(&BigInt) -> bool) {
         let (Some(x), Some(y)) = (T::from_big(a), T::from_big(b)) else { return };
         assert_eq!((x.to_big(), y.to_big()), (a.clone(), b.clone()));

@@ -32,9 +32,7 @@ type Time = i64;
 
 /// Durations are rounded down to this number of bits, so that sums of thousands of them fit.
 const TIME_BITS: u64 = 48;
-/// Time of propositions and actions that are not reached.
 const NEVER: Time = Time::MAX;
-/// Upper limit on the number of repetitions of one action in a relaxed plan.
 const MAX_REPETITIONS: u32 = 8;
 
 #[derive(Debug, Clone)]
@@ -55,7 +53,6 @@ enum Timing {
     At(Time),
 }
 
-/// Duration of an instance: fixed, or computed from numbers when the action starts.
 enum Duration<T: TimeNumber> {
     Constant(Time),
     /// Expression that the start assigns to the number holding the duration, and the factor from this number
@@ -76,13 +73,11 @@ pub(super) struct TimedRelaxation<'a, T: TimeNumber = Int> {
     /// Rule that adds each proposition, and the number of its repetitions.
     supporters: Vec<Option<(u32, u32)>>,
     is_settled: Vec<bool>,
-    /// For each rule: number of its unreached conditions.
     unmet: Vec<u32>,
     /// For each rule: sum of the numbers of relaxed actions of its reached conditions.
     sums: Vec<u32>,
     /// For each rule: its position in the order in which rules fire.
     order: Vec<u32>,
-    /// For each rule: the latest time at which it may fire.
     latest: Vec<Time>,
     is_used: Vec<bool>,
     fired: u32,
@@ -238,7 +233,6 @@ impl<'a, T: TimeNumber> TimedRelaxation<'a, T> {
         }
     }
 
-    /// Applies a rule whose conditions hold from `at`.
     fn fire(&mut self, rule: u32, at: Time, state: &State) {
         let relaxed = self.relaxed;
         self.order[rule as usize] = self.fired;

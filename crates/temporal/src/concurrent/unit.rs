@@ -13,7 +13,6 @@ use task::task::{OperatorId, Task};
 use crate::concurrent::split::Split;
 use crate::concurrent::time_number::TimeNumber;
 
-/// Static parts of the durations of actions, by start operator.
 #[derive(Default)]
 pub(super) struct StaticDurations {
     /// Durations that do not depend on the state, in PDDL time units.
@@ -81,7 +80,7 @@ impl Unit {
     /// Converts a time in PDDL time units to internal units.
     ///
     /// # Errors
-    /// `Error::Overflow` if `T` is too narrow.
+    /// `Error::Overflow` if the time is not an integer number of units, or `T` is too narrow.
     pub(super) fn of<T: TimeNumber>(&self, time: &Rational) -> Result<T, Error> {
         // Big integers are slow, and grounding converts many times.
         if let Some(unit) = self.0.to_i128()
@@ -100,7 +99,7 @@ impl Unit {
     /// time units. The duration in PDDL time units is the value of the fluent divided by `divisor`.
     ///
     /// # Errors
-    /// `Error::Overflow` if `T` is too narrow.
+    /// `Error::Overflow` if the factor is not an integer, or `T` is too narrow.
     pub(super) fn factor<T: TimeNumber>(
         &self,
         task: &Task,

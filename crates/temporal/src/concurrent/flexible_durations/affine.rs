@@ -10,7 +10,7 @@ pub(super) type Column = u32;
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 pub(super) struct Affine {
     pub(super) constant: Rational,
-    /// Columns with their factors, sorted by column.
+    /// Sorted by column.
     pub(super) terms: Vec<(Column, Rational)>,
 }
 
@@ -23,7 +23,6 @@ impl Affine {
         Self { constant: Rational::zero(), terms: vec![(column, Rational::one())] }
     }
 
-    /// Value of the expression if it contains no column; otherwise `None`.
     pub(super) fn known(&self) -> Option<&Rational> {
         self.terms.is_empty().then_some(&self.constant)
     }

@@ -21,8 +21,7 @@ pub(super) struct Answer {
     pub(super) plan: Plan,
 }
 
-/// Returns the best plan of a sequence, or `None` if no times and durations reach the numeric
-/// goals.
+/// Returns the best plan of a sequence, or `None` if no times and durations reach the goal.
 ///
 /// Minimises, in this order: metric, makespan, sum of durations, sum of the times of all happenings.
 /// A metric without a minimum is skipped. Durations are decimals if possible, even if that increases
@@ -67,7 +66,6 @@ fn best(program: &Program, objectives: &[&Affine]) -> Program {
     best
 }
 
-/// Constrains each duration to its value at the optimum of `program`.
 fn fix(program: &Program, durations: &[Affine]) -> Program {
     let mut fixed = program.clone();
     for duration in durations {

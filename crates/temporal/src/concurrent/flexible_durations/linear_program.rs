@@ -13,7 +13,6 @@ use task::number::Rational;
 
 use crate::concurrent::flexible_durations::affine::{Affine, Column};
 
-/// First column that represents the slack of a constraint.
 const FIRST_SLACK_COLUMN: Column = 1 << 30;
 
 /// A linear program at the optimum of its objective.
@@ -21,7 +20,6 @@ const FIRST_SLACK_COLUMN: Column = 1 << 30;
 pub(super) struct Program {
     /// Dictionary: basic columns in ascending order, each as an expression over nonbasic columns.
     rows: Vec<(Column, Affine)>,
-    /// Objective to minimise, over the nonbasic columns.
     objective: Affine,
     slacks: Column,
 }
@@ -41,7 +39,6 @@ impl Program {
         self.rows.iter().fold(self.objective.bytes(), |sum, (_, row)| sum.saturating_add(row.bytes()))
     }
 
-    /// Value of an expression at the current optimum.
     pub(super) fn value(&self, expression: &Affine) -> Rational {
         self.reduced(expression).constant
     }
@@ -118,7 +115,6 @@ impl Program {
         }
     }
 
-    /// Exchanges the basic column `leaving` with the nonbasic column `entering`.
     fn pivot(&mut self, leaving: Column, entering: Column) {
         let position = self.rows.binary_search_by_key(&leaving, |(candidate, _)| *candidate);
         let (_, mut row) = self.rows.remove(position.expect("invariant: a row of the dictionary"));

@@ -49,9 +49,8 @@ pub(super) struct RunningAction {
     last: Option<Affine>,
 }
 
-/// A happening of a partial plan, with its time, the duration of an action that it starts, and the
-/// metric after it as far as numbers contribute to it. The values are expressions over the columns
-/// of the linear program.
+/// Times, durations and metric contributions are expressions over the columns of the linear
+/// program.
 #[derive(Debug, Clone)]
 pub(super) struct Passed {
     pub(super) operator: OperatorId,
@@ -61,7 +60,6 @@ pub(super) struct Passed {
     pub(super) time: Affine,
     /// For a start: duration of the action. Otherwise 0.
     pub(super) duration: Affine,
-    /// Contribution of the numbers to the metric after this happening, in the task's cost unit.
     pub(super) measured: Affine,
 }
 
@@ -255,7 +253,6 @@ impl Course {
         Some(())
     }
 
-    /// Value of a linear expression of the task, as an expression over durations.
     pub(super) fn value(&self, linear: &Linear<Int>) -> Affine {
         let constant = Affine::constant(linear.quantity.at(&[], &[]).to_rational());
         let terms = linear.coefficients.iter();

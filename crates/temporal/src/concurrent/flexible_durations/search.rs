@@ -38,13 +38,10 @@ type QueueEntry = Reverse<(u64, Rational, Reverse<u32>, u32, u32, (OperatorId, u
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Outcome {
     Found,
-    /// The open list is empty: all sequences were expanded or pruned.
     Exhausted,
-    /// Stopped by an interrupt, or at a limit of time, memory or work.
     Stopped,
 }
 
-/// Kind of a search, with its data for duplicate detection and guidance.
 enum Kind<'a> {
     Greedy { guidance: Box<RelaxedPlanHeuristic<'a>>, seen: FxHashMap<u64, Rational> },
     Exhaustive { traces: Traces<'a>, seen: FxHashSet<Vec<(OperatorId, u32)>> },
@@ -214,8 +211,6 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Removes an entry from the queue whose turn it is. Returns the lower bound, the parent node
-    /// and the happening.
     fn pop(&mut self) -> Option<(Rational, u32, (OperatorId, u32))> {
         let filled = (0..self.queues.len()).filter(|queue| !self.queues[*queue].is_empty());
         let queue = filled.min_by_key(|queue| self.priorities[*queue])?;
@@ -225,7 +220,6 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Returns `true` if plans with the lower bound `least` cannot be better than the incumbent.
 fn is_lost(concurrent: &TemporalTask, least: &Rational, best: &Answer) -> bool {
     concurrent.is_whole && *least >= best.value
 }

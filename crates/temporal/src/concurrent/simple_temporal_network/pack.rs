@@ -131,7 +131,6 @@ pub(in crate::concurrent) struct PackedStn<'a, T: TimeNumber = Int> {
 }
 
 impl<T: TimeNumber> PackedStn<'_, T> {
-    /// Unpacks the times of accesses and changes.
     pub(in crate::concurrent) fn finish(&mut self) {
         let reader = &mut self.rest;
         let mut times = || reader.list(|times| (times.index(), times.time()));
