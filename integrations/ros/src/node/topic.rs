@@ -44,7 +44,6 @@ fn published(info: &MessageInfo) -> Option<SystemTime> {
     stamp.map(|nanoseconds| UNIX_EPOCH + Duration::from_nanos(nanoseconds))
 }
 
-/// Type of a topic.
 struct TopicType<'n> {
     package: &'n str,
     name: &'n str,
@@ -90,9 +89,6 @@ impl Node {
     }
 
     /// Creates a publisher of encoded messages of a type that is known at run time.
-    ///
-    /// # Errors
-    /// Fails if the name is invalid, or the topic exists with another type.
     pub(crate) fn raw_publisher(
         &self,
         name: &str,
@@ -136,11 +132,9 @@ impl Node {
         self.subscribe_as(name, &names, qos, move |message, _| take(message))
     }
 
-    /// Subscribes to a topic of a type that is known at run time, as [`Node::subscribe`] does. `take` receives the
-    /// encoded message and the time at which it was published (if unknown, the time of its arrival).
-    ///
-    /// # Errors
-    /// Fails if the name is invalid, or the topic exists with another type.
+    /// Subscribes to a topic of a type that is known at run time, as [`Node::subscribe`] does.
+    /// `take` receives the encoded message and the time at which it was published (if unknown, the
+    /// time of its arrival).
     pub(crate) fn subscribe_raw(
         self: &Arc<Self>,
         name: &str,
