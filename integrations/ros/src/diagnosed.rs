@@ -103,9 +103,9 @@ impl Queue {
 }
 
 impl Diagnosed {
-    /// Subscribes to diagnostics and signals, and calls `waits` when the first status becomes pending. Repeated
-    /// statuses are ignored unless a filter needs them. An unused status of another node at level WARN or above is
-    /// reported once, with a rule that would use it. At most [`MAX_UNUSED`] statuses are reported.
+    /// Subscribes to diagnostics and signals, and calls `waits` when the first status becomes
+    /// pending. An unused status of another node at level WARN or above is reported once, with a
+    /// rule that would use it. At most [`MAX_UNUSED`] statuses are reported.
     pub(crate) fn subscribe(
         node: &Arc<Node>,
         sources: Sources,

@@ -386,12 +386,11 @@ impl Robot {
                 let _ = inputs.send(input);
             }
         });
-        // Finished actions are removed.
         self.performing.retain(|_, (_, task)| !task.is_finished());
         self.performing.insert(number, (running, task));
     }
 
-    /// Cancels an action. An action that was not started by this program is reported as cancelled.
+    /// Cancels an action. An action that this program does not execute is reported as cancelled.
     pub(super) fn stop(&self, number: u64) {
         match self.performing.get(&number) {
             Some((running, _)) => running.cancel(),
@@ -475,7 +474,6 @@ fn subscribe_nodes(
     })
 }
 
-/// Subscribes to the transition events of a node, in the message type of the distribution.
 fn subscribe_transitions(
     node: &Arc<Node>,
     topic: &str,

@@ -36,7 +36,6 @@ pub(super) struct Grant {
     until: Duration,
     /// Modes that the function had shortly before; reports of them may be late.
     earlier: Vec<String>,
-    /// `true` if another mode was reported.
     is_contradicted: bool,
 }
 
@@ -47,7 +46,6 @@ impl Machine {
         let Some(mode) = self.settings.functions.unground(function).map(str::to_owned) else { return };
         let requested = self.pending.get(function).map(|change| &change.mode);
         let has = requested.or_else(|| self.modes.get(function));
-        // Nothing is requested while the mode of the function is unknown.
         if has.is_some_and(|has| *has != mode) {
             self.change(function.to_owned(), mode, None);
         }
@@ -156,8 +154,9 @@ impl Machine {
         self.grants.insert(function.to_owned(), grant);
     }
 
-    /// Handles a request for a mode that a mode manager has received. Unlike a reported mode, a request that
-    /// this program has not sent recently comes from another client. It therefore ends the [`GRANT_PERIOD`].
+    /// Handles a request for a mode that a mode manager has received. Unlike a reported mode, a
+    /// request that this program has not sent recently comes from another client. It therefore ends
+    /// the [`GRANT_PERIOD`], unless a change is pending.
     pub(super) fn mode_requested(&mut self, function: &str, mode: &str) -> String {
         if self.modes.get(function).is_some_and(|current| current == mode) {
             return format!("{function} was requested to have the mode {mode}, which it has");
@@ -245,9 +244,9 @@ impl Machine {
         format!("{function} answers again")
     }
 
-    /// Reports designs as realisable again once their retry delay is over. Forgets granted modes once their
-    /// period is over; if another mode was reported in the meantime, asks for the current mode of the function.
-    /// In the state EXECUTE, also passes a due tick to the loop.
+    /// Reports designs as realisable again once their retry delay is over. Forgets granted modes
+    /// once their period is over; if another mode was reported in the meantime, requests the
+    /// current mode of the function. In the state EXECUTE, also passes a due tick to the loop.
     pub(super) fn tick(&mut self) -> String {
         let now = self.now;
         let mut back = Vec::new();

@@ -19,7 +19,6 @@ pub(in crate::manager) enum Input {
     Request(u64, String),
     /// Request to end a task: the number that identifies the reply, and the name of the task.
     Cancel(u64, String),
-    /// A function has replied to a call, or the call has failed.
     Changed(Change, Outcome),
     /// The current mode of a function, as its mode manager has answered or as its nodes show. Empty if the
     /// function is in none of its modes.
@@ -45,7 +44,7 @@ pub(in crate::manager) struct Change {
     pub(in crate::manager) mode: String,
     /// Number of the effect of the loop that requires the change. `None` if the function is no longer needed.
     pub(in crate::manager) effect: Option<u64>,
-    /// Number of the attempt, from 1.
+    /// Number of the attempt, from 1. Steps have only the last attempt.
     pub(in crate::manager) attempt: u32,
 }
 

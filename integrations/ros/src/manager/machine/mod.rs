@@ -67,11 +67,9 @@ pub(super) struct Machine {
     modes: BTreeMap<String, String>,
     grants: BTreeMap<String, Grant>,
     action: Option<Action>,
-    /// Numbers of the unanswered requests to start a task.
     start_requests: Vec<u64>,
     end_requests: Vec<u64>,
     failures: BTreeMap<String, CallFailures>,
-    /// `true` if the last planning found no plan.
     without_plan: bool,
     autopilot_obeyed: bool,
     deferred: Option<Deferred>,
@@ -130,7 +128,6 @@ impl Machine {
         &self.functions
     }
 
-    /// Returns the mode of each design of a function.
     pub(super) fn modes_of(&self, function: &str) -> Vec<String> {
         let designs = self.control.beliefs().mission().designs_of(function);
         designs.iter().map(|design| self.settings.functions.mode(function, design).to_owned()).collect()
@@ -183,7 +180,6 @@ impl Machine {
 
     /// Passes all pending lines to the loop, unless the machine still waits for the functions.
     fn settle(&mut self) -> Result<(), Message> {
-        // The loop starts once the modes of the functions are known.
         if self.state == State::WaitGraph {
             return Ok(());
         }

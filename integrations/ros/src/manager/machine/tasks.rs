@@ -65,7 +65,7 @@ impl Machine {
             return because;
         }
         if self.task.as_deref().is_some_and(|current| current != task) {
-            // Another task is running, so the cancelled task is already ended.
+            // Another task is running, so the cancelled task is not.
             self.outputs.extend(number.map(|number| Output::Reply(number, true)));
             return format!("the task {task} is not under way");
         }
