@@ -26,7 +26,6 @@ pub(super) const QUEUE_DEPTH: usize = 100;
 
 const REQUEST_PERIOD: Duration = Duration::from_secs(1);
 
-/// Upper limit on the time to wait for a performer.
 const SEARCH_TIMEOUT: Duration = Duration::from_secs(30);
 
 pub(super) struct Hub {

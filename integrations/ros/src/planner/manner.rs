@@ -89,10 +89,8 @@ pub(crate) struct Chosen {
 }
 
 impl Chosen {
-    /// Declares the planning parameters, and adopts their changes. The node must not have declared parameters before.
-    ///
-    /// # Errors
-    /// Fails if the command line gives a parameter an invalid value.
+    /// Declares the planning parameters, and adopts their changes. The node must not have declared
+    /// parameters before.
     pub(crate) fn declare(node: &Arc<Node>) -> Result<Arc<Self>, Errors> {
         let manner = Manner {
             metric: None,

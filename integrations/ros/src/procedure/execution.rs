@@ -63,10 +63,8 @@ enum Undo {
 }
 
 impl Procedures {
-    /// Creates the procedures, which are given by function and mode. Events about their steps are passed to `report`.
-    ///
-    /// # Errors
-    /// A topic of a condition cannot be subscribed to.
+    /// Creates the procedures, which are given by function and mode. Events about their steps are
+    /// passed to `report`.
     pub(crate) fn new(
         node: &Arc<Node>,
         functions: BTreeMap<String, BTreeMap<String, Procedure>>,
@@ -208,8 +206,9 @@ impl Procedures {
         true
     }
 
-    /// Puts a mode of a function into effect. A procedure that still runs for the function is undone first;
-    /// its caller must have set its `is_replaced` before.
+    /// Puts a mode of a function into effect, once no other procedure runs for the function. The
+    /// caller must first set the `is_replaced` of a running procedure, which is then normally
+    /// undone.
     pub(crate) async fn apply(
         &self,
         function: &str,
@@ -406,7 +405,6 @@ impl Run<'_> {
     }
 }
 
-/// Returns the undo that the settings give for an operation, or [`Undo::Impossible`].
 fn undo_of(operation: &Operation, undo: Option<&Operation>) -> Undo {
     match undo {
         Some(undo) => Undo::Operation(undo.clone()),

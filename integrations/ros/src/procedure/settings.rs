@@ -28,7 +28,6 @@ pub(crate) struct Procedure {
     pub(crate) timeout: Option<Duration>,
 }
 
-/// A step, with the operation that undoes it if the program cannot derive this operation.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Step {
     pub(crate) operation: Operation,
@@ -85,7 +84,6 @@ pub(crate) enum Condition {
     },
 }
 
-/// A table `[functions.F.designs.D]`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ProcedureEntry {
@@ -371,8 +369,9 @@ impl Operation {
 }
 
 impl Procedure {
-    /// Returns all conditions that hold while the design is in effect and that can be observed at any time. A
-    /// node that occurs in several steps has only its last state, a topic its last message.
+    /// Returns all conditions that hold while the design is in effect and that can be observed at
+    /// any time. If several steps concern one node, topic or parameter, only the last state,
+    /// message or value counts.
     pub(crate) fn lasting(&self) -> Vec<Condition> {
         let steps = self.steps.iter().filter_map(|step| step.operation.condition());
         let conditions = self.conditions.iter().filter(|condition| !matches!(condition, Condition::Topic(_)));

@@ -22,9 +22,7 @@ const SILENT_DELAY: Duration = Duration::from_secs(2);
 
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Output {
-    /// Request the mode of a function.
     Configure(Wanted),
-    /// Publish the status of an objective.
     Feedback(GoalId, QoS),
     /// Answer a cancel request. `true` if the goal has ended.
     Cancelled(GoalId, bool),
@@ -189,8 +187,9 @@ impl Keeping {
         self.publish_status(goal);
     }
 
-    /// Cancels a goal: requests the unground mode of its function, and ends the goal when the mode is set.
-    /// Without such a mode, the goal ends at once. The cancellation of an unknown goal is rejected.
+    /// Cancels a goal: requests the unground mode of its function, and ends the goal when the mode
+    /// is set. If this fails, the cancellation is rejected. Without such a mode, the goal ends at
+    /// once. The cancellation of an unknown goal is rejected.
     pub(super) fn cancel(&mut self, goal: GoalId) {
         let Some(pursued) = self.goals.get_mut(&goal) else {
             self.outputs.push(Output::Cancelled(goal, false));
@@ -370,7 +369,6 @@ impl Keeping {
         }
     }
 
-    /// Publishes the status of an objective in MROS's format.
     fn publish_status(&mut self, goal: GoalId) {
         let Some(pursued) = self.goals.get(&goal) else { return };
         let objectives = self.keeper.configurator().objectives();

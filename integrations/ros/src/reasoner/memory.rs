@@ -26,7 +26,6 @@ pub(super) struct Memory {
 /// A goal of the reasoner that had not ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Remembered {
-    /// Id that the client gave to the goal.
     pub(super) goal: [u8; 16],
     /// Requested objective. Its `objective_id` is the final name, which the client may have
     /// omitted.
@@ -51,9 +50,6 @@ impl Memory {
 impl MemoryFile {
     /// Opens the state file in a directory, and creates the directory if needed. A missing file is
     /// an empty state.
-    ///
-    /// # Errors
-    /// Fails if the directory cannot be used, or the file is damaged or has another format.
     pub(super) fn open(directory: &Path) -> Result<Self, Message> {
         let path = directory.join("reasoner.json");
         let failed = |text: String| Message::at("N141", &path.display().to_string(), None, text);
@@ -78,9 +74,6 @@ impl MemoryFile {
     }
 
     /// Writes the state to the file if it differs from the stored state.
-    ///
-    /// # Errors
-    /// Fails if the file cannot be written.
     pub(super) fn write(&mut self, memory: Memory) -> Result<(), Message> {
         if memory == self.last {
             return Ok(());
