@@ -28,7 +28,7 @@ impl Health {
         self.state(|state| state.round.is_none_or(|round| round.elapsed() < MAX_SILENCE))
     }
 
-    /// Returns `true` if the worker takes part in the fleet.
+    /// Returns `Ok` if the worker takes part in the fleet.
     ///
     /// # Errors
     /// The reason why it does not: it waits for servers, has lost them, or is shutting down.

@@ -209,8 +209,8 @@ async fn write_decisions<S: Store>(
 }
 
 /// Runs a fleet in a directory: events from standard input, decisions to standard output. Ends when
-/// the input has ended and all events are decided, when `stop` becomes true, or when the output is
-/// closed. `after` is as in [`follow`].
+/// `stop` becomes true, or when the input has ended and either all events are decided or the output
+/// is closed. `after` is as in [`follow`].
 pub(crate) async fn up(
     shared: Arc<Shared<Local>>,
     after: Option<u64>,

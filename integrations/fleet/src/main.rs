@@ -236,7 +236,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Returns `true` if standard error is a terminal and `NO_COLOR` is not set.
+/// Returns `true` if standard error is a terminal and `NO_COLOR` is not set or empty.
 fn has_colours() -> bool {
     std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
 }
