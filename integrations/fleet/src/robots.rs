@@ -105,7 +105,8 @@ pub struct PartitionStatus {
     pub worker: Option<String>,
     /// Number of times that a worker has taken over the partition, or has recovered it again.
     pub epoch: u64,
-    /// Sequence number up to which the effects of all events are contained in snapshots.
+    /// Sequence number up to which snapshots contain the effects of all events, except those of
+    /// suspended or delayed robots.
     pub events: u64,
 }
 

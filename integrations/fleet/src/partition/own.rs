@@ -122,8 +122,9 @@ impl<S: Store> Partition<S> {
     }
 
     /// Queues the next event of the stream for its robot, or refuses it. Ignores events that were
-    /// read before, events that the robot's snapshot contains, and events of suspended robots. Omits the
-    /// event, to be read again, if the queue is full.
+    /// read before, events that the robot's snapshot contains, and events of suspended robots
+    /// except their retirement. Omits the event, to be read again, if too many events are queued or
+    /// if earlier ones of the robot were omitted.
     fn read(&mut self, event: Stored) {
         if event.sequence <= self.seen.0 {
             return;
@@ -157,8 +158,8 @@ impl<S: Store> Partition<S> {
         }
     }
 
-    /// Parses the address of an event. Refuses an event without a valid address or with the id of another
-    /// robot, and returns `None` then.
+    /// Parses the address of an event. Refuses the event and returns `None` if the address or its
+    /// partition is wrong, or if the message id is not one of the robot.
     fn address(&self, event: &Stored) -> Option<Address> {
         let Some(address) = Address::parse(&event.subject) else {
             self.refuse(None, "wrong_subject");
@@ -190,7 +191,6 @@ impl<S: Store> Partition<S> {
         self.shared.counts.waiting.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Removes the next event from the queue of a robot.
     fn dequeue(&mut self, name: &str) -> Option<Stored> {
         let event = self.slots.get_mut(name)?.waiting.pop_front()?;
         self.waiting -= 1;
@@ -198,8 +198,9 @@ impl<S: Store> Partition<S> {
         Some(event)
     }
 
-    /// Starts to handle the next queued event of a robot, if the robot is idle. Drops events of a suspended robot, and
-    /// refuses events that a former owner has skipped. Starts to read more events of the robot if the queue lacks some.
+    /// Starts to handle the next queued event of a robot, if the robot is idle. Drops events of a
+    /// suspended robot except its retirement, and refuses events that a former owner has skipped.
+    /// Starts to read more events of the robot if the queue lacks some.
     fn begin(&mut self, name: &str) {
         let last_decision = self.seen.1;
         loop {

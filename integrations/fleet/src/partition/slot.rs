@@ -88,7 +88,7 @@ pub(super) enum Done {
         own: Box<Robot>,
         event: Stored,
         outcome: Outcome,
-        /// New estimate of the duration of a search, if there was one.
+        /// Estimated duration of a search, updated if the event required a search.
         search: Option<Duration>,
     },
     /// A snapshot of a robot, which contains all decided events up to `event`, was stored or could not be stored.

@@ -75,9 +75,9 @@ impl<S: Store> Task<S> {
         Done::Taken { robot: self.name, own, event, outcome, search: self.estimate }
     }
 
-    /// Looks up the robot's last decision. If it has retired the robot, restores the ids of decided events.
-    /// Returns the sequence number of the decision, or 0 without a decision. Returns `None` if another worker
-    /// has decided this event or a later one.
+    /// Looks up the robot's last decision. If it has retired the robot, restores the ids of decided
+    /// events. Returns the sequence number of the decision, or 0 without a decision. Returns `None`
+    /// if another worker may have decided this event or a later one.
     async fn last_decision(&self, robot: &mut Robot, event: &Stored) -> Option<u64> {
         let store = &self.shared.store;
         let last = persist(|| store.last(Stream::Decisions, &event.subject)).await.ok()?;
