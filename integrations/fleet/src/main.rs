@@ -103,7 +103,8 @@ struct Work {
     /// Read former versions of missions from this directory (repeatable). Robots enrolled with one of them keep it.
     #[arg(long, value_name = "DIR")]
     former: Vec<PathBuf>,
-    /// Set the number of loops that search for plans at the same time. [default: number of processors]
+    /// Set the number of loops that search for plans at the same time, for each of three classes of
+    /// search durations. [default: number of processors]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
     /// Set the number of robots that are kept in memory. Others are restored from snapshots when they have events.

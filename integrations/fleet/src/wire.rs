@@ -127,9 +127,11 @@ impl Decided {
 pub struct Progress {
     /// Number of times that a worker has taken over the partition, or has recovered it again.
     pub epoch: u64,
-    /// Sequence number up to which the effects of all events are contained in snapshots.
+    /// Sequence number up to which the effects of all events are contained in snapshots, except for
+    /// robots with [`Saved::behind`].
     pub events: u64,
-    /// Sequence number up to which all decisions are contained in snapshots.
+    /// Sequence number up to which all decisions are contained in snapshots, except for robots with
+    /// [`Saved::behind`].
     pub decisions: u64,
     /// Revision of the last snapshot. A reader of snapshots has to wait for this revision, because
     /// it may read from a server that lags behind.
@@ -139,7 +141,7 @@ pub struct Progress {
 /// Snapshot of a robot after an event.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Saved {
-    /// Name of the robot's mission; `None` if the robot was retired.
+    /// Name of the robot's mission; `None` if the robot is not enrolled.
     pub mission: Option<String>,
     /// Checksum of the mission's files and settings.
     #[serde(default)]

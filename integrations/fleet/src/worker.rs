@@ -163,8 +163,6 @@ impl<S: Store> Worker<S> {
             let order = *held.orders.borrow();
             let end = held.task.await;
             match (end, order) {
-                // Another worker has written data that only the owner writes, although this worker
-                // has the lease; or there was a panic. The partition is recovered again.
                 (Ok(End::Fenced) | Err(_), Order::Go) => {
                     tracing::warn!(
                         partition,

@@ -245,7 +245,8 @@ impl Nats {
         Ok(self.stream(stream).get_info().await.map_err(failed)?.state.messages)
     }
 
-    /// Subscribes to refused events: subject without `err.` (`PARTITION.ROBOT`), and reason.
+    /// Subscribes to notices about refused events and suspended robots: subject without `err.`
+    /// (`PARTITION.ROBOT`), and reason.
     ///
     /// # Errors
     /// The server cannot be reached.

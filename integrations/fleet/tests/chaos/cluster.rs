@@ -166,7 +166,6 @@ impl Cluster {
         self.begin_process(&format!("s{own}"), command);
     }
 
-    /// Starts a worker process with this number of partitions, and a lease in seconds.
     pub(super) fn begin_worker(&self, own: usize, partitions: u32, lease: u64) {
         let missions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../missions");
         let mut command = Command::new(env!("CARGO_BIN_EXE_metaplan-fleet"));
