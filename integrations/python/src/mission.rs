@@ -118,7 +118,6 @@ struct Wanted {
     certificate: Option<PathBuf>,
 }
 
-/// Parses a number in the keyword argument `name`.
 fn number(name: &str, text: &str) -> PyResult<Exact> {
     text.parse().map_err(|error| PyValueError::new_err(format!("{name}: {error}")))
 }

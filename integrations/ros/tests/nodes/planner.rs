@@ -161,7 +161,7 @@ fn others_are_answered_while_a_plan_is_looked_for_and_its_time_is_kept() {
     assert!(!found.success && found.error_info.contains("a limit was reached"), "{}", found.error_info);
 }
 
-/// After diagnostics report a failed component, its design is no longer used.
+/// After diagnostics report murky water, the plan uses a design with a lower altitude.
 #[test]
 fn the_knowledge_base_of_a_mission_joins_in() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
