@@ -12,17 +12,14 @@ use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Semaphore;
 
-/// Maximum number of bytes of a request before its body.
 const MAX_HEAD_BYTES: usize = 16 << 10;
 
 const MAX_HEADERS: usize = 64;
 
 const MAX_CONNECTIONS: usize = 64;
 
-/// Time limit of a request and its response.
 const TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Period of the maintenance of histograms.
 const UPKEEP: Duration = Duration::from_secs(5);
 
 type Response = (&'static str, String);

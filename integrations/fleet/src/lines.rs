@@ -115,7 +115,6 @@ fn say(message: &Message) {
     eprint!("{}", message.text());
 }
 
-/// Stores the events in lines `ROBOT EVENT` from standard input, until the input ends.
 pub(crate) async fn send<S: Store>(store: S, session: &str) -> Result<(), Message> {
     let (_goes_on, stop) = watch::channel(false);
     feed(&store, session, stop).await

@@ -11,7 +11,6 @@ use crate::ids::Ids;
 /// Version of the data format, which every decision contains.
 pub const FORMAT: &str = "metaplan-fleet/1";
 
-/// Maximum length of a robot's name in bytes.
 const LONGEST_NAME: usize = 64;
 
 /// Returns `true` if a text is a valid name of a robot: 1 to 64 letters, digits, `-` and `_`, so

@@ -108,7 +108,6 @@ impl Planned {
     }
 }
 
-/// Planning parameters of a call.
 struct Wanted {
     config: Config,
     minimize: Vec<String>,

@@ -16,7 +16,6 @@ use crate::interfaces::std_msgs::msg::Header;
 use crate::node::{Clock, Node, keep_all};
 use crate::signals::{self, Signal};
 
-/// Upper limit on the number of warnings about statuses that nothing uses.
 const MAX_UNUSED: usize = 20;
 
 /// Diagnostics and signals that are not handled yet. Only the latest status of each subject (message and keys of the

@@ -43,7 +43,6 @@ pub(super) struct Partition<S> {
 /// Number of undecided events that each robot can have in memory, regardless of other robots.
 const FEW: usize = 16;
 
-/// Maximum number of events of a robot that are read again at once.
 const MAX_PAGE: usize = 64;
 
 impl<S: Store> Partition<S> {
@@ -180,7 +179,6 @@ impl<S: Store> Partition<S> {
         None
     }
 
-    /// Appends an event to the queue of its robot, unless the robot's snapshot contains it.
     fn queue(&mut self, robot: &str, event: Stored) {
         let slot = self.slot(robot);
         if slot.robot.as_ref().is_some_and(|robot| event.sequence <= robot.event) {
@@ -337,7 +335,6 @@ impl<S: Store> Partition<S> {
         Ok(())
     }
 
-    /// Takes back a robot that has handled an event.
     fn taken(
         &mut self,
         name: &str,

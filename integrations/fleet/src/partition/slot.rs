@@ -41,7 +41,6 @@ pub(super) struct Slot {
     /// Number of events that the partition had handled when the robot was last used; 0 if the robot is
     /// not loaded.
     pub(super) used: u64,
-    /// Estimated duration of a search, if the robot has searched.
     pub(super) search: Option<Duration>,
 }
 
@@ -98,7 +97,6 @@ pub(super) enum Done {
         behind: bool,
         revision: Result<u64, Fault>,
     },
-    /// The snapshot of a retired robot was removed or could not be removed.
     Removed {
         robot: String,
         outcome: Result<(), Fault>,

@@ -101,7 +101,6 @@ impl<S: Store> Partition<S> {
         saved.behind.then_some((address, saved.event, saved.decision))
     }
 
-    /// Keeps a decision of a former owner for its replay.
     fn take_decision(&mut self, message: &Stored) {
         self.seen.1 = self.seen.1.max(message.sequence);
         let Some(address) = Address::parse(&message.subject) else { return };

@@ -26,11 +26,9 @@ pub(super) struct Task<S> {
     /// refused it.
     pub(super) was_refused: bool,
     pub(super) is_suspended: bool,
-    /// Estimated duration of a search, if the robot has searched.
     pub(super) estimate: Option<Duration>,
 }
 
-/// State of a robot with the result of its loop.
 type Work = (Box<Robot>, Stored, Result<Result<Decided, Refused>, Faulted>);
 
 impl<S: Store> Task<S> {

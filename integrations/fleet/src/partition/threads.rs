@@ -27,7 +27,6 @@ pub(crate) struct Threads {
     /// the next class was full.
     extra: AtomicUsize,
     max_extra: usize,
-    /// Estimated duration of a search by mission.
     costs: Mutex<BTreeMap<String, Duration>>,
 }
 

@@ -345,7 +345,6 @@ fn stream_name(fleet: &str, stream: Stream) -> String {
     }
 }
 
-/// Returns the first tokens of the subjects of a new fleet.
 fn subject_prefix(fleet: &str) -> String {
     if fleet == DEFAULT_FLEET { String::new() } else { format!("{fleet}.") }
 }
@@ -363,7 +362,6 @@ fn stored(message: &jetstream::Message) -> Result<Stored, Fault> {
     })
 }
 
-/// Converts a message that was read from the stream leader.
 fn raw(message: &StreamMessage) -> Stored {
     Stored {
         sequence: message.sequence,

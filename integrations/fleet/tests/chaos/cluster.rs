@@ -60,7 +60,6 @@ fn free_port() -> u16 {
     listener.local_addr().expect("it has an address").port()
 }
 
-/// Returns `true` if this system allows a process to mount its own disk.
 fn can_mount() -> bool {
     let script = "mount -t tmpfs -o size=1m tmpfs /mnt";
     let status = Command::new("unshare").args(["-rm", "sh", "-c", script]).stderr(Stdio::null()).status();

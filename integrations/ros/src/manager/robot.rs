@@ -41,7 +41,6 @@ const MAX_MODE_REQUESTS: u32 = 3;
 
 #[derive(Clone)]
 enum Means {
-    /// Services of `system_modes`.
     Modes {
         change: Arc<Caller<ChangeMode>>,
         get_mode: Arc<Caller<GetMode>>,

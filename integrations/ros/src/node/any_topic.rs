@@ -39,7 +39,6 @@ impl Node {
         self.graph.matched_readers(&topic)
     }
 
-    /// Subscribes to a topic, and records when its last message arrived.
     pub(crate) fn arrivals(self: &Arc<Self>, name: &str) -> Result<Arrivals, Message> {
         let arrivals = Arrivals::default();
         let last = Arc::clone(&arrivals.last);

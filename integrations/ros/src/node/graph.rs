@@ -127,7 +127,6 @@ impl Endpoints {
 
 #[derive(Debug, Clone)]
 pub(crate) struct Writer {
-    /// DDS name of the type.
     pub(crate) type_name: String,
     pub(crate) is_latched: bool,
 }

@@ -177,7 +177,6 @@ impl PhaseChange {
     }
 }
 
-/// Publisher of transitions, in the message type of the distribution.
 enum Events {
     /// Message type up to Kilted.
     Nanoseconds(Publisher<TransitionEvent>),

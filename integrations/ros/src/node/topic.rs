@@ -88,7 +88,6 @@ impl Node {
         )
     }
 
-    /// Creates a publisher of encoded messages of a type that is known at run time.
     pub(crate) fn raw_publisher(
         &self,
         name: &str,

@@ -57,7 +57,6 @@ impl Hub {
         self.publisher.publish(message);
     }
 
-    /// Returns a receiver of all future messages on the topic.
     pub(super) fn listen(&self) -> Receiver<ActionExecution> {
         let (sender, receiver) = channel::unbounded();
         self.listeners.lock().unwrap_or_else(PoisonError::into_inner).push(sender);

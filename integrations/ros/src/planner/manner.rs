@@ -15,7 +15,6 @@ const DEFAULT_TIMEOUT: f64 = 15.0;
 /// Share of the timeout for planning. The reply must arrive before the client times out.
 const PLANNING_SHARE: f64 = 0.9;
 
-/// Default upper limit on the number of alternative plans in the reply of `get_plan_array`.
 const DEFAULT_ALTERNATIVES: usize = 3;
 
 fn declared() -> Vec<Declared> {

@@ -15,7 +15,6 @@ use crate::types::TopicMessage;
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Outcome {
-    /// All steps have succeeded and all conditions hold.
     Done,
     /// A step has failed, a condition does not hold although the robot answers, or a newer request replaces the
     /// procedure. Earlier steps were undone as far as possible.

@@ -16,7 +16,6 @@ use crate::node::{PrimaryState, parameter_value, valid_name};
 use crate::types::{Expectation, Library, MessageType, ServiceCall, TopicMessage};
 use crate::validated::validated;
 
-/// Ordered steps that put a design into effect, and the conditions that must hold afterwards.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Procedure {
     /// Steps in the order of their execution; at least one.

@@ -23,7 +23,6 @@ pub(crate) enum Answer {
 }
 
 impl ServiceCall {
-    /// Reads a service call. See [`Answer::new`] for `expected`.
     pub(crate) fn new(kind: &str, request: Option<&Value>, expected: Option<&Value>) -> Result<Self, String> {
         let kind = Arc::new(Library::current().service(kind)?);
         let request = kind.request.encode(request.unwrap_or(&Value::Object(Map::new())));

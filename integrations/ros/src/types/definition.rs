@@ -52,7 +52,6 @@ pub enum Base {
 pub enum Count {
     One,
     Fixed(u32),
-    /// At most this number.
     Bounded(u32),
     Unbounded,
 }

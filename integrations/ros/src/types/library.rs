@@ -14,7 +14,6 @@ use super::description::{self, Descriptions};
 use super::encode::{least_size, parse_value};
 use super::structure::{Layout, Structure, StructureField};
 
-/// Names and definitions of the interfaces of this package.
 static DEFINITIONS: &[(&str, &str)] = include!(concat!(env!("OUT_DIR"), "/definitions.rs"));
 
 /// Upper limit on the number of single values in a message of a type. A sequence counts as one value.
@@ -211,7 +210,6 @@ fn service_hashes(name: &str, descriptions: &Descriptions) -> Result<[String; 2]
 
 struct Resolver<'l> {
     library: &'l Library,
-    /// Messages that have been resolved.
     structures: BTreeMap<String, Arc<Structure>>,
     /// Messages that are being resolved.
     open: BTreeSet<String>,

@@ -64,7 +64,6 @@ impl Structure {
     }
 }
 
-/// Values that fields of received data must have.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Expectation(Vec<(FieldPath, Value)>);
 

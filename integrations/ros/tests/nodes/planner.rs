@@ -68,7 +68,6 @@ fn hopeless() -> (String, String) {
     (domain.to_owned(), problem)
 }
 
-/// Creates an active planner node, and a client node.
 fn planner(setup: Option<Setup>, words: &str) -> (Arc<Node>, Arc<Node>) {
     let domain = domain();
     let (planner, client) = (node(domain, "planner", words), node(domain, "client", ""));

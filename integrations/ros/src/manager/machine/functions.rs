@@ -20,7 +20,6 @@ const MAX_PROBE_DELAY: Duration = Duration::from_secs(60);
 /// Maximum delay until a function that did not reply to a probe is probed again.
 const SILENT_RETRY_DELAY: Duration = Duration::from_secs(2);
 
-/// Delay after which a design is retried if it was refused or its steps failed.
 const REFUSED_RETRY_DELAY: Duration = Duration::from_secs(60);
 
 /// Time after a granted change of mode during which reports of another mode are ignored.
@@ -32,7 +31,6 @@ const GRANT_PERIOD: Duration = Duration::from_secs(2);
 
 #[derive(Debug)]
 pub(super) struct Grant {
-    /// End of the period in which reports of other modes are ignored.
     until: Duration,
     /// Modes that the function had shortly before; reports of them may be late.
     earlier: Vec<String>,

@@ -67,7 +67,6 @@ pub(in crate::manager) enum Ended {
 
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::manager) enum Output {
-    /// Call `change_mode`, or execute the steps of the mode.
     Change(Change),
     /// Request the mode of a function.
     Look(String),

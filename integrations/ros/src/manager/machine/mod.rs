@@ -50,7 +50,6 @@ struct Deferred {
     /// Answers of the loop at the start, which repeat its outstanding effects.
     answers: Vec<Answer>,
     modes: BTreeMap<String, String>,
-    /// End of the wait for diagnostics.
     until: Duration,
 }
 

@@ -89,7 +89,6 @@ impl Machine {
         format!("the task {task} ends")
     }
 
-    /// Ends the task because its goal is reached: no function is needed any more.
     pub(super) fn reached(&mut self) {
         self.without_plan = false;
         let was_active = self.action.take().is_some();

@@ -14,7 +14,6 @@ const PATH: &str = "f_generate_search_path";
 const MOTION: &str = "f_maintain_motion";
 const RECHARGE: &str = "generate_recharge_path";
 
-/// A machine with a clock that advances with each input.
 struct Robot {
     machine: Machine,
     now: Duration,
