@@ -185,7 +185,6 @@ impl Work {
         }
     }
 
-    /// Starts the endpoints for probes and metrics if `--metrics` is given. Returns the health that the probes report.
     async fn open_endpoints(&self) -> Result<Arc<Health>, Errors> {
         let health = Arc::<Health>::default();
         if let Some(address) = self.metrics {
@@ -237,7 +236,6 @@ fn main() -> ExitCode {
     }
 }
 
-/// Returns `true` if standard error is a terminal and `NO_COLOR` is not set or empty.
 fn has_colours() -> bool {
     std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
 }

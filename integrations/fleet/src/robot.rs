@@ -391,7 +391,6 @@ impl Robot {
     }
 }
 
-/// Returns a version of a mission, or the reason why a robot with this version is suspended.
 fn version<'a>(missions: &'a Missions, name: &str, digest: &str) -> Result<&'a Template, Faulted> {
     missions.version(name, digest).ok_or_else(|| {
         Faulted(format!(

@@ -69,7 +69,6 @@ struct Names {
     designs: BTreeMap<String, Vec<String>>,
 }
 
-/// Summary of all statuses with one name on `/diagnostics`.
 #[derive(Debug, Clone, Default, PartialEq)]
 struct Diagnostic {
     hardware_id: String,

@@ -87,7 +87,6 @@ pub(super) enum Done {
         own: Box<Robot>,
         event: Stored,
         outcome: Outcome,
-        /// Estimated duration of a search, updated if the event required a search.
         search: Option<Duration>,
     },
     /// A snapshot of a robot, which contains all decided events up to `event`, was stored or could not be stored.

@@ -41,10 +41,7 @@ const MAX_MODE_REQUESTS: u32 = 3;
 
 #[derive(Clone)]
 enum Means {
-    Modes {
-        change: Arc<Caller<ChangeMode>>,
-        get_mode: Arc<Caller<GetMode>>,
-    },
+    Modes { change: Arc<Caller<ChangeMode>>, get_mode: Arc<Caller<GetMode>> },
     Steps,
 }
 
@@ -420,7 +417,6 @@ impl Robot {
     }
 }
 
-/// Subscribes to the mode manager's messages about a function, and to the lifecycle of its node.
 fn subscribe_function(
     node: &Arc<Node>,
     settings: &Settings,

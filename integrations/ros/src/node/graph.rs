@@ -389,7 +389,6 @@ impl Graph {
         state.mapping
     }
 
-    /// Polls `look` until it returns a value or the time is up.
     pub(crate) async fn wait<T>(&self, within: Duration, look: impl Fn(&Self) -> Option<T>) -> Option<T> {
         let until = Instant::now() + within;
         loop {

@@ -334,7 +334,6 @@ pub(crate) fn raw(value: ParameterValue) -> msg::ParameterValue {
     }
 }
 
-/// Converts a received value. Returns `None` if it is not set.
 pub(crate) fn parameter(value: msg::ParameterValue) -> Option<ParameterValue> {
     use msg::ParameterType as Kind;
     Some(match value.r#type {

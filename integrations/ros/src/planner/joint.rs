@@ -11,7 +11,6 @@ use metaplan::planner::Exact;
 use crate::diagnosed::{Diagnosed, Sources};
 use crate::node::Node;
 
-/// The mission, and the diagnostics since its last use.
 #[derive(Debug)]
 pub(crate) struct Joint {
     mission: Mutex<Mission>,

@@ -81,7 +81,6 @@ fn alternatives(value: &ParameterValue) -> Result<(), &'static str> {
     }
 }
 
-/// Planning parameters with the current values of the node's ROS parameters.
 #[derive(Debug)]
 pub(crate) struct Chosen {
     manner: Mutex<Manner>,

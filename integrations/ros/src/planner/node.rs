@@ -169,7 +169,6 @@ impl Planner {
     }
 }
 
-/// Runs long work on a separate thread with a large stack, without waiting for its end.
 pub(crate) fn on_a_thread(name: &str, work: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
     std::thread::Builder::new().name(name.to_owned()).stack_size(STACK_SIZE).spawn(work).map(|_| ())
 }

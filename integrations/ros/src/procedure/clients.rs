@@ -32,7 +32,6 @@ pub(super) enum Failure {
     Refused(String),
     /// The robot has given no valid answer in time.
     Silent(String),
-    /// A newer request replaces the procedure.
     Replaced,
 }
 

@@ -23,7 +23,6 @@ pub(super) struct Memory {
     pub(super) goals: Vec<Remembered>,
 }
 
-/// A goal of the reasoner that had not ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Remembered {
     pub(super) goal: [u8; 16],

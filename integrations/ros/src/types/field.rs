@@ -40,7 +40,6 @@ impl FieldPath {
         Ok(Self(parts))
     }
 
-    /// Returns `true` if the field is a text. Fails as [`Self::resolve`] does.
     pub(crate) fn is_text(&self, structure: &Structure) -> Result<bool, String> {
         let (_, layout) = self.resolve(structure)?;
         Ok(matches!(layout, Layout::Text { .. }))

@@ -13,7 +13,6 @@ pub(in crate::manager) enum Input {
     Ready(Vec<(String, Option<String>)>),
     /// A diagnostic is pending; the driver converts it to a line.
     Diagnosed,
-    /// A line of events in the format of the loop.
     Line(String),
     /// Request to start a task: the number that identifies the reply, and the name of the task.
     Request(u64, String),

@@ -61,7 +61,6 @@ pub(super) struct Machine {
     functions: Vec<String>,
     state: State,
     task: Option<String>,
-    /// Requested changes of mode that have not ended, by function.
     pending: BTreeMap<String, Change>,
     modes: BTreeMap<String, String>,
     grants: BTreeMap<String, Grant>,
