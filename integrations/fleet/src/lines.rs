@@ -138,9 +138,9 @@ fn line(message: &Stored) -> Option<(String, String)> {
     Some((address.robot, line.to_string()))
 }
 
-/// Writes the decisions of one robot, or of all robots if `robot` is `None`, to standard output,
-/// until the output is closed or the log fails. Begins after the decision `after`, or with the next
-/// new decision if `after` is `None`.
+/// Writes the decisions of one robot to standard output, or those of all robots if `robot` is
+/// `None`. Ends when the output is closed or the log fails. Begins after the decision `after`, or
+/// with the next new decision if `after` is `None`.
 pub(crate) async fn follow<S: Store>(
     store: S,
     robot: Option<&str>,

@@ -35,9 +35,9 @@ use threads::Threads;
 /// Parameters with which a worker runs its partitions.
 #[derive(Debug, Clone, Copy)]
 pub struct Settings {
-    /// Maximum number of loops that search for plans at the same time in each class of durations
-    /// (up to 25 ms, up to 400 ms, longer), of further searches on extra threads, and of loops that
-    /// work without a search.
+    /// Maximum number of loops that search for plans at the same time, for each class of durations
+    /// (up to 25 ms, up to 400 ms, longer). The same number limits further searches on extra
+    /// threads, and loops that work without a search.
     pub threads: usize,
     /// Maximum number of idle robots loaded in memory. Others are kept as compressed snapshots and
     /// loaded on demand. Robots that are handling events may exceed this number.

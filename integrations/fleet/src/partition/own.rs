@@ -385,8 +385,8 @@ impl<S: Store> Partition<S> {
         Ok(())
     }
 
-    /// Unloads the least recently used idle robots of this partition until the number of loaded robots
-    /// of the worker is within the limit, or until the partition has no further idle robot.
+    /// Unloads idle robots of this partition, the least recently used ones first, while the worker
+    /// has more loaded robots than its limit.
     fn cool(&mut self) {
         let counts = &self.shared.counts;
         while counts.warm.load(Ordering::Relaxed) > self.shared.settings.warm as u64 {

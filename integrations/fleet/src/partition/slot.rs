@@ -63,8 +63,8 @@ impl Slot {
         Some((events.map_or(u64::MAX, |event| event - 1), decisions.unwrap_or(u64::MAX)))
     }
 
-    /// Returns `true` if nothing has to be stored about the robot, because it is retired or was never enrolled,
-    /// and the progress of the partition includes its last event and decision.
+    /// Returns `true` if nothing has to be stored about the robot: it is retired or was never
+    /// enrolled, and the progress of the partition includes its last event and decision.
     pub(super) fn is_obsolete(&self, progress: &Progress) -> bool {
         let is_idle = self.waiting.is_empty()
             && self.before.is_empty()

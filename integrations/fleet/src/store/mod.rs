@@ -162,8 +162,8 @@ pub trait Store: Clone + Send + Sync + 'static {
         after: u64,
     ) -> impl Future<Output = Result<Vec<Stored>, Fault>> + Send;
 
-    /// Returns the messages of one subject after a sequence number that exist at the time of the call, in
-    /// ascending order, but at most the first `most`.
+    /// Returns the messages of one subject after a sequence number, in ascending order, but at most
+    /// the first `most`. Messages that are appended during the call may be missing.
     fn of_subject(
         &self,
         stream: Stream,

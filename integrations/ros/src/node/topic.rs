@@ -24,7 +24,7 @@ const INVALID_PER_LOG_MESSAGE: u64 = 1000;
 const AGE_CHECK_PERIOD: Duration = Duration::from_secs(5);
 
 /// Filter of samples that were published before the subscription existed. A writer keeps the
-/// samples that a killed reader has not acknowledged, and sends them to the next reader even if
+/// samples that a killed reader has not acknowledged. It sends them to the next reader, even if
 /// this reader has not requested old samples.
 struct Old {
     since: SystemTime,

@@ -208,9 +208,9 @@ impl Clients {
         }
     }
 
-    /// Returns the GUIDs of the servers that report the state or the parameters of a node. For a condition about the
-    /// last message on a topic, returns an id made from the condition while the condition holds, so that the result
-    /// changes when the mode changes.
+    /// Returns the GUIDs of the servers that report the state or the parameters of a node. A
+    /// condition about the last message on a topic has no server. Its result is an id made from the
+    /// condition while it holds, so that the result changes when the mode changes.
     pub(super) fn servers(&self, condition: &Condition) -> BTreeSet<[u8; 16]> {
         let (Condition::State { node, .. } | Condition::Parameters { node, .. }) = condition else {
             let is_met = !matches!(condition, Condition::Topic(_)) && self.is_met(condition);

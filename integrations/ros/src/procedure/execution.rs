@@ -131,10 +131,10 @@ impl Procedures {
         missing.into_iter().min_by_key(Vec::len).unwrap_or_default()
     }
 
-    /// Returns the mode whose conditions hold. If several modes qualify, those with the most conditions are
-    /// considered, and of these the mode that was put into effect or seen last is returned. If the last mode has no
-    /// observable conditions, it is returned unchecked. The result is [`Seen::Unsettled`] while a procedure runs or a
-    /// node does not answer.
+    /// Returns the mode whose conditions hold. If several modes qualify, those with the most
+    /// conditions are considered. Of these, the mode that was put into effect or seen last is
+    /// returned. If the last mode has no observable conditions, it is returned unchecked. The
+    /// result is [`Seen::Unsettled`] while a procedure runs or a node does not answer.
     pub(crate) async fn observe(&self, function: &str) -> Seen {
         let Some(procedures) = self.functions.get(function) else { return Seen::Ambiguous };
         // In the middle of a procedure, an observation would be meaningless.
