@@ -12,7 +12,6 @@ const MAX_SESSIONS: usize = 16;
 
 const MAX_RANGES: usize = 16;
 
-/// Maximum length of a text in bytes. Ids with longer texts are not stored.
 const MAX_LENGTH: usize = 128;
 
 /// Approximate set of message ids. It forgets the texts whose last insertion is longest ago, and

@@ -68,7 +68,8 @@ enum Command {
     Send {
         #[command(flatten)]
         server: Server,
-        /// Set the prefix of message ids. Lines that are sent again with the same prefix are stored once.
+        /// Set the prefix of message ids. Lines that are sent again with the same prefix are
+        /// decided once.
         #[arg(long, value_name = "WORD")]
         session: Option<String>,
     },

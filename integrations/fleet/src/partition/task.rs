@@ -17,9 +17,7 @@ pub(super) struct Task<S> {
     pub(super) name: String,
     pub(super) partition: u32,
     pub(super) epoch: u64,
-    /// Sequence number of the robot's last decision; `None` if it has to be looked up.
     pub(super) chain: Option<u64>,
-    /// Sequence number of the last decision that is known to precede the recovery of the partition.
     pub(super) recovered: u64,
     pub(super) before: Option<(u64, Decided)>,
     /// `true` if a former owner has decided later events of the robot but not this one, i.e. has

@@ -30,7 +30,6 @@ pub(crate) struct Threads {
     costs: Mutex<BTreeMap<String, Duration>>,
 }
 
-/// Reserves one of the extra threads until it is dropped.
 struct Extra<'a>(&'a AtomicUsize);
 
 impl Drop for Extra<'_> {
@@ -50,7 +49,6 @@ impl Threads {
         }
     }
 
-    /// Runs work that does not search for a plan. Fails if the work panics.
     pub(crate) async fn quick<T: Send + 'static>(
         &self,
         work: impl FnOnce() -> T + Send + 'static,

@@ -64,7 +64,6 @@ const BATCH: usize = 500;
 /// Timeout of a request to the server.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// Pause between attempts to reach servers that are starting.
 const PAUSE: Duration = Duration::from_millis(500);
 
 /// Period during which a further message with the same id is discarded.

@@ -21,7 +21,6 @@ fn program() -> String {
     std::env::var("NATS_SERVER").unwrap_or_else(|_| "nats-server".to_owned())
 }
 
-/// Returns `true` if the server program is available. Otherwise reports that the test lacks it.
 pub(super) fn is_possible() -> bool {
     let program = program();
     let status = Command::new(&program).arg("--version").stdout(Stdio::null()).status();

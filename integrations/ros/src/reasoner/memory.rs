@@ -33,7 +33,6 @@ pub(super) struct Remembered {
     pub(super) design: Option<String>,
 }
 
-/// State file and the contents that were last read or written.
 #[derive(Debug)]
 pub(super) struct MemoryFile {
     path: PathBuf,

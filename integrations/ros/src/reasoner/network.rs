@@ -119,7 +119,6 @@ impl Network {
         })
     }
 
-    /// Runs until `stop` is set, or until the state cannot be written.
     pub(super) fn run(mut self, stop: &AtomicBool) -> Result<(), Message> {
         self.go_on();
         self.node.log(Severity::Info, "serves /mros/objective");

@@ -25,7 +25,6 @@ use functions::Grant;
 
 pub(super) use io::{Change, Ended, Input, Outcome, Output, State};
 
-/// Goal of the loop while there is no task.
 const EMPTY_GOAL: &str = "(and)";
 
 #[derive(Debug, Clone)]
