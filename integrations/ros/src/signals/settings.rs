@@ -54,6 +54,7 @@ pub(crate) enum Source {
 
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Target {
+    /// The component works while the condition holds.
     Component { component: String, condition: Condition },
     /// The attribute is the value times `scale` plus `offset`.
     Attribute { attribute: String, scale: f64, offset: f64 },
