@@ -5,7 +5,6 @@
 mod definition;
 #[path = "build/rust.rs"]
 mod rust;
-/// Modules of the package that parse and hash definitions.
 #[allow(dead_code, unreachable_pub, reason = "the package uses the rest")]
 #[path = "src/types"]
 mod types {

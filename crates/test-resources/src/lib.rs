@@ -123,7 +123,6 @@ impl Resource {
     }
 }
 
-/// The list of public files, from which `data/fetch.py` downloads them.
 const PUBLIC_FILES: &str = include_str!("../../../data/sources.toml");
 
 /// Returns the directories in which test data is looked up, in this order. They need not exist.
@@ -284,11 +283,8 @@ impl Settings {
         self.names().any(|name| name == resource.name())
     }
 
-    /// Records that a test lacks a resource. Returns a message.
-    ///
-    /// # Errors
-    /// Returns a message if the resource is required, a required name is unknown, or the record cannot be
-    /// written.
+    /// Records that a test lacks a resource. Returns a message for users. It is an error if the
+    /// resource is required, a required name is unknown, or the record cannot be written.
     fn report(&self, test: &str, resource: Resource, detail: &str) -> Result<String, String> {
         if let Some(unknown) = self.names().find(|name| Resource::named(name).is_none()) {
             let names = Resource::ALL.map(|(_, name, _)| name).join(", ");

@@ -8,14 +8,12 @@ use test_resources::{Resource, data, data_path, missing_in, program, python_with
 
 const ABSENT: &str = "no/such/file";
 
-/// Returns a path of this test's own in the temporary directory of the target.
 fn temporary(name: &str) -> PathBuf {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}-{}", std::process::id()));
     let _ = std::fs::remove_file(&path);
     path
 }
 
-/// Runs an ignored test of this program.
 fn run(test: &str, variables: &[(&str, &str)]) -> Output {
     Command::new(std::env::current_exe().expect("this program"))
         .args([test, "--exact", "--ignored", "--nocapture"])

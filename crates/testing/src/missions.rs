@@ -18,7 +18,6 @@ pub struct Mission {
     functions: Vec<Vec<(i64, i64, i64, bool)>>,
     battery: i64,
     charger: Option<usize>,
-    /// Waypoint that the robot must reach.
     goal: usize,
     /// Weights of time and of energy in the cost of a plan.
     pub weights: (i64, i64),

@@ -12,26 +12,19 @@ use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Semaphore;
 
-/// Maximum number of bytes of a request before its body.
 const MAX_HEAD_BYTES: usize = 16 << 10;
 
 const MAX_HEADERS: usize = 64;
 
-/// Maximum number of simultaneous connections.
 const MAX_CONNECTIONS: usize = 64;
 
-/// Time limit of a request and its response.
 const TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Period of the maintenance of histograms.
 const UPKEEP: Duration = Duration::from_secs(5);
 
 type Response = (&'static str, String);
 
 /// Starts to serve the endpoints at `address`, until the program ends.
-///
-/// # Errors
-/// The address cannot be used, or the process already records metrics.
 pub(crate) async fn open(address: SocketAddr, health: Arc<Health>) -> Result<(), Message> {
     let wrong = |error: &dyn std::fmt::Display| Message::error("N301", format!("{address}: {error}"));
     let listener = TcpListener::bind(address).await.map_err(|error| wrong(&error))?;

@@ -3,8 +3,8 @@
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Time without a new round of its main loop after which a worker counts as hanging. Rounds also end if the servers
-/// are unreachable, because every request has a timeout.
+/// Time without a new round of the main loop after which a worker counts as hanging. Rounds also
+/// end if the servers are unreachable, because every request has a timeout.
 const MAX_SILENCE: Duration = Duration::from_secs(300);
 
 /// Health of a worker. The worker updates it; probes read it.
@@ -28,7 +28,7 @@ impl Health {
         self.state(|state| state.round.is_none_or(|round| round.elapsed() < MAX_SILENCE))
     }
 
-    /// Returns `true` if the worker takes part in the fleet.
+    /// Returns `Ok` if the worker takes part in the fleet.
     ///
     /// # Errors
     /// The reason why it does not: it waits for servers, has lost them, or is shutting down.

@@ -1,10 +1,10 @@
-//! Message ids of a robot's decided events, by which repeated messages are recognised without a time
-//! limit. The servers recognise repetitions only for some minutes.
+//! Message ids of a robot's decided events, by which repeated messages are recognised without a
+//! time limit. The servers recognise repetitions only for some minutes.
 //!
 //! An id is a text followed by a number, as in `ugv-1:17` and `ugv-1:7f3a.17`. For each text, the
-//! numbers are stored as ranges; numbers that grow by one are a single range. If there are more ranges than
-//! `MAX_RANGES`, the lowest ones count as one range. The `MAX_SESSIONS` texts that were used last are
-//! kept.
+//! numbers are stored as ranges; numbers that grow by one are a single range. If there are more
+//! ranges than `MAX_RANGES`, the lowest ones count as one range. Only the `MAX_SESSIONS` texts with
+//! the latest insertions are kept.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,11 +12,10 @@ const MAX_SESSIONS: usize = 16;
 
 const MAX_RANGES: usize = 16;
 
-/// Maximum length of a text in bytes. Ids with longer texts are not stored.
 const MAX_LENGTH: usize = 128;
 
-/// Approximate set of message ids. It forgets texts that have not been used for a long time, and also contains the
-/// numbers between merged ranges.
+/// Approximate set of message ids. It forgets the texts whose last insertion is longest ago, and
+/// also contains the numbers between merged ranges.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Ids(Vec<Session>);
 
@@ -30,7 +29,8 @@ impl Ids {
         self.0.is_empty()
     }
 
-    /// Returns `true` if the id was inserted, or if its number belongs to the ranges that were merged.
+    /// Returns `true` if the id was inserted and is not forgotten, or if its number lies between
+    /// merged ranges.
     pub fn contains(&self, id: &str) -> bool {
         let (text, number) = split(id);
         let session = self.0.iter().find(|session| session.0 == text);

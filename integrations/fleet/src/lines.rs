@@ -115,7 +115,6 @@ fn say(message: &Message) {
     eprint!("{}", message.text());
 }
 
-/// Stores the events in lines `ROBOT EVENT` from standard input, until the input ends.
 pub(crate) async fn send<S: Store>(store: S, session: &str) -> Result<(), Message> {
     let (_goes_on, stop) = watch::channel(false);
     feed(&store, session, stop).await
@@ -139,9 +138,9 @@ fn line(message: &Stored) -> Option<(String, String)> {
     Some((address.robot, line.to_string()))
 }
 
-/// Writes the decisions of one robot, or of all robots if `robot` is `None`, to standard output,
-/// until the output is closed or the log fails. Begins after the decision `after`, or with the next
-/// new decision if `after` is `None`.
+/// Writes the decisions of one robot to standard output, or those of all robots if `robot` is
+/// `None`. Ends when the output is closed or the log fails. Begins after the decision `after`, or
+/// with the next new decision if `after` is `None`.
 pub(crate) async fn follow<S: Store>(
     store: S,
     robot: Option<&str>,
@@ -209,8 +208,8 @@ async fn write_decisions<S: Store>(
 }
 
 /// Runs a fleet in a directory: events from standard input, decisions to standard output. Ends when
-/// the input has ended and all events are decided, when `stop` becomes true, or when the output is
-/// closed. `after` is as in [`follow`].
+/// `stop` becomes true, or when the input has ended and either all events are decided or the output
+/// is closed. `after` is as in [`follow`].
 pub(crate) async fn up(
     shared: Arc<Shared<Local>>,
     after: Option<u64>,

@@ -68,7 +68,8 @@ enum Command {
     Send {
         #[command(flatten)]
         server: Server,
-        /// Set the prefix of message ids. Lines that are sent again with the same prefix are stored once.
+        /// Set the prefix of message ids. Lines that are sent again with the same prefix are
+        /// decided once.
         #[arg(long, value_name = "WORD")]
         session: Option<String>,
     },
@@ -103,7 +104,8 @@ struct Work {
     /// Read former versions of missions from this directory (repeatable). Robots enrolled with one of them keep it.
     #[arg(long, value_name = "DIR")]
     former: Vec<PathBuf>,
-    /// Set the number of loops that search for plans at the same time. [default: number of processors]
+    /// Set the number of loops that search for plans at the same time, for each of three classes of
+    /// search durations. [default: number of processors]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
     /// Set the number of robots that are kept in memory. Others are restored from snapshots when they have events.
@@ -184,7 +186,6 @@ impl Work {
         }
     }
 
-    /// Starts the endpoints for probes and metrics if `--metrics` is given. Returns the health that the probes report.
     async fn open_endpoints(&self) -> Result<Arc<Health>, Errors> {
         let health = Arc::<Health>::default();
         if let Some(address) = self.metrics {
@@ -236,7 +237,6 @@ fn main() -> ExitCode {
     }
 }
 
-/// Returns `true` if standard error is a terminal and `NO_COLOR` is not set.
 fn has_colours() -> bool {
     std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
 }

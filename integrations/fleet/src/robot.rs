@@ -48,7 +48,7 @@ pub enum Refused {
     Enrolled,
     /// The directory of missions has no mission of this name.
     Mission,
-    /// The event asks for a migration at an unknown point.
+    /// The event requests a migration at an unknown point.
     SafePoint,
     /// The message id contains the name of another robot.
     Forged,
@@ -198,8 +198,8 @@ impl Robot {
         })
     }
 
-    /// Runs the first phase of [`Robot::decide`], which includes everything except searches for plans.
-    /// Takes milliseconds, while a search can take minutes.
+    /// Runs the first phase of [`Robot::decide`], which includes everything except searches for
+    /// plans. It usually takes milliseconds, while a search can take minutes.
     ///
     /// # Errors
     /// As for [`Robot::decide`].
@@ -391,7 +391,6 @@ impl Robot {
     }
 }
 
-/// Returns a version of a mission, or the reason why a robot with this version is suspended.
 fn version<'a>(missions: &'a Missions, name: &str, digest: &str) -> Result<&'a Template, Faulted> {
     missions.version(name, digest).ok_or_else(|| {
         Faulted(format!(
@@ -420,7 +419,6 @@ fn empty(event: u64) -> Decided {
     }
 }
 
-/// Returns `true` if an event retires its robot.
 pub(crate) fn is_retirement(payload: &[u8]) -> bool {
     // Most events do not contain this word, so they need not be parsed.
     let has_word = payload.windows(6).any(|part| part == b"retire");

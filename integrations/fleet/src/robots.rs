@@ -22,10 +22,11 @@ pub struct Sender<S> {
 }
 
 impl<S: Store> Sender<S> {
-    /// Creates a sender for a robot. `session` becomes a part of the message ids. A second sender
-    /// with the same session that sends the same events in the same order creates the same message
-    /// ids, so no event is decided twice, and none is stored twice (with NATS: within ten minutes). A
-    /// sender of other events needs another session.
+    /// Creates a sender for a robot. `session` becomes a part of the message ids.
+    ///
+    /// If a second sender has the same session, it must send the same events in the same order. It
+    /// then creates the same message ids. So no event is decided twice, and none is stored twice
+    /// (with NATS: within ten minutes).
     pub fn new(store: S, robot: &str, session: &str) -> Self {
         let address = Address::of(robot, store.partitions());
         Self { store, address, session: session.to_owned(), number: 0 }
@@ -105,7 +106,8 @@ pub struct PartitionStatus {
     pub worker: Option<String>,
     /// Number of times that a worker has taken over the partition, or has recovered it again.
     pub epoch: u64,
-    /// Sequence number up to which the effects of all events are contained in snapshots.
+    /// Sequence number up to which snapshots contain the effects of all events, except those of
+    /// suspended or delayed robots.
     pub events: u64,
 }
 

@@ -11,7 +11,6 @@ use crate::ids::Ids;
 /// Version of the data format, which every decision contains.
 pub const FORMAT: &str = "metaplan-fleet/1";
 
-/// Maximum length of a robot's name in bytes.
 const LONGEST_NAME: usize = 64;
 
 /// Returns `true` if a text is a valid name of a robot: 1 to 64 letters, digits, `-` and `_`, so
@@ -127,9 +126,11 @@ impl Decided {
 pub struct Progress {
     /// Number of times that a worker has taken over the partition, or has recovered it again.
     pub epoch: u64,
-    /// Sequence number up to which the effects of all events are contained in snapshots.
+    /// Sequence number up to which the effects of all events are contained in snapshots, except for
+    /// robots with [`Saved::behind`].
     pub events: u64,
-    /// Sequence number up to which all decisions are contained in snapshots.
+    /// Sequence number up to which all decisions are contained in snapshots, except for robots with
+    /// [`Saved::behind`].
     pub decisions: u64,
     /// Revision of the last snapshot. A reader of snapshots has to wait for this revision, because
     /// it may read from a server that lags behind.
@@ -139,7 +140,7 @@ pub struct Progress {
 /// Snapshot of a robot after an event.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Saved {
-    /// Name of the robot's mission; `None` if the robot was retired.
+    /// Name of the robot's mission; `None` if the robot is not enrolled.
     pub mission: Option<String>,
     /// Checksum of the mission's files and settings.
     #[serde(default)]

@@ -149,8 +149,8 @@ impl<S: Store> Worker<S> {
     }
 
     /// Removes partitions whose task has ended, and gives up their leases unless these are lost. A
-    /// partition whose task has ended without an order, because another worker has written in it or
-    /// because of a panic, is recovered again and stays leased.
+    /// partition is recovered again and stays leased if its task has ended without an order. The
+    /// cause is a write of another worker or a panic.
     async fn collect(&mut self) {
         let ended: Vec<u32> = self
             .held
@@ -163,8 +163,6 @@ impl<S: Store> Worker<S> {
             let order = *held.orders.borrow();
             let end = held.task.await;
             match (end, order) {
-                // Another worker has written data that only the owner writes, although this worker
-                // has the lease; or there was a panic. The partition is recovered again.
                 (Ok(End::Fenced) | Err(_), Order::Go) => {
                     tracing::warn!(
                         partition,

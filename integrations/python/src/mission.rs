@@ -108,7 +108,6 @@ impl Planned {
     }
 }
 
-/// Planning parameters of a call.
 struct Wanted {
     config: Config,
     minimize: Vec<String>,
@@ -118,7 +117,6 @@ struct Wanted {
     certificate: Option<PathBuf>,
 }
 
-/// Parses a number in the keyword argument `name`.
 fn number(name: &str, text: &str) -> PyResult<Exact> {
     text.parse().map_err(|error| PyValueError::new_err(format!("{name}: {error}")))
 }

@@ -8,7 +8,6 @@ use std::time::Duration;
 
 use pyo3::prelude::*;
 
-/// Time between two checks for signals.
 const INTERVAL: Duration = Duration::from_millis(20);
 /// Stack size of the working thread in bytes, as large as that of a main thread.
 const STACK: usize = 8 << 20;

@@ -16,7 +16,6 @@ const KEYWORDS: [&str; 1] = ["type"];
 
 type Modules<'i> = BTreeMap<Option<&'i str>, BTreeMap<&'i str, BTreeMap<&'i str, String>>>;
 
-/// Returns the text of the modules of all interfaces.
 pub fn modules(interfaces: &[Interface], hashes: &Hashes) -> Result<String, Box<dyn Error>> {
     let mut modules = Modules::new();
     for interface in interfaces {

@@ -41,7 +41,6 @@ const FAILURE_PAUSE: Duration = Duration::from_secs(1);
 
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Number of consecutive failed executions after which the controller gives up.
 const MAX_FAILURES: usize = 5;
 
 /// Options of the controller.

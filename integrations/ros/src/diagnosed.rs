@@ -16,7 +16,6 @@ use crate::interfaces::std_msgs::msg::Header;
 use crate::node::{Clock, Node, keep_all};
 use crate::signals::{self, Signal};
 
-/// Upper limit on the number of warnings about statuses that nothing uses.
 const MAX_UNUSED: usize = 20;
 
 /// Diagnostics and signals that are not handled yet. Only the latest status of each subject (message and keys of the
@@ -103,9 +102,9 @@ impl Queue {
 }
 
 impl Diagnosed {
-    /// Subscribes to diagnostics and signals, and calls `waits` when the first status becomes pending. Repeated
-    /// statuses are ignored unless a filter needs them. An unused status of another node at level WARN or above is
-    /// reported once, with a rule that would use it. At most [`MAX_UNUSED`] statuses are reported.
+    /// Subscribes to diagnostics and signals, and calls `waits` when the first status becomes
+    /// pending. An unused status of another node at level WARN or above is reported once, with a
+    /// rule that would use it. At most [`MAX_UNUSED`] statuses are reported.
     pub(crate) fn subscribe(
         node: &Arc<Node>,
         sources: Sources,

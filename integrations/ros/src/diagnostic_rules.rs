@@ -16,7 +16,6 @@ pub(crate) const MEASUREMENT: &str = "QA status";
 /// Message of a status that reports components, in the spelling of MROS.
 pub(crate) const COMPONENT: &str = "Component status";
 
-/// A rule that selects diagnostics and translates them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DiagnosticRule {
     name: Pattern,

@@ -23,10 +23,9 @@ const SEARCH_PERIOD: Duration = Duration::from_millis(200);
 
 const STATE_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Placeholder for a component that has to be filled in.
+/// Placeholder for the user to replace.
 const COMPONENT: &str = "COMPONENT";
 
-/// Placeholder for an attribute that has to be filled in.
 const ATTRIBUTE: &str = "ATTRIBUTE";
 
 /// Types of sensors whose rate is measured. Images and point clouds are excluded, because they would load the
@@ -70,7 +69,6 @@ struct Names {
     designs: BTreeMap<String, Vec<String>>,
 }
 
-/// Summary of all statuses with one name on `/diagnostics`.
 #[derive(Debug, Clone, Default, PartialEq)]
 struct Diagnostic {
     hardware_id: String,

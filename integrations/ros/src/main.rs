@@ -67,7 +67,6 @@ enum Role {
     Discover,
 }
 
-/// Parses a positive number of seconds, up to one day.
 fn seconds(text: &str) -> Result<f64, String> {
     let time = text.parse().ok().filter(|seconds| (f64::MIN_POSITIVE..=86_400.0).contains(seconds));
     time.ok_or_else(|| "a number of seconds from 0 to 86400 is expected".to_owned())

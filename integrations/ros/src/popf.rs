@@ -125,7 +125,6 @@ fn seconds(text: &str) -> Result<Duration, String> {
     Duration::try_from_secs_f64(value).ok().filter(|time| !time.is_zero()).ok_or_else(invalid)
 }
 
-/// Returns the output for the plugin, or the reason why there is no plan.
 fn solve(invocation: &Invocation) -> Result<String, String> {
     let domain = read(&invocation.domain, DOMAIN)?;
     let problem = read(&invocation.problem, PROBLEM)?;

@@ -4,7 +4,6 @@
 
 use std::process::Command;
 
-/// Runs the program with an upper limit on open files. Returns the exit status and the messages.
 fn run(files: u32, words: &[&str], domain: &str) -> (Option<i32>, String) {
     let output = Command::new("sh")
         .args(["-c", &format!("ulimit -n {files} && exec \"$0\" \"$@\""), env!("CARGO_BIN_EXE_metaplan-ros")])

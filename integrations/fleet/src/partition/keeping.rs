@@ -10,9 +10,10 @@ use crate::store::{Bucket, Fault, Store};
 use crate::wire::{Address, Progress, Saved};
 
 impl<S: Store> Partition<S> {
-    /// Starts to save all robots whose decisions have been unsaved for [`Settings::save_within`], or, with `all`, all
-    /// robots with unsaved decisions. Also starts to mark the snapshots of suspended robots. Robots that
-    /// [`Self::save_robot`] cannot save now are omitted. Returns `true` if a snapshot was started.
+    /// Starts to save all robots whose decisions have been unsaved for [`Settings::save_within`],
+    /// or, with `all`, all robots with unsaved decisions. Also starts to mark the snapshots of
+    /// suspended robots. Robots that [`Self::save_robot`] cannot save now are omitted. Returns
+    /// `true` if a write was started.
     pub(super) fn save(&mut self, all: bool) -> bool {
         let within = self.shared.settings.save_within;
         let is_due = |slot: &Slot| {

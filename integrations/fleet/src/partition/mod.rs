@@ -35,8 +35,9 @@ use threads::Threads;
 /// Parameters with which a worker runs its partitions.
 #[derive(Debug, Clone, Copy)]
 pub struct Settings {
-    /// Maximum number of loops that search for plans at the same time in each class of durations (up to 25 ms, up to
-    /// 400 ms, longer), and of loops that work without a search.
+    /// Maximum number of loops that search for plans at the same time, for each class of durations
+    /// (up to 25 ms, up to 400 ms, longer). The same number limits further searches on extra
+    /// threads, and loops that work without a search.
     pub threads: usize,
     /// Maximum number of idle robots loaded in memory. Others are kept as compressed snapshots and
     /// loaded on demand. Robots that are handling events may exceed this number.
@@ -49,8 +50,9 @@ pub struct Settings {
     pub save_within: Duration,
     /// Time between two checks whether robots have to be saved.
     pub look: Duration,
-    /// Threshold for the undecided events of a partition in memory. From half of it on, a robot with 16 or more such
-    /// events gets no more. Its later events are read again once the earlier ones are decided.
+    /// If half of this number of undecided events of a partition is in memory, a robot with 16 or
+    /// more of them gets no more. Its later events are read again once the earlier ones are
+    /// decided.
     pub ahead: usize,
     /// Maximum time that a partition waits for running loops when it is given back. Their events are decided by
     /// the next owner.

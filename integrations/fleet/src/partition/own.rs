@@ -43,7 +43,6 @@ pub(super) struct Partition<S> {
 /// Number of undecided events that each robot can have in memory, regardless of other robots.
 const FEW: usize = 16;
 
-/// Maximum number of events of a robot that are read again at once.
 const MAX_PAGE: usize = 64;
 
 impl<S: Store> Partition<S> {
@@ -122,8 +121,9 @@ impl<S: Store> Partition<S> {
     }
 
     /// Queues the next event of the stream for its robot, or refuses it. Ignores events that were
-    /// read before, events that the robot's snapshot contains, and events of suspended robots. Omits the
-    /// event, to be read again, if the queue is full.
+    /// read before, events that the robot's snapshot contains, and events of suspended robots
+    /// except their retirement. Omits the event, to be read again, if too many events are queued or
+    /// if earlier ones of the robot were omitted.
     fn read(&mut self, event: Stored) {
         if event.sequence <= self.seen.0 {
             return;
@@ -157,8 +157,8 @@ impl<S: Store> Partition<S> {
         }
     }
 
-    /// Parses the address of an event. Refuses an event without a valid address or with the id of another
-    /// robot, and returns `None` then.
+    /// Parses the address of an event. Refuses the event and returns `None` if the address or its
+    /// partition is wrong, or if the message id is not one of the robot.
     fn address(&self, event: &Stored) -> Option<Address> {
         let Some(address) = Address::parse(&event.subject) else {
             self.refuse(None, "wrong_subject");
@@ -179,7 +179,6 @@ impl<S: Store> Partition<S> {
         None
     }
 
-    /// Appends an event to the queue of its robot, unless the robot's snapshot contains it.
     fn queue(&mut self, robot: &str, event: Stored) {
         let slot = self.slot(robot);
         if slot.robot.as_ref().is_some_and(|robot| event.sequence <= robot.event) {
@@ -190,7 +189,6 @@ impl<S: Store> Partition<S> {
         self.shared.counts.waiting.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Removes the next event from the queue of a robot.
     fn dequeue(&mut self, name: &str) -> Option<Stored> {
         let event = self.slots.get_mut(name)?.waiting.pop_front()?;
         self.waiting -= 1;
@@ -198,8 +196,9 @@ impl<S: Store> Partition<S> {
         Some(event)
     }
 
-    /// Starts to handle the next queued event of a robot, if the robot is idle. Drops events of a suspended robot, and
-    /// refuses events that a former owner has skipped. Starts to read more events of the robot if the queue lacks some.
+    /// Starts to handle the next queued event of a robot, if the robot is idle. Drops events of a
+    /// suspended robot except its retirement, and refuses events that a former owner has skipped.
+    /// Starts to read more events of the robot if the queue lacks some.
     fn begin(&mut self, name: &str) {
         let last_decision = self.seen.1;
         loop {
@@ -336,7 +335,6 @@ impl<S: Store> Partition<S> {
         Ok(())
     }
 
-    /// Takes back a robot that has handled an event.
     fn taken(
         &mut self,
         name: &str,
@@ -387,8 +385,8 @@ impl<S: Store> Partition<S> {
         Ok(())
     }
 
-    /// Unloads the least recently used idle robots of this partition until the number of loaded robots
-    /// of the worker is within the limit, or until the partition has no further idle robot.
+    /// Unloads idle robots of this partition, the least recently used ones first, while the worker
+    /// has more loaded robots than its limit.
     fn cool(&mut self) {
         let counts = &self.shared.counts;
         while counts.warm.load(Ordering::Relaxed) > self.shared.settings.warm as u64 {

@@ -41,7 +41,6 @@ pub(super) struct Slot {
     /// Number of events that the partition had handled when the robot was last used; 0 if the robot is
     /// not loaded.
     pub(super) used: u64,
-    /// Estimated duration of a search, if the robot has searched.
     pub(super) search: Option<Duration>,
 }
 
@@ -64,8 +63,8 @@ impl Slot {
         Some((events.map_or(u64::MAX, |event| event - 1), decisions.unwrap_or(u64::MAX)))
     }
 
-    /// Returns `true` if nothing has to be stored about the robot, because it is retired or was never enrolled,
-    /// and the progress of the partition includes its last event and decision.
+    /// Returns `true` if nothing has to be stored about the robot: it is retired or was never
+    /// enrolled, and the progress of the partition includes its last event and decision.
     pub(super) fn is_obsolete(&self, progress: &Progress) -> bool {
         let is_idle = self.waiting.is_empty()
             && self.before.is_empty()
@@ -88,7 +87,6 @@ pub(super) enum Done {
         own: Box<Robot>,
         event: Stored,
         outcome: Outcome,
-        /// New estimate of the duration of a search, if there was one.
         search: Option<Duration>,
     },
     /// A snapshot of a robot, which contains all decided events up to `event`, was stored or could not be stored.
@@ -98,7 +96,6 @@ pub(super) enum Done {
         behind: bool,
         revision: Result<u64, Fault>,
     },
-    /// The snapshot of a retired robot was removed or could not be removed.
     Removed {
         robot: String,
         outcome: Result<(), Fault>,

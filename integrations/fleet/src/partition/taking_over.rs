@@ -14,9 +14,10 @@ use crate::store::{Bucket, Store, Stored, Stream};
 use crate::wire::{Address, Decided, Progress, Saved};
 
 impl<S: Store> Partition<S> {
-    /// Takes ownership of a partition and restores its robots: increments the epoch, reads the snapshots, and collects
-    /// later decisions for replay. Robots whose snapshot does not fit the missions are suspended. Snapshots and
-    /// decisions that cannot be parsed are counted and ignored.
+    /// Takes ownership of a partition and restores its robots: increments the epoch, reads the
+    /// snapshots, and collects later decisions for replay. Robots whose version of the mission is
+    /// missing are suspended. Snapshots and decisions that cannot be parsed are counted and
+    /// ignored.
     pub(super) async fn recover(shared: &Arc<Shared<S>>, number: u32) -> Result<Self, End> {
         let key = number.to_string();
         let store = &shared.store;
@@ -100,7 +101,6 @@ impl<S: Store> Partition<S> {
         saved.behind.then_some((address, saved.event, saved.decision))
     }
 
-    /// Keeps a decision of a former owner for its replay.
     fn take_decision(&mut self, message: &Stored) {
         self.seen.1 = self.seen.1.max(message.sequence);
         let Some(address) = Address::parse(&message.subject) else { return };

@@ -17,20 +17,16 @@ pub(super) struct Task<S> {
     pub(super) name: String,
     pub(super) partition: u32,
     pub(super) epoch: u64,
-    /// Sequence number of the robot's last decision; `None` if it has to be looked up.
     pub(super) chain: Option<u64>,
-    /// Sequence number of the last decision that is known to precede the recovery of the partition.
     pub(super) recovered: u64,
     pub(super) before: Option<(u64, Decided)>,
     /// `true` if a former owner has decided later events of the robot but not this one, i.e. has
     /// refused it.
     pub(super) was_refused: bool,
     pub(super) is_suspended: bool,
-    /// Estimated duration of a search, if the robot has searched.
     pub(super) estimate: Option<Duration>,
 }
 
-/// State of a robot with the result of its loop.
 type Work = (Box<Robot>, Stored, Result<Result<Decided, Refused>, Faulted>);
 
 impl<S: Store> Task<S> {
@@ -75,9 +71,9 @@ impl<S: Store> Task<S> {
         Done::Taken { robot: self.name, own, event, outcome, search: self.estimate }
     }
 
-    /// Looks up the robot's last decision. If it has retired the robot, restores the ids of decided events.
-    /// Returns the sequence number of the decision, or 0 without a decision. Returns `None` if another worker
-    /// has decided this event or a later one.
+    /// Looks up the robot's last decision. If it has retired the robot, restores the ids of decided
+    /// events. Returns the sequence number of the decision, or 0 without a decision. Returns `None`
+    /// if another worker may have decided this event or a later one.
     async fn last_decision(&self, robot: &mut Robot, event: &Stored) -> Option<u64> {
         let store = &self.shared.store;
         let last = persist(|| store.last(Stream::Decisions, &event.subject)).await.ok()?;

@@ -27,11 +27,9 @@ pub(crate) struct Threads {
     /// the next class was full.
     extra: AtomicUsize,
     max_extra: usize,
-    /// Estimated duration of a search by mission.
     costs: Mutex<BTreeMap<String, Duration>>,
 }
 
-/// Reserves one of the extra threads until it is dropped.
 struct Extra<'a>(&'a AtomicUsize);
 
 impl Drop for Extra<'_> {
@@ -51,10 +49,6 @@ impl Threads {
         }
     }
 
-    /// Runs work that does not search for a plan.
-    ///
-    /// # Errors
-    /// The work has panicked.
     pub(crate) async fn quick<T: Send + 'static>(
         &self,
         work: impl FnOnce() -> T + Send + 'static,
@@ -63,11 +57,8 @@ impl Threads {
         tokio::task::spawn_blocking(work).await
     }
 
-    /// Runs a search. `estimate` is the expected duration, if the robot has searched before. Also returns the [new
-    /// estimate](updated).
-    ///
-    /// # Errors
-    /// The search has panicked.
+    /// Runs a search. `estimate` is the expected duration, if the robot has searched before. Also
+    /// returns the [new estimate](updated). Fails if the search panics.
     pub(crate) async fn search<T: Send + 'static>(
         &self,
         mission: &str,
@@ -143,7 +134,6 @@ impl Threads {
     }
 }
 
-/// Returns the class of a search with this duration.
 fn class(duration: Duration) -> usize {
     MAX_DURATIONS.partition_point(|limit| *limit < duration)
 }
@@ -172,7 +162,7 @@ mod tests {
             let threads = Arc::clone(&threads);
             long.spawn(async move { threads.search("slow", None, sleep(2_000)).await.map(|_| ()) });
         }
-        // The first long searches are recognised.
+        // In this time, the first long searches move to the last class.
         tokio::time::sleep(Duration::from_millis(600)).await;
         let mut worst = Duration::ZERO;
         for _ in 0..50 {

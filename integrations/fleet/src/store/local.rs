@@ -106,7 +106,8 @@ impl Local {
         Ok(Self(Arc::new(Inner { database, partitions, lease, requests, appended, notices })))
     }
 
-    /// Subscribes to refused events: subject (`PARTITION.ROBOT`) and reason.
+    /// Subscribes to notices about refused events and suspended robots: subject (`PARTITION.ROBOT`)
+    /// and reason.
     pub fn notices(&self) -> broadcast::Receiver<(String, String)> {
         self.0.notices.subscribe()
     }

@@ -162,8 +162,8 @@ pub trait Store: Clone + Send + Sync + 'static {
         after: u64,
     ) -> impl Future<Output = Result<Vec<Stored>, Fault>> + Send;
 
-    /// Returns the messages of one subject after a sequence number that exist at the time of the call, in
-    /// ascending order, but at most the first `most`.
+    /// Returns the messages of one subject after a sequence number, in ascending order, but at most
+    /// the first `most`. Messages that are appended during the call may be missing.
     fn of_subject(
         &self,
         stream: Stream,
@@ -191,7 +191,8 @@ pub trait Store: Clone + Send + Sync + 'static {
         subject: &str,
     ) -> impl Future<Output = Result<Option<Stored>, Fault>> + Send;
 
-    /// Returns the message of a stream with this sequence number, whatever its subject.
+    /// Returns the message of a stream with this sequence number, or `None` if it does not exist.
+    /// The message may have any subject.
     fn at(&self, stream: Stream, sequence: u64)
     -> impl Future<Output = Result<Option<Stored>, Fault>> + Send;
 
@@ -208,7 +209,8 @@ pub trait Store: Clone + Send + Sync + 'static {
         after: u64,
     ) -> impl Future<Output = Result<u64, Fault>> + Send;
 
-    /// Removes the value of a key if its revision is `revision`.
+    /// Removes the value of a key if its revision is `revision`; fails with [`Fault::Conflict`]
+    /// otherwise.
     fn remove(
         &self,
         bucket: Bucket,
@@ -225,7 +227,7 @@ pub trait Store: Clone + Send + Sync + 'static {
         at_least: u64,
     ) -> impl Future<Output = Result<Vec<Entry>, Fault>> + Send;
 
-    /// Publishes why an event of a robot was refused, on `err.PARTITION.ROBOT`. The message is not
-    /// persistent.
+    /// Publishes a notice about a robot on `err.PARTITION.ROBOT`, such as the reason why an event
+    /// was refused. The notice is not persistent.
     fn notice(&self, subject: &str, text: &str) -> impl Future<Output = ()> + Send;
 }

@@ -64,7 +64,6 @@ const BATCH: usize = 500;
 /// Timeout of a request to the server.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// Pause between attempts to reach servers that are starting.
 const PAUSE: Duration = Duration::from_millis(500);
 
 /// Period during which a further message with the same id is discarded.
@@ -245,7 +244,8 @@ impl Nats {
         Ok(self.stream(stream).get_info().await.map_err(failed)?.state.messages)
     }
 
-    /// Subscribes to refused events: subject without `err.` (`PARTITION.ROBOT`), and reason.
+    /// Subscribes to notices about refused events and suspended robots: subject without `err.`
+    /// (`PARTITION.ROBOT`), and reason.
     ///
     /// # Errors
     /// The server cannot be reached.
@@ -344,7 +344,6 @@ fn stream_name(fleet: &str, stream: Stream) -> String {
     }
 }
 
-/// Returns the first tokens of the subjects of a new fleet.
 fn subject_prefix(fleet: &str) -> String {
     if fleet == DEFAULT_FLEET { String::new() } else { format!("{fleet}.") }
 }
@@ -362,7 +361,6 @@ fn stored(message: &jetstream::Message) -> Result<Stored, Fault> {
     })
 }
 
-/// Converts a message that was read from the stream leader.
 fn raw(message: &StreamMessage) -> Stored {
     Stored {
         sequence: message.sequence,

@@ -21,7 +21,6 @@ fn program() -> String {
     std::env::var("NATS_SERVER").unwrap_or_else(|_| "nats-server".to_owned())
 }
 
-/// Returns `true` if the server program is available. Otherwise reports that the test lacks it.
 pub(super) fn is_possible() -> bool {
     let program = program();
     let status = Command::new(&program).arg("--version").stdout(Stdio::null()).status();
@@ -60,7 +59,6 @@ fn free_port() -> u16 {
     listener.local_addr().expect("it has an address").port()
 }
 
-/// Returns `true` if this system allows a process to mount its own disk.
 fn can_mount() -> bool {
     let script = "mount -t tmpfs -o size=1m tmpfs /mnt";
     let status = Command::new("unshare").args(["-rm", "sh", "-c", script]).stderr(Stdio::null()).status();
@@ -166,7 +164,6 @@ impl Cluster {
         self.begin_process(&format!("s{own}"), command);
     }
 
-    /// Starts a worker process with this number of partitions, and a lease in seconds.
     pub(super) fn begin_worker(&self, own: usize, partitions: u32, lease: u64) {
         let missions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../missions");
         let mut command = Command::new(env!("CARGO_BIN_EXE_metaplan-fleet"));

@@ -102,8 +102,6 @@ async fn attack(store: Nats, over: Arc<AtomicBool>, seed: u64) -> u64 {
     count
 }
 
-/// Runs one schedule: all robots send their events while faults are injected, then the decisions
-/// are checked.
 async fn schedule(seed: u64, robots: usize, scripts: &[Script]) {
     let cluster = Cluster::begin(seed);
     let store = Box::pin(open(&cluster, LEASE)).await;

@@ -262,7 +262,6 @@ async fn owners_that_are_gone_at_any_time_leave_what_is_needed() {
     }
 }
 
-/// A partition is given back in time, though a job does not end.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_drain_does_not_wait_for_jobs_without_end() {
     let (events, answers) = scripts::play("ugv", "kinect_at_wp2", 3, 7);

@@ -9,7 +9,6 @@ use serde_json::json;
 
 use super::{assert_same, decisions, open, scripts, tell, work};
 
-/// Returns the enrolment and reports of a component that fails and recovers.
 fn flaps(count: usize) -> Vec<String> {
     let flap = |number: usize| {
         let status = if number.is_multiple_of(2) { "FALSE" } else { "OK" };

@@ -42,7 +42,6 @@ impl Program {
         Self { child, port, folder }
     }
 
-    /// Returns status and body of a page; `None` if the program does not respond.
     fn get(&self, path: &str) -> Option<(u16, String)> {
         let mut stream = TcpStream::connect(("127.0.0.1", self.port)).ok()?;
         stream.set_read_timeout(Some(Duration::from_secs(5))).ok()?;
@@ -57,7 +56,6 @@ impl Program {
         fs::read_to_string(self.folder.path().join("log")).expect("it can be read")
     }
 
-    /// Waits until a page has this status, and returns its body.
     fn wait(&mut self, path: &str, status: u16) -> String {
         for _ in 0..600 {
             if let Some((_, body)) = self.get(path).filter(|page| page.0 == status) {

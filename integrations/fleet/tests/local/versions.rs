@@ -167,7 +167,7 @@ async fn a_robot_changes_its_version_at_the_end_of_an_action() {
     tell(&store, "r", &[wrong, migrate, TICK, end].map(str::to_owned)).await;
     decided(&store, 5).await;
     worker.stop().await;
-    // The former version is not needed any longer, and what the robot has reported is known.
+    // The former version is not needed any longer, and the robot's reports are known.
     let worker = Worker::start(versions.shared(&store, &["new"]));
     tell(&store, "r", &event(LOST)).await;
     decided(&store, 6).await;
@@ -223,7 +223,6 @@ async fn verify(store: &Local, missions: &Missions) {
     }
 }
 
-/// Returns a line for each event of the robot, with its decision.
 async fn listing(store: &Local, made: &BTreeMap<u64, Decided>) -> String {
     let events = store.history(Stream::Events, 0, 0).await.expect("it can be read");
     let line = |event: &Stored| {

@@ -130,7 +130,7 @@ struct Driver {
     settings: Settings,
     /// `true` while the lifecycle state is active. Otherwise, tasks are refused and other inputs wait.
     active: Arc<AtomicBool>,
-    /// Timeout of a change of mode, in milliseconds.
+    /// In milliseconds.
     timeout: Arc<AtomicU64>,
     clock: Arc<Clock>,
     /// Time of `clock` when this driver was created.
@@ -140,9 +140,11 @@ struct Driver {
 }
 
 impl Driver {
-    /// Waits until the functions are present or `stop` is set, and logs the missing ones periodically. Then checks the
-    /// designs and passes the current modes of the functions to the state machine. Requests to start or end a task wait
-    /// for at most [`TASK_WAIT`]; a start is then refused.
+    /// Waits until the functions are present, and logs the missing ones periodically. Then checks
+    /// the designs and passes the current modes of the functions to the state machine. Returns
+    /// early if `stop` is set.
+    ///
+    /// Requests to start or end a task wait for at most [`TASK_WAIT`]; a start is then refused.
     fn wait_for_functions(
         &mut self,
         sender: &Sender<Input>,

@@ -41,11 +41,7 @@ const MAX_MODE_REQUESTS: u32 = 3;
 
 #[derive(Clone)]
 enum Means {
-    /// Services of `system_modes`.
-    Modes {
-        change: Arc<Caller<ChangeMode>>,
-        get_mode: Arc<Caller<GetMode>>,
-    },
+    Modes { change: Arc<Caller<ChangeMode>>, get_mode: Arc<Caller<GetMode>> },
     Steps,
 }
 
@@ -386,12 +382,11 @@ impl Robot {
                 let _ = inputs.send(input);
             }
         });
-        // Finished actions are removed.
         self.performing.retain(|_, (_, task)| !task.is_finished());
         self.performing.insert(number, (running, task));
     }
 
-    /// Cancels an action. An action that was not started by this program is reported as cancelled.
+    /// Cancels an action. An action that this program does not execute is reported as cancelled.
     pub(super) fn stop(&self, number: u64) {
         match self.performing.get(&number) {
             Some((running, _)) => running.cancel(),
@@ -422,7 +417,6 @@ impl Robot {
     }
 }
 
-/// Subscribes to the mode manager's messages about a function, and to the lifecycle of its node.
 fn subscribe_function(
     node: &Arc<Node>,
     settings: &Settings,
@@ -475,7 +469,6 @@ fn subscribe_nodes(
     })
 }
 
-/// Subscribes to the transition events of a node, in the message type of the distribution.
 fn subscribe_transitions(
     node: &Arc<Node>,
     topic: &str,

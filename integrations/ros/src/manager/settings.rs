@@ -70,7 +70,6 @@ impl Source {
     }
 }
 
-/// A task.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TaskSettings {
@@ -301,7 +300,6 @@ impl Functions {
         (!settings.has_steps() || settings.designs.contains_key(mode)).then_some(mode)
     }
 
-    /// Returns `true` if steps put the designs of a function into effect, instead of `system_modes`.
     pub(crate) fn has_steps(&self, function: &str) -> bool {
         self.0.get(function).is_some_and(FunctionSettings::has_steps)
     }

@@ -89,7 +89,6 @@ struct Known<R> {
     status: GoalStatusEnum,
     /// Result of the goal and the time at which the goal ended. `None` while the goal is running.
     result: Option<(R, Instant)>,
-    /// Requests for the result, to be answered when the goal ends.
     result_requests: Vec<RmwRequestId>,
 }
 
@@ -117,7 +116,6 @@ impl Cancellation {
 pub struct Goals<A: Action> {
     server: OnceLock<Server<A>>,
     accepted: Mutex<BTreeMap<GoalId, Known<A::Result>>>,
-    /// Requests to cancel that are not answered yet.
     cancellations: Mutex<Vec<Cancellation>>,
 }
 
@@ -127,8 +125,7 @@ impl<A: Action> std::fmt::Debug for Goals<A> {
     }
 }
 
-/// Waiting requests to the three services of an action: to send a goal, to cancel goals and to get a result. Each
-/// request waits until its client can receive the reply (see [`ReplyGate`]).
+/// Requests that wait until their clients can receive the replies (see [`ReplyGate`]).
 struct Gates<A: Action> {
     goals: ReplyGate<(GoalId, A::Goal)>,
     cancels: ReplyGate<ros2_client::action::CancelGoalRequest>,
@@ -188,8 +185,8 @@ impl<A: Action> Goals<A> {
         }
     }
 
-    /// Decides whether a goal that a client wants to cancel will be cancelled. The client gets its response after the
-    /// decision about the last goal that its request selects.
+    /// Records whether a goal will be cancelled. The client gets its response after the decision
+    /// about the last goal that its request selects.
     pub fn canceling(&self, request: CancelRequest, will_be: bool) {
         if will_be && let Some(known) = self.goals().get_mut(&request.goal) {
             known.status = GoalStatusEnum::Canceling;
@@ -361,7 +358,6 @@ impl<A: Action> Goals<A> {
     }
 }
 
-/// Names and type hashes of the interfaces of an action.
 struct ActionNames<'n> {
     package: &'n str,
     name: &'n str,
@@ -396,7 +392,6 @@ impl<'n> From<&'n ActionType> for ActionNames<'n> {
     }
 }
 
-/// Registers the expected types and hashes of all topics of an action in the graph.
 fn expect_action(graph: &Graph, full: &str, names: ActionNames<'_>) {
     use crate::interfaces::action_msgs::srv::CancelGoal;
     let ActionNames { package, name, send_goal, get_result, feedback } = names;

@@ -39,10 +39,6 @@ impl Node {
         self.graph.matched_readers(&topic)
     }
 
-    /// Subscribes to a topic, and records when its last message arrived.
-    ///
-    /// # Errors
-    /// The name is not a valid topic name.
     pub(crate) fn arrivals(self: &Arc<Self>, name: &str) -> Result<Arrivals, Message> {
         let arrivals = Arrivals::default();
         let last = Arc::clone(&arrivals.last);
@@ -52,11 +48,8 @@ impl Node {
         Ok(arrivals)
     }
 
-    /// Subscribes to a topic with the type of a publisher, once there is one, and calls `arrived` for each
-    /// message. The content of the messages is not read.
-    ///
-    /// # Errors
-    /// The name is not a valid topic name.
+    /// Subscribes to a topic with the type of a publisher, once there is one, and calls `arrived`
+    /// for each message. The content of the messages is not read.
     pub(crate) fn subscribe_any(
         self: &Arc<Self>,
         name: &str,
@@ -117,12 +110,10 @@ impl Node {
         inner.create_subscription(&topic, Some(profile))
     }
 
-    /// Subscribes to a topic once it has a publisher; see [`Node::subscribe_raw`]. If this publisher is latched
-    /// (reliable, and keeps samples for late subscribers), samples are received reliably, beginning with the last
-    /// one. Otherwise, only new samples are received, with best effort. A failed subscription is logged.
-    ///
-    /// # Errors
-    /// The name is not a valid topic name.
+    /// Subscribes to a topic once it has a publisher; see [`Node::subscribe_raw`]. If this
+    /// publisher is latched (reliable, and keeps samples for late subscribers), samples are
+    /// received reliably, beginning with the last one. Otherwise, only new samples are received,
+    /// with best effort. A failed subscription is logged.
     pub(crate) fn subscribe_when_published(
         self: &Arc<Self>,
         name: &str,

@@ -78,7 +78,7 @@ impl Clock {
         state.simulated = Some(time);
     }
 
-    /// Notes that `/clock` is subscribed to. Returns `true` if it already was.
+    /// Marks `/clock` as subscribed. Returns the previous mark.
     fn mark_subscribed(&self) -> bool {
         std::mem::replace(&mut self.state().is_subscribed, true)
     }
@@ -92,7 +92,6 @@ impl Clock {
 }
 
 impl ClockState {
-    /// Adds the system time since `counted` to `elapsed`, unless time is simulated.
     fn count(&mut self) {
         if !self.is_simulated {
             let now = Instant::now();
@@ -107,10 +106,6 @@ impl Node {
         Arc::clone(&self.clock)
     }
 
-    /// Selects simulated time or the time of the system.
-    ///
-    /// # Errors
-    /// `/clock` cannot be subscribed to.
     pub(crate) fn use_simulated_time(self: &Arc<Self>, is_simulated: bool) -> Result<(), Message> {
         self.clock.select(is_simulated);
         if !is_simulated || self.clock.mark_subscribed() {

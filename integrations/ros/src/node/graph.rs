@@ -39,7 +39,7 @@ struct GraphState {
     matched_readers: BTreeSet<[u8; 16]>,
     /// Mapping of our own services, once it is decided.
     mapping: Option<Mapping>,
-    /// Expected types of topics, by DDS names, with the type hash.
+    /// Expected types by the DDS names of the topics.
     expected: BTreeMap<String, Expected>,
     complaints: Vec<String>,
     reported: BTreeSet<String>,
@@ -97,8 +97,8 @@ pub(crate) struct Endpoints {
 }
 
 impl Endpoints {
-    /// Adds the topic, service or action that an endpoint publishes or serves, unless it is omitted. Returns
-    /// `None` for other endpoints.
+    /// Adds the topic, service or action of a publisher or server, unless it is omitted. Returns
+    /// `None` if the names are not those of a ROS 2 publisher or server.
     fn add(&mut self, endpoint: &Endpoint) -> Option<()> {
         let (package, rest) = endpoint.type_name.split_once("::")?;
         let (kind, rest) = rest.split_once("::dds_::")?;
@@ -125,12 +125,9 @@ impl Endpoints {
     }
 }
 
-/// A publisher of a topic.
 #[derive(Debug, Clone)]
 pub(crate) struct Writer {
-    /// DDS name of the type.
     pub(crate) type_name: String,
-    /// `true` if late readers receive the last samples.
     pub(crate) is_latched: bool,
 }
 
@@ -328,12 +325,13 @@ impl Graph {
         Some(Ok(Server { mapping: mapping.unwrap_or(Mapping::Enhanced), reader: *guid }))
     }
 
-    /// Returns `true` if a reply to this client arrives: its reply reader is matched with our reply writer. A
-    /// server that replies earlier loses the reply.
+    /// Returns `true` if the reply reader of a client is matched with our reply writer. Otherwise,
+    /// a reply would be lost.
     ///
-    /// Fast DDS identifies a client by its reply reader, and other middlewares with the enhanced mapping by its
-    /// request writer. Cyclone DDS identifies a client by eight bytes that are no GUID. Then each participant with
-    /// request writers must have at least as many matched reply readers.
+    /// Fast DDS identifies a client by its reply reader. Other middlewares with the enhanced
+    /// mapping use its request writer: then its participant must have at least as many matched
+    /// reply readers as request writers. Cyclone DDS identifies a client by eight bytes that are no
+    /// GUID: then this must hold for each participant with request writers.
     pub(crate) fn can_reply(&self, topics: &Topics, client: Gid) -> bool {
         let client = client.to_bytes16();
         let state = self.state();
@@ -355,7 +353,7 @@ impl Graph {
         !unmatched.is_empty() && unmatched.values().all(|count| *count <= 0)
     }
 
-    /// Returns the readers of a topic, given by its DDS name.
+    /// Returns the GUIDs of the readers of a topic, given by its DDS name.
     pub(crate) fn readers(&self, topic: &str) -> BTreeSet<[u8; 16]> {
         let state = self.state();
         let fits = |endpoint: &Endpoint| endpoint.is_reader && endpoint.topic == topic;
@@ -391,7 +389,6 @@ impl Graph {
         state.mapping
     }
 
-    /// Polls `look` until it returns a value or the time is up.
     pub(crate) async fn wait<T>(&self, within: Duration, look: impl Fn(&Self) -> Option<T>) -> Option<T> {
         let until = Instant::now() + within;
         loop {
@@ -423,7 +420,7 @@ impl GraphState {
 }
 
 impl Endpoint {
-    /// Describes a difference from the expected type, if there is one.
+    /// Describes a difference from the expected type name or type hash, if there is one.
     fn complaint(&self, expected: &Expected) -> Option<String> {
         self.wrong_type(expected).or_else(|| {
             let differs = |hash: &&str| *hash != expected.hash && !expected.hash.is_empty();
@@ -438,7 +435,6 @@ impl Endpoint {
         })
     }
 
-    /// Describes a difference from the expected type name, if there is one.
     fn wrong_type(&self, expected: &Expected) -> Option<String> {
         (self.type_name != expected.type_name).then(|| {
             format!(

@@ -33,7 +33,6 @@ pub enum Phase {
 #[serde(rename_all = "lowercase")]
 pub(crate) enum PrimaryState {
     Unconfigured,
-    /// The node is configured and idle.
     Inactive,
     Active,
 }
@@ -178,7 +177,6 @@ impl PhaseChange {
     }
 }
 
-/// Publisher of transitions, in the message type of the distribution.
 enum Events {
     /// Message type up to Kilted.
     Nanoseconds(Publisher<TransitionEvent>),
@@ -216,9 +214,6 @@ impl fmt::Debug for Lifecycle {
 impl Lifecycle {
     /// Serves the lifecycle of a node that starts in the active state. Returns a flag that is set
     /// while the node is active.
-    ///
-    /// # Errors
-    /// A topic cannot be created.
     pub(crate) fn activated(node: &Arc<Node>) -> Result<Arc<AtomicBool>, Message> {
         let active = Arc::new(AtomicBool::new(true));
         let flag = Arc::clone(&active);

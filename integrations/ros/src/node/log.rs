@@ -31,7 +31,6 @@ pub enum Severity {
 }
 
 impl Severity {
-    /// Parses the argument of `--log-level`. Returns `None` if the level is unknown.
     pub(crate) fn parse(word: &str) -> Option<Self> {
         // The form `node:=level` selects one node of a process. This process has a single node, so
         // the name is ignored.

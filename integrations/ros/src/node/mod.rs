@@ -60,7 +60,7 @@ use preemptive::Preemptive;
 
 pub use qos::{depth, keep_all, latched};
 
-/// Upper limit on the time that [`Node::close`] takes.
+/// Upper limit on the time for which [`Node::close`] waits for the background tasks.
 const CLOSING_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// Options for creating a node.

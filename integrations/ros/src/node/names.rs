@@ -11,7 +11,6 @@ pub(crate) struct FullName {
 }
 
 impl FullName {
-    /// Creates a full name; the leading slash of the namespace is optional.
     pub(crate) fn new(namespace: &str, name: &str) -> Self {
         let namespace = format!("/{}", namespace.trim_matches('/'));
         Self { namespace, name: name.to_owned() }

@@ -83,8 +83,6 @@ fn network_error(text: String) -> Message {
 mod tests {
     use super::Network;
 
-    /// Checks the domain, the restriction to loopback and the number of warnings; `None` expects an
-    /// error.
     fn check(variables: &[(&str, &str)], expected: Option<(u16, bool, usize)>) {
         let value = |name: &str| {
             variables.iter().find(|(known, _)| *known == name).map(|(_, value)| (*value).to_owned())

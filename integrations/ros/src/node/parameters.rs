@@ -30,7 +30,6 @@ pub struct Declared {
     pub check: fn(&ParameterValue) -> Result<(), &'static str>,
 }
 
-/// Accepts every value of the right type.
 #[expect(clippy::unnecessary_wraps, reason = "one of several checks")]
 pub(crate) fn any_value(_: &ParameterValue) -> Result<(), &'static str> {
     Ok(())
@@ -124,11 +123,8 @@ impl Node {
         Ok(warnings)
     }
 
-    /// Declares a single parameter, a time in seconds that can be set while the node runs. Returns its value in
-    /// milliseconds. Undeclared parameters of the command line are logged as warnings.
-    ///
-    /// # Errors
-    /// See [`Node::declare`].
+    /// Declares a single parameter, a time in seconds that can be set while the node runs. Returns
+    /// its value in milliseconds. Undeclared parameters of the command line are logged as warnings.
     pub(crate) fn declare_seconds(
         self: &Arc<Self>,
         name: &'static str,
@@ -224,7 +220,6 @@ impl Node {
         parameters: Vec<msg::Parameter>,
     ) -> Result<(), String> {
         let mut table = table.lock().unwrap_or_else(PoisonError::into_inner);
-        // All values are checked before the first one is set.
         let mut values = Vec::new();
         for msg::Parameter { name, value } in parameters {
             let declared = table.get(&name).ok_or_else(|| format!("there is no parameter `{name}`"))?;
@@ -339,7 +334,6 @@ pub(crate) fn raw(value: ParameterValue) -> msg::ParameterValue {
     }
 }
 
-/// Converts a received value. Returns `None` if it is not set.
 pub(crate) fn parameter(value: msg::ParameterValue) -> Option<ParameterValue> {
     use msg::ParameterType as Kind;
     Some(match value.r#type {

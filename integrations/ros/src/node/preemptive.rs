@@ -67,12 +67,10 @@ struct Match {
     writer: Guid,
 }
 
-/// Sender of preemptive ACKNACKs.
 #[derive(Debug)]
 pub(crate) struct Preemptive {
     /// Receives the ACKNACKs of our own participant.
     socket: UdpSocket,
-    /// Sends to writers.
     sender: UdpSocket,
     /// Address at which our own participant receives discovery messages.
     own_address: SocketAddrV4,
@@ -82,16 +80,12 @@ pub(crate) struct Preemptive {
 
 #[derive(Debug)]
 struct Pending {
-    /// Addresses of the writer.
     addresses: Vec<SocketAddr>,
     acknack: Option<Vec<u8>>,
 }
 
 impl Preemptive {
     /// Opens the sockets. The returned task must be kept as long as ACKNACKs are sent.
-    ///
-    /// # Errors
-    /// Fails if no socket is available.
     pub(crate) fn open(participant: &DomainParticipant, loopback: bool) -> io::Result<(Arc<Self>, Task<()>)> {
         let bind = |address| smol::block_on(UdpSocket::bind((address, 0)));
         let own_port = discovery_port(participant.domain_id(), participant.participant_id());
@@ -203,7 +197,6 @@ impl Preemptive {
         }
     }
 
-    /// Receives the ACKNACKs of our own participant and sends them to the writers.
     async fn receive(&self) {
         let mut buffer = [0; MAX_LENGTH];
         loop {

@@ -24,7 +24,6 @@ const RECHECK: Duration = Duration::from_millis(1);
 /// the limit is reached.
 const MAX_CLIENTS: usize = 4096;
 
-/// Queue of the requests to one service that wait for the reply reader of their client.
 #[derive(Debug)]
 pub(crate) struct ReplyGate<T> {
     topics: Topics,

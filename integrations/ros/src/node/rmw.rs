@@ -22,7 +22,7 @@ pub enum Rmw {
     Cyclonedds,
 }
 
-/// Mapping of ROS services to DDS topics, named after a middleware that uses it.
+/// Mapping of ROS services to DDS topics, displayed as the name of a middleware that uses it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Mapping {
     Enhanced,
@@ -70,13 +70,10 @@ impl Rmw {
 /// Vendor of a DDS participant (RTPS 2.5, section 8.3.3.1.3; the OMG assigns the ids).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Vendor {
-    /// eProsima Fast DDS, 01.0F.
     FastDds,
-    /// RTI Connext, 01.01.
     Connext,
-    /// Eclipse Cyclone DDS, 01.10.
     Cyclone,
-    /// `RustDDS`, 01.12, the DDS library of this program, which supports both mappings.
+    /// `RustDDS`, the DDS library of this program, which supports both mappings.
     Own,
     Other,
 }

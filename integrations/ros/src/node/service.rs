@@ -115,7 +115,7 @@ impl<S: Service> Caller<S> {
         &self.full
     }
 
-    /// Returns `true` if a server of the service is currently known.
+    /// Returns `true` if a server of the service is currently known, even one of another type.
     pub fn is_served(&self) -> bool {
         self.node.graph.server(&self.topics).is_some()
     }
@@ -129,7 +129,8 @@ impl<S: Service> Caller<S> {
     /// for discovery.
     ///
     /// # Errors
-    /// Fails if the service has no server in time, or the server has another type.
+    /// Fails if the service has no server in time, the server has another type, or the client
+    /// cannot be created.
     pub async fn ready(&self, within: Duration) -> Result<(), CallError> {
         self.connect(&mut *self.connection.lock().await, within).await.map(|_| ())
     }
@@ -207,7 +208,6 @@ impl Node {
         self.caller_of(name, S::PACKAGE, S::NAME, [hashes.request.into(), hashes.response.into()])
     }
 
-    /// Creates a client of the service `name`, whose type is known at run time.
     pub(crate) fn any_caller(self: &Arc<Self>, name: &str, kind: &ServiceType) -> Caller<AnyService> {
         self.caller_of(name, &kind.package, &kind.name, kind.hashes.clone().map(Cow::Owned))
     }

@@ -24,7 +24,7 @@ const INVALID_PER_LOG_MESSAGE: u64 = 1000;
 const AGE_CHECK_PERIOD: Duration = Duration::from_secs(5);
 
 /// Filter of samples that were published before the subscription existed. A writer keeps the
-/// samples that a killed reader has not acknowledged, and sends them to the next reader even if
+/// samples that a killed reader has not acknowledged. It sends them to the next reader, even if
 /// this reader has not requested old samples.
 struct Old {
     since: SystemTime,
@@ -44,7 +44,6 @@ fn published(info: &MessageInfo) -> Option<SystemTime> {
     stamp.map(|nanoseconds| UNIX_EPOCH + Duration::from_nanos(nanoseconds))
 }
 
-/// Type of a topic.
 struct TopicType<'n> {
     package: &'n str,
     name: &'n str,
@@ -89,10 +88,6 @@ impl Node {
         )
     }
 
-    /// Creates a publisher of encoded messages of a type that is known at run time.
-    ///
-    /// # Errors
-    /// Fails if the name is invalid, or the topic exists with another type.
     pub(crate) fn raw_publisher(
         &self,
         name: &str,
@@ -136,11 +131,9 @@ impl Node {
         self.subscribe_as(name, &names, qos, move |message, _| take(message))
     }
 
-    /// Subscribes to a topic of a type that is known at run time, as [`Node::subscribe`] does. `take` receives the
-    /// encoded message and the time at which it was published (if unknown, the time of its arrival).
-    ///
-    /// # Errors
-    /// Fails if the name is invalid, or the topic exists with another type.
+    /// Subscribes to a topic of a type that is known at run time, as [`Node::subscribe`] does.
+    /// `take` receives the encoded message and the time at which it was published (if unknown, the
+    /// time of its arrival).
     pub(crate) fn subscribe_raw(
         self: &Arc<Self>,
         name: &str,

@@ -17,7 +17,6 @@ use crate::node::{Accepted, ActionCaller, GoalEnd, Node, Pursued};
 use crate::perform::{Call, End, Perform, Performance, Progress, Running};
 use crate::performer::{feedback, part};
 
-/// Upper limit on the time to wait for a server and its reply.
 pub(super) const SERVER_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Mapping of an action of a plan to goals, feedback and results of a ROS action.
@@ -25,8 +24,6 @@ pub(super) trait Meaning: Action + Sized + 'static {
     /// Settings that are needed to create a goal, in addition to the arguments of the action.
     type Settings: Clone + Send + Sync + 'static;
 
-    /// Creates the goal for an action of a plan. The error is the reason why no goal can be
-    /// created.
     fn goal(settings: &Self::Settings, call: &Call) -> Result<Self::Goal, String>;
 
     fn progress(call: &Call, feedback: &Self::Feedback) -> Progress;

@@ -106,7 +106,6 @@ trait Values {
     fn pose(&self, number: usize, is_stamped: bool) -> Result<Value, String>;
 }
 
-/// Values of an action of a plan.
 struct OfCall<'c> {
     call: &'c Call,
     poses: &'c Poses,

@@ -26,7 +26,6 @@ pub(super) const QUEUE_DEPTH: usize = 100;
 
 const REQUEST_PERIOD: Duration = Duration::from_secs(1);
 
-/// Upper limit on the time to wait for a performer.
 const SEARCH_TIMEOUT: Duration = Duration::from_secs(30);
 
 pub(super) struct Hub {
@@ -58,7 +57,6 @@ impl Hub {
         self.publisher.publish(message);
     }
 
-    /// Returns a receiver of all future messages on the topic.
     pub(super) fn listen(&self) -> Receiver<ActionExecution> {
         let (sender, receiver) = channel::unbounded();
         self.listeners.lock().unwrap_or_else(PoisonError::into_inner).push(sender);

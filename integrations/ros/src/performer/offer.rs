@@ -30,7 +30,6 @@ enum Stage {
 struct Offer {
     hub: Arc<Hub>,
     action: String,
-    /// Required arguments by position. An empty string admits every argument.
     specialized: Vec<String>,
     performer: Arc<dyn Perform>,
     stage: Mutex<Stage>,

@@ -175,7 +175,6 @@ impl Poses {
         })
     }
 
-    /// Error message about a missing pose, with a suggestion for a similar name.
     pub(super) fn lacking(&self, object: &str) -> String {
         let suggestion = did_you_mean(object, self.places.keys().map(String::as_str));
         format!("`[poses]` has no `{object}`{suggestion}")

@@ -8,7 +8,6 @@ use crate::interfaces::std_msgs::msg::Bool;
 use crate::node::{Node, depth};
 use crate::perform::{Call, End, Perform, Running};
 
-/// Actions that wait for the value `true` on a topic.
 #[derive(Debug)]
 pub(super) struct Awaited {
     waiting: Arc<Mutex<Vec<smol::channel::Sender<()>>>>,

@@ -11,7 +11,6 @@ use metaplan::planner::Exact;
 use crate::diagnosed::{Diagnosed, Sources};
 use crate::node::Node;
 
-/// The mission, and the diagnostics since its last use.
 #[derive(Debug)]
 pub(crate) struct Joint {
     mission: Mutex<Mission>,
@@ -19,10 +18,6 @@ pub(crate) struct Joint {
 }
 
 impl Joint {
-    /// Subscribes to the diagnostics.
-    ///
-    /// # Errors
-    /// The topic cannot be created.
     pub(crate) fn listen(node: &Arc<Node>, mission: Mission) -> Result<Arc<Self>, Errors> {
         let diagnosed = Diagnosed::subscribe(node, Sources::default(), || {})?;
         Ok(Arc::new(Self { mission: Mutex::new(mission), diagnosed }))
@@ -43,7 +38,7 @@ impl Joint {
     /// Locks the mission and applies the pending diagnostics to it.
     fn lock(&self) -> MutexGuard<'_, Mission> {
         let mut mission = self.mission.lock().unwrap_or_else(PoisonError::into_inner);
-        // Diagnostics that the mission rejects are ignored, because they concern other devices.
+        // Diagnostics that the mission rejects are ignored, because they may concern other devices.
         for event in Observation::parse(&self.diagnosed.line()).events.into_iter().flatten() {
             let _ = match event {
                 Event::Measured { attribute, value } => {

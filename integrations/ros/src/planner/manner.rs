@@ -15,7 +15,6 @@ const DEFAULT_TIMEOUT: f64 = 15.0;
 /// Share of the timeout for planning. The reply must arrive before the client times out.
 const PLANNING_SHARE: f64 = 0.9;
 
-/// Default upper limit on the number of alternative plans in the reply of `get_plan_array`.
 const DEFAULT_ALTERNATIVES: usize = 3;
 
 fn declared() -> Vec<Declared> {
@@ -82,17 +81,14 @@ fn alternatives(value: &ParameterValue) -> Result<(), &'static str> {
     }
 }
 
-/// Planning parameters with the current values of the node's ROS parameters.
 #[derive(Debug)]
 pub(crate) struct Chosen {
     manner: Mutex<Manner>,
 }
 
 impl Chosen {
-    /// Declares the planning parameters, and adopts their changes. The node must not have declared parameters before.
-    ///
-    /// # Errors
-    /// Fails if the command line gives a parameter an invalid value.
+    /// Declares the planning parameters, and adopts their changes. The node must not have declared
+    /// parameters before.
     pub(crate) fn declare(node: &Arc<Node>) -> Result<Arc<Self>, Errors> {
         let manner = Manner {
             metric: None,

@@ -36,7 +36,6 @@ const MAX_REQUESTS: usize = 8;
 struct Planner {
     node: Arc<Node>,
     busy: AtomicUsize,
-    /// Mission whose knowledge base restricts the designs.
     joint: Option<Arc<Joint>>,
     manner: Arc<Chosen>,
     plan_publisher: PlanPublisher,
@@ -69,7 +68,7 @@ pub struct Options {
     /// Manifest of a mission whose knowledge base restricts the designs.
     pub mission: Option<PathBuf>,
     /// Settings of the robot, with the performers of actions that are offered to PlanSys2's
-    /// executor.
+    /// executor; by default a file `ros.toml` in the directory of the mission.
     pub settings: Option<PathBuf>,
 }
 
@@ -127,7 +126,6 @@ impl Planner {
         })
     }
 
-    /// Runs work on a separate planning thread. If no thread can be created, logs an error.
     fn run_in_background(self: &Arc<Self>, name: &str, work: impl FnOnce(&Self) + Send + 'static) {
         let planner = Arc::clone(self);
         if let Err(error) = on_a_thread(name, move || work(&planner)) {
@@ -171,10 +169,6 @@ impl Planner {
     }
 }
 
-/// Runs long work on a separate thread with a large stack, without waiting for its end.
-///
-/// # Errors
-/// Fails if the thread cannot be created.
 pub(crate) fn on_a_thread(name: &str, work: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
     std::thread::Builder::new().name(name.to_owned()).stack_size(STACK_SIZE).spawn(work).map(|_| ())
 }

@@ -254,7 +254,6 @@ impl FilledMission<'_> {
         Ok((solution, other_plans))
     }
 
-    /// Computes a sequential plan for a task whose numbers exceed the range of the SAT encoding.
     fn exact(&self, config: &Config) -> Result<Solution, NoPlan> {
         let task =
             self.mission.ground_exact(self.problem, &[], &config.limits).map_err(NoPlan::Unsupported)?;

@@ -21,7 +21,6 @@ impl PlanPublisher {
         Ok(Self { node: Arc::clone(node), plans })
     }
 
-    /// Publishes a plan in the log and on the topic, or logs the reason why no plan was found.
     pub(crate) fn publish_result(&self, found: &Result<Found, NoPlan>) {
         match found {
             Ok(found) => {

@@ -24,7 +24,6 @@ use crate::types::{AnyService, MessageType, Raw, ServiceCall, TopicMessage};
 
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Timeout of a single observation of a node.
 pub(super) const OBSERVATION_TIMEOUT: Duration = Duration::from_secs(2);
 
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -33,7 +32,6 @@ pub(super) enum Failure {
     Refused(String),
     /// The robot has given no valid answer in time.
     Silent(String),
-    /// A newer request replaces the procedure.
     Replaced,
 }
 
@@ -62,7 +60,6 @@ struct NodeClient {
 /// Message on a topic that was published last, with the time of its publication (if unknown, of its arrival).
 type LastMessage = Arc<Mutex<Option<(SystemTime, Vec<u8>)>>>;
 
-/// Last message on a topic, and the publisher of this program on it.
 struct Observed {
     last: LastMessage,
     /// Exists if a step publishes on the topic.
@@ -92,10 +89,6 @@ fn remaining(deadline: Instant) -> Duration {
 }
 
 impl Clients {
-    /// Creates the clients of procedures.
-    ///
-    /// # Errors
-    /// A topic cannot be subscribed to.
     pub(super) fn new<'p>(
         node: &Arc<Node>,
         procedures: impl Iterator<Item = &'p Procedure>,
@@ -215,9 +208,9 @@ impl Clients {
         }
     }
 
-    /// Returns the GUIDs of the servers that report the state or the parameters of a node. For a condition about the
-    /// last message on a topic, returns an id made from the condition while the condition holds, so that the result
-    /// changes when the mode changes.
+    /// Returns the GUIDs of the servers that report the state or the parameters of a node. A
+    /// condition about the last message on a topic has no server. Its result is an id made from the
+    /// condition while it holds, so that the result changes when the mode changes.
     pub(super) fn servers(&self, condition: &Condition) -> BTreeSet<[u8; 16]> {
         let (Condition::State { node, .. } | Condition::Parameters { node, .. }) = condition else {
             let is_met = !matches!(condition, Condition::Topic(_)) && self.is_met(condition);
@@ -352,7 +345,6 @@ impl Clients {
         call: &ServiceCall,
         within: Duration,
     ) -> Result<(), Failure> {
-        // Clients exist for all services of the settings.
         let client = self.services.get(&service_key(service, call));
         let client = client.ok_or_else(|| Failure::Refused(format!("{service} has no client")))?;
         let Raw(answer) = client.call(Raw(call.request.clone()), within).await?;

@@ -15,7 +15,6 @@ use crate::types::TopicMessage;
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Outcome {
-    /// All steps have succeeded and all conditions hold.
     Done,
     /// A step has failed, a condition does not hold although the robot answers, or a newer request replaces the
     /// procedure. Earlier steps were undone as far as possible.
@@ -63,10 +62,8 @@ enum Undo {
 }
 
 impl Procedures {
-    /// Creates the procedures, which are given by function and mode. Events about their steps are passed to `report`.
-    ///
-    /// # Errors
-    /// A topic of a condition cannot be subscribed to.
+    /// Creates the procedures, which are given by function and mode. Events about their steps are
+    /// passed to `report`.
     pub(crate) fn new(
         node: &Arc<Node>,
         functions: BTreeMap<String, BTreeMap<String, Procedure>>,
@@ -134,10 +131,10 @@ impl Procedures {
         missing.into_iter().min_by_key(Vec::len).unwrap_or_default()
     }
 
-    /// Returns the mode whose conditions hold. If several modes qualify, those with the most conditions are
-    /// considered, and of these the mode that was put into effect or seen last is returned. If the last mode has no
-    /// observable conditions, it is returned unchecked. The result is [`Seen::Unsettled`] while a procedure runs or a
-    /// node does not answer.
+    /// Returns the mode whose conditions hold. If several modes qualify, those with the most
+    /// conditions are considered. Of these, the mode that was put into effect or seen last is
+    /// returned. If the last mode has no observable conditions, it is returned unchecked. The
+    /// result is [`Seen::Unsettled`] while a procedure runs or a node does not answer.
     pub(crate) async fn observe(&self, function: &str) -> Seen {
         let Some(procedures) = self.functions.get(function) else { return Seen::Ambiguous };
         // In the middle of a procedure, an observation would be meaningless.
@@ -208,8 +205,9 @@ impl Procedures {
         true
     }
 
-    /// Puts a mode of a function into effect. A procedure that still runs for the function is undone first;
-    /// its caller must have set its `is_replaced` before.
+    /// Puts a mode of a function into effect, once no other procedure runs for the function. The
+    /// caller must first set the `is_replaced` of a running procedure, which is then normally
+    /// undone.
     pub(crate) async fn apply(
         &self,
         function: &str,
@@ -406,7 +404,6 @@ impl Run<'_> {
     }
 }
 
-/// Returns the undo that the settings give for an operation, or [`Undo::Impossible`].
 fn undo_of(operation: &Operation, undo: Option<&Operation>) -> Undo {
     match undo {
         Some(undo) => Undo::Operation(undo.clone()),

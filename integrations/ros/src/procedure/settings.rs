@@ -16,7 +16,6 @@ use crate::node::{PrimaryState, parameter_value, valid_name};
 use crate::types::{Expectation, Library, MessageType, ServiceCall, TopicMessage};
 use crate::validated::validated;
 
-/// Ordered steps that put a design into effect, and the conditions that must hold afterwards.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Procedure {
     /// Steps in the order of their execution; at least one.
@@ -28,7 +27,6 @@ pub(crate) struct Procedure {
     pub(crate) timeout: Option<Duration>,
 }
 
-/// A step, with the operation that undoes it if the program cannot derive this operation.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Step {
     pub(crate) operation: Operation,
@@ -85,7 +83,6 @@ pub(crate) enum Condition {
     },
 }
 
-/// A table `[functions.F.designs.D]`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ProcedureEntry {
@@ -371,8 +368,9 @@ impl Operation {
 }
 
 impl Procedure {
-    /// Returns all conditions that hold while the design is in effect and that can be observed at any time. A
-    /// node that occurs in several steps has only its last state, a topic its last message.
+    /// Returns all conditions that hold while the design is in effect and that can be observed at
+    /// any time. If several steps concern one node, topic or parameter, only the last state,
+    /// message or value counts.
     pub(crate) fn lasting(&self) -> Vec<Condition> {
         let steps = self.steps.iter().filter_map(|step| step.operation.condition());
         let conditions = self.conditions.iter().filter(|condition| !matches!(condition, Condition::Topic(_)));

@@ -14,7 +14,6 @@ use crate::interfaces::mros2_msgs::msg::QoS;
 use crate::manager::Functions;
 use crate::reasoner::memory::{Memory, Remembered};
 
-/// Delay after which a design is retried if it was refused or its steps failed.
 const REFUSED_DELAY: Duration = Duration::from_secs(60);
 
 /// Initial delay until a design without a reply is retried; doubled with each attempt, up to 64 s.
@@ -22,9 +21,7 @@ const SILENT_DELAY: Duration = Duration::from_secs(2);
 
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Output {
-    /// Request the mode of a function.
     Configure(Wanted),
-    /// Publish the status of an objective.
     Feedback(GoalId, QoS),
     /// Answer a cancel request. `true` if the goal has ended.
     Cancelled(GoalId, bool),
@@ -56,7 +53,6 @@ struct Pursued {
     function: String,
     always_improve: bool,
     design: Option<String>,
-    /// `true` while cancellation waits for the function.
     cancelling: bool,
     /// The goal as requested, to restore it after a restart.
     wanted: QoS,
@@ -72,7 +68,6 @@ pub(super) struct Keeping {
     /// Failed designs with the time of the next attempt and the number of missing replies.
     failed: BTreeMap<String, (Duration, u32)>,
     measured: BTreeMap<String, String>,
-    /// Last event, as a line, by measured attribute or component.
     reports: BTreeMap<String, String>,
     /// Designs that functions had before a restart, by function. Empty after the restart is handled.
     restored: BTreeMap<String, String>,
@@ -138,7 +133,6 @@ impl Keeping {
         self.restored.clear();
     }
 
-    /// Returns the reason why a goal must be rejected, if there is one.
     pub(super) fn refused(&self, wanted: &QoS) -> Option<String> {
         let QoS { objective_type: function, .. } = wanted;
         let functions = self.functions();
@@ -189,8 +183,9 @@ impl Keeping {
         self.publish_status(goal);
     }
 
-    /// Cancels a goal: requests the unground mode of its function, and ends the goal when the mode is set.
-    /// Without such a mode, the goal ends at once. The cancellation of an unknown goal is rejected.
+    /// Cancels a goal: requests the unground mode of its function, and ends the goal when the mode
+    /// is set. If this fails, the cancellation is rejected. Without such a mode, the goal ends at
+    /// once. The cancellation of an unknown goal is rejected.
     pub(super) fn cancel(&mut self, goal: GoalId) {
         let Some(pursued) = self.goals.get_mut(&goal) else {
             self.outputs.push(Output::Cancelled(goal, false));
@@ -330,7 +325,7 @@ impl Keeping {
         })));
     }
 
-    /// Handles a design that could not be set: it counts as not realisable for a while.
+    /// Handles a design that could not be set: it counts as not realisable until it is retried.
     fn could_not(&mut self, wanted: &Wanted, design: &str, outcome: &Outcome, now: Duration) {
         self.complain(wanted, outcome);
         let times = self.failed.get(design).map_or(0, |(_, times)| *times);
@@ -370,7 +365,6 @@ impl Keeping {
         }
     }
 
-    /// Publishes the status of an objective in MROS's format.
     fn publish_status(&mut self, goal: GoalId) {
         let Some(pursued) = self.goals.get(&goal) else { return };
         let objectives = self.keeper.configurator().objectives();

@@ -23,10 +23,8 @@ pub(super) struct Memory {
     pub(super) goals: Vec<Remembered>,
 }
 
-/// A goal of the reasoner that had not ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Remembered {
-    /// Id that the client gave to the goal.
     pub(super) goal: [u8; 16],
     /// Requested objective. Its `objective_id` is the final name, which the client may have
     /// omitted.
@@ -35,7 +33,6 @@ pub(super) struct Remembered {
     pub(super) design: Option<String>,
 }
 
-/// State file and the contents that were last read or written.
 #[derive(Debug)]
 pub(super) struct MemoryFile {
     path: PathBuf,
@@ -51,9 +48,6 @@ impl Memory {
 impl MemoryFile {
     /// Opens the state file in a directory, and creates the directory if needed. A missing file is
     /// an empty state.
-    ///
-    /// # Errors
-    /// Fails if the directory cannot be used, or the file is damaged or has another format.
     pub(super) fn open(directory: &Path) -> Result<Self, Message> {
         let path = directory.join("reasoner.json");
         let failed = |text: String| Message::at("N141", &path.display().to_string(), None, text);
@@ -78,9 +72,6 @@ impl MemoryFile {
     }
 
     /// Writes the state to the file if it differs from the stored state.
-    ///
-    /// # Errors
-    /// Fails if the file cannot be written.
     pub(super) fn write(&mut self, memory: Memory) -> Result<(), Message> {
         if memory == self.last {
             return Ok(());

@@ -48,9 +48,8 @@ pub(super) struct Network {
     replaced: BTreeMap<String, Arc<AtomicBool>>,
     diagnosed: Diagnosed,
     events: Arc<Publisher<std_msgs::msg::String>>,
-    /// Period of status messages in milliseconds.
+    /// In milliseconds.
     period: Arc<AtomicU64>,
-    /// `true` while the lifecycle state is active.
     active: Arc<AtomicBool>,
     memory: Option<MemoryFile>,
     sender: Sender<Input>,
@@ -120,10 +119,6 @@ impl Network {
         })
     }
 
-    /// Runs until `stop` is set.
-    ///
-    /// # Errors
-    /// The state cannot be written.
     pub(super) fn run(mut self, stop: &AtomicBool) -> Result<(), Message> {
         self.go_on();
         self.node.log(Severity::Info, "serves /mros/objective");

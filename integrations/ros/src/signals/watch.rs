@@ -28,11 +28,8 @@ const STATE_TIMEOUT: Duration = Duration::from_secs(2);
 
 pub(crate) type Report = Arc<dyn Fn(DiagnosticStatus) + Send + Sync>;
 
-/// Observes signals. Polling lasts until the returned tasks are dropped, subscriptions last as long as the
-/// node.
-///
-/// # Errors
-/// A topic cannot be subscribed to.
+/// Observes signals. Polling lasts until the returned tasks are dropped, subscriptions last as long
+/// as the node.
 pub(crate) fn watch(node: &Arc<Node>, signals: &[Signal], report: &Report) -> Result<Vec<Task<()>>, Message> {
     let mut tasks = Vec::new();
     for signal in signals {

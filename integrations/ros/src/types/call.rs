@@ -6,11 +6,9 @@ use serde_json::{Map, Value, json};
 
 use super::{Expectation, Library, MessageType, ServiceType};
 
-/// A service call with the answer that counts as success.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ServiceCall {
     pub(crate) kind: Arc<ServiceType>,
-    /// Encoded request.
     pub(crate) request: Vec<u8>,
     pub(crate) answer: Answer,
 }
@@ -25,11 +23,6 @@ pub(crate) enum Answer {
 }
 
 impl ServiceCall {
-    /// Reads a service call. Without an expectation, every answer counts as success, unless the answer has a truth
-    /// value `success`, which must be true.
-    ///
-    /// # Errors
-    /// The type is unknown, or a field does not exist or cannot have its value.
     pub(crate) fn new(kind: &str, request: Option<&Value>, expected: Option<&Value>) -> Result<Self, String> {
         let kind = Arc::new(Library::current().service(kind)?);
         let request = kind.request.encode(request.unwrap_or(&Value::Object(Map::new())));
@@ -38,21 +31,14 @@ impl ServiceCall {
         Ok(Self { kind, request, answer })
     }
 
-    /// Checks an encoded answer.
-    ///
-    /// # Errors
-    /// The answer is not the expected one.
     pub(crate) fn check(&self, answer: &[u8]) -> Result<(), String> {
         self.answer.check(&self.kind, answer)
     }
 }
 
 impl Answer {
-    /// Reads the expected answer of a service. `None` selects [`Answer::Success`] if the answer has a truth value
-    /// `success`, otherwise [`Answer::Any`].
-    ///
-    /// # Errors
-    /// A field does not exist or cannot have its value.
+    /// Reads the expected answer of a service. `None` selects [`Answer::Success`] if the answer has
+    /// a truth value `success`, otherwise [`Answer::Any`].
     pub(crate) fn new(kind: &ServiceType, expected: Option<&Value>) -> Result<Self, String> {
         Ok(match expected {
             Some(expected) => {
@@ -64,10 +50,6 @@ impl Answer {
         })
     }
 
-    /// Checks an encoded answer.
-    ///
-    /// # Errors
-    /// The answer is not the expected one.
     pub(crate) fn check(&self, kind: &ServiceType, answer: &[u8]) -> Result<(), String> {
         let response = &kind.response;
         let message = || {
@@ -90,20 +72,16 @@ impl Answer {
     }
 }
 
-/// A message for a topic, of a type that is known only at run time.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct TopicMessage {
     pub(crate) topic: String,
     pub(crate) kind: Arc<MessageType>,
-    /// Encoded message.
     pub(crate) message: Vec<u8>,
 }
 
 impl TopicMessage {
-    /// Encodes a message of the settings. Fields that the settings do not give have their default values.
-    ///
-    /// # Errors
-    /// The type is unknown, or a field does not exist or cannot have its value.
+    /// Encodes a message of the settings. Fields that the settings do not give have their default
+    /// values.
     pub(crate) fn new(topic: String, kind: &str, message: Option<&Value>) -> Result<Self, String> {
         let kind = Arc::new(Library::current().message(kind)?);
         let message = kind.structure.encode(message.unwrap_or(&Value::Object(Map::new())));

@@ -13,11 +13,9 @@ pub struct Part {
     /// Fields in the order of the definition, which is the order of serialisation. A definition without fields gets
     /// one, as in rosidl.
     pub fields: Vec<Field>,
-    /// Constants of the definition.
     pub constants: Vec<Constant>,
 }
 
-/// A field of a structure.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Field {
     pub name: String,
@@ -26,16 +24,13 @@ pub struct Field {
     pub default: Option<String>,
 }
 
-/// A named value of a primitive type.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Constant {
     pub name: String,
     pub kind: Primitive,
-    /// Text of the value.
     pub value: String,
 }
 
-/// Type of a field.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FieldType {
     pub base: Base,
@@ -57,7 +52,6 @@ pub enum Base {
 pub enum Count {
     One,
     Fixed(u32),
-    /// At most this number.
     Bounded(u32),
     Unbounded,
 }
@@ -106,27 +100,20 @@ impl Primitive {
 pub const FOLDERS: [(&str, &[&str]); 3] =
     [("msg", &[""]), ("srv", &["_Request", "_Response"]), ("action", &["_Goal", "_Result", "_Feedback"])];
 
-/// A ROS message, service or action definition.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Interface {
     /// Distribution or package version to which the definition belongs. `None` for the default.
     pub variant: Option<String>,
-    /// Name of the package, such as `std_msgs`.
     pub package: String,
     /// Folder, which shows the kind of the interface: `msg`, `srv` or `action`.
     pub folder: &'static str,
-    /// Name of the interface, such as `String`.
     pub name: String,
-    /// One structure for a message, two for a service, three for an action.
     pub parts: Vec<Part>,
 }
 
 impl Interface {
-    /// Parses the definition of an interface. `full_name` is its name with package and folder, such as
-    /// `std_msgs/msg/String`.
-    ///
-    /// # Errors
-    /// The name or a line of the text is wrong.
+    /// Parses the definition of an interface. `full_name` is its name with package and folder, such
+    /// as `std_msgs/msg/String`.
     pub fn parse(full_name: &str, text: &str) -> Result<Self, String> {
         let wrong = || {
             format!(
@@ -142,7 +129,6 @@ impl Interface {
         Ok(Self { variant: None, package: package.to_owned(), folder, name: name.to_owned(), parts })
     }
 
-    /// Full name of the interface, such as `std_msgs/msg/String`.
     pub fn full_name(&self) -> String {
         format!("{}/{}/{}", self.package, self.folder, self.name)
     }

@@ -20,10 +20,8 @@ pub type Descriptions = BTreeMap<String, TypeDescription>;
 const TIME: &str = "builtin_interfaces/msg/Time";
 const UUID: &str = "unique_identifier_msgs/msg/UUID";
 
-/// Returns the type hash, `RIHS01_…`, of a type.
-///
-/// # Errors
-/// The description of the type, or of a type that it refers to, is missing.
+/// Returns the type hash, `RIHS01_…`, of a type. Fails if the description of the type, or of a type
+/// that it refers to, is missing.
 pub fn hash(name: &str, all: &Descriptions) -> Result<String, String> {
     let mut referenced = Descriptions::new();
     collect(name, all, &mut referenced)?;

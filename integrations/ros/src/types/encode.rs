@@ -14,23 +14,18 @@ use super::field::{FieldPath, unknown_field};
 use super::structure::{Layout, Structure};
 
 impl Structure {
-    /// Encodes a message. Fields that the table does not give have their default values. For a number, the table may
-    /// contain the name of a constant; for a `Duration` or `Time`, a number of seconds; and for NaN or an infinite
-    /// number, the text `nan`, `inf` or `-inf`.
-    ///
-    /// # Errors
-    /// A field does not exist or cannot have its value.
+    /// Encodes a message. Fields that the table does not give have their default values. For a
+    /// number, the table may contain the name of a constant; for a `Duration` or `Time`, a number
+    /// of seconds; and for NaN or an infinite number, the text `nan`, `inf` or `-inf`.
     pub(crate) fn encode(&self, table: &Value) -> Result<Vec<u8>, String> {
         let mut writer = Writer(Vec::new());
         writer.structure(self, Some(table))?;
         Ok(writer.0)
     }
 
-    /// Converts a value of a field to the form in which [`Structure::find`] returns it: the name of a constant to its
-    /// value, and a number to the nearest `float32` if this is the type of the field.
-    ///
-    /// # Errors
-    /// The field does not exist or cannot have the value.
+    /// Converts a value of a field to the form in which [`Structure::find`] returns it: the name of
+    /// a constant to its value, and a number to the nearest `float32` if this is the type of the
+    /// field.
     pub(super) fn single_value(&self, path: &FieldPath, value: &Value) -> Result<Value, String> {
         let (container, layout) = path.resolve(self)?;
         let mut writer = Writer(Vec::new());
@@ -194,7 +189,6 @@ impl Writer {
             None if primitive == Primitive::Bool => &Value::Bool(false),
             None => &zero,
         };
-        /// Writes an integer. Fails if the value is outside of the range of the type.
         macro_rules! integer {
             ($kind:ty) => {{
                 let number = value.as_i64().map(i128::from).or_else(|| value.as_u64().map(i128::from));

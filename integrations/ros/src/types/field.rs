@@ -40,19 +40,13 @@ impl FieldPath {
         Ok(Self(parts))
     }
 
-    /// Returns `true` if the field is a text.
-    ///
-    /// # Errors
-    /// The structure has no such field, or the field is a list or has fields itself.
     pub(crate) fn is_text(&self, structure: &Structure) -> Result<bool, String> {
         let (_, layout) = self.resolve(structure)?;
         Ok(matches!(layout, Layout::Text { .. }))
     }
 
-    /// Returns the layout of the field, and the structure that contains it.
-    ///
-    /// # Errors
-    /// The structure has no such field, or the field is a list or has fields itself.
+    /// Returns the layout of the field, and the structure that contains it. Fails if the structure
+    /// has no such field, or if the field is a list or has fields itself.
     pub(super) fn resolve<'s>(
         &self,
         structure: &'s Structure,
@@ -104,7 +98,6 @@ impl fmt::Display for FieldPath {
     }
 }
 
-/// Error about a field that a structure does not have.
 pub(super) fn unknown_field(structure: &Structure, name: &str) -> String {
     if structure.is_empty() {
         return format!("{} has no fields: remove `{name}`", structure.name);

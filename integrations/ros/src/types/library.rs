@@ -14,13 +14,11 @@ use super::description::{self, Descriptions};
 use super::encode::{least_size, parse_value};
 use super::structure::{Layout, Structure, StructureField};
 
-/// Names and definitions of the interfaces of this package.
 static DEFINITIONS: &[(&str, &str)] = include!(concat!(env!("OUT_DIR"), "/definitions.rs"));
 
 /// Upper limit on the number of single values in a message of a type. A sequence counts as one value.
 const MAX_VALUES: u64 = 1_000_000;
 
-/// A definition in the settings.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(untagged)]
 pub(crate) enum Definition {
@@ -42,7 +40,6 @@ impl Definition {
     }
 }
 
-/// A message type that is known only at run time.
 #[derive(Debug, PartialEq)]
 pub(crate) struct MessageType {
     pub(crate) package: String,
@@ -61,7 +58,6 @@ pub(crate) struct ServiceType {
     pub(crate) hashes: [String; 2],
 }
 
-/// An action type that is known only at run time.
 #[derive(Debug, PartialEq)]
 pub(crate) struct ActionType {
     pub(crate) package: String,
@@ -94,10 +90,6 @@ impl Library {
         Self { given: BTreeMap::new(), prefixes: std::env::split_paths(&prefixes).collect() }
     }
 
-    /// Adds a definition.
-    ///
-    /// # Errors
-    /// The name or the definition is wrong.
     pub(crate) fn add(&mut self, name: &str, text: &str) -> Result<(), String> {
         let interface = Interface::parse(name, text)?;
         self.given.insert(name.to_owned(), interface);
@@ -178,10 +170,6 @@ impl Library {
         Ok((interface, structures, descriptions))
     }
 
-    /// Returns a message type by its full name.
-    ///
-    /// # Errors
-    /// The type, or one that it refers to, is unknown or wrong.
     pub(crate) fn message(&self, name: &str) -> Result<MessageType, String> {
         let (interface, structures, descriptions) = self.resolve(name, "msg")?;
         let [structure] = parts(structures)?;
@@ -189,10 +177,6 @@ impl Library {
         Ok(MessageType { package: interface.package, name: interface.name, structure, hash })
     }
 
-    /// Returns a service type by its full name.
-    ///
-    /// # Errors
-    /// The type, or one that it refers to, is unknown or wrong.
     pub(crate) fn service(&self, name: &str) -> Result<ServiceType, String> {
         let (interface, structures, descriptions) = self.resolve(name, "srv")?;
         let [request, response] = parts(structures)?;
@@ -200,10 +184,6 @@ impl Library {
         Ok(ServiceType { package: interface.package, name: interface.name, request, response, hashes })
     }
 
-    /// Returns an action type by its full name.
-    ///
-    /// # Errors
-    /// The type, or one that it refers to, is unknown or wrong.
     pub(crate) fn action(&self, name: &str) -> Result<ActionType, String> {
         let (interface, structures, descriptions) = self.resolve(name, "action")?;
         let [goal, result, _] = parts(structures)?;
@@ -230,7 +210,6 @@ fn service_hashes(name: &str, descriptions: &Descriptions) -> Result<[String; 2]
 
 struct Resolver<'l> {
     library: &'l Library,
-    /// Messages that have been resolved.
     structures: BTreeMap<String, Arc<Structure>>,
     /// Messages that are being resolved.
     open: BTreeSet<String>,

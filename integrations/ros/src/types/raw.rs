@@ -53,7 +53,6 @@ impl interfaces::Structure for Raw {
     const RIHS01: &'static str = "";
 }
 
-/// A service whose type is known at run time.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct AnyService;
 
@@ -64,7 +63,6 @@ impl interfaces::Service for AnyService {
     const NAME: &'static str = "";
 }
 
-/// An action whose type is known at run time.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct AnyAction;
 

@@ -50,12 +50,10 @@ impl Structure {
         self.fields.iter().map(|field| field.name.as_str())
     }
 
-    /// Returns `true` if the structure has a field of this name that is a truth value.
     pub(crate) fn has_truth_value(&self, name: &str) -> bool {
         self.field(name).is_some_and(|field| field.layout == Layout::Single(Primitive::Bool))
     }
 
-    /// Returns `true` if the structure has a field of this name that is a text.
     pub(crate) fn has_text(&self, name: &str) -> bool {
         self.field(name).is_some_and(|field| matches!(field.layout, Layout::Text { .. }))
     }
@@ -66,15 +64,11 @@ impl Structure {
     }
 }
 
-/// Values that fields of received data must have.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Expectation(Vec<(FieldPath, Value)>);
 
 impl Expectation {
     /// Reads an expectation from a table. Its keys are fields or paths to fields.
-    ///
-    /// # Errors
-    /// A field does not exist or cannot have its value.
     pub(crate) fn new(structure: &Structure, table: &Value) -> Result<Self, String> {
         let mut fields = Vec::new();
         collect("", table, &mut fields)?;
@@ -87,9 +81,6 @@ impl Expectation {
     }
 
     /// Checks received data; `offset` is as for [`Structure::find`].
-    ///
-    /// # Errors
-    /// A field has another value, or the data are incomplete.
     pub(crate) fn check(&self, structure: &Structure, data: &[u8], offset: usize) -> Result<(), String> {
         for (path, expected) in &self.0 {
             let present = structure.find(path, data, offset)?;

@@ -1,4 +1,4 @@
-//! Helpers for tests with nodes. Each test uses a separate ROS domain.
+//! Helpers for tests with nodes. Consecutive tests use different ROS domains.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU16, Ordering};
@@ -9,7 +9,7 @@ use metaplan_ros::node::{Network, Node, Opening, Rmw, RosArguments};
 /// First ROS domain for tests. Concurrent runs on one machine need different domains.
 const FIRST: u16 = 20;
 
-/// Returns a ROS domain that no other test of this process uses.
+/// Returns the next of the ten ROS domains of this process, in turn.
 pub fn domain() -> u16 {
     static USED: AtomicU16 = AtomicU16::new(0);
     let slot = (std::process::id() % 20) as u16 * 10;

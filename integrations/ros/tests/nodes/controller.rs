@@ -18,7 +18,6 @@ use crate::common::{domain, node, until};
 use crate::nav2::file;
 use crate::performers::serve;
 
-/// Simulates PlanSys2's experts for domain and problem.
 fn experts(robot: &Arc<Node>) -> Arc<Mutex<String>> {
     let text = |name: &str| std::fs::read_to_string(file(name)).expect("a file");
     let domain = text("domain.pddl");

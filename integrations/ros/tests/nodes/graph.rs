@@ -102,7 +102,7 @@ fn goals_are_pursued_cancelled_and_rejected() {
         name.clone_into(&mut goal.qos_expected.objective_type);
         goal
     };
-    // A goal runs to its end.
+    // One goal runs to its end, one is rejected, and one is cancelled.
     let pursuing = std::thread::spawn(move || {
         let first = block_on(caller.pursue(goal("f_move"), LONG)).expect("accepted");
         let second = block_on(caller.pursue(goal("nonsense"), LONG));

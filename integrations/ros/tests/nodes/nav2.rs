@@ -21,7 +21,6 @@ pub fn file(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/nav2").join(name)
 }
 
-/// Returns the best plan after the given components have failed.
 fn plan(failed: &[&str]) -> Result<Found, NoPlan> {
     let mut mission = Setup::read(&file("mission.toml")).expect("a mission").mission;
     for component in failed {

@@ -68,7 +68,6 @@ fn hopeless() -> (String, String) {
     (domain.to_owned(), problem)
 }
 
-/// Creates an active planner node, and a client node.
 fn planner(setup: Option<Setup>, words: &str) -> (Arc<Node>, Arc<Node>) {
     let domain = domain();
     let (planner, client) = (node(domain, "planner", words), node(domain, "client", ""));
@@ -161,7 +160,7 @@ fn others_are_answered_while_a_plan_is_looked_for_and_its_time_is_kept() {
     assert!(!found.success && found.error_info.contains("a limit was reached"), "{}", found.error_info);
 }
 
-/// After diagnostics report a failed component, its design is no longer used.
+/// After diagnostics report murky water, the plan uses a design with a lower altitude.
 #[test]
 fn the_knowledge_base_of_a_mission_joins_in() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");

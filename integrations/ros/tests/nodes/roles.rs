@@ -232,7 +232,6 @@ fn a_reasoner_serves_objectives() {
     running.end().expect("it ends as it should");
 }
 
-/// A node of the robot with a parameter that designs set.
 fn spiral(domain: u16) -> (Arc<Node>, Arc<Mutex<Vec<f64>>>) {
     let (node, values) = (node(domain, "spiral", ""), Arc::new(Mutex::new(Vec::new())));
     let noted = Arc::clone(&values);

@@ -20,7 +20,6 @@ const MAX_PROBE_DELAY: Duration = Duration::from_secs(60);
 /// Maximum delay until a function that did not reply to a probe is probed again.
 const SILENT_RETRY_DELAY: Duration = Duration::from_secs(2);
 
-/// Delay after which a design is retried if it was refused or its steps failed.
 const REFUSED_RETRY_DELAY: Duration = Duration::from_secs(60);
 
 /// Time after a granted change of mode during which reports of another mode are ignored.
@@ -32,11 +31,9 @@ const GRANT_PERIOD: Duration = Duration::from_secs(2);
 
 #[derive(Debug)]
 pub(super) struct Grant {
-    /// End of the period in which reports of other modes are ignored.
     until: Duration,
     /// Modes that the function had shortly before; reports of them may be late.
     earlier: Vec<String>,
-    /// `true` if another mode was reported.
     is_contradicted: bool,
 }
 
@@ -47,7 +44,6 @@ impl Machine {
         let Some(mode) = self.settings.functions.unground(function).map(str::to_owned) else { return };
         let requested = self.pending.get(function).map(|change| &change.mode);
         let has = requested.or_else(|| self.modes.get(function));
-        // Nothing is requested while the mode of the function is unknown.
         if has.is_some_and(|has| *has != mode) {
             self.change(function.to_owned(), mode, None);
         }
@@ -156,8 +152,9 @@ impl Machine {
         self.grants.insert(function.to_owned(), grant);
     }
 
-    /// Handles a request for a mode that a mode manager has received. Unlike a reported mode, a request that
-    /// this program has not sent recently comes from another client. It therefore ends the [`GRANT_PERIOD`].
+    /// Handles a request for a mode that a mode manager has received. Unlike a reported mode, a
+    /// request that this program has not sent recently comes from another client. It therefore ends
+    /// the [`GRANT_PERIOD`], unless a change is pending.
     pub(super) fn mode_requested(&mut self, function: &str, mode: &str) -> String {
         if self.modes.get(function).is_some_and(|current| current == mode) {
             return format!("{function} was requested to have the mode {mode}, which it has");
@@ -245,9 +242,9 @@ impl Machine {
         format!("{function} answers again")
     }
 
-    /// Reports designs as realisable again once their retry delay is over. Forgets granted modes once their
-    /// period is over; if another mode was reported in the meantime, asks for the current mode of the function.
-    /// In the state EXECUTE, also passes a due tick to the loop.
+    /// Reports designs as realisable again once their retry delay is over. Forgets granted modes
+    /// once their period is over; if another mode was reported in the meantime, requests the
+    /// current mode of the function. In the state EXECUTE, also passes a due tick to the loop.
     pub(super) fn tick(&mut self) -> String {
         let now = self.now;
         let mut back = Vec::new();

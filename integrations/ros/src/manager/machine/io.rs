@@ -13,13 +13,11 @@ pub(in crate::manager) enum Input {
     Ready(Vec<(String, Option<String>)>),
     /// A diagnostic is pending; the driver converts it to a line.
     Diagnosed,
-    /// A line of events in the format of the loop.
     Line(String),
     /// Request to start a task: the number that identifies the reply, and the name of the task.
     Request(u64, String),
     /// Request to end a task: the number that identifies the reply, and the name of the task.
     Cancel(u64, String),
-    /// A function has replied to a call, or the call has failed.
     Changed(Change, Outcome),
     /// The current mode of a function, as its mode manager has answered or as its nodes show. Empty if the
     /// function is in none of its modes.
@@ -45,7 +43,7 @@ pub(in crate::manager) struct Change {
     pub(in crate::manager) mode: String,
     /// Number of the effect of the loop that requires the change. `None` if the function is no longer needed.
     pub(in crate::manager) effect: Option<u64>,
-    /// Number of the attempt, from 1.
+    /// Number of the attempt, from 1. Steps have only the last attempt.
     pub(in crate::manager) attempt: u32,
 }
 
@@ -68,7 +66,6 @@ pub(in crate::manager) enum Ended {
 
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::manager) enum Output {
-    /// Call `change_mode`, or execute the steps of the mode.
     Change(Change),
     /// Request the mode of a function.
     Look(String),

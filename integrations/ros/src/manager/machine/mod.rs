@@ -25,7 +25,6 @@ use functions::Grant;
 
 pub(super) use io::{Change, Ended, Input, Outcome, Output, State};
 
-/// Goal of the loop while there is no task.
 const EMPTY_GOAL: &str = "(and)";
 
 #[derive(Debug, Clone)]
@@ -50,7 +49,6 @@ struct Deferred {
     /// Answers of the loop at the start, which repeat its outstanding effects.
     answers: Vec<Answer>,
     modes: BTreeMap<String, String>,
-    /// End of the wait for diagnostics.
     until: Duration,
 }
 
@@ -62,16 +60,13 @@ pub(super) struct Machine {
     functions: Vec<String>,
     state: State,
     task: Option<String>,
-    /// Requested changes of mode that have not ended, by function.
     pending: BTreeMap<String, Change>,
     modes: BTreeMap<String, String>,
     grants: BTreeMap<String, Grant>,
     action: Option<Action>,
-    /// Numbers of the unanswered requests to start a task.
     start_requests: Vec<u64>,
     end_requests: Vec<u64>,
     failures: BTreeMap<String, CallFailures>,
-    /// `true` if the last planning found no plan.
     without_plan: bool,
     autopilot_obeyed: bool,
     deferred: Option<Deferred>,
@@ -130,7 +125,6 @@ impl Machine {
         &self.functions
     }
 
-    /// Returns the mode of each design of a function.
     pub(super) fn modes_of(&self, function: &str) -> Vec<String> {
         let designs = self.control.beliefs().mission().designs_of(function);
         designs.iter().map(|design| self.settings.functions.mode(function, design).to_owned()).collect()
@@ -183,7 +177,6 @@ impl Machine {
 
     /// Passes all pending lines to the loop, unless the machine still waits for the functions.
     fn settle(&mut self) -> Result<(), Message> {
-        // The loop starts once the modes of the functions are known.
         if self.state == State::WaitGraph {
             return Ok(());
         }

@@ -52,7 +52,6 @@ impl Machine {
             (std::mem::take(&mut deferred.answers), std::mem::take(&mut deferred.modes));
         let outstanding: BTreeSet<u64> =
             self.control.beliefs().outstanding().map(|effect| effect.number).collect();
-        // An effect that is no longer outstanding is not requested again.
         answers.retain(|answer| answer.effect().is_none_or(|effect| outstanding.contains(&effect.number)));
         self.handle_answers(answers);
         self.deferred = None;

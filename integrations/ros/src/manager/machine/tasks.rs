@@ -65,7 +65,7 @@ impl Machine {
             return because;
         }
         if self.task.as_deref().is_some_and(|current| current != task) {
-            // Another task is running, so the cancelled task is already ended.
+            // Another task is running, so the cancelled task is not.
             self.outputs.extend(number.map(|number| Output::Reply(number, true)));
             return format!("the task {task} is not under way");
         }
@@ -89,7 +89,6 @@ impl Machine {
         format!("the task {task} ends")
     }
 
-    /// Ends the task because its goal is reached: no function is needed any more.
     pub(super) fn reached(&mut self) {
         self.without_plan = false;
         let was_active = self.action.take().is_some();

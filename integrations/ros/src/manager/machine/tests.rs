@@ -14,7 +14,6 @@ const PATH: &str = "f_generate_search_path";
 const MOTION: &str = "f_maintain_motion";
 const RECHARGE: &str = "generate_recharge_path";
 
-/// A machine with a clock that advances with each input.
 struct Robot {
     machine: Machine,
     now: Duration,
@@ -228,7 +227,7 @@ fn modes_set_by_other_clients_are_adopted_or_reverted() {
     let mut robot = Robot::new(None);
     let outputs = robot.request("search_pipeline");
     robot.obey(outputs);
-    // A requested mode is no news.
+    // The report of a requested mode changes nothing.
     assert_eq!(robot.handle(Input::Mode(PATH.to_owned(), "fd_spiral_high".to_owned())), []);
     let outputs = robot.handle(Input::ModeRequested(PATH.to_owned(), "fd_spiral_low".to_owned()));
     assert_eq!(

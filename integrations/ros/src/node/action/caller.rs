@@ -161,7 +161,6 @@ impl<A: Action + 'static> ActionCaller<A> {
             discovered.ok_or_else(|| format!("it has no server after {:.1} s", within.as_secs_f64()))??;
         if connection.as_ref().is_none_or(|connected| connected.server != server) {
             let client = self.client(server.mapping).map_err(|message| message.message.clone())?;
-            // Answers that the server sends before it has discovered this client are lost.
             Timer::after(MATCHING_TIME.min(within)).await;
             *connection = Some(Arc::new(Connection { server, client, goals: Mutex::default() }));
         }
@@ -260,7 +259,6 @@ impl Node {
         self.action_caller_of(name, ActionNames::of::<A>())
     }
 
-    /// Creates a client of the action `name`, whose type is known at run time.
     pub(crate) fn any_action_caller(
         self: &Arc<Self>,
         name: &str,

@@ -28,7 +28,6 @@ fn wanted(function: &str) -> QoS {
     QoS { objective_type: function.to_owned(), always_improve: true, ..QoS::default() }
 }
 
-/// Returns the requested modes among the pending outputs; other outputs are discarded.
 fn requested_modes(keeping: &mut Keeping) -> Vec<Wanted> {
     let mut requested = Vec::new();
     for output in keeping.outputs() {
