@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::planner::Planned;
-use planner::Alternatives;
+use planner::{Alternatives, Status};
 
 use crate::cli::plan_text::steps_text;
 
@@ -11,7 +11,11 @@ use crate::cli::plan_text::steps_text;
 /// that all optimal plans share.
 pub(super) fn text(found: Option<&Alternatives>, planned: &Planned<'_>, columns: Option<u16>) -> String {
     let Some(found) = found else {
-        return "\nequally good plans were not searched for: the plan is not proved optimal\n".to_owned();
+        return if planned.solution.status == Status::Optimal {
+            "\nequally good plans were not searched for: the metric depends on the state\n".to_owned()
+        } else {
+            "\nequally good plans were not searched for: the plan is not proved optimal\n".to_owned()
+        };
     };
     let mut text = String::new();
     for (plan, number) in found.plans.iter().zip(1..) {

@@ -241,7 +241,7 @@ fn repairs_text(found: &DesignExplanation) -> String {
         }
     }
     for repair in groups {
-        text += "it is available again only if all of these hold together\n";
+        text += "it is available again if all of these hold together\n";
         for alteration in &repair.alterations {
             let _ = writeln!(text, "    {}", alteration_text(alteration, false));
         }

@@ -14,6 +14,9 @@ use crate::message::{Errors, Message};
 
 pub(super) const FORMAT: &str = "metaplan-sweep/1";
 
+/// First characters of each result file.
+const HEADER_START: &str = "{\"format\":\"metaplan-sweep/1\"";
+
 const OTHER_STUDY: &str = "it belongs to another study, or the study or its files have changed";
 
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -168,6 +171,10 @@ pub fn read_lines(directory: &Path, study: &Study) -> Result<Vec<Line>, Errors> 
             }
         };
         let whole = text.rfind('\n').map_or(0, |end| end + 1);
+        if whole == 0 && (text.starts_with(HEADER_START) || HEADER_START.starts_with(&text)) {
+            // The process was killed before it had written the header.
+            continue;
+        }
         match parse(path, &text[..whole]) {
             Err(message) => mistakes.push(message),
             Ok((header, lines)) => {

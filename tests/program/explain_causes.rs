@@ -245,7 +245,7 @@ fn joint_causes_are_repaired_together() {
     for line in [
         "    c_status(c_suction_cup, \"FALSE\")\n",
         "    hasMaximum(clean_air, \"0.5\"^^decimal)\n",
-        "it is available again only if all of these hold together\n    \
+        "it is available again if all of these hold together\n    \
          c_suction_cup works again\n    air_dust at most 0.5 (now 0.8)\nthen the best plan costs 110.8, 8 less\n",
     ] {
         assert!(text.contains(line), "{line}\n{text}");

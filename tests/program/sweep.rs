@@ -65,6 +65,12 @@ fn killed_shards_give_the_same_table() {
         let outcome = sweep(STUDY, &shards, &["--shard", shard, "--resume"]);
         assert_eq!((outcome.status, &outcome.json()["done"]), (0, &4.into()), "{outcome:#?}");
     }
+    // A process that is killed at once leaves a file without a complete header.
+    for (name, text) in
+        [("empty", ""), ("short", "{\"for"), ("long", "{\"format\":\"metaplan-sweep/1\",\"stu")]
+    {
+        fs::write(shards.join(name).with_extension("jsonl"), text).expect("it can be written");
+    }
     let (shard_table, shard_answer) = merged(STUDY, &shards);
     assert_eq!(shard_table, table);
     assert_eq!(shard_answer, answer);

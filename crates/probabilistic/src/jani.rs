@@ -27,7 +27,7 @@ pub fn write(name: &str, model: &Model) -> Result<Value, Error> {
     if !recursive.is_empty() {
         return Err(Error::Model(recursive.into()));
     }
-    let writer = Writer { formulas: &model.formulas };
+    let writer = Writer { formulas: &model.formulas, has_initial_condition: model.initial.is_some() };
     let mut problems = Vec::new();
     let actions = actions(model);
     let globals = model.modules.iter().flat_map(|module| &module.variables).chain(&model.globals);
@@ -64,7 +64,7 @@ pub fn write(name: &str, model: &Model) -> Result<Value, Error> {
         }
         entry
     });
-    Ok(json!({
+    let mut document = json!({
         "jani-version": 1,
         "name": name,
         "type": if model.kind == ModelKind::Mdp { "mdp" } else { "dtmc" },
@@ -75,7 +75,11 @@ pub fn write(name: &str, model: &Model) -> Result<Value, Error> {
         "properties": [],
         "automata": automata,
         "system": system(model, &actions),
-    }))
+    });
+    if let Some(condition) = &model.initial {
+        document["restrict-initial"] = json!({ "exp": writer.expression(condition) });
+    }
+    Ok(document)
 }
 
 fn is_taken(model: &Model, name: &str) -> bool {
@@ -173,6 +177,7 @@ fn parts(condition: &Expr) -> Vec<&Expr> {
 
 struct Writer<'a> {
     formulas: &'a [Named],
+    has_initial_condition: bool,
 }
 
 impl Writer<'_> {
@@ -306,8 +311,12 @@ impl Writer<'_> {
                 (kind, least)
             }
         };
-        let initial = variable.initial.as_ref().map_or(least, |value| self.expression(value));
-        json!({ "name": variable.name, "type": kind, "initial-value": initial })
+        let mut entry = json!({ "name": variable.name, "type": kind });
+        // Without an initial value, all values that the condition on initial states admits are initial.
+        if !self.has_initial_condition {
+            entry["initial-value"] = variable.initial.as_ref().map_or(least, |value| self.expression(value));
+        }
+        entry
     }
 
     fn expression(&self, expression: &Expr) -> Value {

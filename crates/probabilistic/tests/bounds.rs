@@ -169,6 +169,30 @@ fn a_policy_is_evaluated_over_bounded_steps() {
 }
 
 #[test]
+fn a_path_fails_where_an_evaluated_policy_has_no_choice() {
+    let model = "mdp
+        module m s:[0..2] init 0; [go] s=0 -> (s'=1); [back] s=1 -> (s'=0); [end] s=1 -> (s'=2); endmodule
+        rewards \"cost\" true : 1; endrewards
+        label \"goal\" = s=2;";
+    let policy = "{\"format\": \"metaplan-policy/1\", \"states\": [{\"state\": {\"s\": 0}, \"action\": \"go\", \"choice\": 0}]}";
+    for question in ["Pmax=? [ F \"goal\" ]", "Pmin=? [ F \"goal\" ]"] {
+        for exactness in [Exactness::Always, Exactness::Never] {
+            let evaluate = Some(PolicyTable::from_json(policy).expect("a policy"));
+            let options = Options::default().with_exactness(exactness).with_evaluation(evaluate);
+            let answer = outcome(model, question, &options).expect("an answer");
+            let Outcome::Value(Answer::Finite(answer)) = answer else { panic!("{answer:?}") };
+            assert_eq!(answer.upper.to_bits(), 0.0f64.to_bits(), "{question}");
+        }
+    }
+    for question in ["R{\"cost\"}max=? [ F \"goal\" ]", "R{\"cost\"}min=? [ F \"goal\" ]"] {
+        let evaluate = Some(PolicyTable::from_json(policy).expect("a policy"));
+        let answer =
+            outcome(model, question, &Options::default().with_evaluation(evaluate)).expect("an answer");
+        assert!(!matches!(answer, Outcome::Value(Answer::Finite(_))), "{question}: {answer:?}");
+    }
+}
+
+#[test]
 fn the_policy_for_tiny_values_is_optimal() {
     let model = "mdp
         module m s:[0..40] init 0; d:bool init false; h:bool init false;

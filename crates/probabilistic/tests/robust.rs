@@ -264,3 +264,18 @@ fn a_large_component_gets_bounds() {
         assert!(cost.upper - cost.lower <= 1e-6 * cost.value, "{cost:?}");
     }
 }
+
+#[test]
+fn jani_has_the_initial_states_of_the_model() {
+    let model = "dtmc
+        module m s:[0..2]; d:bool; [] s<2 -> (s'=s+1); endmodule
+        init s>0 & !d endinit";
+    let jani = jani::write("m", &prism::parse(model).expect("a model")).expect("JANI");
+    let variables = jani["variables"].as_array().expect("variables");
+    assert!(variables.iter().all(|variable| variable.get("initial-value").is_none()), "{jani}");
+    assert_eq!(jani["restrict-initial"]["exp"]["op"], "\u{2227}", "{jani}");
+    let without = model.replace("init s>0 & !d endinit", "");
+    let jani = jani::write("m", &prism::parse(&without).expect("a model")).expect("JANI");
+    assert!(jani.get("restrict-initial").is_none(), "{jani}");
+    assert_eq!(jani["variables"][0]["initial-value"], 0);
+}

@@ -129,18 +129,18 @@ impl Program {
             // answer is checked in any case.
             thread::spawn(move || input.write_all(text.as_bytes()));
         }
+        let is_over_budget = || self.budget < u64::MAX && started.elapsed() > BUDGET_TIME;
+        let is_over = || is_over_budget() || self.limits.reached();
         loop {
             match receiver.recv_timeout(INTERVAL) {
                 Ok(Ok(text)) => {
-                    let is_over = || self.limits.reached();
                     return Ok(has_ended(&mut child.0, &is_over)?
                         .then(|| String::from_utf8_lossy(&text).into_owned()));
                 }
                 Ok(Err(error)) => return Err(format!("its output cannot be read: {error}")),
                 Err(mpsc::RecvTimeoutError::Disconnected) => return Err("its output is closed".to_owned()),
                 Err(mpsc::RecvTimeoutError::Timeout) => {
-                    let is_over_budget = self.budget < u64::MAX && started.elapsed() > BUDGET_TIME;
-                    if is_over_budget || self.limits.reached() {
+                    if is_over() {
                         return Ok(None);
                     }
                 }

@@ -83,6 +83,10 @@ impl<N: Number> Run<'_, N> {
         // component) and none can leave it to an unsure state. All other states are marked as unsure.
         let ends = end_components(local, |_| true);
         let mut unsure = ends.inside;
+        // A path ends without success in a state without an allowed choice.
+        for (state, first) in local.first.windows(2).enumerate() {
+            unsure[state] |= first[0] == first[1];
+        }
         let owners = local.owners();
         let users = Users::new(&local.rows, local.states.len());
         for (choice, owner) in owners.iter().enumerate() {

@@ -91,10 +91,10 @@ impl TemporalRelaxation {
         let mut ends = vec![0; concurrent.instances.len()];
         let ids = OperatorId::all(task.operators.len());
         for ((operator, happening), id) in task.operators.iter().zip(&concurrent.happenings).zip(ids) {
-            if let Role::End(instance) = happening.role {
-                ends[instance as usize] = dense(builder.rules.len());
+            let rule = builder.happening(concurrent, id, operator, happening.role);
+            if let (Role::End(instance), Some(rule)) = (happening.role, rule) {
+                ends[instance as usize] = rule;
             }
-            builder.happening(concurrent, id, operator, happening.role);
         }
         for rule in task.axioms.iter().flat_map(|layer| &layer.rules) {
             let needs = builder.needs(&rule.body);
@@ -209,16 +209,17 @@ impl<'a> RelaxationBuilder<'a> {
         proposition
     }
 
+    /// Returns the index of the rule without conditional effects; `None` for [`Role::Never`].
     fn happening<T: TimeNumber>(
         &mut self,
         concurrent: &TemporalTask<T>,
         id: OperatorId,
         operator: &Operator,
         role: Role,
-    ) {
+    ) -> Option<u32> {
         let (mut needs, mut over_all_needs) = (self.needs(&operator.condition), Vec::new());
         let weight = match role {
-            Role::Never => return,
+            Role::Never => return None,
             Role::Timed(_) => 0,
             Role::Whole => 1,
             Role::Start(_) if self.is_admissible => 1,
@@ -271,8 +272,10 @@ impl<'a> RelaxationBuilder<'a> {
             let sets = [&rule.sets[..], &adds].concat();
             conditional.push(Rule { needs, adds, sets, ..rule.clone() });
         }
+        let index = dense(self.rules.len());
         self.rules.push(rule);
         self.rules.extend(conditional);
+        Some(index)
     }
 
     /// Adds a conjunction for each pair of facts selected by [`add_conjunctions`], and rewrites

@@ -86,8 +86,14 @@ impl<S: Store> Partition<S> {
     /// Restores a robot from its snapshot, or suspends it. If later events and decisions have to be read
     /// separately, returns the robot and the sequence numbers of the last ones that the snapshot contains.
     fn take_saved(&mut self, key: &str, value: &[u8], revision: u64) -> Option<(Address, u64, u64)> {
-        let (Some(address), Ok(saved)) = (Address::parse(key), serde_json::from_slice::<Saved>(value)) else {
+        let Some(address) = Address::parse(key) else {
             self.refuse(None, "not_a_snapshot");
+            return None;
+        };
+        let Ok(saved) = serde_json::from_slice::<Saved>(value) else {
+            self.refuse(None, "not_a_snapshot");
+            // The next snapshot of the robot replaces this one.
+            self.slot(&address.robot).revision = revision;
             return None;
         };
         let (robot, fault) = Robot::restore(&saved, &self.shared.missions);
