@@ -143,12 +143,9 @@ fn solved_again(referee: &Referee<'_>, from: Valuation, spent: f64) -> Result<Op
 /// Number of moves after which a loss is treated as if it never happened.
 const HORIZON: usize = 2000;
 
-/// Quantity for which a lower bound is computed: time or energy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Spent {
-    /// Time, in the mission's time unit.
     Time,
-    /// Energy, in the mission's unit of energy.
     Energy,
 }
 

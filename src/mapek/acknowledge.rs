@@ -31,9 +31,8 @@ pub(super) enum Failure {
 }
 
 impl Beliefs {
-    /// Records that the robot has acknowledged the effect (a request of the loop) with this number. The effect is then
-    /// no longer outstanding, i.e. no longer waits for its acknowledgement. Returns [`Receipt::Unknown`] if the loop
-    /// has created no effect with this number.
+    /// Records an acknowledgement by number. The effect is then no longer outstanding. Returns [`Receipt::Unknown`] if
+    /// the loop has created no effect with this number.
     pub(super) fn acknowledge(&mut self, effect: u64) -> Receipt {
         if effect == 0 || effect > self.effects {
             return Receipt::Unknown;

@@ -28,11 +28,10 @@ use crate::number;
 /// Number of consecutive failures of one step after which planning pauses until something else changes.
 const MAX_FAILURES: u32 = 3;
 
-/// Least base of the pauses after searches without a proved outcome. The base is the time limit of a search if that is
-/// longer. The first pause is twice the base, and each further pause is twice the previous one.
+/// Minimum base of the pauses after searches without a proved outcome. The base is the time limit of a search if that
+/// is longer. The first pause is twice the base, and each further pause is twice the previous one.
 const MIN_RETRY: Duration = Duration::from_secs(10);
 
-/// Upper limit on the pause before a search without a proved outcome is repeated.
 const MAX_RETRY: Duration = Duration::from_secs(3600);
 
 /// Entry of `Beliefs::improvement_causes`, among the names of designs, that represents changed facts.
@@ -43,12 +42,10 @@ const FACTS: &str = "facts";
 pub(super) enum Need {
     /// The action under way could not continue unchanged. Other designs for it, or its suspension, were requested.
     Interrupted,
-    /// A new plan is needed, for example because the current plan is invalid or missing.
     Must,
     Better,
 }
 
-/// Stage that decides whether to search for a plan, and adopts plans. [`Planner`] computes the plans.
 #[derive(Debug)]
 pub(super) struct Adaptation<'a> {
     pub(super) beliefs: &'a mut Beliefs,
@@ -57,8 +54,6 @@ pub(super) struct Adaptation<'a> {
 }
 
 impl Adaptation<'_> {
-    /// Decides from changes and findings of the analysis whether a plan is needed. If so, searches for a plan, and
-    /// adopts it or keeps the current one.
     pub(super) fn adapt(&mut self, changes: Changes, findings: Findings, answers: &mut Vec<Answer>) {
         let is_observed = changes.observed;
         self.decide(changes, findings, answers);
@@ -294,7 +289,6 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Returns `true` if all designs of an action under way are available, and its remainder is executable.
     fn can_go_on(&self, running: &Running) -> bool {
         let designs = running.step.configuration.iter();
         designs.into_iter().all(|(_, design)| self.beliefs.is_available(design))
@@ -382,8 +376,8 @@ impl Adaptation<'_> {
         self.beliefs.plan = Some(steps);
     }
 
-    /// Reports that no plan was found. If `is_necessary`, also drops the current plan, and planning pauses until
-    /// something changes.
+    /// If `is_necessary`, also drops the current plan. Planning then pauses until something changes or another search
+    /// is due.
     fn report_no_plan(&mut self, is_necessary: bool, outcome: Outcome, answers: &mut Vec<Answer>) {
         let status = if outcome.proved { "unsolvable" } else { "unknown" };
         answers.push(Answer::PlanNone { status, because: outcome.because, blocking: outcome.blocking });
@@ -401,15 +395,14 @@ fn goes_on_with(running: &Running, going_on: &Outcome) -> bool {
     first.is_some_and(|first| first.configuration == running.step.configuration)
 }
 
-/// Returns the improvement from the metric value `metric` to the value `other`; negative if `other` is worse.
+/// Improvement from the metric value `metric` to the value `other`; negative if `other` is worse.
 fn gain(beliefs: &Beliefs, metric: &BigRational, other: &BigRational) -> BigRational {
     let declared = beliefs.mission.problem().metric.as_ref();
     let maximize = declared.is_some_and(|metric| metric.direction == Direction::Maximize);
     if maximize { other - metric } else { metric - other }
 }
 
-/// Returns the [`gain`] from `metric` to `other` if it is positive and at least the minimum benefit, and `None`
-/// otherwise.
+/// Returns the [`gain`] from `metric` to `other`, or `None` if it is not positive or below the minimum benefit.
 fn benefit(
     beliefs: &Beliefs,
     settings: &Settings,

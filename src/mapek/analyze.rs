@@ -49,7 +49,6 @@ pub(crate) fn available(knowledge: &Knowledge) -> BTreeSet<String> {
     designs.map(|design| design.individual.name.clone()).collect()
 }
 
-/// Reports new or resolved contradictions, and whether the conclusions have become incomplete or complete.
 pub(super) fn report_contradictions(beliefs: &mut Beliefs, answers: &mut Vec<Answer>) {
     let Some(knowledge) = beliefs.mission.knowledge() else { return };
     answers.extend(doubts(knowledge, &mut beliefs.fault, &mut beliefs.violated));
@@ -104,7 +103,6 @@ pub(super) fn analyze(beliefs: &mut Beliefs, answers: &mut Vec<Answer>) -> Findi
     findings
 }
 
-/// Returns an answer with the changes, or `None` if both lists are empty.
 pub(crate) fn inferred(designs: Vec<DesignChange>, objectives: Vec<ObjectiveChange>) -> Option<Answer> {
     let is_something = !designs.is_empty() || !objectives.is_empty();
     is_something.then_some(Answer::Inferred { designs, objectives })
@@ -144,8 +142,6 @@ pub(super) fn availability(knowledge: &Knowledge, design: &str, available: bool)
     DesignChange { design: design.to_owned(), available, because }
 }
 
-/// Returns the message that conclusions are missing. Without conclusions, no design counts as available, and planning
-/// is impossible.
 pub(super) fn missing_conclusions(fault: &Fault) -> String {
     format!("the conclusions are unknown: {}", fault.message)
 }

@@ -22,7 +22,6 @@ pub(crate) struct Outcome {
     pub blocking: Vec<String>,
 }
 
-/// Planning problem: the believed situation and, if one is fixed, the first step.
 #[derive(Debug)]
 pub(crate) struct Question<'a> {
     pub mission: &'a Mission,
@@ -52,7 +51,6 @@ impl Outcome {
         Self { steps: None, cost: BigRational::default(), proved, because, blocking: Vec::new() }
     }
 
-    /// Serialises the outcome for the journal.
     pub fn to_record(&self) -> Value {
         let steps: Option<Vec<Value>> =
             self.steps.as_ref().map(|steps| steps.iter().map(PlannedStep::to_record).collect());

@@ -26,28 +26,26 @@ use crate::mission::Mission;
 #[derive(Debug, Clone)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub struct Beliefs {
-    /// Knowledge base and problem in their believed state.
     pub(super) mission: Mission,
     pub(super) goal: Option<String>,
     pub(super) available: BTreeSet<String>,
     pub(super) statuses: BTreeMap<String, Vec<String>>,
     /// Axioms and rules that the known facts violate, as last reported.
     pub(super) violated: BTreeSet<String>,
-    /// Fault that stopped the reasoning, as last reported; the conclusions are then incomplete. `None` if they are
-    /// complete.
+    /// Fault that stopped the reasoning, as last reported; `None` if the conclusions are complete.
     pub(super) fault: Option<Fault>,
     pub(super) configuration: BTreeMap<String, String>,
     pub(super) plan: Option<VecDeque<PlannedStep>>,
     pub(super) running: Option<Running>,
     pub(super) reached: bool,
-    /// Whether planning has failed and pauses until something changes.
+    /// Whether planning has failed and pauses until something changes or another search is due.
     pub(super) stuck: bool,
-    /// Whether the plan is not proved optimal, e.g. because its search hit a limit.
+    /// Whether the plan is not proved optimal.
     pub(super) unproved: bool,
     pub(super) retry: Option<Retry>,
     /// The step that failed last, with its number of consecutive failures.
     pub(super) failures: Option<(PlannedStep, u32)>,
-    /// Reasons why a better plan may exist: names of designs that are available again, and an entry for changed facts.
+    /// Names of designs that are available again, and an entry for changed facts. A better plan may then exist.
     pub(super) improvement_causes: BTreeSet<String>,
     /// Time at which the last entry of `improvement_causes` was added, since the start of the mission.
     pub(super) improvement_since: Duration,
@@ -55,10 +53,8 @@ pub struct Beliefs {
     pub(super) actions: u64,
     /// Number of effects requested since the start.
     pub(super) effects: u64,
-    /// Unacknowledged effects (requests to the robot) by number.
     pub(super) outstanding: BTreeMap<u64, Effect>,
     pub(super) receipts: Receipts,
-    /// Time of the last request and number of repetitions, by number of the outstanding effect.
     pub(super) waits: BTreeMap<u64, Wait>,
     /// Whether the robot has ever reported the start or the progress of an action.
     pub(super) reports_actions: bool,
@@ -97,9 +93,9 @@ pub(super) struct Running {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Retry {
-    /// Time at which the search is due, since the start of the mission.
+    /// Due time, since the start of the mission.
     pub(super) at: Duration,
-    /// Number of consecutive searches without a proved outcome, e.g. because of the time limit.
+    /// Number of consecutive searches without a proved outcome.
     pub(super) attempt: u32,
 }
 
@@ -282,7 +278,6 @@ impl Beliefs {
         self.mission.knowledge().is_none() || self.available.contains(design) || self.mission.provides(design)
     }
 
-    /// Returns the designs of the remaining steps of the plan, with repetitions.
     pub(super) fn planned_designs(&self) -> impl Iterator<Item = &String> {
         let steps = self.plan.iter().flatten();
         steps.flat_map(|step| step.configuration.iter().map(|(_, design)| design))
@@ -306,7 +301,6 @@ impl Beliefs {
         }
     }
 
-    /// Returns the action under way and the remaining plan as input for the validator.
     fn remaining_plan(&self) -> PlanText {
         let running = self.running.iter().map(|running| &running.step);
         plan_text(running.chain(self.plan.iter().flatten()))

@@ -12,7 +12,6 @@ pub(super) struct Changes {
     pub(super) facts: bool,
     /// Whether a report has changed facts of the problem or a design of the action under way, and not only values.
     pub(super) predicates: bool,
-    /// Whether the goal has changed, which invalidates all remembered plans.
     pub(super) goal: bool,
     /// Whether reported values of the problem differ from the believed ones.
     pub(super) values: bool,

@@ -1,9 +1,10 @@
 //! Deadlines for unacknowledged effects and for actions without reports.
 //!
-//! Deadlines are checked at each line, including ticks. Acknowledgements have deadlines only after the robot has first
-//! acknowledged an effect by its number. An overdue action is cancelled only if the robot has sent messages of the
-//! missing kind before: progress of this action, the start or progress of some action, or an acknowledgement. Every
-//! robot is expected to report the end of a cancelled action.
+//! Deadlines are checked at each timer and each line, including ticks, unless the whole line is refused.
+//! Acknowledgements have deadlines only after the robot has first acknowledged an effect by its number. An overdue
+//! action is cancelled only if the robot has sent messages of the missing kind before: progress of this action, the
+//! start or progress of some action, or an acknowledgement. Every robot is expected to report the end of a cancelled
+//! action.
 
 use std::time::Duration;
 
@@ -72,8 +73,7 @@ fn suspended_request(beliefs: &Beliefs) -> Option<u64> {
 }
 
 /// Repeats effects that were not acknowledged in time. Returns the reconfigurations that count as failed. Requests of
-/// actions are skipped unless the action is suspended, because the deadline of the action applies to them. Does nothing
-/// if the robot has never acknowledged an effect by its number.
+/// actions are skipped unless the action is suspended, because the deadline of the action applies to them.
 fn check_effects(beliefs: &mut Beliefs, deadline: Duration, answers: &mut Vec<Answer>) -> Expired {
     let mut expired = Expired::new();
     // This robot may never acknowledge effects.
@@ -119,8 +119,6 @@ fn open_cancel(beliefs: &Beliefs) -> Option<&Effect> {
     beliefs.outstanding.values().find(is_cancel).filter(|_| !beliefs.receipts.are_sent())
 }
 
-/// Checks the deadline of the action under way. After the deadline, repeats its request or its cancellation, cancels
-/// the action, or reports that the loop keeps waiting.
 fn check_action(beliefs: &mut Beliefs, settings: &Settings, answers: &mut Vec<Answer>) {
     if let Some(cancel) = open_cancel(beliefs).cloned()
         && let Some(running) = &mut beliefs.running

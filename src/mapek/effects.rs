@@ -7,7 +7,6 @@ use crate::mapek::answer::{Answer, Command, Effect};
 use crate::mapek::beliefs::{Beliefs, Running, Wait};
 use crate::mapek::step::PlannedStep;
 
-/// Upper limit on the number of superseded effects listed in one effect.
 const MAX_SUPERSEDED: usize = 64;
 
 /// Ends the mission, whose goal holds: drops the plan, and removes all objectives from the knowledge base.
@@ -43,8 +42,8 @@ pub(super) fn request(beliefs: &mut Beliefs, step: PlannedStep, answers: &mut Ve
     beliefs.running = Some(running);
 }
 
-/// Requests those designs of an action that must be sent (see [`must_be_sent`]), i.e. mainly for functions that are
-/// expected to have another design. Then makes the action's functions the objectives of the knowledge base.
+/// Requests those designs of an action that must be sent (see [`must_be_sent`]). Then makes the action's functions the
+/// objectives of the knowledge base.
 ///
 /// A requested action can still be waiting for its previous designs. Therefore, a changed design of the action is
 /// requested even if the function already has it.
@@ -138,8 +137,7 @@ pub(super) fn cancel(beliefs: &mut Beliefs, running: Running, because: String, a
     beliefs.running = Some(Running { cancelling: true, ..running });
 }
 
-/// Requests the suspension of the action under way unless it is suspended, drops the plan, and stops planning until the
-/// situation changes.
+/// Drops the plan and pauses planning. Requests the suspension of the action under way unless it is suspended already.
 pub(super) fn suspend(beliefs: &mut Beliefs, running: Running, reason: &str, answers: &mut Vec<Answer>) {
     beliefs.plan = None;
     beliefs.stuck = true;

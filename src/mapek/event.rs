@@ -464,7 +464,6 @@ impl Event {
     }
 }
 
-/// An event with the optional fields of its line, for serialisation.
 #[derive(Serialize)]
 struct Line<'a> {
     #[serde(flatten)]

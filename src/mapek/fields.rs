@@ -102,7 +102,6 @@ pub(super) fn numbers(value: &Value) -> Option<Vec<(String, BigRational)>> {
     fields.map(|(name, value)| Some((name.clone(), number::from_json(value)?))).collect()
 }
 
-/// Parses the value of a fact: a word, a number or a truth value.
 pub(super) fn word(value: &Value) -> Option<String> {
     match value {
         Value::Bool(truth) => Some(truth.to_string()),

@@ -22,8 +22,6 @@ pub(super) enum Interruption {
         /// `unsolvable` if the absence of a plan is proved, and `unknown` otherwise.
         status: &'static str,
         because: String,
-        /// Minimal set of unavailable designs that blocks every plan. Empty if not computed, or if there is no plan
-        /// even with all designs.
         blocking: Vec<String>,
     },
 }

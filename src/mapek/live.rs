@@ -14,7 +14,6 @@ use crate::mapek::step::PlannedStep;
 use crate::mapek::watch::Watch;
 use crate::mission::replanner;
 
-/// Upper limit on the number of configurations for which the action under way is simulated.
 const MAX_CONFIGURATIONS: usize = 256;
 
 #[derive(Debug, Clone, Default)]
@@ -103,8 +102,7 @@ impl Live {
     }
 }
 
-/// Returns the outcome that proves the absence of a plan. `blocking` is a set of unavailable designs that blocks every
-/// plan. It is empty if not computed, or if there is no plan even with all designs.
+/// Returns the outcome that proves the absence of a plan.
 fn none(blocking: Vec<String>) -> Outcome {
     Outcome {
         steps: None,

@@ -29,7 +29,6 @@ pub(crate) struct StoredQuestion {
 }
 
 impl Memo {
-    /// Returns the cached outcome of an equal planning problem, if any, and moves it to the front.
     pub(super) fn recall(&mut self, question: &Question<'_>) -> Option<Outcome> {
         let position = self.0.iter().position(|(situation, _)| situation.equals(question))?;
         let entry = self.0.remove(position)?;

@@ -37,8 +37,7 @@ const PLANNED: [&str; 9] = [
     "FunctionDesign",
 ];
 
-/// Local names of the properties that hold values of quality attributes. A derived value is an estimation; a reported
-/// value is a stated fact.
+/// Local names of the properties that hold values of quality attributes.
 const VALUES: [&str; 2] = ["hasValue", "qa_has_value"];
 
 /// Data for the interpretation of events: attributes, filters and caches. Not a part of the beliefs.
@@ -73,10 +72,6 @@ impl Monitor {
         due.into_iter().filter_map(|accepted| update.accept(accepted).err()).collect()
     }
 
-    /// Applies an event to the beliefs, and records the changes.
-    ///
-    /// # Errors
-    /// The event does not fit the mission or the state of the loop.
     pub(super) fn apply(
         &mut self,
         beliefs: &mut Beliefs,
@@ -412,7 +407,6 @@ mod tests {
     use crate::mapek::settings::Settings;
     use crate::setup::Setup;
 
-    /// Applies an event to the mission `ugv`, and compares the changes or the code of the refusal.
     fn check(line: &str, expected: Result<(Base, [bool; 3], &[&str]), &str>) {
         let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions/ugv.toml");
         let mission = Setup::read(&manifest).expect("the mission is read").mission;

@@ -19,15 +19,13 @@ use crate::mapek::watch::Watch;
 use crate::mission::ground_with;
 use crate::number;
 
-/// Upper limit on the number of doublings of the time limit.
 const MAX_DOUBLINGS: u32 = 3;
 
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Planner {
-    /// Time limit of one search for a plan; `None` for no limit.
     pub time_limit: Option<Duration>,
-    /// Number of consecutive searches before this one that ended without a proved outcome, e.g. at their time limit.
-    /// Each doubles the time limit, up to [`MAX_DOUBLINGS`] times.
+    /// Number of consecutive earlier searches without a proved outcome. Each doubles the time limit, up to
+    /// [`MAX_DOUBLINGS`] times.
     pub attempt: u32,
     /// Limits in addition to the time limit of one search.
     pub limits: Limits,
@@ -69,7 +67,7 @@ impl Planner {
 
     /// Removes and returns the next outcome computed by another thread. Returns `None` if there is none, or if the
     /// outcome is about a different action under way. If the situation has changed, for example by progress of the
-    /// action, the plan is not reported as optimal.
+    /// action, the outcome no longer counts as proved.
     fn prepared(&mut self, question: &Question<'_>) -> Option<Outcome> {
         let (answered, mut outcome) = self.prepared.pop_front()?;
         if !answered.has_same_action(question) {

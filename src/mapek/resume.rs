@@ -54,7 +54,6 @@ pub(crate) fn resume(domain: &Domain, running: &PlannedStep, done: &BigRational)
     gated
 }
 
-/// Returns the conjunction of `goal` and the gate fact, which holds once the action under way has ended.
 pub(crate) fn resumed_goal(goal: &Condition) -> Condition {
     Condition::And(vec![goal.clone(), Condition::Atom(gate())])
 }

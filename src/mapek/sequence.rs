@@ -68,8 +68,7 @@ impl Numbers {
         }
     }
 
-    /// Adds a number that was not seen before. Drops the lowest range if there are then more than [`MAX_RANGES`]
-    /// ranges.
+    /// Adds a number that was not seen before.
     pub(crate) fn insert(&mut self, number: u64) {
         // The number may close the gap to the next range, to the previous range, or both.
         let last = number.checked_add(1).and_then(|next| self.ranges.remove(&next)).unwrap_or(number);

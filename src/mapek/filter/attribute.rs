@@ -83,8 +83,8 @@ pub(crate) struct AttributeFilter {
     pub debounce: Micros,
     pub minimum: Option<BigRational>,
     pub maximum: Option<BigRational>,
-    /// Greatest plausible distance between consecutive samples. A sample at a greater distance is rejected, unless the
-    /// previous sample was rejected, too, and lies within this distance.
+    /// Greatest plausible distance from the last plausible sample. A sample at a greater distance is rejected, unless
+    /// it lies within this distance of the last sample rejected as a jump.
     pub jump: Option<BigRational>,
     /// Time without a plausible sample after which the sensor counts as silent; `None` for never.
     pub period: Option<Micros>,
@@ -138,7 +138,6 @@ pub(crate) enum Verdict {
     /// Newly believed value. The value differs from the sample if the sample satisfies some violated bounds by less
     /// than their hysteresis.
     Accepted(BigRational),
-    /// The sample is held, and the believed value is unchanged.
     Held(Hold),
 }
 
@@ -198,8 +197,6 @@ impl AttributeFilter {
         if self.is_confirmed(state, now) { self.accept(state, value) } else { Verdict::Held(Hold::Debounce) }
     }
 
-    /// Returns `true` if a sample is implausibly far from the last plausible sample, and also from the last sample that
-    /// was rejected as a jump.
     fn is_jump(&self, state: &AttributeState, value: &BigRational) -> bool {
         let Some(jump) = &self.jump else { return false };
         let is_near = |sample: &BigRational| {
@@ -282,7 +279,6 @@ impl AttributeFilter {
         Some(Elapsed::Silent(worst))
     }
 
-    /// Returns `true` if two values satisfy the same bounds.
     fn is_same_cell(&self, first: &BigRational, second: &BigRational) -> bool {
         self.bounds.iter().all(|bound| bound.keeps(first) == bound.keeps(second))
     }

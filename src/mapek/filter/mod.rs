@@ -251,7 +251,6 @@ impl Filters {
 }
 
 impl Accepted {
-    /// Returns the name of the attribute or component, and the report in the form for the knowledge base.
     pub(crate) fn report(&self) -> (&str, RobotReport) {
         match self {
             Self::Value(name, value) => (name, RobotReport::measured(value)),
