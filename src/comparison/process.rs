@@ -273,7 +273,6 @@ impl<N: Number> Generator<N> for Process<N> {
         self.rewards
     }
 
-    /// Returns the number of state codes.
     fn codes(&self) -> Option<usize> {
         self.levels.checked_mul(self.moves.len())?.checked_mul(8)?.checked_mul(self.lost.len())
     }

@@ -59,7 +59,6 @@ pub(super) fn range(name: &str, greatest: usize, initial: usize) -> Variable {
     }
 }
 
-/// Creates a Boolean variable that is initially false.
 pub(super) fn flag(name: &str) -> Variable {
     Variable { range: None, initial: Some(Expr::bool(false)), ..range(name, 0, 0) }
 }

@@ -15,7 +15,6 @@ use crate::comparison::process::{Action, Process, REWARDS, Risk, State, Valuatio
 /// Name of the objective that a policy optimises, and the policy: the number of the chosen choice for each state.
 pub type NamedPolicy = (String, Vec<u32>);
 
-/// The decision process in which all candidates are evaluated, with its explored states.
 pub struct Referee<'a> {
     pub mission: &'a Coadaptation,
     pub risk: Risk,

@@ -21,7 +21,6 @@ use crate::comparison::process::{Action, Valuation};
 use crate::message::{Errors, Message};
 use crate::mission::{Mission, Planning as _};
 
-/// Maximum number of states of a task that is converted to a process.
 const MAX_STATES: usize = 50_000;
 
 /// A mission as a process whose places are task states, with the mapping from actions of the task to moves of

@@ -128,9 +128,6 @@ pub(super) fn current(objective: &Objective) -> Option<&str> {
 
 /// Chooses designs for the objectives for which `is_in_need` returns `true`; the other objectives keep their designs.
 /// At a limit, returns the best choice found.
-///
-/// # Errors
-/// The rules do not terminate.
 pub(super) fn choose(
     knowledge: &Knowledge,
     wishes: &Wishes,

@@ -207,9 +207,9 @@ impl Keeper {
         self.handle_at(observation, self.now)
     }
 
-    /// Handles a line and returns the answers. `now`, the time since the start, is used if the line has no time of
-    /// its own. Time never decreases: an earlier time is replaced by the time of the previous line. A line is refused
-    /// if its sequence number was used before, or if its number or its own time is too far ahead.
+    /// Handles a line and returns the answers. `now`, the time since the start, is used if the line has no time of its
+    /// own. Time never decreases: an earlier time is replaced by the time of the previous line. A line is refused if
+    /// its sequence number was used before or is too old, or if its number or its own time is too far ahead.
     pub fn handle_at(&mut self, observation: &Observation, now: Duration) -> Vec<KeeperAnswer> {
         let mut answers = Vec::new();
         self.lines += u64::from(!observation.is_timer);

@@ -42,8 +42,7 @@ pub(super) enum End {
 }
 
 impl Segment {
-    /// Returns `true` if the segment's last record is an `end` record, which refers to the next
-    /// segment.
+    /// Returns `true` if the segment ends with an `end` record, which refers to the next segment.
     pub(super) fn is_closed(&self) -> bool {
         self.records.last().is_some_and(|record| record.kind == "end")
     }
@@ -59,20 +58,13 @@ pub(super) struct SnapshotFile {
 
 #[derive(Debug, Default)]
 pub(super) struct JournalFiles {
-    /// Segments by number; for an unreadable segment, a description of its fault.
     pub(super) segments: BTreeMap<u64, Result<Segment, String>>,
-    /// Snapshots by number; for an unreadable snapshot, a description of its fault.
     pub(super) snapshots: BTreeMap<u64, Result<SnapshotFile, String>>,
     /// Number of the segment whose last write failed, if the loop continued after the failure.
     pub(super) incomplete: Option<u64>,
 }
 
 impl JournalFiles {
-    /// Reads all segments and snapshots of a directory. Unreadable files are stored with their
-    /// fault.
-    ///
-    /// # Errors
-    /// The directory cannot be listed.
     pub(super) fn read(directory: &Path) -> io::Result<Self> {
         let mut contents = Self::default();
         for entry in std::fs::read_dir(directory)? {
@@ -98,11 +90,7 @@ impl JournalFiles {
         name(if self.incomplete == Some(number) { INCOMPLETE } else { "journal" }, number)
     }
 
-    /// Checks that no segment is marked as incomplete, i.e. that the loop has not continued after a
-    /// failed write.
-    ///
-    /// # Errors
-    /// M324 if a segment is marked.
+    /// Returns the error M324 if a segment is marked as incomplete: then the loop has continued after a failed write.
     pub(super) fn require_complete(&self, directory: &Path) -> Result<(), Message> {
         let Some(number) = self.incomplete else { return Ok(()) };
         let text = format!(
@@ -277,9 +265,6 @@ fn read_private(path: &Path) -> io::Result<Vec<u8>> {
 }
 
 /// Checks that a path is a regular file or does not exist. A symbolic link is not a regular file.
-///
-/// # Errors
-/// The path is something else, or cannot be examined.
 pub(super) fn require_file(path: &Path) -> io::Result<()> {
     match std::fs::symlink_metadata(path) {
         Ok(found) if !found.is_file() => Err(io::Error::other("is not a regular file")),

@@ -343,8 +343,7 @@ impl Journal {
         Ok(())
     }
 
-    /// Renames the last segment, so that the journal cannot be resumed. Renaming needs no disk
-    /// space.
+    /// Renames the last segment, so that the journal cannot be resumed.
     fn mark_incomplete(&self) -> io::Result<()> {
         let from = path(&self.directory, "journal", self.segment);
         std::fs::rename(from, path(&self.directory, INCOMPLETE, self.segment))?;

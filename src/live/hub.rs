@@ -17,14 +17,12 @@ use crate::mapek::DesignChange;
 const MAX_QUEUED_LINES: usize = 4096;
 const MAX_QUEUED_BYTES: usize = 16 << 20;
 
-/// Maximum number of retained lines for clients.
 const MAX_LINES: usize = 2000;
 
 /// Maximum total size of the retained lines in bytes. A single line may be longer.
 const MAX_RETAINED_BYTES: usize = 4 << 20;
 
-/// Maximum number of keys (parts of the loop's state, such as `function f`) whose latest line is retained.
-/// Above it, the keys that changed longest ago are dropped.
+/// Maximum number of keys whose latest line is retained. Above it, the keys that changed longest ago are dropped.
 const MAX_KEYS: usize = 10_000;
 
 const MAX_BATCH: usize = 100;
@@ -41,8 +39,7 @@ struct RetainedLines {
     lines: VecDeque<Arc<str>>,
     bytes: usize,
     first: u64,
-    /// For each key (part of the loop's state, such as `function f`), the latest line about it, and the number of this
-    /// line.
+    /// For each key, the latest line about it, and the number of this line.
     words: BTreeMap<String, (u64, Arc<str>)>,
     ended: bool,
 }
@@ -184,7 +181,6 @@ impl HubSender {
         self.enqueue(Entry::Designs(designs));
     }
 
-    /// Sends whether a plan exists, and the number of the action under way, if there is one.
     pub(super) fn send_plan(&self, exists: bool, under_way: Option<u64>) {
         self.enqueue(Entry::Planned { exists, under_way });
     }

@@ -18,7 +18,6 @@ use crate::report::Painter;
 /// Time limit for reading a request, and for sending each text.
 const CLIENT_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Interval between keep-alive comments on an idle event stream.
 const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(10);
 
 const MAX_CONNECTIONS: usize = 16;
@@ -121,7 +120,6 @@ impl Live {
     }
 }
 
-/// Decrements the number of open connections when dropped.
 struct ConnectionGuard(Arc<SharedState>);
 
 impl Drop for ConnectionGuard {

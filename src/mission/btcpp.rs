@@ -33,8 +33,6 @@ pub fn btcpp_text(mission: &Mission, plan: &Plan) -> String {
     String::from_utf8(text).unwrap_or_default() + "\n"
 }
 
-/// Returns the nodes of the sequence: the actions of the plan, each after the changes of designs
-/// that it needs.
 fn nodes(mission: &Mission, plan: &Plan) -> Vec<Node> {
     let mut nodes = Vec::new();
     let mut at_work: BTreeMap<&str, &str> = BTreeMap::new();

@@ -15,8 +15,7 @@ use super::clause::{self, Clause, Fact, Literal, Operand};
 use super::possible::Possible;
 use super::settle::{Guards, settle};
 
-/// Result of partial evaluation: settled predicates, which no action can change, with their
-/// clauses, and bounds for the other derived predicates.
+/// Settled predicates, which no action can change, with their clauses, and bounds for the other derived predicates.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Folded {
     settled: BTreeMap<Name, Vec<Clause>>,

@@ -21,7 +21,6 @@ use pddl::ast::{Action, ActionBody, Atom, Condition, Domain, Effect, Name, Term}
 use super::clause::{Clause, Fact, Literal, Operand};
 
 const MAX_DEPTH: usize = 8;
-/// Maximum number of clauses that are examined while one predicate is unfolded.
 const MAX_CLAUSES: usize = 1000;
 
 /// Guards. A guard is a predicate, an argument position and a class (unary predicate that never
@@ -57,7 +56,6 @@ pub(super) fn guards(domain: &Domain, varying: &BTreeSet<Name>, timed: &BTreeSet
     .collect()
 }
 
-/// The facts that an action adds, and the classes that its conditions require of its arguments.
 pub(super) struct Additions<'a> {
     /// Required classes, each with the term that has to be a member.
     pub classes: Vec<(Name, &'a Term)>,
@@ -65,8 +63,7 @@ pub(super) struct Additions<'a> {
     pub atoms: Vec<(&'a Atom, Vec<&'a Name>)>,
 }
 
-/// Returns the additions of an action. Unary predicates count as classes unless they are in
-/// `varying`.
+/// Unary predicates count as classes unless they are in `varying`.
 pub(super) fn additions<'a>(action: &'a Action, varying: &BTreeSet<Name>) -> Additions<'a> {
     let (conditions, effects): (Vec<&Condition>, Vec<&Effect>) = match &action.body {
         ActionBody::Instantaneous { precondition, effect } => (vec![precondition], vec![effect]),
@@ -103,8 +100,6 @@ fn classes<'c>(conditions: &[&'c Condition], varying: &BTreeSet<Name>) -> Vec<(N
     found_classes
 }
 
-/// Collects the atoms that an effect adds, each with the variables that are bound by quantifiers
-/// within the effect.
 fn added<'e>(effect: &'e Effect, bound: &[&'e Name], atoms: &mut Vec<(&'e Atom, Vec<&'e Name>)>) {
     match effect {
         Effect::And(parts) => {

@@ -173,7 +173,6 @@ impl Stage {
         }
     }
 
-    /// Returns the reason for the end of the mission, or `None` if it continues.
     fn ending(&self) -> Option<Ending> {
         if self.world.reached() {
             Some(Ending::Goal)

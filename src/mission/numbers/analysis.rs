@@ -71,7 +71,6 @@ pub(super) struct NegativeDuration {
     pub(super) design: Option<String>,
 }
 
-/// The numbers and static facts of a mission in its initial state, prepared for the analysis.
 pub(super) struct Numbers<'m> {
     pub(super) mission: &'m Mission,
     pub(super) domain: &'m Domain,
