@@ -333,7 +333,6 @@ impl Coadaptation {
     }
 }
 
-/// Checks that the encoding of a state supports these numbers of places and configurations.
 pub(super) fn fits(places: usize, configurations: usize) -> Result<(), Errors> {
     if places <= MAX_PLACES && configurations <= MAX_CONFIGURATIONS {
         return Ok(());

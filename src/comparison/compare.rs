@@ -73,8 +73,7 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// Returns the penalised time of the first candidate of a kind (see [`Candidate::kind`]). Returns `None` if there
-    /// is no such candidate or its time is infinite.
+    /// Penalised time of the first candidate of a kind; `None` if it is missing or infinite.
     fn penalised(&self, kind: char) -> Option<f64> {
         self.candidates.iter().find(|candidate| candidate.kind == kind)?.measures.penalised_time
     }

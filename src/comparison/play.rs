@@ -17,7 +17,6 @@ pub type Decide<'a> = dyn FnMut(State, u32) -> Option<u32> + 'a;
 struct FixedProcess<'a, 'b, N> {
     process: &'a Process<N>,
     decide: RefCell<&'a mut Decide<'b>>,
-    /// `true` if decisions depend on the number of executed steps.
     counts: bool,
 }
 

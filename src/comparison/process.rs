@@ -122,10 +122,8 @@ pub struct Process<N> {
     reserve: u32,
     moves: Vec<Vec<Vec<Move<N>>>>,
     changes: Vec<Vec<Reconfiguration<N>>>,
-    /// For each configuration, `true` if it needs the component that may be lost.
     lost: Vec<bool>,
     risk: Risk,
-    /// Number of selected rewards.
     rewards: usize,
     /// Number of battery levels, including the empty one; 1 without a battery.
     levels: usize,

@@ -96,7 +96,7 @@ pub fn shortest_routes(mission: &Coadaptation, wanted: usize) -> Vec<Vec<usize>>
     found
 }
 
-/// Returns the length of the shortest route from each place to the goal, `None` where there is no route.
+/// Returns the length of the shortest route from each place to the goal.
 fn to_goal(mission: &Coadaptation, length: &dyn Fn(usize) -> u64) -> Vec<Option<u64>> {
     let mut entering = vec![Vec::new(); mission.places.len()];
     for (number, arc) in mission.arcs.iter().enumerate() {

@@ -150,7 +150,6 @@ struct Explorer<'a> {
     places: Vec<TaskState>,
     numbers: HashMap<TaskState, usize>,
     configurations: Vec<String>,
-    /// Traversals by configuration, for each pair of places.
     arcs: BTreeMap<(usize, usize), BTreeMap<usize, Traversal>>,
     origins: Vec<Option<(usize, Act)>>,
     /// For each place and each action that is executable there, the number of the next place and the configuration.

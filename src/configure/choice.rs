@@ -120,7 +120,6 @@ impl Group {
     }
 }
 
-/// Returns the local name of the design that currently provides an objective's function; `None` if no design does.
 pub(super) fn current(objective: &Objective) -> Option<&str> {
     let designs = objective.groundings.iter().filter_map(|grounding| grounding.design.as_ref());
     designs.map(|design| design.name.as_str()).next()
@@ -247,7 +246,6 @@ impl<'a> Offers<'a> {
     }
 }
 
-/// The joint choice for all objectives in need, from which the verdict (decision) on each candidate design is derived.
 struct Whole<'a> {
     knowledge: &'a Knowledge,
     wishes: &'a Wishes,
@@ -295,8 +293,7 @@ impl Whole<'_> {
         Verdict::Together(self.conflict(at, offer))
     }
 
-    /// Returns the reason, as a sentence, why a usable and preferred design was not chosen: its conflict with other
-    /// choices.
+    /// Returns the conflict with other choices because of which a usable and preferred design was not chosen.
     fn conflict(&self, at: usize, offer: &Offer) -> String {
         let chosen_elsewhere =
             self.needing.iter().zip(self.designs).enumerate().filter(|(other, _)| *other != at);

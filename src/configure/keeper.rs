@@ -323,8 +323,7 @@ impl Keeper {
         self.configurator.revert(&objective, from.as_deref())
     }
 
-    /// Asserts the beliefs that filters change because of the passing of time: reports that were held back and are
-    /// now due, and assumed values of silent sensors.
+    /// Asserts the beliefs that filters change by the passing of time.
     fn elapse(&mut self, answers: &mut Vec<KeeperAnswer>) {
         let mut filter_answers = Vec::new();
         let due: Vec<Accepted> = self.filters.elapse(&mut self.states, self.now, &mut filter_answers);
@@ -368,8 +367,7 @@ impl Keeper {
         Ok(())
     }
 
-    /// Reports new conclusions, then chooses and requests designs for the objectives in need. Chooses nothing if
-    /// reasoning itself failed.
+    /// Reports new conclusions, then requests designs for the objectives in need, unless reasoning itself failed.
     fn adapt(&mut self, answers: &mut Vec<KeeperAnswer>) {
         self.infer(answers);
         let knowledge = self.configurator.knowledge();
@@ -448,7 +446,6 @@ impl Keeper {
         KeeperAnswer::Service(reconfigure)
     }
 
-    /// Reports designs whose availability has changed, and objectives whose status has changed.
     fn infer(&mut self, answers: &mut Vec<KeeperAnswer>) {
         let knowledge = self.configurator.knowledge();
         let (designs, objectives) = changes(knowledge, &mut self.available, &mut self.statuses);

@@ -103,8 +103,6 @@ impl JournalFiles {
         Err(Message::at("M324", &directory.display().to_string(), None, text).with_help(help))
     }
 
-    /// Returns the snapshot at the beginning of the segment with this number, or a description of
-    /// its fault.
     pub(super) fn start(&self, number: u64) -> Result<&SnapshotFile, String> {
         let name = name("snapshot", number);
         let missing = || Err(format!("{name} is missing"));
@@ -233,7 +231,6 @@ pub(super) const OLD_FORMAT: &str = "is of the format `metaplan-journal/2` or ol
                                      read; finish the mission with the version that wrote it, or restart the mission \
                                      with a journal in another directory";
 
-/// Describes the fault of a file whose first line is not a segment header.
 fn no_journal(first: &[u8]) -> String {
     let text = String::from_utf8_lossy(first);
     let old = text.contains("metaplan-journal/1");

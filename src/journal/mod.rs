@@ -343,7 +343,6 @@ impl Journal {
         Ok(())
     }
 
-    /// Renames the last segment, so that the journal cannot be resumed.
     fn mark_incomplete(&self) -> io::Result<()> {
         let from = path(&self.directory, "journal", self.segment);
         std::fs::rename(from, path(&self.directory, INCOMPLETE, self.segment))?;

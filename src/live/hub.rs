@@ -27,7 +27,6 @@ const MAX_KEYS: usize = 10_000;
 
 const MAX_BATCH: usize = 100;
 
-/// The retained lines of a run, and the condition variable that is signalled for new lines.
 #[derive(Debug, Default)]
 pub(super) struct Hub {
     retained: Mutex<RetainedLines>,
@@ -85,8 +84,7 @@ impl Hub {
         }
     }
 
-    /// Appends a line, and stores it as the latest line about each of `keys`. Above the limits, drops the oldest lines,
-    /// and the keys that changed longest ago.
+    /// Above the limits, drops the oldest lines, and the keys that changed longest ago.
     fn take(&self, line: Arc<str>, keys: Vec<String>) {
         let mut state = self.lock();
         let number = state.end();
@@ -150,7 +148,6 @@ enum Entry {
 }
 
 impl Entry {
-    /// Returns the number of bytes of text that count towards the limit of the queue.
     fn bytes(&self) -> usize {
         match self {
             Self::Event(_, text) | Self::Answer(text) => text.len(),
@@ -160,7 +157,6 @@ impl Entry {
 }
 
 impl HubSender {
-    /// Starts the thread that moves messages from the queue to `hub`, and returns the sender.
     pub(super) fn of(hub: Arc<Hub>) -> Self {
         let (queue, receiver) = sync_channel(MAX_QUEUED_LINES);
         let backlog = Arc::new(Backlog::default());
@@ -185,7 +181,7 @@ impl HubSender {
         self.enqueue(Entry::Planned { exists, under_way });
     }
 
-    /// Sends the end of the run. Blocks while the queue is full.
+    /// Blocks while the queue is full.
     pub(super) fn end(&self) {
         let _ = self.queue.send(None);
     }

@@ -45,7 +45,7 @@ impl Request {
         }
     }
 
-    /// Parses the bytes of a request. Returns `None` while the request is incomplete.
+    /// Returns `None` while the request is incomplete.
     fn parse(bytes: &[u8]) -> Option<Result<Self, Refused>> {
         let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
         let mut parsed = httparse::Request::new(&mut headers);

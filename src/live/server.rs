@@ -204,8 +204,7 @@ fn refuse(stream: &mut TcpStream, (status, words): Refused) -> io::Result<()> {
     send(stream, &(head + &text))
 }
 
-/// Sends the lines of the current state, the retained lines, and then all new lines. Stops when the run ends, the
-/// client disconnects, or the client is too slow.
+/// Stops when the run ends, the client disconnects, or the client is too slow.
 fn events(shared: &SharedState, stream: &mut TcpStream) -> io::Result<()> {
     send(
         stream,
@@ -236,7 +235,7 @@ fn stanzas(lines: &[Arc<str>]) -> String {
     lines.iter().flat_map(|line| ["data: ", line, "\n\n"]).collect()
 }
 
-/// Sends a text. Fails if the connection does not accept the whole text within [`CLIENT_TIMEOUT`].
+/// Fails if the connection does not accept the whole text within [`CLIENT_TIMEOUT`].
 fn send(stream: &mut TcpStream, text: &str) -> io::Result<()> {
     let begun = Instant::now();
     let mut remaining = text.as_bytes();

@@ -53,8 +53,7 @@ impl Beliefs {
     }
 
     /// Records that the request of an action has arrived, as implied by a report of the action. If the robot has never
-    /// acknowledged an effect by its number, the report also implies that the reconfigurations before the request have
-    /// arrived.
+    /// acknowledged an effect by its number, the earlier reconfigurations have arrived, too.
     pub(super) fn confirm_request(&mut self, request: u64) {
         self.outstanding.remove(&request);
         self.waits.remove(&request);
@@ -121,8 +120,6 @@ impl Beliefs {
         Failure::Stale
     }
 
-    /// Records the failure of a reconfiguration to `design` that was not acknowledged. If the function is believed to
-    /// have this design, its design becomes unknown. Otherwise the function keeps its believed design.
     fn unanswered_failed(&mut self, function: &str, design: String) -> Failure {
         if self.configuration.get(function) == Some(&design) {
             self.configuration.remove(function);
@@ -130,9 +127,8 @@ impl Beliefs {
         Failure::Design(design)
     }
 
-    /// Records that a reconfiguration has arrived, unless its arrival, or the arrival of a later reconfiguration of the
-    /// function, is already recorded. If the function was observed with another design while the reconfiguration was
-    /// pending, the order of observation and reconfiguration is unknown, and so is the design.
+    /// Records that a reconfiguration has arrived, unless it or a later one of the function is already recorded. If the
+    /// function was observed with another design while the reconfiguration was pending, the design is unknown.
     fn configured(&mut self, effect: u64, function: String, design: String) -> Receipt {
         let history = self.receipts.functions.entry(function.clone()).or_default();
         // A superseded reconfiguration with a smaller number may have been carried out without an answer. Then the

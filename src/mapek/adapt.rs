@@ -124,8 +124,6 @@ impl Adaptation<'_> {
         }
     }
 
-    /// If one step has failed [`MAX_FAILURES`] times in a row and there is a reason to plan, drops the plan and returns
-    /// `true`. Planning then pauses until something else changes.
     fn stop_after_failures(&mut self, changes: &Changes, answers: &mut Vec<Answer>) -> bool {
         match &self.beliefs.failures {
             Some((step, count)) if *count >= MAX_FAILURES && !changes.reasons.is_empty() => {
@@ -140,9 +138,6 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Updates the reasons why a better plan may exist: designs that have become available and are not lost again, and
-    /// changed facts. If the current plan is not proved optimal, any change of the situation is a reason, even a lost
-    /// design.
     fn record_improvement_causes(&mut self, findings: &Findings, changes: &Changes) {
         let improvement_causes = &mut self.beliefs.improvement_causes;
         improvement_causes.retain(|design| !findings.lost.contains(design));
@@ -173,9 +168,8 @@ impl Adaptation<'_> {
         self.beliefs.running = Some(running);
     }
 
-    /// Searches for a better plan if the repetition of a search without a proved outcome is due, or if the settle time
-    /// has passed since the last reason why a better plan may exist. Does not search without a plan, or while
-    /// conclusions are missing.
+    /// Searches for a better plan if a repeated search is due, or if the settle time has passed since the last entry of
+    /// `improvement_causes` was added. Does not search without a plan, or while conclusions are missing.
     fn improve(&mut self, answers: &mut Vec<Answer>) {
         let has_plan = self.beliefs.plan.is_some() && !self.beliefs.reached;
         if !has_plan {
@@ -196,7 +190,7 @@ impl Adaptation<'_> {
     }
 
     /// Schedules another search after a search without a proved outcome. The pause doubles with each attempt, up to
-    /// [`MAX_RETRY`]. Nothing is scheduled while conclusions are missing because of a fault of the reasoner.
+    /// [`MAX_RETRY`].
     fn schedule_retry(&mut self, attempt: u32, outcome: &Outcome) {
         if outcome.proved || self.beliefs.fault.is_some() {
             return;
@@ -246,8 +240,6 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Requests those designs of the action under way that must be sent (see [`must_be_sent`]). Does nothing if the
-    /// action is suspended or being cancelled.
     fn configure_again(&mut self, answers: &mut Vec<Answer>) {
         let Some(mut running) = self.beliefs.running.take() else { return };
         let is_active = !running.suspended && !running.cancelling;
@@ -335,8 +327,7 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Returns `true` if `steps` are the action under way followed by the current plan. Only actions and their
-    /// arguments are compared.
+    /// Returns `true` if `steps` are the current plan. Compares only actions and their arguments.
     fn is_current(&self, steps: &[PlannedStep]) -> bool {
         let key = |step: &PlannedStep| (step.action.clone(), step.arguments.clone());
         let Some(plan) = &self.beliefs.plan else { return false };
@@ -344,8 +335,8 @@ impl Adaptation<'_> {
         running.chain(plan).map(key).eq(steps.iter().map(key))
     }
 
-    /// Returns the reason to keep the current plan if the benefit of `outcome` is too small. Returns `None` if it is
-    /// sufficient, or if the metric of the current plan is undefined.
+    /// Returns the reason to keep the current plan, or `None` if the benefit of `outcome` is sufficient or the metric
+    /// of the current plan is undefined.
     fn insufficient_benefit(&self, outcome: &Outcome) -> Option<String> {
         let current_metric = self.beliefs.metric()?;
         if benefit(self.beliefs, self.settings, &current_metric, &outcome.cost).is_some() {
@@ -356,8 +347,6 @@ impl Adaptation<'_> {
         Some(format!("the benefit of another plan is {benefit}, the minimum is {minimum}"))
     }
 
-    /// Adopts a plan. The action under way gets the designs of the plan's first step, and is resumed if it was
-    /// suspended.
     fn adopt(&mut self, outcome: Outcome, answers: &mut Vec<Answer>) {
         let Outcome { steps, proved, .. } = outcome;
         self.beliefs.unproved = !proved;
@@ -376,8 +365,6 @@ impl Adaptation<'_> {
         self.beliefs.plan = Some(steps);
     }
 
-    /// If `is_necessary`, also drops the current plan. Planning then pauses until something changes or another search
-    /// is due.
     fn report_no_plan(&mut self, is_necessary: bool, outcome: Outcome, answers: &mut Vec<Answer>) {
         let status = if outcome.proved { "unsolvable" } else { "unknown" };
         answers.push(Answer::PlanNone { status, because: outcome.because, blocking: outcome.blocking });
@@ -388,8 +375,8 @@ impl Adaptation<'_> {
     }
 }
 
-/// Returns `true` if the plan `going_on`, which begins with the remainder of the action under way, keeps the action's
-/// present designs. The remainder is then executable, because the planner has simulated it.
+/// Returns `true` if the plan `going_on` keeps the present designs of the action under way. The planner has simulated
+/// the remainder of the action, so the remainder is then executable.
 fn goes_on_with(running: &Running, going_on: &Outcome) -> bool {
     let first = going_on.steps.as_ref().and_then(|steps| steps.first());
     first.is_some_and(|first| first.configuration == running.step.configuration)

@@ -23,8 +23,7 @@ impl Findings {
         self.lost.is_empty() && self.gained.is_empty() && self.errors.is_empty()
     }
 
-    /// Adds later findings. A design that is lost and then gained, or gained and then lost, is removed from both `lost`
-    /// and `gained`.
+    /// Adds later findings. A design that is lost and then gained, or gained and then lost, counts as neither.
     pub(super) fn extend(&mut self, later: Self) {
         for design in later.lost {
             if !self.gained.remove(&design) {
@@ -79,8 +78,6 @@ pub(crate) fn doubts(
     answers
 }
 
-/// Handles a change of the knowledge base: reports contradictions, and analyzes designs and objectives if their
-/// availability or statuses may have changed.
 pub(super) fn analyze_change(beliefs: &mut Beliefs, base: Base, answers: &mut Vec<Answer>) -> Findings {
     if base > Base::Nothing {
         report_contradictions(beliefs, answers);
@@ -152,7 +149,6 @@ fn statuses(knowledge: &Knowledge) -> BTreeMap<String, Vec<String>> {
     in_error.map(|objective| (objective.individual.name, objective.statuses)).collect()
 }
 
-/// Returns the rules and stated facts that make a design unavailable, as lines of text.
 pub(crate) fn ruled_out(knowledge: &Knowledge, design: &str) -> Vec<String> {
     unavailable(knowledge, design).iter().flat_map(|derivation| reasons(knowledge, derivation)).collect()
 }

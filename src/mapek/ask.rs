@@ -25,7 +25,6 @@ pub(crate) struct Outcome {
 #[derive(Debug)]
 pub(crate) struct Question<'a> {
     pub mission: &'a Mission,
-    /// The believed problem, filled from the knowledge base.
     pub problem: &'a Problem,
     /// The action under way, if every plan must begin with its remainder.
     pub running: Option<&'a Running>,
@@ -57,7 +56,6 @@ impl Outcome {
         json!([steps, self.cost.to_string(), self.proved, self.because, self.blocking])
     }
 
-    /// Inverse of [`Outcome::to_record`]. Returns `None` if the record is malformed.
     pub fn from_record(record: &Value) -> Option<Self> {
         let [steps, cost, proved, because, blocking] = record.as_array()?.as_slice() else { return None };
         let text = |value: &Value| value.as_str().map(ToOwned::to_owned);

@@ -40,7 +40,6 @@ pub struct Beliefs {
     pub(super) reached: bool,
     /// Whether planning has failed and pauses until something changes or another search is due.
     pub(super) stuck: bool,
-    /// Whether the plan is not proved optimal.
     pub(super) unproved: bool,
     pub(super) retry: Option<Retry>,
     /// The step that failed last, with its number of consecutive failures.
@@ -49,9 +48,9 @@ pub struct Beliefs {
     pub(super) improvement_causes: BTreeSet<String>,
     /// Time at which the last entry of `improvement_causes` was added, since the start of the mission.
     pub(super) improvement_since: Duration,
-    /// Number of actions requested since the start.
+    /// Number of requested actions, which is also the number of the last one.
     pub(super) actions: u64,
-    /// Number of effects requested since the start.
+    /// Number of created effects, which is also the number of the last one.
     pub(super) effects: u64,
     pub(super) outstanding: BTreeMap<u64, Effect>,
     pub(super) receipts: Receipts,
@@ -66,7 +65,6 @@ pub struct Beliefs {
     pub(super) filters: FilterStates,
 }
 
-/// An action that was requested and has not ended.
 #[derive(Debug, Clone, PartialEq)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub(super) struct Running {
@@ -93,7 +91,6 @@ pub(super) struct Running {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Retry {
-    /// Due time, since the start of the mission.
     pub(super) at: Duration,
     /// Number of consecutive searches without a proved outcome.
     pub(super) attempt: u32,
@@ -211,7 +208,6 @@ impl Beliefs {
         self.running.as_ref().map(|running| (running.action, &running.step))
     }
 
-    /// Completed share of the action under way, from 0 to 1.
     pub(crate) fn progress(&self) -> Option<&BigRational> {
         self.running.as_ref().map(|running| &running.progress)
     }
@@ -272,8 +268,8 @@ impl Beliefs {
         self.reached
     }
 
-    /// Returns `true` if a design is believed to be available. If the problem decides on the availability of the
-    /// design, the problem has to state it. Without a knowledge base, all designs are available.
+    /// Returns `true` if a design is believed to be available: according to the knowledge base, or to the problem if
+    /// that decides. Without a knowledge base, all designs are available.
     pub(super) fn is_available(&self, design: &str) -> bool {
         self.mission.knowledge().is_none() || self.available.contains(design) || self.mission.provides(design)
     }
@@ -283,7 +279,6 @@ impl Beliefs {
         steps.flat_map(|step| step.configuration.iter().map(|(_, design)| design))
     }
 
-    /// Returns the problem in its believed state, with the facts of the knowledge base added.
     pub(super) fn filled(&self) -> Arc<Problem> {
         self.mission.current()
     }
@@ -313,7 +308,6 @@ impl Beliefs {
         metric_of(&domain, &problem, &self.remaining_plan())
     }
 
-    /// Returns the reason why the remainder of the action under way cannot be executed, or `None` if it can.
     pub(super) fn obstacle(&self, running: &Running) -> Option<String> {
         let (domain, problem) = self.remaining_mission();
         let violation = advance(&domain, &problem, &running.step.to_plan_step(), false).err()?;

@@ -23,7 +23,6 @@ pub(super) struct Changes {
     pub(super) interruptions: Vec<String>,
     /// Reasons to plan, as sentences, that apply even if the current plan is valid.
     pub(super) reasons: Vec<String>,
-    /// Answers about reports held by filters and about silent sensors.
     pub(super) filtered: Vec<Answer>,
 }
 

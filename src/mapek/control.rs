@@ -65,7 +65,6 @@ pub(crate) fn time_of_line(
     }
 }
 
-/// Changes and findings since the last deliberation, which the next deliberation considers.
 #[derive(Debug, Clone, Default)]
 struct Agenda {
     changes: Changes,

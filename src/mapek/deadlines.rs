@@ -18,8 +18,8 @@ use crate::number;
 /// acknowledged in time.
 pub(super) type Expired = Vec<u64>;
 
-/// Repeats overdue effects. Repeats the request of an overdue action, cancels the action, or only reports the delay.
-/// Returns the reconfigurations that count as failed. Does nothing if deadlines are disabled, i.e. if the setting is 0.
+/// Repeats overdue effects. For an overdue action, repeats its request, cancels it, or only reports the delay. Returns
+/// the reconfigurations that count as failed. Does nothing if the deadline is 0.
 pub(super) fn handle_overdue(
     beliefs: &mut Beliefs,
     settings: &Settings,
@@ -33,7 +33,6 @@ pub(super) fn handle_overdue(
     expired
 }
 
-/// Returns the time of the next deadline, since the start of the mission; `None` if there is no deadline.
 pub(super) fn due(beliefs: &Beliefs, settings: &Settings) -> Option<Duration> {
     if settings.deadline.is_zero() {
         return None;
@@ -56,7 +55,7 @@ pub(super) fn due(beliefs: &Beliefs, settings: &Settings) -> Option<Duration> {
     effects.chain(action).min()
 }
 
-/// Returns `true` if the effect requests an action. The deadline of the action then applies to the effect.
+/// The deadline of the action applies to its request.
 fn is_request(effect: &Effect) -> bool {
     matches!(effect.command, Command::Request { .. })
 }

@@ -17,7 +17,6 @@ pub(super) fn finish(beliefs: &mut Beliefs, answers: &mut Vec<Answer>) {
     answers.push(Answer::GoalReached);
 }
 
-/// Requests the action of a step, preceded by the reconfigurations that its designs need.
 pub(super) fn request(beliefs: &mut Beliefs, step: PlannedStep, answers: &mut Vec<Answer>) {
     beliefs.actions += 1;
     let action = beliefs.actions;
@@ -130,7 +129,6 @@ pub(super) fn objectives(beliefs: &mut Beliefs, step: Option<&PlannedStep>, answ
     analyze(beliefs, answers);
 }
 
-/// Requests the cancellation of the action under way, and drops the plan.
 pub(super) fn cancel(beliefs: &mut Beliefs, running: Running, because: String, answers: &mut Vec<Answer>) {
     beliefs.plan = None;
     effect(beliefs, running.action, Command::Cancel { because }, answers);

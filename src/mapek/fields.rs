@@ -29,7 +29,6 @@ pub(super) fn doubled_key(text: &str) -> Option<String> {
     doubled.map(|(_, key)| key.clone())
 }
 
-/// Keys of an object in the order of the text, including repetitions.
 struct Keys(Vec<String>);
 
 impl<'de> serde::Deserialize<'de> for Keys {
@@ -96,7 +95,7 @@ pub(super) fn fraction(value: &Value) -> Option<BigRational> {
     Some((fraction * &percent).round() / percent)
 }
 
-/// Parses a JSON object whose values are numbers, without rounding. Returns `None` for other JSON values.
+/// Parses a JSON object of numbers, without rounding.
 pub(super) fn numbers(value: &Value) -> Option<Vec<(String, BigRational)>> {
     let fields = value.as_object()?.iter();
     fields.map(|(name, value)| Some((name.clone(), number::from_json(value)?))).collect()

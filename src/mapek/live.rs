@@ -18,7 +18,6 @@ const MAX_CONFIGURATIONS: usize = 256;
 
 #[derive(Debug, Clone, Default)]
 pub(super) enum Live {
-    /// State before the first query: no planner has been built.
     #[default]
     Untried,
     Unsuited,

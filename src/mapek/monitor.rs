@@ -64,8 +64,8 @@ impl Monitor {
         &self.filters
     }
 
-    /// Applies the changes of belief that become due by the passage of time, e.g. reports that filters have held back.
-    /// Returns refusals of changes that do not fit the mission.
+    /// Applies the changes of belief that are due without an event, e.g. reports that filters have held back. Returns
+    /// refusals of changes that do not fit the mission.
     pub(super) fn elapse(&mut self, beliefs: &mut Beliefs, changes: &mut Changes) -> Vec<Refusal> {
         let due = self.filters.elapse(&mut beliefs.filters, beliefs.now, &mut changes.filtered);
         let mut update = BeliefUpdate { monitor: self, beliefs, changes };
@@ -254,8 +254,7 @@ impl BeliefUpdate<'_> {
         running.ok_or_else(|| Refusal::new("M305", format!("no action {action} is under way")))
     }
 
-    /// Records that the action under way has started, which also confirms the arrival of its request. Returns the
-    /// action.
+    /// A report of the start also confirms the arrival of the request.
     fn confirm_started(&mut self, action: u64) -> Result<&mut Running, Refusal> {
         let request = self.running(action)?.request;
         self.beliefs.confirm_request(request);
@@ -266,9 +265,8 @@ impl BeliefUpdate<'_> {
         Ok(running)
     }
 
-    /// Removes and returns the action under way, or returns a refusal if no action with this number is under way. The
-    /// effects of this action and of earlier ones are no longer outstanding, except reconfigurations, which belong to
-    /// functions.
+    /// Removes the action under way. The effects of this action and of earlier ones are no longer outstanding, except
+    /// reconfigurations, which belong to functions.
     fn end(&mut self, action: u64) -> Result<Running, Refusal> {
         self.running(action)?;
         let is_moot = |effect: &Effect| {
@@ -341,8 +339,7 @@ impl BeliefUpdate<'_> {
         Ok(())
     }
 
-    /// Returns the effects of a complete execution of `step`, regardless of its conditions. Returns `None` if the step
-    /// does not fit the domain.
+    /// Returns the effects of a complete execution of `step`, regardless of its conditions.
     fn advance(&self, step: &PlannedStep) -> Option<Advance> {
         let mission = &self.beliefs.mission;
         advance(mission.domain(), &self.beliefs.filled(), &step.to_plan_step(), true).ok()

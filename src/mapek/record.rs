@@ -151,7 +151,6 @@ fn restore_mission(beliefs: &mut Beliefs, data: &Value) -> Option<()> {
     Some(())
 }
 
-/// Restores all beliefs except the mission.
 fn restore_work(beliefs: &mut Beliefs, data: &Value) -> Option<()> {
     let number = |name: &str| data.get(name).and_then(Value::as_u64);
     let truth = |name: &str| data.get(name).and_then(Value::as_bool);

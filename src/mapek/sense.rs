@@ -71,7 +71,6 @@ impl BeliefUpdate<'_> {
         }
     }
 
-    /// Applies a sample of a measured attribute, unless the attribute's filter holds the sample back.
     pub(super) fn sampled(&mut self, attribute: &str, value: &BigRational) -> Result<(), Refusal> {
         let is_known = self.monitor.attributes.contains(attribute);
         let (states, now, filtered) =
@@ -85,7 +84,6 @@ impl BeliefUpdate<'_> {
         }
     }
 
-    /// Applies a reported status of a component, unless the component's filter holds the report back.
     pub(super) fn component(&mut self, component: &str, status: Status) -> Result<(), Refusal> {
         let name = match self.monitor.components.get(component) {
             Some(name) => Some(name.clone()),

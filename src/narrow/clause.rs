@@ -5,7 +5,6 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use pddl::ast::{Condition, Derived, Name, Term, TypedName};
 
-/// A ground fact: predicate and arguments.
 pub(super) type Fact = (Name, Vec<Name>);
 
 /// A Horn clause `head(arguments) ← body`, possibly with inequalities in the body. Its variables
@@ -32,7 +31,6 @@ pub(super) enum Operand {
 }
 
 impl Literal {
-    /// Returns the predicate of an atom, or `None` for an equality or inequality.
     pub fn name(&self) -> Option<&Name> {
         match self {
             Self::Holds(name, _) => Some(name),
@@ -40,7 +38,7 @@ impl Literal {
         }
     }
 
-    /// Returns `true` if the literal is a type test, i.e. its predicate is the relation of a type.
+    /// Returns `true` if the predicate is the relation of a type.
     pub fn is_type(&self) -> bool {
         matches!(self, Self::Holds(name, _) if name.as_str().contains(' '))
     }

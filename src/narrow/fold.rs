@@ -49,8 +49,7 @@ impl Folded {
         Self { settled, possible }
     }
 
-    /// Removes the axioms of settled predicates from a domain, and restricts the other derived
-    /// predicates by their bounds.
+    /// Removes the axioms of settled predicates, and restricts the other derived predicates by their bounds.
     pub fn shorten(&self, domain: &mut Domain) {
         domain.derived.retain(|axiom| !self.settled.contains_key(&axiom.head.identifier.name));
         self.possible.restrict(domain);
@@ -164,7 +163,6 @@ type Bindings<'k> = BTreeMap<&'k Name, &'k Name>;
 /// Argument tuples for which a predicate holds, in the order of their discovery and as a set.
 type Rows = (Vec<Vec<Name>>, HashSet<Vec<Name>>);
 
-/// Extensions of predicates (stated and derived facts), and all objects.
 struct Relations<'o> {
     relations: HashMap<Name, Rows>,
     objects: &'o BTreeSet<Name>,

@@ -29,7 +29,6 @@ enum Argument {
     Of(Vec<Name>),
 }
 
-/// The predicates with an upper bound, and the data from which the bounds are computed.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Possible {
     bounded: BTreeSet<Name>,
@@ -129,8 +128,7 @@ impl Possible {
         facts
     }
 
-    /// Returns the facts of the companion predicates: one for each derived fact of a bounded
-    /// predicate.
+    /// Returns a fact of the companion predicate for each derived fact of a bounded predicate.
     pub fn bounds(&self, derived: BTreeSet<Fact>) -> impl Iterator<Item = Fact> {
         let bounded = derived.into_iter().filter(|(name, _)| self.bounded.contains(name));
         bounded.map(|(name, row)| (possible(&name), row))

@@ -135,9 +135,8 @@ fn is_bound(term: &Term, bound: &[&Name]) -> bool {
 /// or if the predicate may have a large extension).
 pub(super) type Parted = (BTreeMap<Name, Vec<Clause>>, BTreeMap<Name, Option<Vec<Clause>>>);
 
-/// Unfolds clauses until no further predicate becomes settled, i.e. has only clauses without open
-/// atoms in the body (see the head of this file). Returns the clauses of settled predicates and those of the other, open
-/// predicates.
+/// Unfolds clauses until no further predicate becomes settled (see the head of this file). Returns the clauses of the
+/// settled and of the open predicates.
 pub(super) fn settle(
     mut clauses_by_head: BTreeMap<Name, Option<Vec<Clause>>>,
     changed: &BTreeSet<Name>,
@@ -225,8 +224,8 @@ impl Unfold<'_> {
         Some(done.into_iter().collect())
     }
 
-    /// Returns `true` if the clause is redundant: its body contains its head, or an atom whose guard (class that its
-    /// argument must belong to) already implies the head.
+    /// Returns `true` if the clause is redundant: its body contains its head, or an atom whose guard already implies
+    /// the head.
     fn says_nothing(&self, clause: &Clause) -> bool {
         clause.body.iter().any(|part| {
             let Literal::Holds(name, operands) = part else { return false };

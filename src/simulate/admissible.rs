@@ -47,13 +47,11 @@ impl<'p> Admission<'p> {
         Self { domain, problem }
     }
 
-    /// Returns `true` if the collected conditions hold for the step with its current designs.
     pub(super) fn admits(&self, step: &PlannedStep) -> bool {
         advance(&self.domain, self.problem, &step.to_plan_step(), false).is_ok()
     }
 }
 
-/// Removes the conditions that mention a parameter in `open`.
 fn leave_open(action: &mut Action, open: &[Name]) {
     match &mut action.body {
         ActionBody::Instantaneous { precondition, .. } => drop_open(precondition, open),

@@ -134,8 +134,7 @@ struct Stage {
 }
 
 impl Stage {
-    /// Runs until the mission ends, and returns the reason for its end. Returns `None` if a limit
-    /// is reached first.
+    /// Returns the reason for the end of the mission, or `None` if a limit is reached first.
     fn play(
         &mut self,
         limits: &Limits,
@@ -198,7 +197,6 @@ impl Stage {
         }
     }
 
-    /// Records the current time if the running action stalls (cannot proceed) and no earlier stall is pending.
     fn record_stall(&mut self) {
         if self.stalled_since.is_none() && !self.world.goes_on() {
             self.stalled_since = Some(self.world.time);

@@ -56,7 +56,6 @@ pub struct World {
     pub lost: bool,
     /// Greatest completed share of the action that inspects the pipeline, from 0 to 1.
     pub inspected: f64,
-    /// Time at which the condition "pipeline found" first held.
     pub found: Option<f64>,
 }
 
@@ -121,7 +120,6 @@ impl World {
         }
     }
 
-    /// Executes a command, and returns the events that the robot reports immediately.
     pub fn obey(&mut self, effect: &Effect) -> Vec<Event> {
         match &effect.command {
             Command::Request { step } => {

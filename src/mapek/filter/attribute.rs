@@ -29,13 +29,12 @@ pub(crate) type Micros = u64;
 /// Side of a bound on which a design can be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Side {
-    /// Values that are at least the bound, i.e. a lower bound.
+    /// A lower bound.
     Least,
-    /// Values that are at most the bound, i.e. an upper bound.
+    /// An upper bound.
     Most,
 }
 
-/// A value beyond which a design cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Bound {
     pub value: BigRational,
@@ -59,7 +58,6 @@ pub enum Stale {
 }
 
 impl Stale {
-    /// Key of the outcome in manifests and answers.
     pub(crate) fn word(self) -> &'static str {
         match self {
             Self::Keep => "keep",
@@ -72,7 +70,6 @@ impl Stale {
 /// Filter of one attribute. Any field values are valid; the default accepts every sample at once.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct AttributeFilter {
-    /// Bounds of designs, in any order.
     pub bounds: Vec<Bound>,
     /// Number of the last `of` samples that must have crossed a bound before the crossing is believed; 0 and 1 disable
     /// the condition.
@@ -215,7 +212,6 @@ impl AttributeFilter {
         lasted && agreeing >= self.agree
     }
 
-    /// Believes a sample whose crossing of bounds is confirmed, and ends the crossing.
     fn accept(&self, state: &mut AttributeState, value: &BigRational) -> Verdict {
         let target = match &state.believed {
             Some(current) => self.target(current, value).into_owned(),
@@ -228,22 +224,18 @@ impl AttributeFilter {
         Verdict::Accepted(target)
     }
 
-    /// Returns the earliest time at which a crossing is confirmed or the sensor becomes silent without a further
-    /// sample.
     pub(crate) fn due(&self, state: &AttributeState) -> Option<Micros> {
         let silent = self.silent_at(state);
         let confirmed = self.confirmed_from(state);
         [silent, confirmed].into_iter().flatten().min()
     }
 
-    /// Returns the time at which the sensor will count as silent; `None` if the sensor is silent already or has no
-    /// period.
     fn silent_at(&self, state: &AttributeState) -> Option<Micros> {
         let period = self.period.filter(|_| !state.silent)?;
         Some(state.last_sample_time.unwrap_or(0).saturating_add(period).saturating_add(1))
     }
 
-    /// Returns the time at which a crossing has lasted for the debounce time; `None` without a crossing or if too few
+    /// Returns the time at which a crossing is confirmed by the debounce time; `None` without a crossing or if too few
     /// samples agree.
     fn confirmed_from(&self, state: &AttributeState) -> Option<Micros> {
         let (since, _) = state.crossing.as_ref()?;

@@ -12,7 +12,6 @@ use crate::mapek::{Loop, Observation, PlannedStep, Settings, Watch};
 use crate::mission::Mission;
 use crate::setup::Setup;
 
-/// A mission with the event lines from which the test draws at random.
 struct World {
     name: String,
     mission: Mission,
@@ -136,8 +135,7 @@ struct Tally {
 }
 
 impl Tally {
-    /// Plans incrementally and from scratch, and asserts that the plans are equal. With `goes_on`, the plans continue
-    /// the action under way.
+    /// With `goes_on`, the plans continue the action under way.
     fn compare(&mut self, control: &mut Loop, goes_on: bool, context: &dyn Fn() -> String) {
         let problem = control.beliefs.filled();
         let running = control.beliefs.running.as_ref().filter(|_| goes_on);
@@ -167,8 +165,6 @@ impl Tally {
     }
 }
 
-/// Applies `count` random events. After each event, compares incremental plans with plans from scratch, with and
-/// without the action under way.
 fn check(world: &World, seed: u64, count: usize) -> Tally {
     let mut random = fastrand::Rng::with_seed(seed);
     let mut control = Loop::new(world.mission.clone(), Settings::default()).expect("a loop");

@@ -36,7 +36,6 @@ use crate::message::Message;
 use crate::mission::conditions::written;
 use crate::number;
 
-/// Maximum number of variable bindings that are examined; further ones are not checked.
 const BUDGET: usize = 50_000;
 
 /// A numeric function with arguments for which an action needs a value that is missing.
@@ -54,7 +53,6 @@ pub struct MissingValue {
     pub(super) symbol: String,
     /// `true` if the function has no value for any arguments, and no action assigns one.
     pub(super) is_silent: bool,
-    /// `true` if the value is probably missing by mistake.
     pub(super) is_likely: bool,
 }
 
@@ -230,8 +228,7 @@ impl<'m> Numbers<'m> {
         }
     }
 
-    /// Adds to `negative` the negative durations of an action, as far as they follow from values
-    /// that nothing changes.
+    /// Considers only durations that follow from values that nothing changes.
     fn negative_durations(&self, action: &Action, negative: &mut BTreeSet<NegativeDuration>) {
         let ActionBody::Durative { duration, .. } = &action.body else { return };
         let conditions = conditions(&action.body);
