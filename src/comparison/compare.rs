@@ -73,7 +73,6 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// Penalised time of the first candidate of a kind; `None` if it is missing or infinite.
     fn penalised(&self, kind: char) -> Option<f64> {
         self.candidates.iter().find(|candidate| candidate.kind == kind)?.measures.penalised_time
     }

@@ -64,7 +64,6 @@ impl Compared<'_> {
     }
 }
 
-/// `actions` converts the steps of the plan to actions of the process.
 fn solve(
     mission: &Mission,
     problem: impl FnOnce(&Mission) -> Result<Problem, Errors>,

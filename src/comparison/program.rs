@@ -120,7 +120,6 @@ impl ProcessWriter<'_> {
         variables
     }
 
-    /// Returns the guard "the mission is running": not at the goal, and no move has failed.
     fn running(&self) -> Expr {
         let away = Expr::name("l").op(BinaryOp::NotEqual, Expr::int(self.mission.goal as i64));
         all(std::iter::once(away).chain(self.risk.failures.then(|| not(Expr::name("failed")))))

@@ -120,8 +120,6 @@ impl Referee<'_> {
         self.mission.battery.filter(|_| self.risk.battery).map_or(0, |battery| battery.reserve)
     }
 
-    /// Returns the action of a policy in a state. Returns `None` if the state was not explored, or if the policy
-    /// chooses no action there.
     pub fn decision(&self, policy: &[u32], situation: Valuation) -> Option<Action> {
         let state = State::from(situation);
         let number = self.explored.states.number(self.process.code(&state), &state)?;

@@ -36,7 +36,6 @@ pub struct Tasked {
     moves: Vec<HashMap<Act, (usize, usize)>>,
 }
 
-/// Name of a ground action and its arguments.
 type Act = (String, Vec<String>);
 
 impl Tasked {

@@ -293,7 +293,6 @@ impl Whole<'_> {
         Verdict::Together(self.conflict(at, offer))
     }
 
-    /// Returns the conflict with other choices because of which a usable and preferred design was not chosen.
     fn conflict(&self, at: usize, offer: &Offer) -> String {
         let chosen_elsewhere =
             self.needing.iter().zip(self.designs).enumerate().filter(|(other, _)| *other != at);

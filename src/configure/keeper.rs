@@ -323,7 +323,6 @@ impl Keeper {
         self.configurator.revert(&objective, from.as_deref())
     }
 
-    /// Asserts the beliefs that filters change by the passing of time.
     fn elapse(&mut self, answers: &mut Vec<KeeperAnswer>) {
         let mut filter_answers = Vec::new();
         let due: Vec<Accepted> = self.filters.elapse(&mut self.states, self.now, &mut filter_answers);

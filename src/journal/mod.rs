@@ -96,7 +96,6 @@ pub struct Journal {
     unrecorded: Unrecorded,
     /// `true` if a write failed and the loop continued without the journal. Nothing more is written then.
     is_incomplete: bool,
-    /// Message about the failed write, until it is added to the next answers.
     notice: Option<String>,
 }
 
@@ -414,7 +413,6 @@ struct Resumed<'c> {
     segments: Vec<&'c Segment>,
     observations: u64,
     unfinished: Option<Unfinished>,
-    /// Numbers and lines of missing or damaged snapshots, which have to be written again.
     missing_snapshots: Vec<(u64, String)>,
 }
 

@@ -5,7 +5,6 @@ use std::borrow::Cow;
 
 use serde::Deserialize;
 
-/// The fields of an answer that determine its keys.
 #[derive(Deserialize)]
 struct About<'a> {
     #[serde(borrow, default)]
@@ -32,7 +31,6 @@ pub(super) fn design_key(design: &str) -> String {
     format!("design {design}")
 }
 
-/// Returns the keys that an answer, given as JSON, defines.
 pub(super) fn keys(answer: &str) -> Vec<String> {
     let Ok(about) = serde_json::from_str::<About>(answer) else { return Vec::new() };
     match about.answer.as_ref() {

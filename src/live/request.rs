@@ -45,7 +45,6 @@ impl Request {
         }
     }
 
-    /// Returns `None` while the request is incomplete.
     fn parse(bytes: &[u8]) -> Option<Result<Self, Refused>> {
         let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
         let mut parsed = httparse::Request::new(&mut headers);

@@ -22,7 +22,6 @@ const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(10);
 
 const MAX_CONNECTIONS: usize = 16;
 
-/// Maximum time that the program waits at the end of a run, so that clients receive the last lines.
 const SHUTDOWN_GRACE: Duration = Duration::from_millis(500);
 
 const PAGE: &str = include_str!("page/index.html");

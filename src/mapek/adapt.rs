@@ -189,8 +189,6 @@ impl Adaptation<'_> {
         self.beliefs.retry.is_some_and(|scheduled| scheduled.at <= self.beliefs.now)
     }
 
-    /// Schedules another search after a search without a proved outcome. The pause doubles with each attempt, up to
-    /// [`MAX_RETRY`].
     fn schedule_retry(&mut self, attempt: u32, outcome: &Outcome) {
         if outcome.proved || self.beliefs.fault.is_some() {
             return;

@@ -14,7 +14,6 @@ use crate::mapek::monitor::Base;
 pub(super) struct Findings {
     pub(super) lost: BTreeSet<String>,
     pub(super) gained: BTreeSet<String>,
-    /// Sentences about the objectives that are in error and whose statuses have changed.
     pub(super) errors: Vec<String>,
 }
 
@@ -180,7 +179,6 @@ fn why_objective(knowledge: &Knowledge, objective: &str) -> Vec<String> {
     derivations.iter().flat_map(|derivation| reasons(knowledge, derivation)).collect()
 }
 
-/// Formats a derivation as lines: the labels of its rules, then the stated facts that support it.
 fn reasons(knowledge: &Knowledge, derivation: &Derivation) -> Vec<String> {
     let symbols = knowledge.engine().symbols();
     let mut lines = Vec::new();

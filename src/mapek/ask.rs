@@ -15,7 +15,6 @@ pub(crate) struct Outcome {
     pub cost: BigRational,
     /// Whether the plan is proved optimal, or its absence is proved.
     pub proved: bool,
-    /// Reason for the absence of a plan.
     pub because: String,
     /// Unavailable designs that block every plan. Empty if not computed, or if there is no plan even with all designs;
     /// see [`planner::Replanner::blocking`].

@@ -30,7 +30,6 @@ pub struct Beliefs {
     pub(super) goal: Option<String>,
     pub(super) available: BTreeSet<String>,
     pub(super) statuses: BTreeMap<String, Vec<String>>,
-    /// Axioms and rules that the known facts violate, as last reported.
     pub(super) violated: BTreeSet<String>,
     /// Fault that stopped the reasoning, as last reported; `None` if the conclusions are complete.
     pub(super) fault: Option<Fault>,
@@ -42,7 +41,6 @@ pub struct Beliefs {
     pub(super) stuck: bool,
     pub(super) unproved: bool,
     pub(super) retry: Option<Retry>,
-    /// The step that failed last, with its number of consecutive failures.
     pub(super) failures: Option<(PlannedStep, u32)>,
     /// Names of designs that are available again, and an entry for changed facts. A better plan may then exist.
     pub(super) improvement_causes: BTreeSet<String>,
@@ -82,7 +80,6 @@ pub(super) struct Running {
     pub(super) last_report: Duration,
     /// Backoff factor: 0 after a report, 1 after the first missed deadline, then doubled by each further one.
     pub(super) overdue: u32,
-    /// Whether the start or progress of the action was reported.
     pub(super) started: bool,
     pub(super) progressed: bool,
     pub(super) resumed: bool,
@@ -92,7 +89,6 @@ pub(super) struct Running {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Retry {
     pub(super) at: Duration,
-    /// Number of consecutive searches without a proved outcome.
     pub(super) attempt: u32,
 }
 

@@ -2,7 +2,6 @@
 
 use crate::mapek::answer::Answer;
 
-/// Changes caused by one observation, or by all observations since the last deliberation.
 #[derive(Debug, Clone, Default)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub(super) struct Changes {

@@ -271,8 +271,6 @@ impl Loop {
         self.agenda.is_some()
     }
 
-    /// Handles a reconfiguration that was not acknowledged in time: it counts as failed, and the design of the function
-    /// becomes unknown.
     fn abandon(&mut self, effect: u64, changes: &mut Changes) {
         let Some(Command::Reconfigure { function, to, .. }) =
             self.beliefs.outstanding.get(&effect).map(|effect| effect.command.clone())
@@ -429,7 +427,6 @@ impl Loop {
         self.planner.limits = limits;
     }
 
-    /// Searches for a plan from the believed situation, without adopting it.
     pub(crate) fn plan_anew(&mut self) -> Option<Vec<PlannedStep>> {
         let outcome = self.adaptation().plan(true);
         self.planner.computed.clear();

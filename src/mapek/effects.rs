@@ -9,7 +9,6 @@ use crate::mapek::step::PlannedStep;
 
 const MAX_SUPERSEDED: usize = 64;
 
-/// Ends the mission, whose goal holds: drops the plan, and removes all objectives from the knowledge base.
 pub(super) fn finish(beliefs: &mut Beliefs, answers: &mut Vec<Answer>) {
     beliefs.reached = true;
     beliefs.plan = None;

@@ -95,7 +95,6 @@ pub(super) fn fraction(value: &Value) -> Option<BigRational> {
     Some((fraction * &percent).round() / percent)
 }
 
-/// Parses a JSON object of numbers, without rounding.
 pub(super) fn numbers(value: &Value) -> Option<Vec<(String, BigRational)>> {
     let fields = value.as_object()?.iter();
     fields.map(|(name, value)| Some((name.clone(), number::from_json(value)?))).collect()

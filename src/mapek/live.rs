@@ -101,7 +101,6 @@ impl Live {
     }
 }
 
-/// Returns the outcome that proves the absence of a plan.
 fn none(blocking: Vec<String>) -> Outcome {
     Outcome {
         steps: None,

@@ -40,14 +40,12 @@ const PLANNED: [&str; 9] = [
 /// Local names of the properties that hold values of quality attributes.
 const VALUES: [&str; 2] = ["hasValue", "qa_has_value"];
 
-/// Data for the interpretation of events: attributes, filters and caches. Not a part of the beliefs.
 #[derive(Debug, Clone)]
 pub(super) struct Monitor {
     /// IRIs and local names of the quality attributes of the knowledge base.
     pub(super) attributes: BTreeSet<String>,
     checked: HashSet<String>,
     pub(super) filters: Filters,
-    /// Cache of local names of components, by the reported name.
     pub(super) components: HashMap<String, String>,
 }
 

@@ -29,13 +29,11 @@ pub(crate) struct Planner {
     pub attempt: u32,
     /// Limits in addition to the time limit of one search.
     pub limits: Limits,
-    /// Recorded plans for replay, in order.
     pub recorded: VecDeque<Outcome>,
     /// Plans computed for the current decision, for the journal.
     pub computed: Vec<Outcome>,
     /// Whether searches are forbidden: only recorded, prepared and cached plans are used.
     pub forbids_search: bool,
-    /// Whether a plan was missing because searches are forbidden.
     pub is_missing: bool,
     /// Planning problems of the current deliberation with their outcomes; `None` if they are not logged.
     pub question_log: Option<Vec<(StoredQuestion, Outcome)>>,
@@ -96,7 +94,6 @@ impl Planner {
     }
 }
 
-/// Grounds the planning problem and searches for an optimal plan, without data from earlier searches.
 pub(super) fn from_scratch(question: &Question<'_>, limits: Limits, watch: &Watch) -> Outcome {
     let no_plan = Outcome::no_plan;
     let (mut domain, mut problem) =

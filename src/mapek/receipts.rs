@@ -91,8 +91,6 @@ impl Receipts {
         self.unanswered_superseded(function).chain(implied)
     }
 
-    /// Returns the function and the requested design of the superseded reconfiguration with number `effect`, if
-    /// recorded.
     pub(super) fn superseded(&self, effect: u64) -> Option<(&String, &String)> {
         let design = |(function, history)| Some((function, Received::superseded(history, effect)?));
         self.functions.iter().find_map(design)

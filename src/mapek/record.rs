@@ -34,7 +34,6 @@ impl Decision {
     }
 }
 
-/// Removes the explanations from an answer.
 fn essence(mut answer: Value) -> Value {
     let kind = answer["answer"].as_str().unwrap_or_default().to_owned();
     let mut strip = |list: &str, field: &str| {

@@ -49,7 +49,6 @@ impl Folded {
         Self { settled, possible }
     }
 
-    /// Removes the axioms of settled predicates, and restricts the other derived predicates by their bounds.
     pub fn shorten(&self, domain: &mut Domain) {
         domain.derived.retain(|axiom| !self.settled.contains_key(&axiom.head.identifier.name));
         self.possible.restrict(domain);

@@ -128,7 +128,6 @@ impl Possible {
         facts
     }
 
-    /// Returns a fact of the companion predicate for each derived fact of a bounded predicate.
     pub fn bounds(&self, derived: BTreeSet<Fact>) -> impl Iterator<Item = Fact> {
         let bounded = derived.into_iter().filter(|(name, _)| self.bounded.contains(name));
         bounded.map(|(name, row)| (possible(&name), row))
@@ -194,7 +193,6 @@ impl Possible {
     }
 }
 
-/// Returns the name of the companion of a predicate, i.e. of the static predicate that bounds it.
 pub(super) fn possible(name: &Name) -> Name {
     Name::new(&format!("possible-{name}"))
 }

@@ -161,7 +161,6 @@ pub(super) fn settle(
     }
 }
 
-/// Returns the predicates whose extension may differ between states.
 fn open(clauses_by_head: &BTreeMap<Name, Option<Vec<Clause>>>, changed: &BTreeSet<Name>) -> BTreeSet<Name> {
     let mut open = changed.clone();
     loop {

@@ -30,7 +30,6 @@ impl Simulation {
         self.watched(mission).1
     }
 
-    /// Parses the conditions and functions of the simulation. Also returns all mistakes in the section.
     pub(super) fn watched(&self, mission: &Mission) -> (Watched, Vec<Mistake>) {
         let mut checker = Checker { mission, mistakes: Vec::new() };
         checker.numbers(self);

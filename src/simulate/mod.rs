@@ -203,8 +203,6 @@ impl Stage {
         }
     }
 
-    /// Executes the effects in the controller's answers, and appends the resulting events to the
-    /// queue.
     fn take(&mut self, answers: &[Answer], queue: &mut VecDeque<Event>) {
         for effect in answers.iter().filter_map(Answer::effect) {
             if let Command::Reconfigure { function, from, to } = &effect.command {

@@ -361,8 +361,6 @@ impl World {
     }
 }
 
-/// Returns `true` if the initial state of the problem satisfies its goal, i.e. the empty plan is
-/// valid.
 fn is_valid(domain: &Domain, problem: &Problem) -> bool {
     validate(domain, problem, &PlanText::default(), &Options::default()).valid
 }

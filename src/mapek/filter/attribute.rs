@@ -29,9 +29,7 @@ pub(crate) type Micros = u64;
 /// Side of a bound on which a design can be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Side {
-    /// A lower bound.
     Least,
-    /// An upper bound.
     Most,
 }
 
@@ -138,10 +136,8 @@ pub(crate) enum Verdict {
     Held(Hold),
 }
 
-/// Change of a filter's state by the passage of time, without a sample.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Elapsed {
-    /// A crossing of a bound has lasted for the debounce time. Contains the newly believed value.
     Accepted(BigRational),
     /// The sensor counts as silent from now on. Contains the newly believed value if the filter uses [`Stale::Worst`]
     /// and has bounds.
@@ -203,8 +199,6 @@ impl AttributeFilter {
             && !state.suspect.as_ref().is_some_and(is_near)
     }
 
-    /// Returns `true` if a crossing, i.e. a change of a bound between satisfied and violated, has lasted for the
-    /// debounce time and enough samples agree.
     fn is_confirmed(&self, state: &AttributeState, now: Micros) -> bool {
         let agreeing = state.recent.iter().filter(|crosses| **crosses).count();
         let lasted =
@@ -235,8 +229,6 @@ impl AttributeFilter {
         Some(state.last_sample_time.unwrap_or(0).saturating_add(period).saturating_add(1))
     }
 
-    /// Returns the time at which a crossing is confirmed by the debounce time; `None` without a crossing or if too few
-    /// samples agree.
     fn confirmed_from(&self, state: &AttributeState) -> Option<Micros> {
         let (since, _) = state.crossing.as_ref()?;
         let confirmed = since.saturating_add(self.debounce);

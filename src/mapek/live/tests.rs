@@ -89,7 +89,6 @@ fn uuv(name: &str) -> World {
     World { name: name.to_owned(), mission: shipped(name), events }
 }
 
-/// The ground vehicle on a grid of `width` by `height` waypoints, with corridors of random kinds and lengths.
 fn map(width: usize, height: usize, seed: u64) -> World {
     let mut random = fastrand::Rng::with_seed(seed);
     let count = width * height;
@@ -135,7 +134,6 @@ struct Tally {
 }
 
 impl Tally {
-    /// With `goes_on`, the plans continue the action under way.
     fn compare(&mut self, control: &mut Loop, goes_on: bool, context: &dyn Fn() -> String) {
         let problem = control.beliefs.filled();
         let running = control.beliefs.running.as_ref().filter(|_| goes_on);

@@ -64,7 +64,6 @@ type Needed = BTreeMap<(Name, Vec<Name>), (bool, BTreeSet<String>)>;
 pub(super) struct NegativeDuration {
     pub(super) action: String,
     pub(super) duration: String,
-    /// The negative values from which the duration is computed, each as a phrase.
     pub(super) causes: Vec<String>,
     pub(super) design: Option<String>,
 }

@@ -68,7 +68,6 @@ pub(super) fn effects(body: &ActionBody) -> Vec<&Effect> {
     }
 }
 
-/// Visits the elementary parts of an effect, i.e. those that do not contain other effects.
 pub(super) fn walk<'a>(effect: &'a Effect, visit: &mut dyn FnMut(&'a Effect)) {
     match effect {
         Effect::And(parts) => parts.iter().for_each(|part| walk(part, visit)),
