@@ -22,8 +22,7 @@ pub type Listener<'a> = dyn FnMut(&[Candidate], &Costs) + 'a;
 /// Settings of a comparison.
 #[derive(Clone)]
 pub struct Config<'a> {
-    /// Sources of uncertainty in the process in which all candidates are evaluated, and whether it includes the
-    /// battery.
+    /// Optional parts of the process in which all candidates are evaluated: sources of uncertainty, and the battery.
     pub risk: Risk,
     /// Time added if a mission does not reach the goal. `None` for ten times the time that the first plan takes if
     /// nothing fails (at least 10; 10,000 if there is no plan).

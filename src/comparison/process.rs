@@ -1,8 +1,8 @@
 //! Converts a co-adaptation mission to a Markov decision process whose successors are computed on
 //! demand.
 //!
-//! The process corrects the published procedure: it has every route, reconfigurations at every place, a permanent
-//! collision flag, and only actions that need no energy or keep the battery at the reserve or above.
+//! The process corrects the published procedure: it has every route, reconfigurations at every place, and a permanent
+//! collision flag. An action that needs energy must keep the battery at the reserve or above.
 
 use fixedbitset::FixedBitSet;
 use num_rational::BigRational;

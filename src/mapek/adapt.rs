@@ -25,7 +25,7 @@ use crate::mapek::settings::Settings;
 use crate::mapek::step::PlannedStep;
 use crate::number;
 
-/// Number of consecutive failures of one step after which planning pauses until something else changes.
+/// Number of consecutive failures of one step after which the plan is dropped and planning pauses.
 const MAX_FAILURES: u32 = 3;
 
 /// Minimum base of the pauses after searches without a proved outcome. The base is the time limit of a search if that

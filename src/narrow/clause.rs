@@ -57,9 +57,9 @@ pub(super) fn of_type(r#type: &Name) -> Name {
     Name::new(&format!("type {type}"))
 }
 
-/// Converts a derived predicate to clauses without equalities. Returns `None` unless its condition consists of
-/// conjunctions, disjunctions and existential quantifiers over atoms, equalities and negated equalities, with distinct
-/// variable names and at most one type per variable.
+/// Converts a derived predicate to clauses without equalities. Supports conjunctions, disjunctions and existential
+/// quantifiers over atoms, equalities and negated equalities. Returns `None` for other conditions, for repeated
+/// variable names, and for variables with several types.
 pub(super) fn clauses(derived: &Derived) -> Option<Vec<Clause>> {
     let head = &derived.head;
     let mut variables: BTreeSet<Name> = BTreeSet::new();

@@ -38,9 +38,9 @@ pub(super) struct Possible {
 
 impl Possible {
     /// Determines which open predicates (predicates that actions can change) get a bound. A predicate has no bound if
-    /// one of its axioms is not a clause or leaves a variable unbound. It has no bound either if it depends on a
-    /// predicate without bound, on one that timed initial literals change, or on one that actions add with an argument
-    /// that they do not require to be a member of a class of the knowledge base.
+    /// one of its axioms is not a clause or leaves a variable unbound. Predicates that timed initial literals change
+    /// have no bound. If an action adds the predicate, each argument must be a constant, or a parameter for which the
+    /// action requires a class. A predicate that depends on a predicate without bound has no bound, either.
     pub fn new(
         domain: &Domain,
         open: &BTreeMap<Name, Option<Vec<Clause>>>,

@@ -1,12 +1,13 @@
 //! Determines the derived predicates of a domain that no action and no timed initial literal can change, and their
 //! clauses.
 //!
-//! A predicate is *open* if an action or a timed initial literal changes it, if it has an axiom that is not a clause,
-//! or if one of its clauses has an open atom in the body. Axioms about domains and ranges of properties make nearly
-//! every predicate open: for example, `(functionGrounding ?f ?fd)` implies that `?f` is a function and `?fd` is a
-//! function design. Such a clause derives nothing new if all facts of the predicate have arguments of the right class
-//! anyway. This is so if the initial facts have such arguments, and if every action that adds a `functionGrounding`
-//! requires, by a unary predicate that never changes, that the argument is in the class (a *guard*).
+//! A predicate is *open* if an action or a timed initial literal changes it, or if it has an axiom that is not a
+//! clause. It is also open if one of its clauses has an open atom in the body. Axioms about domains and ranges of
+//! properties make nearly every predicate open: for example, `(functionGrounding ?f ?fd)` implies that `?f` is a
+//! function and `?fd` is a function design. Such a clause derives nothing new if all facts of the predicate have
+//! arguments of the right class anyway. This is so if the initial facts have such arguments, and every action that adds
+//! a `functionGrounding` requires that the argument is in the class. Such a requirement, by a unary predicate that
+//! never changes, is a *guard*.
 //!
 //! Clauses of an open predicate are therefore unfolded \[1\]. A clause is dropped if its body contains its head, or an
 //! atom whose guard implies the head. If no open atom remains, the predicate is *settled*. Each step preserves the

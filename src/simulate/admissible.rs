@@ -1,8 +1,8 @@
 //! Designs with which an action can be executed now, for strategies that choose the design of each
 //! function separately.
 //!
-//! A design is *admissible* for a function of an action if it is available, and if all conditions of the action hold
-//! with it when the action is executed now. These conditions include the quality bounds of the action in the current
+//! A design is *admissible* for a function of an action if it is available and the action can be executed with it now,
+//! i.e. all conditions of the action hold. These conditions include the quality bounds of the action in the current
 //! context (`t:requiresQuality`) and a sufficient battery level. A condition that mentions the design of another
 //! function is omitted until that design is chosen.
 

@@ -3,7 +3,7 @@
 //! Bounds of designs divide the values of an attribute into *cells*: within a cell, each bound is either satisfied
 //! (kept) or violated (missed). A sample in the cell of the believed value is believed at once. A satisfied bound
 //! counts as violated as soon as a sample violates it. A violated bound counts as satisfied only after a sample that
-//! satisfies it by at least its band (a Schmitt trigger whose lower threshold is the bound \[1\]). A change of the cell
+//! satisfies it by at least its band (a Schmitt trigger with the bound as one threshold \[1\]). A change of the cell
 //! (*crossing*) is debounced.
 //!
 //! There is an exception if a lower bound of one design and an upper bound of another design are within one band of
@@ -299,9 +299,8 @@ impl AttributeFilter {
         }
     }
 
-    /// Returns a value that satisfies the fewest bounds, the lowest one if several do. Values between two bounds are
-    /// considered only if they are plausible; a value below all bounds may be less than the minimum, and a value above
-    /// all bounds greater than the maximum. Returns `None` without bounds.
+    /// Returns a value that satisfies the fewest bounds, the lowest one if several do; `None` without bounds. A value
+    /// between two bounds must be plausible. A value beyond all bounds may lie outside of the plausible range.
     pub(crate) fn worst(&self) -> Option<BigRational> {
         let unit = BigRational::from_integer(1.into());
         let two = BigRational::from_integer(2.into());

@@ -1,9 +1,9 @@
 //! Finds missing values of numeric functions, and negative durations.
 //!
-//! For each numeric function that an action needs, the analysis enumerates the argument tuples for which the
-//! static facts do not rule out the action (three-valued evaluation of its conditions, as in grounding).
-//! Tuples with two equal arguments are skipped, and the enumeration ends when its budget is spent. A mission
-//! may omit values for impossible cases, so a missing value causes a warning only in three cases:
+//! For each numeric function that an action needs, the analysis enumerates argument tuples. It omits tuples for which
+//! the static facts rule out the action (three-valued evaluation of its conditions, as in grounding). Tuples with two
+//! equal arguments are skipped, and the enumeration ends when its budget is spent. A mission may omit values for
+//! impossible cases, so a missing value causes a warning only in three cases:
 //!
 //! - The function has only constants as arguments.
 //! - At least three quarters of the tuples have a value.
