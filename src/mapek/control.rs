@@ -69,8 +69,7 @@ pub(crate) fn time_of_line(
 struct Agenda {
     changes: Changes,
     findings: Findings,
-    /// Whether the loop has just started. The first deliberation then reconsiders the plan only if something has
-    /// changed.
+    /// Whether the loop has just started. Without changes, the first deliberation then skips [`Adaptation::adapt`].
     is_start: bool,
 }
 
