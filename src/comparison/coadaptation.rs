@@ -282,10 +282,7 @@ impl Coadaptation {
         (energy / BigRational::from(BigInt::from(unit))).ceil().to_integer().to_u32().unwrap_or(u32::MAX)
     }
 
-    /// Checks that all probabilities are from 0 to 1, and that no time or energy is negative.
-    ///
-    /// # Errors
-    /// M122 for each move, change of configuration or loss with a number out of range.
+    /// Checks that all probabilities are from 0 to 1, and that no time or energy is negative (M122).
     pub(super) fn checked(self) -> Result<Self, Errors> {
         let (zero, one) = (BigRational::zero(), BigRational::one());
         let mut problems = Vec::new();
@@ -336,7 +333,6 @@ impl Coadaptation {
     }
 }
 
-/// Checks that the encoding of a state supports these numbers of places and configurations.
 pub(super) fn fits(places: usize, configurations: usize) -> Result<(), Errors> {
     if places <= MAX_PLACES && configurations <= MAX_CONFIGURATIONS {
         return Ok(());
@@ -390,7 +386,6 @@ impl Facts {
         result
     }
 
-    /// Returns the arcs with their traversals, which are given by the facts of the role `suits`.
     fn arcs(&self, roles: &Roles, places: &[String], designs: &[String]) -> Result<Vec<Arc>, Errors> {
         let index = |names: &[String], name: &str| {
             names.iter().position(|candidate| candidate == name).unwrap_or_default()

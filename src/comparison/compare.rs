@@ -22,8 +22,7 @@ pub type Listener<'a> = dyn FnMut(&[Candidate], &Costs) + 'a;
 /// Settings of a comparison.
 #[derive(Clone)]
 pub struct Config<'a> {
-    /// Sources of uncertainty in the process in which all candidates are evaluated, and whether it includes the
-    /// battery.
+    /// Optional parts of the process in which all candidates are evaluated: sources of uncertainty, and the battery.
     pub risk: Risk,
     /// Time added if a mission does not reach the goal. `None` for ten times the time that the first plan takes if
     /// nothing fails (at least 10; 10,000 if there is no plan).
@@ -73,8 +72,6 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// Returns the penalised time of the first candidate of a kind (see [`Candidate::kind`]). Returns `None` if there
-    /// is no such candidate or its time is infinite.
     fn penalised(&self, kind: char) -> Option<f64> {
         self.candidates.iter().find(|candidate| candidate.kind == kind)?.measures.penalised_time
     }

@@ -64,8 +64,6 @@ impl Compared<'_> {
     }
 }
 
-/// Computes a plan for the problem that `problem` returns, and the effort of planning. `actions` converts the
-/// steps of the plan to actions of the process.
 fn solve(
     mission: &Mission,
     problem: impl FnOnce(&Mission) -> Result<Problem, Errors>,

@@ -90,8 +90,8 @@ pub(super) fn report(
 /// Number of actions after which a run is considered infinite.
 const MAX_ACTIONS: usize = 100_000;
 
-/// Returns the total time of a policy if the component is lost after `moves` moves and nothing else fails. Returns
-/// `None` if the policy does not reach the goal.
+/// Total time of a policy if the component is lost after `moves` moves and nothing else fails. `None` if the policy
+/// does not reach the goal.
 fn anticipated(referee: &Referee<'_>, policy: &[u32], start: Valuation, moves: usize) -> Option<f64> {
     let mission = referee.mission;
     let (mut at, mut left, mut time) = (start, moves, 0.0);
@@ -109,8 +109,7 @@ fn anticipated(referee: &Referee<'_>, policy: &[u32], start: Valuation, moves: u
     None
 }
 
-/// Returns `true` if no action of the remaining plan needs the lost component. `configuration` is the configuration
-/// before these actions.
+/// Returns `true` if the remaining plan never needs the lost component. `configuration` is the configuration before it.
 fn carries_on(mission: &Coadaptation, configuration: usize, remaining_plan: &[Action]) -> bool {
     let mut configuration = configuration;
     remaining_plan.iter().all(|action| match action {
@@ -143,12 +142,9 @@ fn solved_again(referee: &Referee<'_>, from: Valuation, spent: f64) -> Result<Op
 /// Number of moves after which a loss is treated as if it never happened.
 const HORIZON: usize = 2000;
 
-/// Quantity for which a lower bound is computed: time or energy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Spent {
-    /// Time, in the mission's time unit.
     Time,
-    /// Energy, in the mission's unit of energy.
     Energy,
 }
 

@@ -246,7 +246,6 @@ fn manifest(name: &str) -> String {
     )
 }
 
-/// Returns a CSV file with the coordinates of the places, in metres.
 fn positions(map: &Map<'_>) -> String {
     map.nodes.iter().fold("place,x,y\n".to_owned(), |text, node| {
         text + &format!("{},{},{}\n", object(&node.id.text), node.coords.x, node.coords.y)
@@ -319,7 +318,6 @@ const DOMAIN: &str = "; A robot moves along arcs in one of its configurations. W
       (increase (total_time) (switch_time ?old ?new)))))
 ";
 
-/// Returns the domain. Without a battery, the parts about the battery are omitted.
 fn domain(options: &MapOptions) -> String {
     if options.battery.is_some() {
         return DOMAIN.to_owned();

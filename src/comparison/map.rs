@@ -42,7 +42,6 @@ pub(super) struct Coordinates {
     pub(super) y: f64,
 }
 
-/// A string with its position in the text.
 pub(super) struct Placed<'t> {
     pub(super) text: String,
     raw: &'t str,

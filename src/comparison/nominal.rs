@@ -24,7 +24,6 @@ pub(super) fn time_of(mission: &Coadaptation, plan: &[Action]) -> f64 {
     time
 }
 
-/// Returns the state after an action if nothing fails.
 pub(super) fn after(mission: &Coadaptation, at: Valuation, action: Action, risk: Risk) -> Valuation {
     let levels = |energy: &BigRational| if risk.battery { mission.levels(energy) } else { 0 };
     match action {

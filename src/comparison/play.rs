@@ -17,7 +17,6 @@ pub type Decide<'a> = dyn FnMut(State, u32) -> Option<u32> + 'a;
 struct FixedProcess<'a, 'b, N> {
     process: &'a Process<N>,
     decide: RefCell<&'a mut Decide<'b>>,
-    /// `true` if decisions depend on the number of executed steps.
     counts: bool,
 }
 
@@ -86,12 +85,9 @@ pub struct Measures {
 }
 
 /// Evaluates a decision rule. `process` must have all rewards of `REWARDS`. With `counts`, steps are counted, so that
-/// decisions can depend on their number. `penalty` is the time added if a mission does not reach the goal. `reserve`
-/// is the battery level for [`Measures::goal_with_reserve`]. `replans` is called after all decisions are made, and
-/// returns `true` for states in which a new plan was needed.
-///
-/// # Errors
-/// There are too many states.
+/// decisions can depend on their number. `penalty` is the time added if a mission does not reach the goal. `reserve` is
+/// the battery level for [`Measures::goal_with_reserve`]. `replans` is called after all decisions are made, and returns
+/// `true` for states in which a new plan was needed.
 pub fn play<N: Number>(
     process: &Process<N>,
     counts: bool,

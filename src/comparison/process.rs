@@ -1,8 +1,8 @@
 //! Converts a co-adaptation mission to a Markov decision process whose successors are computed on
 //! demand.
 //!
-//! The process corrects the published procedure: it has every route, reconfigurations at every place, a permanent
-//! collision flag, and only actions that need no energy or keep the battery at the reserve or above.
+//! The process corrects the published procedure: it has every route, reconfigurations at every place, and a permanent
+//! collision flag. An action that needs energy must keep the battery at the reserve or above.
 
 use fixedbitset::FixedBitSet;
 use num_rational::BigRational;
@@ -122,10 +122,8 @@ pub struct Process<N> {
     reserve: u32,
     moves: Vec<Vec<Vec<Move<N>>>>,
     changes: Vec<Vec<Reconfiguration<N>>>,
-    /// For each configuration, `true` if it needs the component that may be lost.
     lost: Vec<bool>,
     risk: Risk,
-    /// Number of selected rewards.
     rewards: usize,
     /// Number of battery levels, including the empty one; 1 without a battery.
     levels: usize,
@@ -273,7 +271,6 @@ impl<N: Number> Generator<N> for Process<N> {
         self.rewards
     }
 
-    /// Returns the number of state codes.
     fn codes(&self) -> Option<usize> {
         self.levels.checked_mul(self.moves.len())?.checked_mul(8)?.checked_mul(self.lost.len())
     }

@@ -59,7 +59,6 @@ pub(super) fn range(name: &str, greatest: usize, initial: usize) -> Variable {
     }
 }
 
-/// Creates a Boolean variable that is initially false.
 pub(super) fn flag(name: &str) -> Variable {
     Variable { range: None, initial: Some(Expr::bool(false)), ..range(name, 0, 0) }
 }
@@ -121,7 +120,6 @@ impl ProcessWriter<'_> {
         variables
     }
 
-    /// Returns the guard "the mission is running": not at the goal, and no move has failed.
     fn running(&self) -> Expr {
         let away = Expr::name("l").op(BinaryOp::NotEqual, Expr::int(self.mission.goal as i64));
         all(std::iter::once(away).chain(self.risk.failures.then(|| not(Expr::name("failed")))))

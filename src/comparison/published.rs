@@ -96,7 +96,7 @@ pub fn shortest_routes(mission: &Coadaptation, wanted: usize) -> Vec<Vec<usize>>
     found
 }
 
-/// Returns the length of the shortest route from each place to the goal, `None` where there is no route.
+/// Returns the length of the shortest route from each place to the goal.
 fn to_goal(mission: &Coadaptation, length: &dyn Fn(usize) -> u64) -> Vec<Option<u64>> {
     let mut entering = vec![Vec::new(); mission.places.len()];
     for (number, arc) in mission.arcs.iter().enumerate() {
@@ -120,9 +120,8 @@ fn to_goal(mission: &Coadaptation, length: &dyn Fn(usize) -> u64) -> Vec<Option<
     best
 }
 
-/// Returns the time, the energy and the probability of no collision that the published model predicts for a route
-/// with one configuration, including the initial change to this configuration. Returns `None` if the route cannot be
-/// traversed with it.
+/// Returns the time, the energy and the probability of no collision that the published model predicts. The initial
+/// change to the configuration is included. Returns `None` if the route cannot be traversed with the configuration.
 fn believed(mission: &Coadaptation, route: &[usize], configuration: usize) -> Option<[f64; 3]> {
     let way: Option<Vec<&Traversal>> =
         route.iter().map(|arc| mission.arcs[*arc].by[configuration].as_ref()).collect();
@@ -138,6 +137,9 @@ fn believed(mission: &Coadaptation, route: &[usize], configuration: usize) -> Op
 
 /// Runs the published procedure with the priority on time (0), energy (1) or safety (2). Returns `None` if no route
 /// can be traversed.
+///
+/// # Panics
+/// `priority` is greater than 2, and several configurations can traverse a route.
 pub fn published(mission: &Coadaptation, priority: usize) -> Option<Published> {
     let available = |configuration: &usize| mission.configurations[*configuration].available;
     let mut candidates = Vec::new();

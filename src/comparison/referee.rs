@@ -15,7 +15,6 @@ use crate::comparison::process::{Action, Process, REWARDS, Risk, State, Valuatio
 /// Name of the objective that a policy optimises, and the policy: the number of the chosen choice for each state.
 pub type NamedPolicy = (String, Vec<u32>);
 
-/// The decision process in which all candidates are evaluated, with its explored states.
 pub struct Referee<'a> {
     pub mission: &'a Coadaptation,
     pub risk: Risk,
@@ -121,8 +120,6 @@ impl Referee<'_> {
         self.mission.battery.filter(|_| self.risk.battery).map_or(0, |battery| battery.reserve)
     }
 
-    /// Returns the action of a policy in a state. Returns `None` if the state was not explored, or if the policy
-    /// chooses no action there.
     pub fn decision(&self, policy: &[u32], situation: Valuation) -> Option<Action> {
         let state = State::from(situation);
         let number = self.explored.states.number(self.process.code(&state), &state)?;

@@ -12,8 +12,6 @@ pub fn best_on_route(mission: &Coadaptation, route: &[usize]) -> Option<Vec<Acti
         .map(|(_, plan)| plan)
 }
 
-/// Returns the least cost of following a route, and the actions with this cost. `traversal_cost` and
-/// `switch_cost` define the cost. Returns `None` if the route cannot be traversed.
 fn best_by(
     mission: &Coadaptation,
     route: &[usize],

@@ -21,9 +21,9 @@ use crate::comparison::program::{
 };
 use crate::comparison::published::{ROUTES, shortest_routes};
 
-/// Returns the model of the published setting. Its variables are the route `r` (0 before it is chosen), the number
-/// `p` of arcs that the robot has traversed, the configuration `c` and, if the mission has a battery, its level `b`.
-/// The flag `rd` is set after a reconfiguration; the flag `collided` is true if the latest risky move has collided.
+/// Returns the model of the published setting. Its variables are the route `r` (0 before it is chosen), the number `p`
+/// of traversed arcs, and the configuration `c`. If the mission has a battery, `b` is its level. The flag `rd` is set
+/// after a reconfiguration; the flag `collided` is true if the latest risky move has collided.
 pub fn published_program(mission: &Coadaptation) -> Model {
     let routes = shortest_routes(mission, ROUTES);
     let writer = RouteWriter { mission, routes };

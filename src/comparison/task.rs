@@ -21,7 +21,6 @@ use crate::comparison::process::{Action, Valuation};
 use crate::message::{Errors, Message};
 use crate::mission::{Mission, Planning as _};
 
-/// Maximum number of states of a task that is converted to a process.
 const MAX_STATES: usize = 50_000;
 
 /// A mission as a process whose places are task states, with the mapping from actions of the task to moves of
@@ -37,7 +36,6 @@ pub struct Tasked {
     moves: Vec<HashMap<Act, (usize, usize)>>,
 }
 
-/// Name of a ground action and its arguments.
 type Act = (String, Vec<String>);
 
 impl Tasked {
@@ -151,7 +149,6 @@ struct Explorer<'a> {
     places: Vec<TaskState>,
     numbers: HashMap<TaskState, usize>,
     configurations: Vec<String>,
-    /// Traversals by configuration, for each pair of places.
     arcs: BTreeMap<(usize, usize), BTreeMap<usize, Traversal>>,
     origins: Vec<Option<(usize, Act)>>,
     /// For each place and each action that is executable there, the number of the next place and the configuration.

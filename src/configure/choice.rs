@@ -95,8 +95,8 @@ pub enum Verdict {
     RuledOut(Vec<String>),
     /// The design is not better than the chosen one: it misses more requirements, or equally many without more utility.
     Less,
-    /// The design is usable and preferred to the chosen one, if any, but was not chosen together with the designs of
-    /// the other objectives; the reason is a sentence.
+    /// The design is usable and preferred to the chosen one, if any, but conflicts with the choices for other
+    /// objectives. The reason is a sentence.
     Together(String),
 }
 
@@ -120,7 +120,6 @@ impl Group {
     }
 }
 
-/// Returns the local name of the design that currently provides an objective's function; `None` if no design does.
 pub(super) fn current(objective: &Objective) -> Option<&str> {
     let designs = objective.groundings.iter().filter_map(|grounding| grounding.design.as_ref());
     designs.map(|design| design.name.as_str()).next()
@@ -128,9 +127,6 @@ pub(super) fn current(objective: &Objective) -> Option<&str> {
 
 /// Chooses designs for the objectives for which `is_in_need` returns `true`; the other objectives keep their designs.
 /// At a limit, returns the best choice found.
-///
-/// # Errors
-/// The rules do not terminate.
 pub(super) fn choose(
     knowledge: &Knowledge,
     wishes: &Wishes,
@@ -250,7 +246,6 @@ impl<'a> Offers<'a> {
     }
 }
 
-/// The joint choice for all objectives in need, from which the verdict (decision) on each candidate design is derived.
 struct Whole<'a> {
     knowledge: &'a Knowledge,
     wishes: &'a Wishes,
@@ -298,8 +293,6 @@ impl Whole<'_> {
         Verdict::Together(self.conflict(at, offer))
     }
 
-    /// Returns the reason, as a sentence, why a usable and preferred design was not chosen: its conflict with other
-    /// choices.
     fn conflict(&self, at: usize, offer: &Offer) -> String {
         let chosen_elsewhere =
             self.needing.iter().zip(self.designs).enumerate().filter(|(other, _)| *other != at);

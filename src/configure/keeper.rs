@@ -207,9 +207,9 @@ impl Keeper {
         self.handle_at(observation, self.now)
     }
 
-    /// Handles a line and returns the answers. `now`, the time since the start, is used if the line has no time of
-    /// its own. Time never decreases: an earlier time is replaced by the time of the previous line. A line is refused
-    /// if its sequence number was used before, or if its number or its own time is too far ahead.
+    /// Handles a line and returns the answers. `now`, the time since the start, is used if the line has no time of its
+    /// own. Time never decreases: an earlier time is replaced by the time of the previous line. A line is refused if
+    /// its sequence number was used before or is too old, or if its number or its own time is too far ahead.
     pub fn handle_at(&mut self, observation: &Observation, now: Duration) -> Vec<KeeperAnswer> {
         let mut answers = Vec::new();
         self.lines += u64::from(!observation.is_timer);
@@ -323,8 +323,6 @@ impl Keeper {
         self.configurator.revert(&objective, from.as_deref())
     }
 
-    /// Asserts the beliefs that filters change because of the passing of time: reports that were held back and are
-    /// now due, and assumed values of silent sensors.
     fn elapse(&mut self, answers: &mut Vec<KeeperAnswer>) {
         let mut filter_answers = Vec::new();
         let due: Vec<Accepted> = self.filters.elapse(&mut self.states, self.now, &mut filter_answers);
@@ -368,8 +366,7 @@ impl Keeper {
         Ok(())
     }
 
-    /// Reports new conclusions, then chooses and requests designs for the objectives in need. Chooses nothing if
-    /// reasoning itself failed.
+    /// Reports new conclusions, then requests designs for the objectives in need, unless reasoning itself failed.
     fn adapt(&mut self, answers: &mut Vec<KeeperAnswer>) {
         self.infer(answers);
         let knowledge = self.configurator.knowledge();
@@ -448,7 +445,6 @@ impl Keeper {
         KeeperAnswer::Service(reconfigure)
     }
 
-    /// Reports designs whose availability has changed, and objectives whose status has changed.
     fn infer(&mut self, answers: &mut Vec<KeeperAnswer>) {
         let knowledge = self.configurator.knowledge();
         let (designs, objectives) = changes(knowledge, &mut self.available, &mut self.statuses);

@@ -76,7 +76,7 @@ impl Recoverable for Keeper {
         // find the same explanation. Therefore, the statements are asserted again. This also frees the names of former
         // values.
         if let Some(statements) = statements(&snapshot.0) {
-            // Cannot fail: these statements were evaluated before, within the budget and without a fault.
+            // An error, such as an exceeded budget, leaves the knowledge base unchanged.
             let _ = self.configurator.knowledge_mut().restore(&statements);
         }
         snapshot
@@ -114,8 +114,6 @@ fn snapshot(keeper: &Keeper) -> Snapshot {
     }))
 }
 
-/// Parses the assertions that were added to the assertions of the OWL documents, and the assertions that were
-/// removed.
 fn statements(data: &Value) -> Option<Statements> {
     let list = |name: &str| {
         data.get(name)?.as_array()?.iter().map(statement_from_record).collect::<Option<Vec<_>>>()
@@ -123,8 +121,8 @@ fn statements(data: &Value) -> Option<Statements> {
     Some(Statements { added: list("added")?, removed: list("removed")? })
 }
 
-/// Restores the state from a snapshot. Returns `None` if the snapshot is damaged or belongs to another knowledge base;
-/// the state may then be partly restored.
+/// Restores the state from a snapshot. Returns `None` if the snapshot is damaged; the state may then be partly
+/// restored.
 fn restore(keeper: &mut Keeper, data: &Value) -> Option<()> {
     let number = |name: &str| data.get(name).and_then(Value::as_u64);
     let knowledge = keeper.configurator.knowledge_mut();

@@ -42,8 +42,7 @@ pub(super) enum End {
 }
 
 impl Segment {
-    /// Returns `true` if the segment's last record is an `end` record, which refers to the next
-    /// segment.
+    /// Returns `true` if the segment ends with an `end` record, which refers to the next segment.
     pub(super) fn is_closed(&self) -> bool {
         self.records.last().is_some_and(|record| record.kind == "end")
     }
@@ -59,20 +58,13 @@ pub(super) struct SnapshotFile {
 
 #[derive(Debug, Default)]
 pub(super) struct JournalFiles {
-    /// Segments by number; for an unreadable segment, a description of its fault.
     pub(super) segments: BTreeMap<u64, Result<Segment, String>>,
-    /// Snapshots by number; for an unreadable snapshot, a description of its fault.
     pub(super) snapshots: BTreeMap<u64, Result<SnapshotFile, String>>,
     /// Number of the segment whose last write failed, if the loop continued after the failure.
     pub(super) incomplete: Option<u64>,
 }
 
 impl JournalFiles {
-    /// Reads all segments and snapshots of a directory. Unreadable files are stored with their
-    /// fault.
-    ///
-    /// # Errors
-    /// The directory cannot be listed.
     pub(super) fn read(directory: &Path) -> io::Result<Self> {
         let mut contents = Self::default();
         for entry in std::fs::read_dir(directory)? {
@@ -98,11 +90,7 @@ impl JournalFiles {
         name(if self.incomplete == Some(number) { INCOMPLETE } else { "journal" }, number)
     }
 
-    /// Checks that no segment is marked as incomplete, i.e. that the loop has not continued after a
-    /// failed write.
-    ///
-    /// # Errors
-    /// M324 if a segment is marked.
+    /// Returns the error M324 if a segment is marked as incomplete: then the loop has continued after a failed write.
     pub(super) fn require_complete(&self, directory: &Path) -> Result<(), Message> {
         let Some(number) = self.incomplete else { return Ok(()) };
         let text = format!(
@@ -115,8 +103,6 @@ impl JournalFiles {
         Err(Message::at("M324", &directory.display().to_string(), None, text).with_help(help))
     }
 
-    /// Returns the snapshot at the beginning of the segment with this number, or a description of
-    /// its fault.
     pub(super) fn start(&self, number: u64) -> Result<&SnapshotFile, String> {
         let name = name("snapshot", number);
         let missing = || Err(format!("{name} is missing"));
@@ -245,7 +231,6 @@ pub(super) const OLD_FORMAT: &str = "is of the format `metaplan-journal/2` or ol
                                      read; finish the mission with the version that wrote it, or restart the mission \
                                      with a journal in another directory";
 
-/// Describes the fault of a file whose first line is not a segment header.
 fn no_journal(first: &[u8]) -> String {
     let text = String::from_utf8_lossy(first);
     let old = text.contains("metaplan-journal/1");
@@ -277,9 +262,6 @@ fn read_private(path: &Path) -> io::Result<Vec<u8>> {
 }
 
 /// Checks that a path is a regular file or does not exist. A symbolic link is not a regular file.
-///
-/// # Errors
-/// The path is something else, or cannot be examined.
 pub(super) fn require_file(path: &Path) -> io::Result<()> {
     match std::fs::symlink_metadata(path) {
         Ok(found) if !found.is_file() => Err(io::Error::other("is not a regular file")),

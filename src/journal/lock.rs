@@ -14,9 +14,7 @@ use crate::message::Message;
 /// Number of further attempts to lock after a failed one; a killed process may still hold the lock for a short time.
 const LOCK_RETRIES: u32 = 10;
 const RETRY_INTERVAL: Duration = Duration::from_millis(20);
-/// Width in characters of the process number, which is in the first line of the lock file.
 const OWNER_CHARACTERS: usize = 10;
-/// Width in characters of the record count, which is in the second line of the lock file.
 const COUNT_CHARACTERS: usize = 20;
 
 #[derive(Debug)]
@@ -27,11 +25,8 @@ pub(super) struct Lock {
 }
 
 impl Lock {
-    /// Locks the journal in a directory. Stores this process's number in the lock file, so that
-    /// other processes can name it in their error message.
-    ///
-    /// # Errors
-    /// M322 if another process has locked the journal, M321 if the lock file cannot be used.
+    /// Stores this process's number in the lock file, so that other processes can name it in their message. Returns
+    /// M322 if another process holds the lock.
     pub(super) fn take(directory: &Path) -> Result<Self, Message> {
         let name = directory.join("lock");
         let failed = |error: &io::Error| broken(&name, &error.to_string());

@@ -96,7 +96,6 @@ pub struct Journal {
     unrecorded: Unrecorded,
     /// `true` if a write failed and the loop continued without the journal. Nothing more is written then.
     is_incomplete: bool,
-    /// Message about the failed write, until it is added to the next answers.
     notice: Option<String>,
 }
 
@@ -343,8 +342,6 @@ impl Journal {
         Ok(())
     }
 
-    /// Renames the last segment, so that the journal cannot be resumed. Renaming needs no disk
-    /// space.
     fn mark_incomplete(&self) -> io::Result<()> {
         let from = path(&self.directory, "journal", self.segment);
         std::fs::rename(from, path(&self.directory, INCOMPLETE, self.segment))?;
@@ -416,7 +413,6 @@ struct Resumed<'c> {
     segments: Vec<&'c Segment>,
     observations: u64,
     unfinished: Option<Unfinished>,
-    /// Numbers and lines of missing or damaged snapshots, which have to be written again.
     missing_snapshots: Vec<(u64, String)>,
 }
 

@@ -10,7 +10,6 @@ use sha2::{Digest as _, Sha256};
 
 pub(super) const FORMAT: &str = "metaplan-journal/3";
 
-/// Number of hexadecimal digits of the hash in front of each record.
 const DIGITS: usize = 16;
 
 /// A position between two records: the number of the next record, and the digits (hash) of the previous one.
@@ -25,8 +24,7 @@ impl Link {
         Self { next: 0, digits: "0".repeat(DIGITS) }
     }
 
-    /// Formats the next record as a line with its line break. Also returns the link after this
-    /// line.
+    /// Formats the next record as a line. Also returns the link after it.
     pub(super) fn line(&self, kind: &str, fields: &[Value]) -> (String, Self) {
         let mut array = vec![json!(self.next), json!(kind)];
         array.extend_from_slice(fields);
@@ -91,7 +89,6 @@ pub(super) fn opening(line: &[u8], kind: &str) -> Option<(Record, Link, Link)> {
     (record.kind == kind).then_some((record, before, after))
 }
 
-/// Parses a line into its record and its digits, without checking the digits.
 fn parse(line: &[u8]) -> Option<(Record, String)> {
     let (digits, text) = line.split_at_checked(DIGITS)?;
     let digits = std::str::from_utf8(digits).ok()?.to_owned();

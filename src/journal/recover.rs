@@ -12,7 +12,6 @@ use super::recovery::Recovery;
 use crate::mapek::{Observation, Recoverable};
 use crate::message::Message;
 
-/// Work that the previous process did not finish. It is completed after the journal is opened.
 #[derive(Debug)]
 pub(super) enum Unfinished {
     /// The loop has a pending deliberation: it has reacted to an observation, or has just been

@@ -17,19 +17,16 @@ use crate::mapek::DesignChange;
 const MAX_QUEUED_LINES: usize = 4096;
 const MAX_QUEUED_BYTES: usize = 16 << 20;
 
-/// Maximum number of retained lines for clients.
 const MAX_LINES: usize = 2000;
 
 /// Maximum total size of the retained lines in bytes. A single line may be longer.
 const MAX_RETAINED_BYTES: usize = 4 << 20;
 
-/// Maximum number of keys (parts of the loop's state, such as `function f`) whose latest line is retained.
-/// Above it, the keys that changed longest ago are dropped.
+/// Maximum number of keys whose latest line is retained. Above it, the keys that changed longest ago are dropped.
 const MAX_KEYS: usize = 10_000;
 
 const MAX_BATCH: usize = 100;
 
-/// The retained lines of a run, and the condition variable that is signalled for new lines.
 #[derive(Debug, Default)]
 pub(super) struct Hub {
     retained: Mutex<RetainedLines>,
@@ -41,8 +38,7 @@ struct RetainedLines {
     lines: VecDeque<Arc<str>>,
     bytes: usize,
     first: u64,
-    /// For each key (part of the loop's state, such as `function f`), the latest line about it, and the number of this
-    /// line.
+    /// For each key, the latest line about it, and the number of this line.
     words: BTreeMap<String, (u64, Arc<str>)>,
     ended: bool,
 }
@@ -88,8 +84,7 @@ impl Hub {
         }
     }
 
-    /// Appends a line, and stores it as the latest line about each of `keys`. Above the limits, drops the oldest lines,
-    /// and the keys that changed longest ago.
+    /// Above the limits, drops the oldest lines, and the keys that changed longest ago.
     fn take(&self, line: Arc<str>, keys: Vec<String>) {
         let mut state = self.lock();
         let number = state.end();
@@ -153,7 +148,6 @@ enum Entry {
 }
 
 impl Entry {
-    /// Returns the number of bytes of text that count towards the limit of the queue.
     fn bytes(&self) -> usize {
         match self {
             Self::Event(_, text) | Self::Answer(text) => text.len(),
@@ -163,7 +157,6 @@ impl Entry {
 }
 
 impl HubSender {
-    /// Starts the thread that moves messages from the queue to `hub`, and returns the sender.
     pub(super) fn of(hub: Arc<Hub>) -> Self {
         let (queue, receiver) = sync_channel(MAX_QUEUED_LINES);
         let backlog = Arc::new(Backlog::default());
@@ -184,12 +177,11 @@ impl HubSender {
         self.enqueue(Entry::Designs(designs));
     }
 
-    /// Sends whether a plan exists, and the number of the action under way, if there is one.
     pub(super) fn send_plan(&self, exists: bool, under_way: Option<u64>) {
         self.enqueue(Entry::Planned { exists, under_way });
     }
 
-    /// Sends the end of the run. Blocks while the queue is full.
+    /// Blocks while the queue is full.
     pub(super) fn end(&self) {
         let _ = self.queue.send(None);
     }

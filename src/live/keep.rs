@@ -5,7 +5,6 @@ use std::borrow::Cow;
 
 use serde::Deserialize;
 
-/// The fields of an answer that determine its keys, i.e. the parts of the state that the answer is about.
 #[derive(Deserialize)]
 struct About<'a> {
     #[serde(borrow, default)]
@@ -32,7 +31,6 @@ pub(super) fn design_key(design: &str) -> String {
     format!("design {design}")
 }
 
-/// Returns the keys of the parts of the state that an answer (as JSON) defines. Empty if it defines none.
 pub(super) fn keys(answer: &str) -> Vec<String> {
     let Ok(about) = serde_json::from_str::<About>(answer) else { return Vec::new() };
     match about.answer.as_ref() {

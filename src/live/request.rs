@@ -4,7 +4,6 @@ use std::io::{self, Read};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-/// Maximum number of bytes of a request before its body.
 const MAX_HEAD_BYTES: usize = 16 << 10;
 
 const MAX_HEADERS: usize = 64;
@@ -46,7 +45,6 @@ impl Request {
         }
     }
 
-    /// Parses the bytes of a request. Returns `None` while the request is incomplete.
     fn parse(bytes: &[u8]) -> Option<Result<Self, Refused>> {
         let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
         let mut parsed = httparse::Request::new(&mut headers);

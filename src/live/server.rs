@@ -18,12 +18,10 @@ use crate::report::Painter;
 /// Time limit for reading a request, and for sending each text.
 const CLIENT_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Interval between keep-alive comments on an idle event stream.
 const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(10);
 
 const MAX_CONNECTIONS: usize = 16;
 
-/// Maximum time that the program waits at the end of a run, so that clients receive the last lines.
 const SHUTDOWN_GRACE: Duration = Duration::from_millis(500);
 
 const PAGE: &str = include_str!("page/index.html");
@@ -121,7 +119,6 @@ impl Live {
     }
 }
 
-/// Decrements the number of open connections when dropped.
 struct ConnectionGuard(Arc<SharedState>);
 
 impl Drop for ConnectionGuard {
@@ -206,8 +203,7 @@ fn refuse(stream: &mut TcpStream, (status, words): Refused) -> io::Result<()> {
     send(stream, &(head + &text))
 }
 
-/// Sends the lines of the current state, the retained lines, and then all new lines. Stops when the run ends, the
-/// client disconnects, or the client is too slow.
+/// Stops when the run ends, the client disconnects, or the client is too slow.
 fn events(shared: &SharedState, stream: &mut TcpStream) -> io::Result<()> {
     send(
         stream,
@@ -238,7 +234,7 @@ fn stanzas(lines: &[Arc<str>]) -> String {
     lines.iter().flat_map(|line| ["data: ", line, "\n\n"]).collect()
 }
 
-/// Sends a text. Fails if the connection does not accept the whole text within [`CLIENT_TIMEOUT`].
+/// Fails if the connection does not accept the whole text within [`CLIENT_TIMEOUT`].
 fn send(stream: &mut TcpStream, text: &str) -> io::Result<()> {
     let begun = Instant::now();
     let mut remaining = text.as_bytes();

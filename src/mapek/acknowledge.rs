@@ -1,10 +1,10 @@
 //! Determines the believed design of each function from acknowledgements and failures of reconfigurations.
 //!
-//! An event with the number of a reconfiguration acknowledges it. Unless another design is observed or a failure is
-//! reported later, the function is believed to have the design of its last acknowledged reconfiguration. Messages can
-//! cross, be duplicated or arrive out of order: of two acknowledged reconfigurations of one function, the one requested
-//! later counts. A reconfiguration that a later one has superseded can still be acknowledged; until then its design is
-//! not believed.
+//! The event `acknowledged` refers to a reconfiguration by its number. Unless another design is observed or a failure
+//! is reported later, the function is believed to have the design of its last acknowledged reconfiguration. Messages
+//! can cross, be duplicated or arrive out of order: of two acknowledged reconfigurations of one function, the one
+//! requested later counts. A reconfiguration that a later one has superseded can still be acknowledged; until then its
+//! design is not believed.
 //!
 //! A report that an action has started, progressed or succeeded implies that the request of the action has arrived.
 //! Some robots never acknowledge an effect by its number. For such a robot, the report also implies that the
@@ -31,9 +31,8 @@ pub(super) enum Failure {
 }
 
 impl Beliefs {
-    /// Records that the robot has acknowledged the effect (a request of the loop) with this number. The effect is then
-    /// no longer outstanding, i.e. no longer waits for its acknowledgement. Returns [`Receipt::Unknown`] if the loop
-    /// has created no effect with this number.
+    /// Records an acknowledgement by number. The effect is then no longer outstanding. Returns [`Receipt::Unknown`] if
+    /// the loop has created no effect with this number.
     pub(super) fn acknowledge(&mut self, effect: u64) -> Receipt {
         if effect == 0 || effect > self.effects {
             return Receipt::Unknown;
@@ -54,8 +53,7 @@ impl Beliefs {
     }
 
     /// Records that the request of an action has arrived, as implied by a report of the action. If the robot has never
-    /// acknowledged an effect by its number, the report also implies that the reconfigurations before the request have
-    /// arrived.
+    /// acknowledged an effect by its number, the earlier reconfigurations have arrived, too.
     pub(super) fn confirm_request(&mut self, request: u64) {
         self.outstanding.remove(&request);
         self.waits.remove(&request);
@@ -122,8 +120,6 @@ impl Beliefs {
         Failure::Stale
     }
 
-    /// Records the failure of a reconfiguration to `design` that was not acknowledged. If the function is believed to
-    /// have this design, its design becomes unknown. Otherwise the function keeps its believed design.
     fn unanswered_failed(&mut self, function: &str, design: String) -> Failure {
         if self.configuration.get(function) == Some(&design) {
             self.configuration.remove(function);
@@ -131,9 +127,8 @@ impl Beliefs {
         Failure::Design(design)
     }
 
-    /// Records that a reconfiguration has arrived, unless its arrival, or the arrival of a later reconfiguration of the
-    /// function, is already recorded. If the function was observed with another design while the reconfiguration was
-    /// pending, the order of observation and reconfiguration is unknown, and so is the design.
+    /// Records that a reconfiguration has arrived, unless it or a later one of the function is already recorded. If the
+    /// function was observed with another design while the reconfiguration was pending, the design is unknown.
     fn configured(&mut self, effect: u64, function: String, design: String) -> Receipt {
         let history = self.receipts.functions.entry(function.clone()).or_default();
         // A superseded reconfiguration with a smaller number may have been carried out without an answer. Then the

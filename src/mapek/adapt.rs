@@ -25,14 +25,13 @@ use crate::mapek::settings::Settings;
 use crate::mapek::step::PlannedStep;
 use crate::number;
 
-/// Number of consecutive failures of one step after which planning pauses until something else changes.
+/// Number of consecutive failures of one step after which the plan is dropped and planning pauses.
 const MAX_FAILURES: u32 = 3;
 
-/// Least base of the pauses after searches without a proved outcome. The base is the time limit of a search if that is
-/// longer. The first pause is twice the base, and each further pause is twice the previous one.
+/// Minimum base of the pauses after searches without a proved outcome. The base is the time limit of a search if that
+/// is longer. The first pause is twice the base, and each further pause is twice the previous one.
 const MIN_RETRY: Duration = Duration::from_secs(10);
 
-/// Upper limit on the pause before a search without a proved outcome is repeated.
 const MAX_RETRY: Duration = Duration::from_secs(3600);
 
 /// Entry of `Beliefs::improvement_causes`, among the names of designs, that represents changed facts.
@@ -43,12 +42,10 @@ const FACTS: &str = "facts";
 pub(super) enum Need {
     /// The action under way could not continue unchanged. Other designs for it, or its suspension, were requested.
     Interrupted,
-    /// A new plan is needed, for example because the current plan is invalid or missing.
     Must,
     Better,
 }
 
-/// Stage that decides whether to search for a plan, and adopts plans. [`Planner`] computes the plans.
 #[derive(Debug)]
 pub(super) struct Adaptation<'a> {
     pub(super) beliefs: &'a mut Beliefs,
@@ -57,8 +54,6 @@ pub(super) struct Adaptation<'a> {
 }
 
 impl Adaptation<'_> {
-    /// Decides from changes and findings of the analysis whether a plan is needed. If so, searches for a plan, and
-    /// adopts it or keeps the current one.
     pub(super) fn adapt(&mut self, changes: Changes, findings: Findings, answers: &mut Vec<Answer>) {
         let is_observed = changes.observed;
         self.decide(changes, findings, answers);
@@ -129,8 +124,6 @@ impl Adaptation<'_> {
         }
     }
 
-    /// If one step has failed [`MAX_FAILURES`] times in a row and there is a reason to plan, drops the plan and returns
-    /// `true`. Planning then pauses until something else changes.
     fn stop_after_failures(&mut self, changes: &Changes, answers: &mut Vec<Answer>) -> bool {
         match &self.beliefs.failures {
             Some((step, count)) if *count >= MAX_FAILURES && !changes.reasons.is_empty() => {
@@ -145,9 +138,6 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Updates the reasons why a better plan may exist: designs that have become available and are not lost again, and
-    /// changed facts. If the current plan is not proved optimal, any change of the situation is a reason, even a lost
-    /// design.
     fn record_improvement_causes(&mut self, findings: &Findings, changes: &Changes) {
         let improvement_causes = &mut self.beliefs.improvement_causes;
         improvement_causes.retain(|design| !findings.lost.contains(design));
@@ -178,9 +168,8 @@ impl Adaptation<'_> {
         self.beliefs.running = Some(running);
     }
 
-    /// Searches for a better plan if the repetition of a search without a proved outcome is due, or if the settle time
-    /// has passed since the last reason why a better plan may exist. Does not search without a plan, or while
-    /// conclusions are missing.
+    /// Searches for a better plan if a repeated search is due, or if the settle time has passed since the last entry of
+    /// `improvement_causes` was added. Does not search without a plan, or while conclusions are missing.
     fn improve(&mut self, answers: &mut Vec<Answer>) {
         let has_plan = self.beliefs.plan.is_some() && !self.beliefs.reached;
         if !has_plan {
@@ -200,8 +189,6 @@ impl Adaptation<'_> {
         self.beliefs.retry.is_some_and(|scheduled| scheduled.at <= self.beliefs.now)
     }
 
-    /// Schedules another search after a search without a proved outcome. The pause doubles with each attempt, up to
-    /// [`MAX_RETRY`]. Nothing is scheduled while conclusions are missing because of a fault of the reasoner.
     fn schedule_retry(&mut self, attempt: u32, outcome: &Outcome) {
         if outcome.proved || self.beliefs.fault.is_some() {
             return;
@@ -251,8 +238,6 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Requests those designs of the action under way that must be sent (see [`must_be_sent`]). Does nothing if the
-    /// action is suspended or being cancelled.
     fn configure_again(&mut self, answers: &mut Vec<Answer>) {
         let Some(mut running) = self.beliefs.running.take() else { return };
         let is_active = !running.suspended && !running.cancelling;
@@ -294,7 +279,6 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Returns `true` if all designs of an action under way are available, and its remainder is executable.
     fn can_go_on(&self, running: &Running) -> bool {
         let designs = running.step.configuration.iter();
         designs.into_iter().all(|(_, design)| self.beliefs.is_available(design))
@@ -341,8 +325,7 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Returns `true` if `steps` are the action under way followed by the current plan. Only actions and their
-    /// arguments are compared.
+    /// Returns `true` if `steps` are the current plan. Compares only actions and their arguments.
     fn is_current(&self, steps: &[PlannedStep]) -> bool {
         let key = |step: &PlannedStep| (step.action.clone(), step.arguments.clone());
         let Some(plan) = &self.beliefs.plan else { return false };
@@ -350,8 +333,8 @@ impl Adaptation<'_> {
         running.chain(plan).map(key).eq(steps.iter().map(key))
     }
 
-    /// Returns the reason to keep the current plan if the benefit of `outcome` is too small. Returns `None` if it is
-    /// sufficient, or if the metric of the current plan is undefined.
+    /// Returns the reason to keep the current plan, or `None` if the benefit of `outcome` is sufficient or the metric
+    /// of the current plan is undefined.
     fn insufficient_benefit(&self, outcome: &Outcome) -> Option<String> {
         let current_metric = self.beliefs.metric()?;
         if benefit(self.beliefs, self.settings, &current_metric, &outcome.cost).is_some() {
@@ -362,8 +345,6 @@ impl Adaptation<'_> {
         Some(format!("the benefit of another plan is {benefit}, the minimum is {minimum}"))
     }
 
-    /// Adopts a plan. The action under way gets the designs of the plan's first step, and is resumed if it was
-    /// suspended.
     fn adopt(&mut self, outcome: Outcome, answers: &mut Vec<Answer>) {
         let Outcome { steps, proved, .. } = outcome;
         self.beliefs.unproved = !proved;
@@ -382,8 +363,6 @@ impl Adaptation<'_> {
         self.beliefs.plan = Some(steps);
     }
 
-    /// Reports that no plan was found. If `is_necessary`, also drops the current plan, and planning pauses until
-    /// something changes.
     fn report_no_plan(&mut self, is_necessary: bool, outcome: Outcome, answers: &mut Vec<Answer>) {
         let status = if outcome.proved { "unsolvable" } else { "unknown" };
         answers.push(Answer::PlanNone { status, because: outcome.because, blocking: outcome.blocking });
@@ -394,22 +373,21 @@ impl Adaptation<'_> {
     }
 }
 
-/// Returns `true` if the plan `going_on`, which begins with the remainder of the action under way, keeps the action's
-/// present designs. The remainder is then executable, because the planner has simulated it.
+/// Returns `true` if the plan `going_on` keeps the present designs of the action under way. The planner has simulated
+/// the remainder of the action, so the remainder is then executable.
 fn goes_on_with(running: &Running, going_on: &Outcome) -> bool {
     let first = going_on.steps.as_ref().and_then(|steps| steps.first());
     first.is_some_and(|first| first.configuration == running.step.configuration)
 }
 
-/// Returns the improvement from the metric value `metric` to the value `other`; negative if `other` is worse.
+/// Improvement from the metric value `metric` to the value `other`; negative if `other` is worse.
 fn gain(beliefs: &Beliefs, metric: &BigRational, other: &BigRational) -> BigRational {
     let declared = beliefs.mission.problem().metric.as_ref();
     let maximize = declared.is_some_and(|metric| metric.direction == Direction::Maximize);
     if maximize { other - metric } else { metric - other }
 }
 
-/// Returns the [`gain`] from `metric` to `other` if it is positive and at least the minimum benefit, and `None`
-/// otherwise.
+/// Returns the [`gain`] from `metric` to `other`, or `None` if it is not positive or below the minimum benefit.
 fn benefit(
     beliefs: &Beliefs,
     settings: &Settings,

@@ -14,7 +14,6 @@ use crate::mapek::monitor::Base;
 pub(super) struct Findings {
     pub(super) lost: BTreeSet<String>,
     pub(super) gained: BTreeSet<String>,
-    /// Sentences about the objectives that are in error and whose statuses have changed.
     pub(super) errors: Vec<String>,
 }
 
@@ -23,8 +22,7 @@ impl Findings {
         self.lost.is_empty() && self.gained.is_empty() && self.errors.is_empty()
     }
 
-    /// Adds later findings. A design that is lost and then gained, or gained and then lost, is removed from both `lost`
-    /// and `gained`.
+    /// Adds later findings. A design that is lost and then gained, or gained and then lost, counts as neither.
     pub(super) fn extend(&mut self, later: Self) {
         for design in later.lost {
             if !self.gained.remove(&design) {
@@ -49,7 +47,6 @@ pub(crate) fn available(knowledge: &Knowledge) -> BTreeSet<String> {
     designs.map(|design| design.individual.name.clone()).collect()
 }
 
-/// Reports new or resolved contradictions, and whether the conclusions have become incomplete or complete.
 pub(super) fn report_contradictions(beliefs: &mut Beliefs, answers: &mut Vec<Answer>) {
     let Some(knowledge) = beliefs.mission.knowledge() else { return };
     answers.extend(doubts(knowledge, &mut beliefs.fault, &mut beliefs.violated));
@@ -80,8 +77,6 @@ pub(crate) fn doubts(
     answers
 }
 
-/// Handles a change of the knowledge base: reports contradictions, and analyzes designs and objectives if their
-/// availability or statuses may have changed.
 pub(super) fn analyze_change(beliefs: &mut Beliefs, base: Base, answers: &mut Vec<Answer>) -> Findings {
     if base > Base::Nothing {
         report_contradictions(beliefs, answers);
@@ -104,7 +99,6 @@ pub(super) fn analyze(beliefs: &mut Beliefs, answers: &mut Vec<Answer>) -> Findi
     findings
 }
 
-/// Returns an answer with the changes, or `None` if both lists are empty.
 pub(crate) fn inferred(designs: Vec<DesignChange>, objectives: Vec<ObjectiveChange>) -> Option<Answer> {
     let is_something = !designs.is_empty() || !objectives.is_empty();
     is_something.then_some(Answer::Inferred { designs, objectives })
@@ -144,8 +138,6 @@ pub(super) fn availability(knowledge: &Knowledge, design: &str, available: bool)
     DesignChange { design: design.to_owned(), available, because }
 }
 
-/// Returns the message that conclusions are missing. Without conclusions, no design counts as available, and planning
-/// is impossible.
 pub(super) fn missing_conclusions(fault: &Fault) -> String {
     format!("the conclusions are unknown: {}", fault.message)
 }
@@ -156,7 +148,6 @@ fn statuses(knowledge: &Knowledge) -> BTreeMap<String, Vec<String>> {
     in_error.map(|objective| (objective.individual.name, objective.statuses)).collect()
 }
 
-/// Returns the rules and stated facts that make a design unavailable, as lines of text.
 pub(crate) fn ruled_out(knowledge: &Knowledge, design: &str) -> Vec<String> {
     unavailable(knowledge, design).iter().flat_map(|derivation| reasons(knowledge, derivation)).collect()
 }
@@ -188,7 +179,6 @@ fn why_objective(knowledge: &Knowledge, objective: &str) -> Vec<String> {
     derivations.iter().flat_map(|derivation| reasons(knowledge, derivation)).collect()
 }
 
-/// Formats a derivation as lines: the labels of its rules, then the stated facts that support it.
 fn reasons(knowledge: &Knowledge, derivation: &Derivation) -> Vec<String> {
     let symbols = knowledge.engine().symbols();
     let mut lines = Vec::new();

@@ -291,7 +291,6 @@ impl Answer {
         }
     }
 
-    /// Writes the fields after `answer`, for answers other than effects.
     fn fields<M: SerializeMap>(&self, object: &mut M) -> Result<(), M::Error> {
         match self {
             Self::Inferred { designs, objectives } => {
@@ -362,7 +361,6 @@ impl Answer {
 }
 
 impl Effect {
-    /// Writes the JSON fields of the effect, including `answer`.
     fn fields<M: SerializeMap>(&self, object: &mut M) -> Result<(), M::Error> {
         object.serialize_entry("answer", self.command.kind())?;
         if let Command::Request { step } = &self.command {

@@ -15,18 +15,15 @@ pub(crate) struct Outcome {
     pub cost: BigRational,
     /// Whether the plan is proved optimal, or its absence is proved.
     pub proved: bool,
-    /// Reason for the absence of a plan.
     pub because: String,
     /// Unavailable designs that block every plan. Empty if not computed, or if there is no plan even with all designs;
     /// see [`planner::Replanner::blocking`].
     pub blocking: Vec<String>,
 }
 
-/// Planning problem: the believed situation and, if one is fixed, the first step.
 #[derive(Debug)]
 pub(crate) struct Question<'a> {
     pub mission: &'a Mission,
-    /// The believed problem, filled from the knowledge base.
     pub problem: &'a Problem,
     /// The action under way, if every plan must begin with its remainder.
     pub running: Option<&'a Running>,
@@ -52,14 +49,12 @@ impl Outcome {
         Self { steps: None, cost: BigRational::default(), proved, because, blocking: Vec::new() }
     }
 
-    /// Serialises the outcome for the journal.
     pub fn to_record(&self) -> Value {
         let steps: Option<Vec<Value>> =
             self.steps.as_ref().map(|steps| steps.iter().map(PlannedStep::to_record).collect());
         json!([steps, self.cost.to_string(), self.proved, self.because, self.blocking])
     }
 
-    /// Inverse of [`Outcome::to_record`]. Returns `None` if the record is malformed.
     pub fn from_record(record: &Value) -> Option<Self> {
         let [steps, cost, proved, because, blocking] = record.as_array()?.as_slice() else { return None };
         let text = |value: &Value| value.as_str().map(ToOwned::to_owned);

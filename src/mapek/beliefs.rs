@@ -26,39 +26,32 @@ use crate::mission::Mission;
 #[derive(Debug, Clone)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub struct Beliefs {
-    /// Knowledge base and problem in their believed state.
     pub(super) mission: Mission,
     pub(super) goal: Option<String>,
     pub(super) available: BTreeSet<String>,
     pub(super) statuses: BTreeMap<String, Vec<String>>,
-    /// Axioms and rules that the known facts violate, as last reported.
     pub(super) violated: BTreeSet<String>,
-    /// Fault that stopped the reasoning, as last reported; the conclusions are then incomplete. `None` if they are
-    /// complete.
+    /// Fault that stopped the reasoning, as last reported; `None` if the conclusions are complete.
     pub(super) fault: Option<Fault>,
     pub(super) configuration: BTreeMap<String, String>,
     pub(super) plan: Option<VecDeque<PlannedStep>>,
     pub(super) running: Option<Running>,
     pub(super) reached: bool,
-    /// Whether planning has failed and pauses until something changes.
+    /// Whether planning has failed and pauses until something changes or another search is due.
     pub(super) stuck: bool,
-    /// Whether the plan is not proved optimal, e.g. because its search hit a limit.
     pub(super) unproved: bool,
     pub(super) retry: Option<Retry>,
-    /// The step that failed last, with its number of consecutive failures.
     pub(super) failures: Option<(PlannedStep, u32)>,
-    /// Reasons why a better plan may exist: names of designs that are available again, and an entry for changed facts.
+    /// Names of designs that are available again, and an entry for changed facts. A better plan may then exist.
     pub(super) improvement_causes: BTreeSet<String>,
     /// Time at which the last entry of `improvement_causes` was added, since the start of the mission.
     pub(super) improvement_since: Duration,
-    /// Number of actions requested since the start.
+    /// Number of requested actions, which is also the number of the last one.
     pub(super) actions: u64,
-    /// Number of effects requested since the start.
+    /// Number of created effects, which is also the number of the last one.
     pub(super) effects: u64,
-    /// Unacknowledged effects (requests to the robot) by number.
     pub(super) outstanding: BTreeMap<u64, Effect>,
     pub(super) receipts: Receipts,
-    /// Time of the last request and number of repetitions, by number of the outstanding effect.
     pub(super) waits: BTreeMap<u64, Wait>,
     /// Whether the robot has ever reported the start or the progress of an action.
     pub(super) reports_actions: bool,
@@ -70,7 +63,6 @@ pub struct Beliefs {
     pub(super) filters: FilterStates,
 }
 
-/// An action that was requested and has not ended.
 #[derive(Debug, Clone, PartialEq)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub(super) struct Running {
@@ -88,7 +80,6 @@ pub(super) struct Running {
     pub(super) last_report: Duration,
     /// Backoff factor: 0 after a report, 1 after the first missed deadline, then doubled by each further one.
     pub(super) overdue: u32,
-    /// Whether the start or progress of the action was reported.
     pub(super) started: bool,
     pub(super) progressed: bool,
     pub(super) resumed: bool,
@@ -97,9 +88,7 @@ pub(super) struct Running {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Retry {
-    /// Time at which the search is due, since the start of the mission.
     pub(super) at: Duration,
-    /// Number of consecutive searches without a proved outcome, e.g. because of the time limit.
     pub(super) attempt: u32,
 }
 
@@ -215,7 +204,6 @@ impl Beliefs {
         self.running.as_ref().map(|running| (running.action, &running.step))
     }
 
-    /// Completed share of the action under way, from 0 to 1.
     pub(crate) fn progress(&self) -> Option<&BigRational> {
         self.running.as_ref().map(|running| &running.progress)
     }
@@ -276,19 +264,17 @@ impl Beliefs {
         self.reached
     }
 
-    /// Returns `true` if a design is believed to be available. If the problem decides on the availability of the
-    /// design, the problem has to state it. Without a knowledge base, all designs are available.
+    /// Returns `true` if a design is believed to be available: according to the knowledge base, or to the problem if
+    /// that decides. Without a knowledge base, all designs are available.
     pub(super) fn is_available(&self, design: &str) -> bool {
         self.mission.knowledge().is_none() || self.available.contains(design) || self.mission.provides(design)
     }
 
-    /// Returns the designs of the remaining steps of the plan, with repetitions.
     pub(super) fn planned_designs(&self) -> impl Iterator<Item = &String> {
         let steps = self.plan.iter().flatten();
         steps.flat_map(|step| step.configuration.iter().map(|(_, design)| design))
     }
 
-    /// Returns the problem in its believed state, with the facts of the knowledge base added.
     pub(super) fn filled(&self) -> Arc<Problem> {
         self.mission.current()
     }
@@ -306,7 +292,6 @@ impl Beliefs {
         }
     }
 
-    /// Returns the action under way and the remaining plan as input for the validator.
     fn remaining_plan(&self) -> PlanText {
         let running = self.running.iter().map(|running| &running.step);
         plan_text(running.chain(self.plan.iter().flatten()))
@@ -319,7 +304,6 @@ impl Beliefs {
         metric_of(&domain, &problem, &self.remaining_plan())
     }
 
-    /// Returns the reason why the remainder of the action under way cannot be executed, or `None` if it can.
     pub(super) fn obstacle(&self, running: &Running) -> Option<String> {
         let (domain, problem) = self.remaining_mission();
         let violation = advance(&domain, &problem, &running.step.to_plan_step(), false).err()?;

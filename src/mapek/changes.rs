@@ -2,7 +2,6 @@
 
 use crate::mapek::answer::Answer;
 
-/// Changes caused by one observation, or by all observations since the last deliberation.
 #[derive(Debug, Clone, Default)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub(super) struct Changes {
@@ -12,7 +11,6 @@ pub(super) struct Changes {
     pub(super) facts: bool,
     /// Whether a report has changed facts of the problem or a design of the action under way, and not only values.
     pub(super) predicates: bool,
-    /// Whether the goal has changed, which invalidates all remembered plans.
     pub(super) goal: bool,
     /// Whether reported values of the problem differ from the believed ones.
     pub(super) values: bool,
@@ -24,7 +22,6 @@ pub(super) struct Changes {
     pub(super) interruptions: Vec<String>,
     /// Reasons to plan, as sentences, that apply even if the current plan is valid.
     pub(super) reasons: Vec<String>,
-    /// Answers about reports held by filters and about silent sensors.
     pub(super) filtered: Vec<Answer>,
 }
 

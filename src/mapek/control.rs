@@ -65,12 +65,11 @@ pub(crate) fn time_of_line(
     }
 }
 
-/// Changes and findings since the last deliberation, which the next deliberation considers.
 #[derive(Debug, Clone, Default)]
 struct Agenda {
     changes: Changes,
     findings: Findings,
-    /// Whether the loop has just started. The first action is then requested even without changes.
+    /// Whether the loop has just started. Without changes, the first deliberation then skips [`Adaptation::adapt`].
     is_start: bool,
 }
 
@@ -153,7 +152,7 @@ impl Loop {
         self.planner.watch.clone()
     }
 
-    /// Runs the first deliberation: makes the first plan and requests its first action.
+    /// Runs the first deliberation: searches for the first plan and requests its first action.
     pub fn start(&mut self) -> Vec<Answer> {
         self.deliberate()
     }
@@ -271,8 +270,6 @@ impl Loop {
         self.agenda.is_some()
     }
 
-    /// Handles a reconfiguration that was not acknowledged in time: it counts as failed, and the design of the function
-    /// becomes unknown.
     fn abandon(&mut self, effect: u64, changes: &mut Changes) {
         let Some(Command::Reconfigure { function, to, .. }) =
             self.beliefs.outstanding.get(&effect).map(|effect| effect.command.clone())
@@ -289,7 +286,6 @@ impl Loop {
         self.beliefs.receipts.supersede(effect, function, to);
     }
 
-    /// Copies the state that deliberation can change before its first search, for [`Loop::roll_back`].
     pub(super) fn checkpoint(&self) -> Checkpoint {
         let beliefs = &self.beliefs;
         Checkpoint {
@@ -302,8 +298,7 @@ impl Loop {
         }
     }
 
-    /// Restores the checkpointed state from before deliberation. Deliberation must not have searched since the
-    /// checkpoint.
+    /// Restores the state at the checkpoint. Deliberation must not have searched since then.
     pub(super) fn roll_back(&mut self, to: Checkpoint) {
         let beliefs = &mut self.beliefs;
         self.agenda = to.agenda;
@@ -350,7 +345,7 @@ impl Loop {
         let is_due = growth > self.rebuilt_growth + MAX_GROWTH;
         let Some(base) = self.beliefs.mission.knowledge_mut().filter(|_| is_due) else { return };
         let statements = base.statements();
-        // The statements were consistent and within the budget before, so restoring them succeeds.
+        // If the restoration exceeds the reasoning budget, the knowledge base stays unchanged.
         let _ = base.restore(&statements);
         self.rebuilt_growth = base.growth();
     }
@@ -397,7 +392,7 @@ impl Loop {
     /// Restores the state from a snapshot of a loop of the same mission.
     ///
     /// # Errors
-    /// The snapshot is damaged, or belongs to another mission.
+    /// The snapshot is damaged or does not fit the mission.
     pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), Message> {
         self.planner.memo.clear();
         self.agenda = None;
@@ -431,7 +426,6 @@ impl Loop {
         self.planner.limits = limits;
     }
 
-    /// Searches for a plan from the believed situation. Returns its steps, or `None` if no plan is found.
     pub(crate) fn plan_anew(&mut self) -> Option<Vec<PlannedStep>> {
         let outcome = self.adaptation().plan(true);
         self.planner.computed.clear();
@@ -458,7 +452,6 @@ impl Loop {
         self.beliefs.plan.is_none() && self.beliefs.running.is_none() && self.beliefs.violation().is_none()
     }
 
-    /// Returns the available designs of a function, in the order of the knowledge base.
     pub(crate) fn designs_for(&self, function: &str) -> Vec<String> {
         let mut designs = self.beliefs.mission.designs_of(function);
         designs.retain(|design| self.beliefs.is_available(design));

@@ -1,9 +1,10 @@
 //! Deadlines for unacknowledged effects and for actions without reports.
 //!
-//! Deadlines are checked at each line, including ticks. Acknowledgements have deadlines only after the robot has first
-//! acknowledged an effect by its number. An overdue action is cancelled only if the robot has sent messages of the
-//! missing kind before: progress of this action, the start or progress of some action, or an acknowledgement. Every
-//! robot is expected to report the end of a cancelled action.
+//! Deadlines are checked at each timer and each line, including ticks, unless the whole line is refused.
+//! Acknowledgements have deadlines only after the robot has first acknowledged an effect by its number. An overdue
+//! action is cancelled only if the robot has sent messages of the missing kind before: progress of this action, the
+//! start or progress of some action, or an acknowledgement. Every robot is expected to report the end of a cancelled
+//! action.
 
 use std::time::Duration;
 
@@ -17,8 +18,8 @@ use crate::number;
 /// acknowledged in time.
 pub(super) type Expired = Vec<u64>;
 
-/// Repeats overdue effects. Repeats the request of an overdue action, cancels the action, or only reports the delay.
-/// Returns the reconfigurations that count as failed. Does nothing if deadlines are disabled, i.e. if the setting is 0.
+/// Repeats overdue effects. For an overdue action, repeats its request, cancels it, or only reports the delay. Returns
+/// the reconfigurations that count as failed. Does nothing if the deadline is 0.
 pub(super) fn handle_overdue(
     beliefs: &mut Beliefs,
     settings: &Settings,
@@ -32,7 +33,6 @@ pub(super) fn handle_overdue(
     expired
 }
 
-/// Returns the time of the next deadline, since the start of the mission; `None` if there is no deadline.
 pub(super) fn due(beliefs: &Beliefs, settings: &Settings) -> Option<Duration> {
     if settings.deadline.is_zero() {
         return None;
@@ -55,7 +55,7 @@ pub(super) fn due(beliefs: &Beliefs, settings: &Settings) -> Option<Duration> {
     effects.chain(action).min()
 }
 
-/// Returns `true` if the effect requests an action. The deadline of the action then applies to the effect.
+/// The deadline of the action applies to its request.
 fn is_request(effect: &Effect) -> bool {
     matches!(effect.command, Command::Request { .. })
 }
@@ -72,8 +72,7 @@ fn suspended_request(beliefs: &Beliefs) -> Option<u64> {
 }
 
 /// Repeats effects that were not acknowledged in time. Returns the reconfigurations that count as failed. Requests of
-/// actions are skipped unless the action is suspended, because the deadline of the action applies to them. Does nothing
-/// if the robot has never acknowledged an effect by its number.
+/// actions are skipped unless the action is suspended, because the deadline of the action applies to them.
 fn check_effects(beliefs: &mut Beliefs, deadline: Duration, answers: &mut Vec<Answer>) -> Expired {
     let mut expired = Expired::new();
     // This robot may never acknowledge effects.
@@ -119,8 +118,6 @@ fn open_cancel(beliefs: &Beliefs) -> Option<&Effect> {
     beliefs.outstanding.values().find(is_cancel).filter(|_| !beliefs.receipts.are_sent())
 }
 
-/// Checks the deadline of the action under way. After the deadline, repeats its request or its cancellation, cancels
-/// the action, or reports that the loop keeps waiting.
 fn check_action(beliefs: &mut Beliefs, settings: &Settings, answers: &mut Vec<Answer>) {
     if let Some(cancel) = open_cancel(beliefs).cloned()
         && let Some(running) = &mut beliefs.running

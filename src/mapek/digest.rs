@@ -29,7 +29,6 @@ pub(super) fn digest(mission: &Mission, settings: &Settings) -> String {
     checksum(&parts)
 }
 
-/// Returns the facts, as N-Triples, and the rules of a knowledge base as text.
 pub(crate) fn knowledge_parts(knowledge: &Knowledge) -> [String; 2] {
     let engine = knowledge.engine();
     let facts: Vec<rules::Fact> = engine.facts().collect();

@@ -7,10 +7,8 @@ use crate::mapek::answer::{Answer, Command, Effect};
 use crate::mapek::beliefs::{Beliefs, Running, Wait};
 use crate::mapek::step::PlannedStep;
 
-/// Upper limit on the number of superseded effects listed in one effect.
 const MAX_SUPERSEDED: usize = 64;
 
-/// Ends the mission, whose goal holds: drops the plan, and removes all objectives from the knowledge base.
 pub(super) fn finish(beliefs: &mut Beliefs, answers: &mut Vec<Answer>) {
     beliefs.reached = true;
     beliefs.plan = None;
@@ -18,7 +16,6 @@ pub(super) fn finish(beliefs: &mut Beliefs, answers: &mut Vec<Answer>) {
     answers.push(Answer::GoalReached);
 }
 
-/// Requests the action of a step, preceded by the reconfigurations that its designs need.
 pub(super) fn request(beliefs: &mut Beliefs, step: PlannedStep, answers: &mut Vec<Answer>) {
     beliefs.actions += 1;
     let action = beliefs.actions;
@@ -43,8 +40,8 @@ pub(super) fn request(beliefs: &mut Beliefs, step: PlannedStep, answers: &mut Ve
     beliefs.running = Some(running);
 }
 
-/// Requests those designs of an action that must be sent (see [`must_be_sent`]), i.e. mainly for functions that are
-/// expected to have another design. Then makes the action's functions the objectives of the knowledge base.
+/// Requests those designs of an action that must be sent (see [`must_be_sent`]). Then makes the action's functions the
+/// objectives of the knowledge base.
 ///
 /// A requested action can still be waiting for its previous designs. Therefore, a changed design of the action is
 /// requested even if the function already has it.
@@ -131,15 +128,13 @@ pub(super) fn objectives(beliefs: &mut Beliefs, step: Option<&PlannedStep>, answ
     analyze(beliefs, answers);
 }
 
-/// Requests the cancellation of the action under way, and drops the plan.
 pub(super) fn cancel(beliefs: &mut Beliefs, running: Running, because: String, answers: &mut Vec<Answer>) {
     beliefs.plan = None;
     effect(beliefs, running.action, Command::Cancel { because }, answers);
     beliefs.running = Some(Running { cancelling: true, ..running });
 }
 
-/// Requests the suspension of the action under way unless it is suspended, drops the plan, and stops planning until the
-/// situation changes.
+/// Drops the plan and pauses planning. Requests the suspension of the action under way unless it is suspended already.
 pub(super) fn suspend(beliefs: &mut Beliefs, running: Running, reason: &str, answers: &mut Vec<Answer>) {
     beliefs.plan = None;
     beliefs.stuck = true;

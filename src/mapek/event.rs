@@ -441,7 +441,6 @@ fn as_numbers<S: Serializer>(values: &[(String, BigRational)], serializer: S) ->
     serializer.collect_map(values.iter().map(|(name, value)| (name, number::to_json(value))))
 }
 
-/// Serialises a status in the spelling of MROS.
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
 fn as_word<S: Serializer>(status: &Status, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(match status {
@@ -464,7 +463,6 @@ impl Event {
     }
 }
 
-/// An event with the optional fields of its line, for serialisation.
 #[derive(Serialize)]
 struct Line<'a> {
     #[serde(flatten)]

@@ -11,8 +11,8 @@ use crate::mapek::effects::{finish, request};
 
 /// Requests the next action if none is under way, or ends the mission if no step remains and the goal holds. A plan
 /// that is missing, or invalid in the believed situation, is replaced once. If the second plan is invalid, too,
-/// planning pauses until the situation changes. Does nothing during such a pause, after the goal was reached, or while
-/// conclusions are missing. Also stops if a plan is missing and the planner may not search for it.
+/// planning pauses. Does nothing during a pause, after the goal was reached, or while conclusions are missing. Also
+/// stops if a plan is missing and the planner may not search for it.
 pub(super) fn execute(adaptation: &mut Adaptation<'_>, answers: &mut Vec<Answer>) {
     for attempt in 0..2 {
         let beliefs = &mut *adaptation.beliefs;

@@ -29,7 +29,6 @@ pub(super) fn doubled_key(text: &str) -> Option<String> {
     doubled.map(|(_, key)| key.clone())
 }
 
-/// Keys of an object in the order of the text, including repetitions.
 struct Keys(Vec<String>);
 
 impl<'de> serde::Deserialize<'de> for Keys {
@@ -96,13 +95,11 @@ pub(super) fn fraction(value: &Value) -> Option<BigRational> {
     Some((fraction * &percent).round() / percent)
 }
 
-/// Parses a JSON object whose values are numbers, without rounding. Returns `None` for other JSON values.
 pub(super) fn numbers(value: &Value) -> Option<Vec<(String, BigRational)>> {
     let fields = value.as_object()?.iter();
     fields.map(|(name, value)| Some((name.clone(), number::from_json(value)?))).collect()
 }
 
-/// Parses the value of a fact: a word, a number or a truth value.
 pub(super) fn word(value: &Value) -> Option<String> {
     match value {
         Value::Bool(truth) => Some(truth.to_string()),

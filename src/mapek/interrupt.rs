@@ -15,17 +15,8 @@ use crate::number;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Interruption {
     None,
-    Cancel {
-        because: String,
-    },
-    Suspend {
-        /// `unsolvable` if the absence of a plan is proved, and `unknown` otherwise.
-        status: &'static str,
-        because: String,
-        /// Minimal set of unavailable designs that blocks every plan. Empty if not computed, or if there is no plan
-        /// even with all designs.
-        blocking: Vec<String>,
-    },
+    Cancel { because: String },
+    Suspend { status: &'static str, because: String, blocking: Vec<String> },
 }
 
 /// Decides about the action under way, given the `reason` why it may have to be interrupted. `going_on` is the plan

@@ -14,12 +14,10 @@ use crate::mapek::step::PlannedStep;
 use crate::mapek::watch::Watch;
 use crate::mission::replanner;
 
-/// Upper limit on the number of configurations for which the action under way is simulated.
 const MAX_CONFIGURATIONS: usize = 256;
 
 #[derive(Debug, Clone, Default)]
 pub(super) enum Live {
-    /// State before the first query: no planner has been built.
     #[default]
     Untried,
     Unsuited,
@@ -103,8 +101,6 @@ impl Live {
     }
 }
 
-/// Returns the outcome that proves the absence of a plan. `blocking` is a set of unavailable designs that blocks every
-/// plan. It is empty if not computed, or if there is no plan even with all designs.
 fn none(blocking: Vec<String>) -> Outcome {
     Outcome {
         steps: None,

@@ -29,7 +29,6 @@ pub(crate) struct StoredQuestion {
 }
 
 impl Memo {
-    /// Returns the cached outcome of an equal planning problem, if any, and moves it to the front.
     pub(super) fn recall(&mut self, question: &Question<'_>) -> Option<Outcome> {
         let position = self.0.iter().position(|(situation, _)| situation.equals(question))?;
         let entry = self.0.remove(position)?;
@@ -38,7 +37,7 @@ impl Memo {
         Some(outcome)
     }
 
-    /// Caches an outcome if it is proved: an optimal plan, or the absence of any plan.
+    /// Caches an outcome if it is proved.
     pub(super) fn store(&mut self, question: &Question<'_>, outcome: &Outcome) {
         if outcome.proved {
             self.0.push_front((StoredQuestion::new(question), outcome.clone()));
@@ -61,8 +60,6 @@ impl StoredQuestion {
         self.running.as_ref().map(|running| running.action) == question.running.map(|running| running.action)
     }
 
-    /// Returns `true` if both planning problems have the same initial state, objects and action under way and, if
-    /// relevant, the same current plan.
     pub(super) fn equals(&self, question: &Question<'_>) -> bool {
         let (left, right) = (&self.problem, question.problem);
         let objects = |problem: &Problem| problem.objects.len();
@@ -79,7 +76,7 @@ impl StoredQuestion {
     }
 }
 
-/// Returns the parts of the action under way on which plans depend. The numbers of action and request are irrelevant.
+/// Plans do not depend on the numbers of action and request.
 fn relevant_part(running: &Running) -> (&PlannedStep, &num_rational::BigRational) {
     (&running.step, &running.progress)
 }

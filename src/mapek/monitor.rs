@@ -37,18 +37,15 @@ const PLANNED: [&str; 9] = [
     "FunctionDesign",
 ];
 
-/// Local names of the properties that hold values of quality attributes. A derived value is an estimation; a reported
-/// value is a stated fact.
+/// Local names of the properties that hold values of quality attributes.
 const VALUES: [&str; 2] = ["hasValue", "qa_has_value"];
 
-/// Data for the interpretation of events: attributes, filters and caches. Not a part of the beliefs.
 #[derive(Debug, Clone)]
 pub(super) struct Monitor {
     /// IRIs and local names of the quality attributes of the knowledge base.
     pub(super) attributes: BTreeSet<String>,
     checked: HashSet<String>,
     pub(super) filters: Filters,
-    /// Cache of local names of components, by the reported name.
     pub(super) components: HashMap<String, String>,
 }
 
@@ -65,18 +62,14 @@ impl Monitor {
         &self.filters
     }
 
-    /// Applies the changes of belief that become due by the passage of time, e.g. reports that filters have held back.
-    /// Returns refusals of changes that do not fit the mission.
+    /// Applies the changes of belief that are due without an event, e.g. reports that filters have held back. Returns
+    /// refusals of changes that do not fit the mission.
     pub(super) fn elapse(&mut self, beliefs: &mut Beliefs, changes: &mut Changes) -> Vec<Refusal> {
         let due = self.filters.elapse(&mut beliefs.filters, beliefs.now, &mut changes.filtered);
         let mut update = BeliefUpdate { monitor: self, beliefs, changes };
         due.into_iter().filter_map(|accepted| update.accept(accepted).err()).collect()
     }
 
-    /// Applies an event to the beliefs, and records the changes.
-    ///
-    /// # Errors
-    /// The event does not fit the mission or the state of the loop.
     pub(super) fn apply(
         &mut self,
         beliefs: &mut Beliefs,
@@ -259,8 +252,7 @@ impl BeliefUpdate<'_> {
         running.ok_or_else(|| Refusal::new("M305", format!("no action {action} is under way")))
     }
 
-    /// Records that the action under way has started, which also confirms the arrival of its request. Returns the
-    /// action.
+    /// A report of the start also confirms the arrival of the request.
     fn confirm_started(&mut self, action: u64) -> Result<&mut Running, Refusal> {
         let request = self.running(action)?.request;
         self.beliefs.confirm_request(request);
@@ -271,9 +263,8 @@ impl BeliefUpdate<'_> {
         Ok(running)
     }
 
-    /// Removes and returns the action under way, or returns a refusal if no action with this number is under way. The
-    /// effects of this action and of earlier ones are no longer outstanding, except reconfigurations, which belong to
-    /// functions.
+    /// Removes the action under way. The effects of this action and of earlier ones are no longer outstanding, except
+    /// reconfigurations, which belong to functions.
     fn end(&mut self, action: u64) -> Result<Running, Refusal> {
         self.running(action)?;
         let is_moot = |effect: &Effect| {
@@ -346,8 +337,7 @@ impl BeliefUpdate<'_> {
         Ok(())
     }
 
-    /// Returns the effects of a complete execution of `step`, regardless of its conditions. Returns `None` if the step
-    /// does not fit the domain.
+    /// Returns the effects of a complete execution of `step`, regardless of its conditions.
     fn advance(&self, step: &PlannedStep) -> Option<Advance> {
         let mission = &self.beliefs.mission;
         advance(mission.domain(), &self.beliefs.filled(), &step.to_plan_step(), true).ok()
@@ -412,7 +402,6 @@ mod tests {
     use crate::mapek::settings::Settings;
     use crate::setup::Setup;
 
-    /// Applies an event to the mission `ugv`, and compares the changes or the code of the refusal.
     fn check(line: &str, expected: Result<(Base, [bool; 3], &[&str]), &str>) {
         let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions/ugv.toml");
         let mission = Setup::read(&manifest).expect("the mission is read").mission;

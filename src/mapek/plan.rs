@@ -19,25 +19,21 @@ use crate::mapek::watch::Watch;
 use crate::mission::ground_with;
 use crate::number;
 
-/// Upper limit on the number of doublings of the time limit.
 const MAX_DOUBLINGS: u32 = 3;
 
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Planner {
-    /// Time limit of one search for a plan; `None` for no limit.
     pub time_limit: Option<Duration>,
-    /// Number of consecutive searches before this one that ended without a proved outcome, e.g. at their time limit.
-    /// Each doubles the time limit, up to [`MAX_DOUBLINGS`] times.
+    /// Number of consecutive earlier searches without a proved outcome. Each doubles the time limit, up to
+    /// [`MAX_DOUBLINGS`] times.
     pub attempt: u32,
     /// Limits in addition to the time limit of one search.
     pub limits: Limits,
-    /// Recorded plans for replay, in order.
     pub recorded: VecDeque<Outcome>,
     /// Plans computed for the current decision, for the journal.
     pub computed: Vec<Outcome>,
     /// Whether searches are forbidden: only recorded, prepared and cached plans are used.
     pub forbids_search: bool,
-    /// Whether a plan was missing because searches are forbidden.
     pub is_missing: bool,
     /// Planning problems of the current deliberation with their outcomes; `None` if they are not logged.
     pub question_log: Option<Vec<(StoredQuestion, Outcome)>>,
@@ -69,7 +65,7 @@ impl Planner {
 
     /// Removes and returns the next outcome computed by another thread. Returns `None` if there is none, or if the
     /// outcome is about a different action under way. If the situation has changed, for example by progress of the
-    /// action, the plan is not reported as optimal.
+    /// action, the outcome no longer counts as proved.
     fn prepared(&mut self, question: &Question<'_>) -> Option<Outcome> {
         let (answered, mut outcome) = self.prepared.pop_front()?;
         if !answered.has_same_action(question) {
@@ -98,7 +94,6 @@ impl Planner {
     }
 }
 
-/// Grounds the planning problem and searches for an optimal plan, without data from earlier searches.
 pub(super) fn from_scratch(question: &Question<'_>, limits: Limits, watch: &Watch) -> Outcome {
     let no_plan = Outcome::no_plan;
     let (mut domain, mut problem) =

@@ -5,14 +5,12 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
-/// Upper limit on the number of superseded reconfigurations recorded per function.
 const MAX_SUPERSEDED: usize = 16;
 
 /// History of acknowledged and superseded reconfigurations, by function. A reconfiguration is superseded if a later
 /// request replaces it before its acknowledgement, or if it is not acknowledged in time.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct Receipts {
-    /// Whether any effect was acknowledged explicitly, by its number.
     pub(super) by_number: bool,
     pub(super) functions: BTreeMap<String, Received>,
 }
@@ -25,8 +23,8 @@ pub(super) struct Received {
     /// Greatest effect number of an uncertain reconfiguration, or 0. After a report of an unexpected design, it is
     /// unknown whether the robot carried out the reconfigurations up to this number before or after the report.
     pub(super) doubted: u64,
-    /// Effect number of the last reconfiguration whose arrival was only implied by a report of an action. `None` if a
-    /// later reconfiguration was acknowledged. Copies of the request may still arrive.
+    /// Effect number of the last reconfiguration whose arrival was only implied by a report of an action. `None` once
+    /// this or a later reconfiguration is acknowledged. Copies of the request may still arrive.
     pub(super) implied: Option<u64>,
 }
 
@@ -93,8 +91,6 @@ impl Receipts {
         self.unanswered_superseded(function).chain(implied)
     }
 
-    /// Returns the function and the requested design of the superseded reconfiguration with number `effect`, if
-    /// recorded.
     pub(super) fn superseded(&self, effect: u64) -> Option<(&String, &String)> {
         let design = |(function, history)| Some((function, Received::superseded(history, effect)?));
         self.functions.iter().find_map(design)

@@ -34,7 +34,6 @@ impl Decision {
     }
 }
 
-/// Removes the explanations from an answer.
 fn essence(mut answer: Value) -> Value {
     let kind = answer["answer"].as_str().unwrap_or_default().to_owned();
     let mut strip = |list: &str, field: &str| {
@@ -117,10 +116,6 @@ pub(super) fn snapshot(beliefs: &Beliefs) -> Snapshot {
     }))
 }
 
-/// Restores the beliefs from a snapshot of a loop of the same mission.
-///
-/// # Errors
-/// The snapshot is damaged, or belongs to another mission.
 pub(super) fn restore(beliefs: &mut Beliefs, snapshot: &Snapshot) -> Result<(), Message> {
     let wrong = |what: &str| Message::error("M320", format!("the snapshot does not fit the mission: {what}"));
     restore_mission(beliefs, &snapshot.0).ok_or_else(|| wrong("facts or statements"))?;
@@ -133,7 +128,6 @@ pub(super) fn restore(beliefs: &mut Beliefs, snapshot: &Snapshot) -> Result<(), 
     Ok(())
 }
 
-/// Restores statements, facts and goal of the mission. Returns `None` if they are malformed or do not fit the mission.
 fn restore_mission(beliefs: &mut Beliefs, data: &Value) -> Option<()> {
     let records = |name: &str| data.get(name).and_then(Value::as_array);
     let statements =
@@ -156,7 +150,6 @@ fn restore_mission(beliefs: &mut Beliefs, data: &Value) -> Option<()> {
     Some(())
 }
 
-/// Restores the other beliefs, such as plan, effects, receipts and filters. Returns `None` if they are malformed.
 fn restore_work(beliefs: &mut Beliefs, data: &Value) -> Option<()> {
     let number = |name: &str| data.get(name).and_then(Value::as_u64);
     let truth = |name: &str| data.get(name).and_then(Value::as_bool);

@@ -62,7 +62,7 @@ pub trait Recoverable {
     /// Restores the state from a snapshot of a loop with the same checksum.
     ///
     /// # Errors
-    /// The snapshot is damaged, or belongs to another loop.
+    /// The snapshot is damaged or does not fit this loop.
     fn restore(&mut self, snapshot: &Snapshot) -> Result<(), Message>;
 }
 

@@ -24,8 +24,7 @@ const LEAST_LEFT: u32 = 1000;
 pub(super) const GATE: &str = "metaplan_resumed";
 
 /// Returns `domain` with the gate and, as the first action, a copy of the schema of `running` that is shortened to the
-/// remainder. The gate is a fact that holds once the action under way has ended; all other actions require it. `done`
-/// is the completed share of `running`, from 0 to 1.
+/// remainder. `done` is the completed share of `running`, from 0 to 1.
 pub(crate) fn resume(domain: &Domain, running: &PlannedStep, done: &BigRational) -> Domain {
     let mut gated = domain.clone();
     gated.predicates.push(Declaration { identifier: identifier(GATE), parameters: Vec::new() });
@@ -54,7 +53,6 @@ pub(crate) fn resume(domain: &Domain, running: &PlannedStep, done: &BigRational)
     gated
 }
 
-/// Returns the conjunction of `goal` and the gate fact, which holds once the action under way has ended.
 pub(crate) fn resumed_goal(goal: &Condition) -> Condition {
     Condition::And(vec![goal.clone(), Condition::Atom(gate())])
 }

@@ -11,8 +11,8 @@ use crate::message::did_you_mean;
 
 impl BeliefUpdate<'_> {
     /// Applies a report that a function has a design, or has none (`None`), without a request of the loop. The report
-    /// is believed from now on. If it is not new, or a reconfiguration of the function is pending, nothing else
-    /// changes. Otherwise, an action under way that uses the function adopts the reported design, and the loop later
+    /// is believed from now on. If it is not new, or a reconfiguration of the function is pending, the plan stays as it
+    /// is. Otherwise, an action under way that uses the function adopts the reported design, and the loop later
     /// searches for a better plan. If the function has no design, but the action needs one, a new plan is needed.
     pub(super) fn observed(&mut self, function: &str, design: Option<&str>) -> Result<(), Refusal> {
         let designs = self.beliefs.mission.designs_of(function);
@@ -71,7 +71,6 @@ impl BeliefUpdate<'_> {
         }
     }
 
-    /// Applies a sample of a measured attribute, unless the attribute's filter holds the sample back.
     pub(super) fn sampled(&mut self, attribute: &str, value: &BigRational) -> Result<(), Refusal> {
         let is_known = self.monitor.attributes.contains(attribute);
         let (states, now, filtered) =
@@ -85,7 +84,6 @@ impl BeliefUpdate<'_> {
         }
     }
 
-    /// Applies a reported status of a component, unless the component's filter holds the report back.
     pub(super) fn component(&mut self, component: &str, status: Status) -> Result<(), Refusal> {
         let name = match self.monitor.components.get(component) {
             Some(name) => Some(name.clone()),

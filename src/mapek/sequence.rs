@@ -25,7 +25,6 @@ enum Classification {
     Seen,
     /// The number is at most the given mark, the end of the dropped ranges: it is unknown whether the number was seen.
     Stale(u64),
-    /// The number is above the given upper limit.
     Ahead(u64),
 }
 
@@ -51,8 +50,6 @@ impl Numbers {
         }
     }
 
-    /// Returns the answer to a line with this sequence number if the line must be ignored, or `None` if the number is
-    /// new.
     pub(crate) fn refused(&self, sequence: u64) -> Option<Answer> {
         match self.classify(sequence) {
             Classification::New => None,
@@ -68,8 +65,6 @@ impl Numbers {
         }
     }
 
-    /// Adds a number that was not seen before. Drops the lowest range if there are then more than [`MAX_RANGES`]
-    /// ranges.
     pub(crate) fn insert(&mut self, number: u64) {
         // The number may close the gap to the next range, to the previous range, or both.
         let last = number.checked_add(1).and_then(|next| self.ranges.remove(&next)).unwrap_or(number);

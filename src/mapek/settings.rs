@@ -203,10 +203,7 @@ impl Settings {
         Ok(settings)
     }
 
-    /// Checks that the knowledge base has all names in the filter settings.
-    ///
-    /// # Errors
-    /// M143 for each unknown name.
+    /// Returns an error M143 for each name in the filter settings that the knowledge base does not have.
     pub(crate) fn check(&self, knowledge: Option<&Knowledge>, origin: &ManifestPath) -> Result<(), Errors> {
         let mistakes = self.filters.mistakes(knowledge).into_iter().map(|(key, name, message)| {
             let path: [Key; 3] = ["adaptation".into(), key.into(), name.as_str().into()];

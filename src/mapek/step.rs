@@ -183,7 +183,6 @@ pub(super) fn configuration_to_json(configuration: &[(String, String)]) -> Map<S
     configuration.iter().map(|(function, design)| (function.clone(), json!(design))).collect()
 }
 
-/// Parses the journal's array of pairs of function and design. Returns `None` if the array is malformed.
 pub(super) fn configuration_from_record(record: &Value) -> Option<Vec<(String, String)>> {
     let text = |value: &Value| value.as_str().map(ToOwned::to_owned);
     let pair = |value: &Value| Some((text(value.get(0)?)?, text(value.get(1)?)?));

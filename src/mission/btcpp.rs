@@ -33,8 +33,6 @@ pub fn btcpp_text(mission: &Mission, plan: &Plan) -> String {
     String::from_utf8(text).unwrap_or_default() + "\n"
 }
 
-/// Returns the nodes of the sequence: the actions of the plan, each after the changes of designs
-/// that it needs.
 fn nodes(mission: &Mission, plan: &Plan) -> Vec<Node> {
     let mut nodes = Vec::new();
     let mut at_work: BTreeMap<&str, &str> = BTreeMap::new();
@@ -58,8 +56,6 @@ fn nodes(mission: &Mission, plan: &Plan) -> Vec<Node> {
     nodes
 }
 
-/// Returns the ports of an action's node: parameter names of the schema with the objects of the
-/// step.
 fn ports(mission: &Mission, step: &Step) -> Vec<(String, String)> {
     let named = |action: &&pddl::ast::Action| {
         action.identifier.name.as_str().eq_ignore_ascii_case(&step.action)
@@ -71,7 +67,7 @@ fn ports(mission: &Mission, step: &Step) -> Vec<(String, String)> {
     names.zip(step.arguments.iter().cloned()).collect()
 }
 
-/// Returns the name of the port for a parameter. It begins with a letter and is not reserved.
+/// A port name begins with a letter and is not reserved.
 fn port(parameter: &str) -> String {
     let is_taken = RESERVED.iter().any(|reserved| reserved.eq_ignore_ascii_case(parameter));
     let begins = parameter.starts_with(|first: char| first.is_ascii_alphabetic());

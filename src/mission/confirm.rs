@@ -54,10 +54,6 @@ impl Reading {
     }
 }
 
-/// Returns the verdict of the independent validator on a plan.
-///
-/// # Errors
-/// A limit was reached.
 pub(super) fn verdict_of(
     mission: &Mission,
     problem: &Problem,

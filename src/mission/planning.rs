@@ -100,10 +100,6 @@ impl Planning for Mission {
     }
 }
 
-/// Grounds a problem that [`Mission::filled`] returned, with a variant of the mission's domain.
-///
-/// # Errors
-/// Errors of [`Planning::ground`].
 pub(crate) fn ground_with(
     mission: &Mission,
     domain: &Domain,

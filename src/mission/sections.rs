@@ -164,7 +164,6 @@ impl<'de> Deserialize<'de> for BindingsSection {
     }
 }
 
-/// Deserialises the section `bindings`: symbols with queries, and the table `names`.
 struct Section;
 
 impl<'de> Visitor<'de> for Section {
@@ -195,7 +194,6 @@ impl<'de> Visitor<'de> for Section {
     }
 }
 
-/// Value of a key in the section `bindings`: a query, or the table `names`.
 enum Bound {
     Query(String),
     Names(Vec<(Spanned<String>, String)>),

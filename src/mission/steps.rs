@@ -28,8 +28,6 @@ pub fn read_plan(source: &Source, mission: &Mission) -> Result<PlanText, Errors>
     PlanText::parse(source).map_err(|diagnostics| Message::from_pddl(&diagnostics, &[source]).into())
 }
 
-/// Returns the number, from 1, of the line with the heading of a table printed by `metaplan plan`,
-/// if the text has one.
 fn table_heading(text: &str) -> Option<usize> {
     let heading = ["step", "start", "duration", "action"];
     let is_heading = |line: &str| line.split_whitespace().take(heading.len()).eq(heading);

@@ -5,7 +5,6 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use pddl::ast::{Condition, Derived, Name, Term, TypedName};
 
-/// A ground fact: predicate and arguments.
 pub(super) type Fact = (Name, Vec<Name>);
 
 /// A Horn clause `head(arguments) ← body`, possibly with inequalities in the body. Its variables
@@ -32,7 +31,6 @@ pub(super) enum Operand {
 }
 
 impl Literal {
-    /// Returns the predicate of an atom, or `None` for an equality or inequality.
     pub fn name(&self) -> Option<&Name> {
         match self {
             Self::Holds(name, _) => Some(name),
@@ -40,7 +38,7 @@ impl Literal {
         }
     }
 
-    /// Returns `true` if the literal is a type test, i.e. its predicate is the relation of a type.
+    /// Returns `true` if the predicate is the relation of a type.
     pub fn is_type(&self) -> bool {
         matches!(self, Self::Holds(name, _) if name.as_str().contains(' '))
     }
@@ -59,9 +57,9 @@ pub(super) fn of_type(r#type: &Name) -> Name {
     Name::new(&format!("type {type}"))
 }
 
-/// Converts a derived predicate to clauses without equalities. Returns `None` unless its condition consists of
-/// conjunctions, disjunctions and existential quantifiers over atoms, equalities and negated equalities, with distinct
-/// variable names and at most one type per variable.
+/// Converts a derived predicate to clauses without equalities. Supports conjunctions, disjunctions and existential
+/// quantifiers over atoms, equalities and negated equalities. Returns `None` for other conditions, for repeated
+/// variable names, and for variables with several types.
 pub(super) fn clauses(derived: &Derived) -> Option<Vec<Clause>> {
     let head = &derived.head;
     let mut variables: BTreeSet<Name> = BTreeSet::new();

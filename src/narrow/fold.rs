@@ -15,8 +15,7 @@ use super::clause::{self, Clause, Fact, Literal, Operand};
 use super::possible::Possible;
 use super::settle::{Guards, settle};
 
-/// Result of partial evaluation: settled predicates, which no action can change, with their
-/// clauses, and bounds for the other derived predicates.
+/// Settled predicates, which no action can change, with their clauses, and bounds for the other derived predicates.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Folded {
     settled: BTreeMap<Name, Vec<Clause>>,
@@ -50,8 +49,6 @@ impl Folded {
         Self { settled, possible }
     }
 
-    /// Removes the axioms of settled predicates from a domain, and restricts the other derived
-    /// predicates by their bounds.
     pub fn shorten(&self, domain: &mut Domain) {
         domain.derived.retain(|axiom| !self.settled.contains_key(&axiom.head.identifier.name));
         self.possible.restrict(domain);
@@ -165,7 +162,6 @@ type Bindings<'k> = BTreeMap<&'k Name, &'k Name>;
 /// Argument tuples for which a predicate holds, in the order of their discovery and as a set.
 type Rows = (Vec<Vec<Name>>, HashSet<Vec<Name>>);
 
-/// Extensions of predicates (stated and derived facts), and all objects.
 struct Relations<'o> {
     relations: HashMap<Name, Rows>,
     objects: &'o BTreeSet<Name>,

@@ -29,7 +29,6 @@ enum Argument {
     Of(Vec<Name>),
 }
 
-/// The predicates with an upper bound, and the data from which the bounds are computed.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Possible {
     bounded: BTreeSet<Name>,
@@ -39,9 +38,9 @@ pub(super) struct Possible {
 
 impl Possible {
     /// Determines which open predicates (predicates that actions can change) get a bound. A predicate has no bound if
-    /// one of its axioms is not a clause or leaves a variable unbound. It has no bound either if it depends on a
-    /// predicate without bound, on one that timed initial literals change, or on one that actions add with an argument
-    /// that they do not require to be a member of a class of the knowledge base.
+    /// one of its axioms is not a clause or leaves a variable unbound. Predicates that timed initial literals change
+    /// have no bound. If an action adds the predicate, each argument must be a constant, or a parameter for which the
+    /// action requires a class. A predicate that depends on a predicate without bound has no bound, either.
     pub fn new(
         domain: &Domain,
         open: &BTreeMap<Name, Option<Vec<Clause>>>,
@@ -129,8 +128,6 @@ impl Possible {
         facts
     }
 
-    /// Returns the facts of the companion predicates: one for each derived fact of a bounded
-    /// predicate.
     pub fn bounds(&self, derived: BTreeSet<Fact>) -> impl Iterator<Item = Fact> {
         let bounded = derived.into_iter().filter(|(name, _)| self.bounded.contains(name));
         bounded.map(|(name, row)| (possible(&name), row))
@@ -196,7 +193,6 @@ impl Possible {
     }
 }
 
-/// Returns the name of the companion of a predicate, i.e. of the static predicate that bounds it.
 pub(super) fn possible(name: &Name) -> Name {
     Name::new(&format!("possible-{name}"))
 }

@@ -1,12 +1,13 @@
 //! Determines the derived predicates of a domain that no action and no timed initial literal can change, and their
 //! clauses.
 //!
-//! A predicate is *open* if an action or a timed initial literal changes it, if it has an axiom that is not a clause,
-//! or if one of its clauses has an open atom in the body. Axioms about domains and ranges of properties make nearly
-//! every predicate open: for example, `(functionGrounding ?f ?fd)` implies that `?f` is a function and `?fd` is a
-//! function design. Such a clause derives nothing new if all facts of the predicate have arguments of the right class
-//! anyway. This is so if the initial facts have such arguments, and if every action that adds a `functionGrounding`
-//! requires, by a unary predicate that never changes, that the argument is in the class (a *guard*).
+//! A predicate is *open* if an action or a timed initial literal changes it, or if it has an axiom that is not a
+//! clause. It is also open if one of its clauses has an open atom in the body. Axioms about domains and ranges of
+//! properties make nearly every predicate open: for example, `(functionGrounding ?f ?fd)` implies that `?f` is a
+//! function and `?fd` is a function design. Such a clause derives nothing new if all facts of the predicate have
+//! arguments of the right class anyway. This is so if the initial facts have such arguments, and every action that adds
+//! a `functionGrounding` requires that the argument is in the class. Such a requirement, by a unary predicate that
+//! never changes, is a *guard*.
 //!
 //! Clauses of an open predicate are therefore unfolded \[1\]. A clause is dropped if its body contains its head, or an
 //! atom whose guard implies the head. If no open atom remains, the predicate is *settled*. Each step preserves the
@@ -21,7 +22,6 @@ use pddl::ast::{Action, ActionBody, Atom, Condition, Domain, Effect, Name, Term}
 use super::clause::{Clause, Fact, Literal, Operand};
 
 const MAX_DEPTH: usize = 8;
-/// Maximum number of clauses that are examined while one predicate is unfolded.
 const MAX_CLAUSES: usize = 1000;
 
 /// Guards. A guard is a predicate, an argument position and a class (unary predicate that never
@@ -57,7 +57,6 @@ pub(super) fn guards(domain: &Domain, varying: &BTreeSet<Name>, timed: &BTreeSet
     .collect()
 }
 
-/// The facts that an action adds, and the classes that its conditions require of its arguments.
 pub(super) struct Additions<'a> {
     /// Required classes, each with the term that has to be a member.
     pub classes: Vec<(Name, &'a Term)>,
@@ -65,8 +64,7 @@ pub(super) struct Additions<'a> {
     pub atoms: Vec<(&'a Atom, Vec<&'a Name>)>,
 }
 
-/// Returns the additions of an action. Unary predicates count as classes unless they are in
-/// `varying`.
+/// Unary predicates count as classes unless they are in `varying`.
 pub(super) fn additions<'a>(action: &'a Action, varying: &BTreeSet<Name>) -> Additions<'a> {
     let (conditions, effects): (Vec<&Condition>, Vec<&Effect>) = match &action.body {
         ActionBody::Instantaneous { precondition, effect } => (vec![precondition], vec![effect]),
@@ -103,8 +101,6 @@ fn classes<'c>(conditions: &[&'c Condition], varying: &BTreeSet<Name>) -> Vec<(N
     found_classes
 }
 
-/// Collects the atoms that an effect adds, each with the variables that are bound by quantifiers
-/// within the effect.
 fn added<'e>(effect: &'e Effect, bound: &[&'e Name], atoms: &mut Vec<(&'e Atom, Vec<&'e Name>)>) {
     match effect {
         Effect::And(parts) => {
@@ -140,9 +136,8 @@ fn is_bound(term: &Term, bound: &[&Name]) -> bool {
 /// or if the predicate may have a large extension).
 pub(super) type Parted = (BTreeMap<Name, Vec<Clause>>, BTreeMap<Name, Option<Vec<Clause>>>);
 
-/// Unfolds clauses until no further predicate becomes settled, i.e. has only clauses without open
-/// atoms in the body (see the head of this file). Returns the clauses of settled predicates and those of the other, open
-/// predicates.
+/// Unfolds clauses until no further predicate becomes settled (see the head of this file). Returns the clauses of the
+/// settled and of the open predicates.
 pub(super) fn settle(
     mut clauses_by_head: BTreeMap<Name, Option<Vec<Clause>>>,
     changed: &BTreeSet<Name>,
@@ -167,7 +162,6 @@ pub(super) fn settle(
     }
 }
 
-/// Returns the predicates whose extension may differ between states.
 fn open(clauses_by_head: &BTreeMap<Name, Option<Vec<Clause>>>, changed: &BTreeSet<Name>) -> BTreeSet<Name> {
     let mut open = changed.clone();
     loop {
@@ -230,8 +224,8 @@ impl Unfold<'_> {
         Some(done.into_iter().collect())
     }
 
-    /// Returns `true` if the clause is redundant: its body contains its head, or an atom whose guard (class that its
-    /// argument must belong to) already implies the head.
+    /// Returns `true` if the clause is redundant: its body contains its head, or an atom whose guard already implies
+    /// the head.
     fn says_nothing(&self, clause: &Clause) -> bool {
         clause.body.iter().any(|part| {
             let Literal::Holds(name, operands) = part else { return false };

@@ -83,7 +83,6 @@ pub(super) struct DiagnosticArray {
     pub(super) status: Vec<DiagnosticStatus>,
 }
 
-/// Value of the field `level` of a status without an error.
 const OK: u8 = 0;
 const ERROR: u8 = 2;
 

@@ -83,7 +83,7 @@ impl Recorder {
         }
     }
 
-    /// Sends an entry to the writer thread. If this thread has ended, e.g. after an error, the entry is lost.
+    /// If the writer thread has ended, e.g. after an error, the entry is lost.
     fn send(&self, entry: Entry) {
         let _ = self.entries.send(entry);
     }
@@ -94,8 +94,7 @@ impl Recorder {
     }
 }
 
-/// Writes entries to the file until an end entry arrives or all senders are dropped. Flushes at
-/// most [`INTERVAL`] after an entry.
+/// Flushes at most [`INTERVAL`] after an entry.
 fn write(mut recording: Recording<File>, entries: &Receiver<Entry>) -> io::Result<()> {
     // Time at which the entries that are not flushed have to be flushed.
     let mut due: Option<Instant> = None;

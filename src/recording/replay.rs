@@ -138,8 +138,6 @@ impl<R: Read> Replay<R> {
         Ok(())
     }
 
-    /// Handles a record that is not a chunk: registers schemas and channels, and queues the lines
-    /// of messages.
     fn take(&mut self, record: Record<'static>) -> io::Result<()> {
         match record {
             Record::Schema { header, .. } => {

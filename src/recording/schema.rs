@@ -30,7 +30,6 @@ pub(super) const ANSWERS: [(&str, &[&str]); 4] = [
     ("/metaplan/loop", &[]),
 ];
 
-/// Returns the index in [`ANSWERS`] of the topic for answers of a kind.
 pub(super) fn topic(kind: &str) -> usize {
     ANSWERS.iter().position(|(_, kinds)| kinds.contains(&kind)).unwrap_or(ANSWERS.len() - 1)
 }

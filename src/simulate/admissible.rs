@@ -1,8 +1,8 @@
 //! Designs with which an action can be executed now, for strategies that choose the design of each
 //! function separately.
 //!
-//! A design is *admissible* for a function of an action if it is available, and if all conditions of the action hold
-//! with it when the action is executed now. These conditions include the quality bounds of the action in the current
+//! A design is *admissible* for a function of an action if it is available and the action can be executed with it now,
+//! i.e. all conditions of the action hold. These conditions include the quality bounds of the action in the current
 //! context (`t:requiresQuality`) and a sufficient battery level. A condition that mentions the design of another
 //! function is omitted until that design is chosen.
 
@@ -47,13 +47,11 @@ impl<'p> Admission<'p> {
         Self { domain, problem }
     }
 
-    /// Returns `true` if the collected conditions hold for the step with its current designs.
     pub(super) fn admits(&self, step: &PlannedStep) -> bool {
         advance(&self.domain, self.problem, &step.to_plan_step(), false).is_ok()
     }
 }
 
-/// Removes the conditions that mention a parameter in `open`.
 fn leave_open(action: &mut Action, open: &[Name]) {
     match &mut action.body {
         ActionBody::Instantaneous { precondition, .. } => drop_open(precondition, open),

@@ -77,7 +77,6 @@ pub(super) struct Controller {
     plan: VecDeque<PlannedStep>,
     random: fastrand::Rng,
     gave_up: bool,
-    /// Designs that were available at the last planning.
     planned_with: BTreeSet<String>,
     pub(super) plans: usize,
 }

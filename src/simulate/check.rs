@@ -30,8 +30,6 @@ impl Simulation {
         self.watched(mission).1
     }
 
-    /// Parses the conditions and functions of the simulation. Also returns all mistakes in the
-    /// section.
     pub(super) fn watched(&self, mission: &Mission) -> (Watched, Vec<Mistake>) {
         let mut checker = Checker { mission, mistakes: Vec::new() };
         checker.numbers(self);
@@ -155,8 +153,7 @@ impl Checker<'_> {
         }
     }
 
-    /// Checks the name of a numeric function. Returns the function in the validator's notation, or
-    /// `None` after adding the mistakes.
+    /// Returns a numeric function in the validator's notation, or `None` after adding the mistakes.
     fn function(&mut self, path: &[Key], text: &str) -> Option<String> {
         match conditions::function(self.mission, text) {
             Ok(atom) => Some(written(&atom)),

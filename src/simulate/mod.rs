@@ -134,8 +134,7 @@ struct Stage {
 }
 
 impl Stage {
-    /// Runs until the mission ends, and returns the reason for its end. Returns `None` if a limit
-    /// is reached first.
+    /// Returns the reason for the end of the mission, or `None` if a limit is reached first.
     fn play(
         &mut self,
         limits: &Limits,
@@ -173,7 +172,6 @@ impl Stage {
         }
     }
 
-    /// Returns the reason for the end of the mission, or `None` if it continues.
     fn ending(&self) -> Option<Ending> {
         if self.world.reached() {
             Some(Ending::Goal)
@@ -199,15 +197,12 @@ impl Stage {
         }
     }
 
-    /// Records the current time if the running action stalls (cannot proceed) and no earlier stall is pending.
     fn record_stall(&mut self) {
         if self.stalled_since.is_none() && !self.world.goes_on() {
             self.stalled_since = Some(self.world.time);
         }
     }
 
-    /// Executes the effects in the controller's answers, and appends the resulting events to the
-    /// queue.
     fn take(&mut self, answers: &[Answer], queue: &mut VecDeque<Event>) {
         for effect in answers.iter().filter_map(Answer::effect) {
             if let Command::Reconfigure { function, from, to } = &effect.command {

@@ -38,7 +38,6 @@ struct ComponentChange {
     status: Status,
 }
 
-/// The true state of the robot and its environment in a simulation.
 #[derive(Debug, Clone)]
 pub struct World {
     truth: Mission,
@@ -57,7 +56,6 @@ pub struct World {
     pub lost: bool,
     /// Greatest completed share of the action that inspects the pipeline, from 0 to 1.
     pub inspected: f64,
-    /// Time at which the condition "pipeline found" first held.
     pub found: Option<f64>,
 }
 
@@ -71,7 +69,6 @@ fn rounded(value: f64) -> f64 {
 }
 
 impl World {
-    /// Creates the world at the beginning of a mission.
     pub fn new(truth: Mission, settings: Simulation, watched: Watched, seed: u64) -> Self {
         let mut random = fastrand::Rng::with_seed(seed);
         let phases =
@@ -123,7 +120,6 @@ impl World {
         }
     }
 
-    /// Executes a command of the controller. Returns the events that the robot reports immediately.
     pub fn obey(&mut self, effect: &Effect) -> Vec<Event> {
         match &effect.command {
             Command::Request { step } => {
@@ -179,11 +175,8 @@ impl World {
         1.0 + self.settings.noise * (2.0 * fastrand::Rng::with_seed(seed).f64() - 1.0)
     }
 
-    /// Advances time by one step of the simulation, or to the end of the running action if this is
-    /// sooner. Returns the events that happen until then.
-    ///
-    /// # Errors
-    /// A disturbance or a signal does not fit the mission.
+    /// Advances time by one step of the simulation, or to the end of the running action if this is sooner. Returns the
+    /// events that happen until then.
     pub fn pass(&mut self) -> Result<Vec<Event>, Message> {
         let mut events = Vec::new();
         let remaining = self.job.as_ref().and_then(|job| self.remaining_time(job));
@@ -322,11 +315,7 @@ impl World {
         Ok(())
     }
 
-    /// Returns the events of time 0: disturbances at this time, and the initial values of the
-    /// signals.
-    ///
-    /// # Errors
-    /// A disturbance or a signal does not fit the mission.
+    /// Returns the events of time 0: disturbances at this time, and the initial values of the signals.
     pub fn first_look(&mut self) -> Result<Vec<Event>, Message> {
         let mut events = Vec::new();
         self.watch();
@@ -349,7 +338,6 @@ impl World {
         Ok(())
     }
 
-    /// Returns `true` if the goal holds in the true state.
     pub fn reached(&self) -> bool {
         is_valid(self.truth.domain(), &self.truth.current())
     }
@@ -361,21 +349,18 @@ impl World {
         metric.map_or(self.time, |metric| number::to_f64(&metric))
     }
 
-    /// Returns `true` if the mission's metric is maximised.
     pub fn maximizes(&self) -> bool {
         self.truth.current().metric.as_ref().is_some_and(|metric| metric.direction == Direction::Maximize)
     }
 
-    /// Returns the inspected length of the pipeline, in the unit of the mission's function for the length. `None` if
-    /// the simulation has no such function, or the function has no value.
+    /// Inspected length of the pipeline, in the unit of the mission's function for the length. `None` if the simulation
+    /// has no such function, or the function has no value.
     pub fn distance(&self) -> Option<f64> {
         let length = self.truth.value(self.watched.length.as_ref()?)?;
         Some(number::to_f64(&length) * self.inspected)
     }
 }
 
-/// Returns `true` if the initial state of the problem satisfies its goal, i.e. the empty plan is
-/// valid.
 fn is_valid(domain: &Domain, problem: &Problem) -> bool {
     validate(domain, problem, &PlanText::default(), &Options::default()).valid
 }

@@ -3,7 +3,7 @@
 //! Bounds of designs divide the values of an attribute into *cells*: within a cell, each bound is either satisfied
 //! (kept) or violated (missed). A sample in the cell of the believed value is believed at once. A satisfied bound
 //! counts as violated as soon as a sample violates it. A violated bound counts as satisfied only after a sample that
-//! satisfies it by at least its band (a Schmitt trigger whose lower threshold is the bound \[1\]). A change of the cell
+//! satisfies it by at least its band (a Schmitt trigger with the bound as one threshold \[1\]). A change of the cell
 //! (*crossing*) is debounced.
 //!
 //! There is an exception if a lower bound of one design and an upper bound of another design are within one band of
@@ -29,13 +29,10 @@ pub(crate) type Micros = u64;
 /// Side of a bound on which a design can be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Side {
-    /// Values that are at least the bound, i.e. a lower bound.
     Least,
-    /// Values that are at most the bound, i.e. an upper bound.
     Most,
 }
 
-/// A value beyond which a design cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Bound {
     pub value: BigRational,
@@ -59,7 +56,6 @@ pub enum Stale {
 }
 
 impl Stale {
-    /// Key of the outcome in manifests and answers.
     pub(crate) fn word(self) -> &'static str {
         match self {
             Self::Keep => "keep",
@@ -72,7 +68,6 @@ impl Stale {
 /// Filter of one attribute. Any field values are valid; the default accepts every sample at once.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct AttributeFilter {
-    /// Bounds of designs, in any order.
     pub bounds: Vec<Bound>,
     /// Number of the last `of` samples that must have crossed a bound before the crossing is believed; 0 and 1 disable
     /// the condition.
@@ -83,8 +78,8 @@ pub(crate) struct AttributeFilter {
     pub debounce: Micros,
     pub minimum: Option<BigRational>,
     pub maximum: Option<BigRational>,
-    /// Greatest plausible distance between consecutive samples. A sample at a greater distance is rejected, unless the
-    /// previous sample was rejected, too, and lies within this distance.
+    /// Greatest plausible distance from the last plausible sample. A sample at a greater distance is rejected, unless
+    /// it lies within this distance of the last sample rejected as a jump.
     pub jump: Option<BigRational>,
     /// Time without a plausible sample after which the sensor counts as silent; `None` for never.
     pub period: Option<Micros>,
@@ -138,14 +133,11 @@ pub(crate) enum Verdict {
     /// Newly believed value. The value differs from the sample if the sample satisfies some violated bounds by less
     /// than their hysteresis.
     Accepted(BigRational),
-    /// The sample is held, and the believed value is unchanged.
     Held(Hold),
 }
 
-/// Change of a filter's state by the passage of time, without a sample.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Elapsed {
-    /// A crossing of a bound has lasted for the debounce time. Contains the newly believed value.
     Accepted(BigRational),
     /// The sensor counts as silent from now on. Contains the newly believed value if the filter uses [`Stale::Worst`]
     /// and has bounds.
@@ -198,8 +190,6 @@ impl AttributeFilter {
         if self.is_confirmed(state, now) { self.accept(state, value) } else { Verdict::Held(Hold::Debounce) }
     }
 
-    /// Returns `true` if a sample is implausibly far from the last plausible sample, and also from the last sample that
-    /// was rejected as a jump.
     fn is_jump(&self, state: &AttributeState, value: &BigRational) -> bool {
         let Some(jump) = &self.jump else { return false };
         let is_near = |sample: &BigRational| {
@@ -209,8 +199,6 @@ impl AttributeFilter {
             && !state.suspect.as_ref().is_some_and(is_near)
     }
 
-    /// Returns `true` if a crossing, i.e. a change of a bound between satisfied and violated, has lasted for the
-    /// debounce time and enough samples agree.
     fn is_confirmed(&self, state: &AttributeState, now: Micros) -> bool {
         let agreeing = state.recent.iter().filter(|crosses| **crosses).count();
         let lasted =
@@ -218,7 +206,6 @@ impl AttributeFilter {
         lasted && agreeing >= self.agree
     }
 
-    /// Believes a sample whose crossing of bounds is confirmed, and ends the crossing.
     fn accept(&self, state: &mut AttributeState, value: &BigRational) -> Verdict {
         let target = match &state.believed {
             Some(current) => self.target(current, value).into_owned(),
@@ -231,23 +218,17 @@ impl AttributeFilter {
         Verdict::Accepted(target)
     }
 
-    /// Returns the earliest time at which a crossing is confirmed or the sensor becomes silent without a further
-    /// sample.
     pub(crate) fn due(&self, state: &AttributeState) -> Option<Micros> {
         let silent = self.silent_at(state);
         let confirmed = self.confirmed_from(state);
         [silent, confirmed].into_iter().flatten().min()
     }
 
-    /// Returns the time at which the sensor will count as silent; `None` if the sensor is silent already or has no
-    /// period.
     fn silent_at(&self, state: &AttributeState) -> Option<Micros> {
         let period = self.period.filter(|_| !state.silent)?;
         Some(state.last_sample_time.unwrap_or(0).saturating_add(period).saturating_add(1))
     }
 
-    /// Returns the time at which a crossing has lasted for the debounce time; `None` without a crossing or if too few
-    /// samples agree.
     fn confirmed_from(&self, state: &AttributeState) -> Option<Micros> {
         let (since, _) = state.crossing.as_ref()?;
         let confirmed = since.saturating_add(self.debounce);
@@ -282,7 +263,6 @@ impl AttributeFilter {
         Some(Elapsed::Silent(worst))
     }
 
-    /// Returns `true` if two values satisfy the same bounds.
     fn is_same_cell(&self, first: &BigRational, second: &BigRational) -> bool {
         self.bounds.iter().all(|bound| bound.keeps(first) == bound.keeps(second))
     }
@@ -319,9 +299,8 @@ impl AttributeFilter {
         }
     }
 
-    /// Returns a value that satisfies the fewest bounds, the lowest one if several do. Values between two bounds are
-    /// considered only if they are plausible; a value below all bounds may be less than the minimum, and a value above
-    /// all bounds greater than the maximum. Returns `None` without bounds.
+    /// Returns a value that satisfies the fewest bounds, the lowest one if several do; `None` without bounds. A value
+    /// between two bounds must be plausible. A value beyond all bounds may lie outside of the plausible range.
     pub(crate) fn worst(&self) -> Option<BigRational> {
         let unit = BigRational::from_integer(1.into());
         let two = BigRational::from_integer(2.into());

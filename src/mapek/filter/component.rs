@@ -16,7 +16,6 @@ pub(crate) struct ComponentFilter {
 
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct ComponentState {
-    /// Whether the component is believed to have failed; `None` if unknown.
     has_failed: Option<bool>,
     /// Time since which all reports differ from the believed status, and the last reported status; `None` if the last
     /// report agrees.
@@ -44,14 +43,11 @@ impl ComponentFilter {
         false
     }
 
-    /// Returns the time at which a reported change will be believed without a further report; `None` without such a
-    /// change.
     pub(crate) fn due(&self, state: &ComponentState) -> Option<Micros> {
         let (since, status) = state.change.as_ref()?;
         Some(since.saturating_add(self.time(*status)))
     }
 
-    /// Applies a change of status that is due at `now`, and returns the newly believed status.
     pub(crate) fn elapse(&self, state: &mut ComponentState, now: Micros) -> Option<Status> {
         self.due(state).filter(|due| *due <= now)?;
         let (_, status) = state.change?;
@@ -63,7 +59,6 @@ impl ComponentFilter {
         *state = ComponentState { has_failed: Some(status == Status::Failed), ..ComponentState::default() };
     }
 
-    /// Time for which a status must be reported before it is believed.
     fn time(&self, status: Status) -> Micros {
         if status == Status::Failed { self.confirm } else { self.heal }
     }

@@ -32,8 +32,7 @@ use crate::message::Message;
 use crate::number;
 
 impl FilterSettings {
-    /// Returns warnings, for `lint`, about settings with which noise causes reconfigurations: attributes without
-    /// hysteresis and debounce, and a general `heal_time` of 0 if the knowledge base has components.
+    /// Returns warnings, for `lint`, about settings with which noise causes reconfigurations.
     pub(crate) fn doubts(&self, knowledge: Option<&Knowledge>) -> Vec<Message> {
         let filters = Filters::new(self, knowledge);
         let is_noisy = |(_, filter): &(&String, &AttributeFilter)| {
@@ -79,7 +78,6 @@ pub(crate) enum Accepted {
     Value(String, BigRational),
     /// Status of a component, by local name.
     Status(String, Status),
-    /// An attribute whose value has become unknown.
     Unknown(String),
 }
 
@@ -143,8 +141,8 @@ impl Filters {
         }
     }
 
-    /// Filters a sample of an attribute. Returns the newly believed value, or `None` if the sample is held back. A
-    /// sample of an attribute without a filter is believed. Some of the held samples are reported in `answers`.
+    /// Returns the newly believed value, or `None` if the sample is held back. A sample of an attribute without a
+    /// filter is believed. Some of the held samples are reported in `answers`.
     pub(crate) fn sample(
         &self,
         states: &mut FilterStates,
@@ -176,8 +174,8 @@ impl Filters {
         }
     }
 
-    /// Filters a status reported for a component. Returns `true` if the status is believed from now on. Some of the
-    /// held reports are mentioned in `answers`.
+    /// Returns `true` if the reported status is believed from now on. Some of the held reports are mentioned in
+    /// `answers`.
     pub(crate) fn report(
         &self,
         states: &mut FilterStates,
@@ -251,7 +249,6 @@ impl Filters {
 }
 
 impl Accepted {
-    /// Returns the name of the attribute or component, and the report in the form for the knowledge base.
     pub(crate) fn report(&self) -> (&str, RobotReport) {
         match self {
             Self::Value(name, value) => (name, RobotReport::measured(value)),

@@ -62,7 +62,7 @@ pub struct MeasuredSettings {
     pub minimum: Option<BigRational>,
     /// Greatest plausible value.
     pub maximum: Option<BigRational>,
-    /// Greatest plausible distance from one sample to the next.
+    /// Greatest plausible distance from the last plausible sample.
     pub jump: Option<BigRational>,
     /// Time without a plausible sample after which the sensor is silent; `None` for never.
     pub period: Option<Duration>,
@@ -88,9 +88,9 @@ impl FilterSettings {
         Self { heal_time: Duration::ZERO, band: BigRational::default(), ..Self::default() }
     }
 
-    /// Returns the attributes and components that the knowledge base does not have (without a knowledge base, all). For
-    /// each one, returns the key in the section `adaptation` (`measured` or `components`), the unknown name, and an
-    /// error.
+    /// Returns the configured attributes and components that the knowledge base does not have (without a knowledge
+    /// base, all). For each one, returns the key in the section `adaptation` (`measured` or `components`), the unknown
+    /// name, and an error.
     pub(crate) fn mistakes(&self, knowledge: Option<&Knowledge>) -> Vec<(&'static str, String, Message)> {
         let view = knowledge.map(Knowledge::view);
         let attributes: Vec<String> = view

@@ -97,8 +97,8 @@ fn noise_within_the_band_crosses_at_most_once() {
 type History = Vec<(u64, Option<i64>)>;
 
 /// Value in thousandths that is believed at the end of a history, computed from the definition of debouncing. A sample
-/// on the believed side of the bound 500 counts at once. Another sample counts if, at some time in the history, all
-/// samples of the last `debounce` and at least `agree` of the last `of` samples lie on the other side.
+/// on the believed side of the bound 500 counts at once. Another sample counts as soon as all samples of the last
+/// `debounce`, and at least `agree` of the last `of` samples, lie on the other side.
 fn believed(history: &History, debounce: u64, agree: usize, of: usize) -> i64 {
     let is_high = |value: i64| value > 500;
     let mut current = history.iter().find_map(|(_, sample)| *sample).expect("a sample");

@@ -12,7 +12,6 @@ use crate::mapek::{Loop, Observation, PlannedStep, Settings, Watch};
 use crate::mission::Mission;
 use crate::setup::Setup;
 
-/// A mission with the event lines from which the test draws at random.
 struct World {
     name: String,
     mission: Mission,
@@ -90,7 +89,6 @@ fn uuv(name: &str) -> World {
     World { name: name.to_owned(), mission: shipped(name), events }
 }
 
-/// The ground vehicle on a grid of `width` by `height` waypoints, with corridors of random kinds and lengths.
 fn map(width: usize, height: usize, seed: u64) -> World {
     let mut random = fastrand::Rng::with_seed(seed);
     let count = width * height;
@@ -136,8 +134,6 @@ struct Tally {
 }
 
 impl Tally {
-    /// Plans incrementally and from scratch, and asserts that the plans are equal. With `goes_on`, the plans continue
-    /// the action under way.
     fn compare(&mut self, control: &mut Loop, goes_on: bool, context: &dyn Fn() -> String) {
         let problem = control.beliefs.filled();
         let running = control.beliefs.running.as_ref().filter(|_| goes_on);
@@ -167,8 +163,6 @@ impl Tally {
     }
 }
 
-/// Applies `count` random events. After each event, compares incremental plans with plans from scratch, with and
-/// without the action under way.
 fn check(world: &World, seed: u64, count: usize) -> Tally {
     let mut random = fastrand::Rng::with_seed(seed);
     let mut control = Loop::new(world.mission.clone(), Settings::default()).expect("a loop");

@@ -1,9 +1,9 @@
 //! Finds missing values of numeric functions, and negative durations.
 //!
-//! For each numeric function that an action needs, the analysis enumerates the argument tuples for which the
-//! static facts do not rule out the action (three-valued evaluation of its conditions, as in grounding).
-//! Tuples with two equal arguments are skipped, and the enumeration ends when its budget is spent. A mission
-//! may omit values for impossible cases, so a missing value causes a warning only in three cases:
+//! For each numeric function that an action needs, the analysis enumerates argument tuples. It omits tuples for which
+//! the static facts rule out the action (three-valued evaluation of its conditions, as in grounding). Tuples with two
+//! equal arguments are skipped, and the enumeration ends when its budget is spent. A mission may omit values for
+//! impossible cases, so a missing value causes a warning only in three cases:
 //!
 //! - The function has only constants as arguments.
 //! - At least three quarters of the tuples have a value.
@@ -36,7 +36,6 @@ use crate::message::Message;
 use crate::mission::conditions::written;
 use crate::number;
 
-/// Maximum number of variable bindings that are examined; further ones are not checked.
 const BUDGET: usize = 50_000;
 
 /// A numeric function with arguments for which an action needs a value that is missing.
@@ -54,7 +53,6 @@ pub struct MissingValue {
     pub(super) symbol: String,
     /// `true` if the function has no value for any arguments, and no action assigns one.
     pub(super) is_silent: bool,
-    /// `true` if the value is probably missing by mistake.
     pub(super) is_likely: bool,
 }
 
@@ -66,12 +64,10 @@ type Needed = BTreeMap<(Name, Vec<Name>), (bool, BTreeSet<String>)>;
 pub(super) struct NegativeDuration {
     pub(super) action: String,
     pub(super) duration: String,
-    /// The negative values from which the duration is computed, each as a phrase.
     pub(super) causes: Vec<String>,
     pub(super) design: Option<String>,
 }
 
-/// The numbers and static facts of a mission in its initial state, prepared for the analysis.
 pub(super) struct Numbers<'m> {
     pub(super) mission: &'m Mission,
     pub(super) domain: &'m Domain,
@@ -231,8 +227,7 @@ impl<'m> Numbers<'m> {
         }
     }
 
-    /// Adds to `negative` the negative durations of an action, as far as they follow from values
-    /// that nothing changes.
+    /// Considers only durations that follow from values that nothing changes.
     fn negative_durations(&self, action: &Action, negative: &mut BTreeSet<NegativeDuration>) {
         let ActionBody::Durative { duration, .. } = &action.body else { return };
         let conditions = conditions(&action.body);

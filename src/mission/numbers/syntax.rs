@@ -4,7 +4,6 @@ use pddl::ast::{
     Action, ActionBody, Assignment, Atom, Condition, Effect, Expression, Name, Term, TypeExpression,
 };
 
-/// A binding: variables with the objects that they denote.
 pub(super) type Binding<'a> = Vec<(&'a Name, Name)>;
 
 pub(super) fn constants(atom: &Atom) -> Vec<Name> {
@@ -17,8 +16,6 @@ pub(super) fn name_of(term: &Term) -> &Name {
     }
 }
 
-/// Returns the object that a term denotes under a binding, or `None` if the term is an unbound
-/// variable.
 pub(super) fn object<'a>(term: &'a Term, binding: &'a Binding<'_>) -> Option<&'a Name> {
     match term {
         Term::Constant(constant) => Some(&constant.name),
@@ -32,7 +29,7 @@ pub(super) fn bound_arguments(atom: &Atom, binding: &Binding<'_>) -> Option<Vec<
     atom.arguments.iter().map(|term| object(term, binding).cloned()).collect()
 }
 
-/// Returns the arguments of an atom under a binding that binds all its variables.
+/// `binding` must bind all variables of the atom.
 pub(super) fn grounded(atom: &Atom, binding: &Binding<'_>) -> Vec<Name> {
     bound_arguments(atom, binding).unwrap_or_default()
 }
@@ -71,7 +68,6 @@ pub(super) fn effects(body: &ActionBody) -> Vec<&Effect> {
     }
 }
 
-/// Visits the elementary parts of an effect, i.e. those that do not contain other effects.
 pub(super) fn walk<'a>(effect: &'a Effect, visit: &mut dyn FnMut(&'a Effect)) {
     match effect {
         Effect::And(parts) => parts.iter().for_each(|part| walk(part, visit)),

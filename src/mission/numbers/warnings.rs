@@ -9,8 +9,6 @@ use pddl::{Diagnostic, Severity, Source};
 use super::analysis::{MissingValue, NegativeDuration, Numbers};
 use crate::message::{Message, did_you_mean};
 
-/// Maximum number of functions without a value that a warning names. Further functions are only
-/// counted.
 const MAX_NAMED: usize = 3;
 
 impl Numbers<'_> {
