@@ -132,6 +132,7 @@ impl Adaptation<'_> {
                 self.beliefs.failures = None;
                 self.beliefs.plan = None;
                 self.beliefs.stuck = true;
+                self.beliefs.retry = None;
                 true
             }
             _ => false,
