@@ -22,7 +22,7 @@ pub const MAX_DIGITS: usize = 10_000;
 #[derive(Clone, PartialEq, Eq, Hash)]
 pub struct Integer(Repr);
 
-/// Canonical representation: `Small` if and only if the value fits, so that equality is structural.
+/// Canonical: `Small` if and only if the value fits, so that equality is structural.
 #[derive(Clone, PartialEq, Eq, Hash)]
 enum Repr {
     Small(i128),

@@ -159,7 +159,7 @@ pub(super) fn check_potential(model: &Model, table: &Table<'_>) -> Result<(), St
     })
 }
 
-/// The effect of an operator on a number, as far as it matters for needs (lower bounds on the number).
+/// The effect of an operator on a number, as far as needs depend on it.
 enum Use {
     /// Decreases the number by at least this amount (≥ 0). If the number can decrease, the operator requires
     /// that the result is at least 0.

@@ -19,7 +19,7 @@ const WIDTH_LIMIT: usize = 4_096;
 
 pub(super) struct Sums {
     spent: Bits,
-    /// Upper limit on the accumulated cost: the claimed cost minus 1.
+    /// The claimed cost minus 1.
     limit: Integer,
     numbers: Vec<Bits>,
 }
@@ -189,8 +189,6 @@ struct Adder<'a> {
 }
 
 impl Adder<'_> {
-    /// Encodes the value of a numeric variable after the step, given its bits before the step.
-    /// Returns its bits after the step.
     fn change(&mut self, formula: &mut Formula, before: &Bits, number: u32) -> Result<Bits, String> {
         let changes: Vec<Option<Change<'_>>> =
             self.model.operators.iter().map(|operator| change(operator, number)).collect::<Result<_, _>>()?;
@@ -285,8 +283,6 @@ impl Adder<'_> {
         sum
     }
 
-    /// Encodes the table entry that the operator of this step adds, for the table at position
-    /// `place` of each quantity.
     #[expect(
         clippy::arithmetic_side_effects,
         clippy::cast_possible_truncation,

@@ -36,8 +36,6 @@ impl Reader<'_> {
         }
     }
 
-    /// Returns the smallest set of candidates among those of the visited conjuncts, or `None` if no
-    /// conjunct restricts the variable; see [`Reader::restricted`].
     fn restricted_by_all<'c>(
         &self,
         name: &Name,

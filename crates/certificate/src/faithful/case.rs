@@ -21,7 +21,7 @@ pub(super) struct Case {
     /// both added and deleted holds.
     pub(super) effects: Vec<(Formula, Key, bool)>,
     pub(super) changes: BTreeMap<Key, Linear>,
-    /// The range of durations; `None` for instantaneous actions and waits.
+    /// `None` for instantaneous actions and waits.
     pub(super) length: Option<Length>,
     pub(super) passage: Passage,
 }

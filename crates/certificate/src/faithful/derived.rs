@@ -14,8 +14,7 @@ use crate::faithful::verdict::Cause;
 use crate::faithful::world::World;
 use pddl::ast::{Condition, Expression};
 
-/// Computes which derived atoms hold in all states or in no state of the witness (the over-approximation of the
-/// reachable states). `linked` contains the derived atoms that are variables of the task.
+/// `linked` contains the derived atoms that are variables of the task.
 pub(super) fn axioms(
     world: &World<'_>,
     invariant: &Invariant,
@@ -96,8 +95,6 @@ fn take_ends_away<'b>(
     }
 }
 
-/// Returns each derived atom that may hold, with the formula under which it holds. Formulas contain
-/// basic and derived atoms.
 fn bodies(world: &World<'_>, invariant: &Invariant, axioms: &Axioms) -> Result<Vec<(Key, Formula)>, Cause> {
     let mut heads: Vec<Key> = axioms.bound.atoms().cloned().collect();
     heads.sort_unstable();

@@ -128,7 +128,7 @@ pub enum Cause {
         /// The values of the variable.
         atoms: String,
     },
-    /// The time or memory limit was reached, or the user cancelled the check.
+    /// The check was cancelled: `stop` returned `true`.
     #[error("the comparison of the task with the files was stopped")]
     Stopped,
 }
@@ -139,7 +139,6 @@ impl Cause {
     }
 }
 
-/// The reason for ending the check before all instances are compared.
 #[derive(Debug)]
 pub(super) enum Obstacle {
     Differs(Difference),
