@@ -218,9 +218,8 @@ impl Checker<'_> {
         })
     }
 
-    /// Returns `true` if no plan through a state, reached at cost `paid`, is cheaper than the claim
-    /// (without a claim: if no such plan exists). A lower bound or a label that covers the state
-    /// proves this.
+    /// Returns `true` if a lower bound or a label proves that no plan through a state, reached at
+    /// cost `paid`, is cheaper than the claim (without a claim: that no such plan exists).
     fn is_covered(&self, state: &State, paid: &Integer) -> bool {
         let too_expensive = self.potentials.iter().any(|potential| match (potential.at(state), &self.cost) {
             (None, _) => true,

@@ -33,7 +33,6 @@ impl Model {
         self.variables[variable as usize].len() as u32 - 1
     }
 
-    /// Creates a state and evaluates the axioms.
     pub(super) fn state(&self, basic: &[u32], numbers: &[Integer]) -> State {
         let mut values = basic.to_vec();
         values.resize(self.variables.len(), 0);
@@ -111,7 +110,6 @@ impl Model {
         sum
     }
 
-    /// Returns a lower bound on a quantity over all combinations of designs.
     pub(super) fn least(&self, quantity: &Quantity) -> Integer {
         let tables =
             quantity.tables.iter().filter_map(|(_, table)| self.tables[*table as usize].iter().min());

@@ -70,7 +70,6 @@ fn literal((own, positive): &Literal) -> String {
     if *positive { fact(*own) } else { format!("(not {})", fact(*own)) }
 }
 
-/// Writes the query whether some state satisfies all assertions, preceded by the comment `about`.
 fn question(text: &mut String, about: &str, declarations: &str, assertions: &[String]) {
     let _ = write!(text, "; {about}\n(push)\n{declarations}");
     for assertion in assertions {

@@ -58,7 +58,6 @@ impl<'t> Table<'t> {
         self.values[row].as_ref()
     }
 
-    /// Returns all combinations of values that agree with the facts about variables of the pattern.
     #[expect(
         clippy::arithmetic_side_effects,
         clippy::cast_possible_truncation,

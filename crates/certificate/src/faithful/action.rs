@@ -26,7 +26,6 @@ use pddl::ast::{
     Expression,
 };
 
-/// Returns the cases of waiting until the next event, for each event after time 0.
 #[expect(clippy::arithmetic_side_effects, reason = "the place of an event that is held in memory")]
 pub(super) fn waits(timeline: &Timeline, structure: &Structure) -> Result<Vec<Case>, Cause> {
     let mut cases = Vec::new();

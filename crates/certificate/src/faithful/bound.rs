@@ -28,7 +28,6 @@ struct Occurrence<'w> {
     rule: &'w Derived,
     atom: &'w Atom,
     variables: Rc<[&'w TypedName]>,
-    /// The conjuncts of the enclosing conjunctions; they restrict the candidate objects.
     others: Rc<[&'w Condition]>,
     has_distinct_names: bool,
 }

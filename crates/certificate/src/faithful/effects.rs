@@ -10,7 +10,7 @@ use crate::faithful::linear::Linear;
 use crate::faithful::translation::Translation;
 use crate::model::Operator;
 
-/// Upper limit on the number of partial states that are examined when one variable is compared in one case (see
+/// Upper limit on the number of partial states when one variable is compared in one case (see
 /// [`Variable::agrees`]). A case split replaces a partial state by several.
 const SPLIT_LIMIT: usize = 1_024;
 
@@ -72,7 +72,6 @@ fn numbers(task: &Translation<'_>, case: &Case, operator: Option<Made<'_>>) -> R
     Ok(())
 }
 
-/// A comparison of the effects on one variable.
 struct Variable<'v> {
     task: &'v Translation<'v>,
     own: u32,

@@ -22,11 +22,9 @@ use crate::faithful::formula::Structure;
 use crate::faithful::key::Key;
 use crate::faithful::world::World;
 
-/// Upper limit on the number of partial states that are examined for one case and one group.
 const SPLIT_LIMIT: usize = 1_024;
 /// Upper limit on the number of checks whether a case preserves a group, during the whole search.
 const SEARCH_LIMIT: usize = 20_000_000;
-/// Upper limit on the number of groups that the search tries for one variable.
 const GROUP_LIMIT: usize = 300;
 
 /// A mutex group: atoms of which at most one holds.
@@ -98,12 +96,12 @@ impl Move {
         !self.adds.is_empty()
     }
 
-    /// Checks that at most one atom of a mutex group holds after the case (outcome of an action instance under
-    /// a condition), given that at most one holds before the case.
+    /// Checks that at most one atom of a mutex group holds after the case, given that at most one
+    /// holds before it.
     ///
     /// # Errors
-    /// The atoms that the case requires and deletes: if one of them is added to the group, the check may
-    /// succeed. Empty if there is no such atom.
+    /// The atoms that the case requires and deletes: if one of them is added to the group, the
+    /// check may succeed. Empty if there is no such atom.
     pub(super) fn keeps(&self, group: &Group, may_hold: &dyn Fn(&Key) -> bool) -> Result<(), Vec<Key>> {
         let mut added = self.adds.iter().filter(|key| group.contains(*key));
         let Some(key) = added.next() else { return Ok(()) };

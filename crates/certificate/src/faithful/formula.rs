@@ -12,7 +12,6 @@ use crate::faithful::key::Key;
 use crate::faithful::linear::Linear;
 use crate::faithful::verdict::Cause;
 
-/// Upper limit on the number of partial states into which a condition is split.
 const CASE_LIMIT: usize = 4_096;
 
 /// Upper limit on the nesting depth of a condition after derived atoms are replaced by their rules.
@@ -100,7 +99,6 @@ pub(super) struct Structure {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Known {
     atoms: BTreeMap<Key, bool>,
-    /// For each mutex group, the atom that is known to hold.
     holding: BTreeMap<u32, Key>,
     pub(super) comparisons: Vec<(Linear, bool)>,
 }
@@ -288,7 +286,6 @@ fn unit(structure: &Structure, linear: &Linear) -> Option<BigRational> {
     unit
 }
 
-/// Returns the greatest common divisor of two positive fractions, by Euclid's algorithm.
 fn common(left: &BigRational, right: &BigRational) -> BigRational {
     let (mut left, mut right) = (left.clone(), right.clone());
     while !right.is_zero() {

@@ -149,7 +149,6 @@ impl Invariant {
         self.atoms.count(predicate, place)
     }
 
-    /// Returns a fluent as an expression, or its value if the interval is a single value.
     pub(super) fn fluent(&self, key: Key) -> Linear {
         match self.numbers.get(&key).and_then(Interval::value) {
             Some(value) => Linear::constant(value.clone()),
@@ -181,8 +180,6 @@ impl Invariant {
         }
     }
 
-    /// Returns an interval that contains the values of an expression in all states of the witness
-    /// that satisfy `known`.
     fn range(&self, linear: &Linear, known: &Known) -> Interval {
         let mut range = linear.range(|key| self.numbers.get(key));
         for (own, _) in &known.comparisons {
@@ -251,8 +248,6 @@ impl Widening {
         Self { invariant: Invariant::initial(world), moves: FxHashMap::default() }
     }
 
-    /// Extends the invariant by the states after a case. Returns `true` if the invariant has
-    /// changed.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer moves than passes over the task")]
     pub(super) fn include(&mut self, structure: &Structure, case: &Case) -> bool {
         let mut news = false;

@@ -50,7 +50,6 @@ pub(super) struct Reader<'r> {
     pub(super) axioms: &'r Axioms,
     pub(super) binding: FxHashMap<&'r Name, u32>,
     pub(super) applied: Applied,
-    /// The range of durations; `None` outside of durative actions.
     pub(super) length: Option<Length>,
     pub(super) is_metric: bool,
     /// Whether the condition of a conditional effect (`when`) is evaluated. Undefined comparisons

@@ -8,7 +8,6 @@ use crate::faithful::key::Key;
 pub(super) struct Relation {
     atoms: FxHashSet<Key>,
     rows: FxHashMap<u32, Vec<Key>>,
-    /// Indices in `rows` by predicate, argument position and object.
     rows_with: FxHashMap<(u32, usize, u32), Vec<usize>>,
 }
 

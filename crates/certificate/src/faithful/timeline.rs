@@ -68,7 +68,6 @@ pub(super) fn clock() -> Key {
 }
 
 impl Timeline {
-    /// Adds a timed initial literal, which replaces an earlier one with the same atom and time.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "phases are counted from 0, and each but the first one begins with an event"

@@ -22,8 +22,6 @@ const TOTAL_LIMIT: usize = 16 * SIZE_LIMIT;
 
 type Result<T> = std::result::Result<T, Obstacle>;
 
-/// The correspondence between the facts and numbers of the task and the atoms and fluents of the
-/// PDDL files.
 pub(super) struct Names {
     /// For each variable and value, the atom; `None` for the last value of a variable and for atoms
     /// that the PDDL files do not contain.
@@ -33,7 +31,6 @@ pub(super) struct Names {
     pub(super) numbers: FxHashMap<Key, u32>,
     pub(super) structure: Structure,
     pub(super) linked: FxHashSet<Key>,
-    /// The axiom layer of each derived variable.
     layers: FxHashMap<u32, usize>,
 }
 
@@ -170,7 +167,6 @@ impl<'t> Translation<'t> {
         Ok(translation)
     }
 
-    /// Iterates over the values of a variable whose atoms may hold in the witness: value and atom.
     pub(super) fn possible(&self, variable: u32) -> impl Iterator<Item = (u32, &'t Key)> {
         self.possible[variable as usize].iter().copied()
     }

@@ -18,7 +18,6 @@ pub(super) struct World<'w> {
     types: TypeHierarchy,
     symbols: FxHashMap<Name, u32>,
     names: Vec<Name>,
-    /// The objects with their types; an object may be declared with several types.
     objects: Vec<(u32, Vec<&'w TypeExpression>)>,
     by_name: FxHashMap<u32, usize>,
     facts: FxHashSet<Key>,
@@ -27,7 +26,6 @@ pub(super) struct World<'w> {
     rows: FxHashMap<u32, Vec<Vec<u32>>>,
     rows_with: FxHashMap<(u32, usize, u32), Vec<usize>>,
     values: FxHashMap<Key, BigRational>,
-    /// The predicates and functions that an action or a timed event changes.
     changing: FxHashSet<u32>,
     pub(super) timeline: Timeline,
     rules: FxHashMap<u32, Vec<&'w Derived>>,
