@@ -194,7 +194,6 @@ impl<'s> Sink<'s> {
         self.source
     }
 
-    /// Returns the number of reported diagnostics, including those beyond [`MAX_DIAGNOSTICS`] that are only counted.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(crate) fn len(&self) -> usize {
         self.diagnostics.len() + self.beyond_limit

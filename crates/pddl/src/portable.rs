@@ -64,7 +64,6 @@ fn declare_total_cost(domain: &mut Domain, problem: &Problem) {
     }
 }
 
-/// Moves objects of the problem that the domain uses to the constants of the domain.
 fn move_constants(domain: &mut Domain, problem: &mut Problem) {
     let mut used: FxHashSet<Name> = FxHashSet::default();
     domain.walk(&mut |node| match node {

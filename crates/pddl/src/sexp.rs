@@ -50,7 +50,6 @@ pub(super) struct Tree<'s> {
     nodes: Vec<Node>,
 }
 
-/// A list or a symbol of a tree.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Item<'t> {
     tree: &'t Tree<'t>,
@@ -76,18 +75,15 @@ impl<'t> Item<'t> {
         (!is_list).then(|| &self.tree.text[span.start as usize..span.end as usize])
     }
 
-    /// Items of a list; empty for a symbol.
     #[expect(clippy::arithmetic_side_effects, reason = "an index in the list of nodes")]
     pub(super) fn items(self) -> Items<'t> {
         Items { tree: self.tree, next: self.index + 1, end: self.node().next }
     }
 
-    /// First item of a list, if it is a symbol.
     pub(super) fn head(self) -> Option<&'t str> {
         self.items().next().and_then(Item::symbol)
     }
 
-    /// Returns `true` if the item is a list whose first item is `keyword`, ignoring case.
     pub(super) fn is_headed(self, keyword: &str) -> bool {
         self.head().is_some_and(|head| head.eq_ignore_ascii_case(keyword))
     }

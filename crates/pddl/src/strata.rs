@@ -5,7 +5,6 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::ast::{Condition, Domain, Name};
 
-/// Number of the stratum of each derived predicate of a domain, from 0.
 #[derive(Debug)]
 pub(crate) struct Strata<'d> {
     level: FxHashMap<&'d Name, usize>,
@@ -16,8 +15,6 @@ pub(crate) struct Strata<'d> {
 pub(crate) struct NegativeCycle<'d>(pub(crate) &'d Name);
 
 impl<'d> Strata<'d> {
-    /// Computes the stratum of each derived predicate. The error is a derived predicate that depends on its
-    /// own negation.
     #[expect(clippy::arithmetic_side_effects, reason = "levels are at most the number of predicates")]
     pub(crate) fn of(domain: &'d Domain) -> Result<Self, NegativeCycle<'d>> {
         let mut level: FxHashMap<&Name, usize> = FxHashMap::default();
@@ -54,7 +51,6 @@ impl<'d> Strata<'d> {
         }
     }
 
-    /// Returns the stratum of a derived predicate; `None` for a basic predicate.
     pub(crate) fn level(&self, name: &Name) -> Option<usize> {
         self.level.get(name).copied()
     }

@@ -107,8 +107,6 @@ impl TypeHierarchy {
     }
 }
 
-/// Returns for each type whether it is reachable from the type `from` in zero or more steps. `links` lists
-/// the direct successors of each type.
 fn closure(links: &[Vec<usize>], from: usize) -> Vec<bool> {
     let mut reached = vec![false; links.len()];
     reached[from] = true;

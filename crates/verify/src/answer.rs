@@ -22,7 +22,7 @@ pub struct VerificationAnswer<'a> {
     claim: Option<&'a Claim>,
     /// Files or mission for which the claim was checked; null if the files cannot be read.
     subject: Option<&'a Subject>,
-    /// Results of the checked parts, up to the first failure.
+    /// Results of the checked parts. Parts that depend on a failed part may be absent.
     parts: Vec<PartAnswer<'a>>,
 }
 

@@ -90,7 +90,6 @@ fn consistency(first: &Assigned, second: &Assigned) -> Option<Condition> {
     Some(if variables.is_empty() { need } else { Condition::ForAll(variables, Box::new(need)) })
 }
 
-/// Returns whether two terms are equal, and `None` if this is not statically known.
 fn known_equality(left: &Term, right: &Term) -> Option<bool> {
     match (left, right) {
         (Term::Constant(left), Term::Constant(right)) => Some(left.name == right.name),

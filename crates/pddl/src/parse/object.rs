@@ -23,8 +23,6 @@ use super::{Parser, at_start};
 const UNDEFINED: &str = "undefined";
 
 impl Parser<'_> {
-    /// Declares an object fluent as a predicate with an additional parameter for the value. Reports a
-    /// repeated declaration.
     pub(super) fn object_fluent(
         &mut self,
         mut declaration: Declaration,
@@ -48,7 +46,6 @@ impl Parser<'_> {
         domain.predicates.push(declaration);
     }
 
-    /// Reports names that denote both an object fluent and another predicate or function.
     pub(super) fn object_fluents_clash(&mut self, domain: &Domain) {
         for name in &domain.object_fluents {
             let namesakes = domain.predicates.iter().filter(|candidate| candidate.identifier.name == *name);
@@ -148,7 +145,6 @@ impl Parser<'_> {
         Some(term)
     }
 
-    /// Returns the function and the arguments of an object-fluent term; reports a wrong number of arguments.
     fn object_term(&mut self, item: Item<'_>) -> Option<(Identifier, Vec<Term>)> {
         let function = self.name_item(item.items().next()?, "a function")?;
         let message_count = self.sink.len();
@@ -360,7 +356,6 @@ fn variables_and_atoms(values: Vec<Value>) -> (Vec<TypedName>, Vec<Condition>) {
     values.into_iter().map(|value| (value.variable, Condition::Atom(value.atom))).unzip()
 }
 
-/// Returns the condition that each object-fluent term in `values` has a value.
 fn has_value(values: Vec<Value>) -> Condition {
     let (variables, parts) = variables_and_atoms(values);
     Condition::Exists(variables, Box::new(conjunction(parts)))

@@ -6,7 +6,6 @@ use crate::sexp::Item;
 use super::durative::{is_conjunction, timed};
 use super::{Parser, list_start};
 
-/// Unparsed preference with its context.
 struct RawPreference<'t> {
     variables: Vec<TypedName>,
     time: Option<ConditionTime>,

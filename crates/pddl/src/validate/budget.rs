@@ -48,7 +48,6 @@ impl<'s> Budget<'s> {
         self.is_spent.get()
     }
 
-    /// Returns `result`, or an error if the execution that computed `result` was interrupted.
     pub(super) fn check<T>(&self, result: T) -> Result<T, Interrupted> {
         if self.is_spent.get() { Err(Interrupted) } else { Ok(result) }
     }

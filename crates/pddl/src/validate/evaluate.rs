@@ -63,7 +63,6 @@ pub(super) struct Evaluator<'e, 'p> {
     pub(super) world: &'e World<'p>,
     pub(super) state: &'e State,
     pub(super) duration: Option<&'e BigRational>,
-    /// Value of `total-time`, in the metric only.
     pub(super) total_time: Option<&'e BigRational>,
     /// Addresses of subconditions that count as true while [`Evaluator::solve`] searches for bindings.
     pub(super) ignored: Option<&'e FxHashSet<*const Condition>>,

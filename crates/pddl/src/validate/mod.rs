@@ -138,8 +138,6 @@ fn judge<'p>(world: &World<'p>, steps: &[Step<'p>], options: &Options) -> Verdic
     Verdict { valid: violation.is_none(), total_time, metric, values, violation }
 }
 
-/// Returns `true` if `candidate` is better than `incumbent`, another valid verdict, by the metric, or by the total time
-/// if there is no metric.
 fn is_better(problem: &Problem, candidate: &Verdict, incumbent: &Verdict) -> bool {
     match (&problem.metric, &candidate.metric, &incumbent.metric) {
         (Some(metric), Some(candidate), Some(incumbent)) => match metric.direction {

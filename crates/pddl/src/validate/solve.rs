@@ -17,7 +17,6 @@ pub(super) type OnSolution<'f, 'p> = &'f mut dyn FnMut(&Bindings<'p>, Option<&Un
 type Goals<'p> = (Vec<&'p Condition>, Option<Undefined>);
 
 struct Branch<'e, 'p> {
-    /// Conditions that remain to be solved after any of the options.
     open: Vec<&'p Condition>,
     undefined: Option<Undefined>,
     /// Number of variables declared before the choice.
@@ -28,7 +27,6 @@ struct Branch<'e, 'p> {
 }
 
 enum Choices<'e, 'p> {
-    /// Candidate objects of the variable at a position.
     Objects(usize, Box<dyn Iterator<Item = Symbol> + 'e>),
     Facts(&'p Atom, Box<dyn Iterator<Item = &'e Arguments> + 'e>),
     Alternatives(std::slice::Iter<'p, Condition>),
