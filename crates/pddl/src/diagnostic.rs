@@ -199,8 +199,8 @@ impl<'s> Sink<'s> {
         self.diagnostics.len() + self.beyond_limit
     }
 
-    /// Returns `true` if more than [`MAX_DIAGNOSTICS`] diagnostics are stored. Further diagnostics are then only
-    /// counted, so suggestions for them need not be computed.
+    /// If the sink is full, further diagnostics are only counted, so suggestions for them need not
+    /// be computed.
     pub(crate) fn is_full(&self) -> bool {
         self.diagnostics.len() > MAX_DIAGNOSTICS
     }

@@ -151,8 +151,6 @@ const IMPLIED: [(&str, &str); 12] = [
     ("action-costs", "numeric-fluents"),
 ];
 
-/// Adds the requirement flags of all features that the domain or the problem uses, except those that stated
-/// flags imply.
 fn require(domain: &mut Domain, problem: &Problem) {
     let mut required: FxHashSet<&'static str> = FxHashSet::default();
     required.insert("strips");

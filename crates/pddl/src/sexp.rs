@@ -61,7 +61,6 @@ impl<'t> Item<'t> {
         self.tree.nodes[self.index as usize]
     }
 
-    /// Extent in the text, including the parentheses of a list.
     pub(super) fn span(self) -> Span {
         self.node().span
     }
@@ -190,7 +189,6 @@ fn is_space(character: char) -> bool {
 
 struct Reader<'r, 's> {
     nodes: Vec<Node>,
-    /// Indices of the open lists, outermost first.
     open: Vec<u32>,
     sink: &'r mut Sink<'s>,
     /// Byte offset behind the last closing parenthesis.

@@ -59,7 +59,6 @@ impl<'d> Strata<'d> {
 /// Dependency of a derived predicate (first) on another (second). The number is 1 if the dependency is negated, else 0.
 type Dependency<'d> = (&'d Name, &'d Name, usize);
 
-/// Returns the head of the first negated dependency that lies on a cycle; `None` without such a dependency.
 fn on_negative_cycle<'d>(edges: &[Dependency<'d>]) -> Option<&'d Name> {
     let depends = |from: &'d Name, target: &Name| {
         let (mut visited, mut open) = (FxHashSet::from_iter([from]), vec![from]);

@@ -231,8 +231,6 @@ impl<'c> Comparison<'c> {
         self.find(&self.candidates(action, arguments), case, &instance).map(|()| true)
     }
 
-    /// Checks that wait operators of the task simulate a wait, or that the wait does not change the
-    /// task state.
     pub(super) fn wait(&self, case: &Case) -> Result<()> {
         let name = || {
             let phases = case.truths.iter().filter(|(key, holds)| key.0 == PHASE && **holds);

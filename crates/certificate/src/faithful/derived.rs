@@ -140,8 +140,6 @@ fn fixpoint(bodies: &[(Key, Formula)], holds: impl Fn(&Formula, &FxHashSet<Key>)
     fixpoint
 }
 
-/// Returns `true` if a body may hold, given that at most the derived atoms of `may` and at least
-/// the derived atoms of `must` hold.
 fn possible(world: &World<'_>, formula: &Formula, may: &FxHashSet<Key>, must: &FxHashSet<Key>) -> bool {
     match formula {
         Formula::All(parts) => parts.iter().all(|part| possible(world, part, may, must)),
@@ -152,8 +150,6 @@ fn possible(world: &World<'_>, formula: &Formula, may: &FxHashSet<Key>, must: &F
     }
 }
 
-/// Returns `true` if a body certainly holds, given that at least the derived atoms of `must` and at
-/// most the derived atoms of `may` hold.
 fn certain(world: &World<'_>, formula: &Formula, must: &FxHashSet<Key>, may: &FxHashSet<Key>) -> bool {
     match formula {
         Formula::All(parts) => parts.iter().all(|part| certain(world, part, must, may)),

@@ -23,7 +23,6 @@ pub(super) const DEPTH_LIMIT: usize = 300;
 pub(super) enum Formula {
     All(Vec<Formula>),
     Any(Vec<Formula>),
-    /// An atom with its required truth value.
     Atom(Key, bool),
     /// The expression is at least 0, or greater than 0 if the flag (strict) is `true`.
     Compare(Linear, bool),

@@ -67,7 +67,6 @@ pub(super) struct Reader<'r> {
 struct Unfolding {
     /// The derived atoms whose rules are being evaluated, outermost first.
     path: Vec<Key>,
-    /// The nesting depth at which the outermost derived atom is evaluated.
     base: usize,
     /// An atom nested deeper than [`UNFOLDING_LIMIT`]. Its condition is computed separately, before
     /// the evaluation that found the atom is repeated.

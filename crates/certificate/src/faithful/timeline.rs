@@ -226,8 +226,6 @@ impl Passage {
         (self.at_end && self.to > self.from).then(|| &timeline.events[self.to - 1])
     }
 
-    /// Returns the effects of an action with this passage on the atoms of the phases and on the
-    /// atom `waited`. Empty if there are no events.
     pub(super) fn truths(&self, timeline: &Timeline) -> Truths {
         if timeline.is_empty() {
             return Truths::new();

@@ -237,7 +237,6 @@ impl<'t> Translation<'t> {
         self.bodies.get(&variable).into_iter().flatten().copied()
     }
 
-    /// Returns the condition under which the rules of the task derive a variable.
     pub(super) fn rules(&self, variable: u32) -> Formula {
         Formula::junction(self.bodies(variable).map(|body| self.condition(body, &[], &[])), false)
     }

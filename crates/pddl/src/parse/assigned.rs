@@ -10,8 +10,6 @@ use super::fluents::Assigned;
 type Renaming = FxHashMap<Name, Identifier>;
 
 impl Parser<'_> {
-    /// Returns the conditions under which no two assignments of an action give different values to one object
-    /// fluent at one time.
     pub(super) fn uniqueness_conditions(&mut self, assigned: &[Assigned]) -> Vec<(EffectTime, Condition)> {
         let mut needs = Vec::new();
         for (position, first) in assigned.iter().enumerate() {

@@ -71,7 +71,6 @@ pub(super) struct Assigned {
     pub(super) arguments: Vec<Term>,
     /// `None` for `undefined`.
     pub(super) value: Option<Term>,
-    /// Variables of the enclosing quantifiers.
     pub(super) variables: Vec<TypedName>,
     /// Generated variables for the values of object-fluent terms within the assignment.
     pub(super) values: Vec<TypedName>,

@@ -46,7 +46,6 @@ pub fn parse_problem_of(domain: &Domain, source: &Source) -> (Option<Problem>, V
     (parsed.tree, parsed.diagnostics)
 }
 
-/// Parses a single expression of a metric: `total-time`, `(energy)`, `(+ (energy) (* 2 total-time))`.
 pub(super) fn expression(source: &Source) -> Parsed<Expression> {
     parse_top(source, |parser, top| {
         let mut items: Vec<_> = top.collect();

@@ -110,7 +110,6 @@ impl Parser<'_> {
         item.head().is_some_and(|head| self.objects.contains(&Name::new(head)))
     }
 
-    /// Reports an object fluent in place of a predicate or a number. Always returns `None`.
     pub(super) fn misplaced_object_fluent<T>(&mut self, item: Item<'_>, name: &Name) -> Option<T> {
         self.sink
             .error("P106", at_start(item), format!("`{name}` is a function with an object as its value"))

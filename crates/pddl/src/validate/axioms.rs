@@ -29,7 +29,6 @@ pub(super) struct Axiom<'p> {
 pub(super) struct Occurrence<'p> {
     pub(super) axiom: usize,
     pub(super) atom: &'p Atom,
-    /// Variables of the enclosing quantifiers, outermost first.
     pub(super) variables: Vec<&'p [TypedName]>,
     /// Enclosing conjunctions, each with the index of the conjunct that contains the atom.
     pub(super) conjunctions: Vec<(&'p [Condition], usize)>,
@@ -128,7 +127,6 @@ impl<'p> Walk<'_, 'p> {
         is_opaque
     }
 
-    /// Returns `true` if one of `variables` shadows an enclosing variable.
     fn hides(&self, variables: &[TypedName]) -> bool {
         let enclosing = self.variables.iter().copied().chain([&self.derived.head.parameters[..]]).flatten();
         let enclosing: FxHashSet<&Name> = enclosing.map(|entry| &entry.identifier.name).collect();

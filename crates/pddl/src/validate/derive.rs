@@ -54,7 +54,6 @@ struct Closure<'c, 'p> {
     state: &'c mut State,
     agenda: Vec<Ground>,
     instances: Vec<WaitingInstance>,
-    /// Index in `instances` by axiom and arguments.
     numbers: FxHashMap<(usize, Arguments), usize>,
     waiting: Waiting,
 }
@@ -143,8 +142,6 @@ impl<'p> Closure<'_, 'p> {
         }
     }
 
-    /// Derives the head of an instance if its whole condition holds. Otherwise the instance waits for the
-    /// missing facts.
     fn evaluate(&mut self, number: usize) {
         let WaitingInstance { axiom, arguments, evaluations } = &mut self.instances[number];
         *evaluations = evaluations.saturating_add(1);

@@ -19,7 +19,6 @@ use super::world::{Arguments, State, Symbol, World};
 pub(super) enum Undefined {
     Function(String),
     Division,
-    /// A number whose numerator or denominator has more than [`BITS_LIMIT`] bits.
     Size,
     /// `?duration` or `total-time` in a context that does not define it.
     Place,

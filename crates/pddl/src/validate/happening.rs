@@ -72,7 +72,6 @@ impl<'e, 'p> Execution<'e, 'p> {
         Ok(start)
     }
 
-    /// Applies all pending events before `time`, and with `inclusive` also those at `time`.
     pub(super) fn apply_events_until(&mut self, time: &BigRational, inclusive: bool) {
         let is_due = |next: &BigRational| next < time || (inclusive && next == time);
         while self.next_timed().is_some_and(is_due) {

@@ -19,10 +19,8 @@ type Goals<'p> = (Vec<&'p Condition>, Option<Undefined>);
 struct Branch<'e, 'p> {
     open: Vec<&'p Condition>,
     undefined: Option<Undefined>,
-    /// Number of variables declared before the choice.
     declared: usize,
     options: Choices<'e, 'p>,
-    /// Positions of the variables that the current option has bound.
     bound: Vec<usize>,
 }
 

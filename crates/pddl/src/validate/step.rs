@@ -128,8 +128,6 @@ pub(super) fn conditions<'p>(
     single.into_iter().chain(several)
 }
 
-/// Effects that an action has at the given time. Effects of an instantaneous action count as effects at
-/// start.
 pub(super) fn effects<'p>(
     instance: &Instance<'p>,
     when: EffectTime,

@@ -99,7 +99,6 @@ struct TrajectoryEvaluator<'j, 'p> {
 }
 
 impl<'p> TrajectoryEvaluator<'_, 'p> {
-    /// Returns for each state of the trajectory whether a condition holds in it.
     fn holds(&self, condition: &'p Condition, bindings: &mut Bindings<'p>) -> Vec<bool> {
         let holds = |moment: &Moment| {
             Evaluator::new(self.world, &moment.state).holds(condition, bindings) == Ok(true)

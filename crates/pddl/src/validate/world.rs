@@ -22,7 +22,6 @@ pub(super) struct Symbol(u32);
 
 pub(super) type Arguments = SmallVec<[Symbol; 4]>;
 
-/// Predicate, argument position (column), and object at this position.
 type ColumnKey = (Symbol, usize, Symbol);
 
 #[derive(Debug)]
@@ -36,7 +35,6 @@ pub(super) struct World<'p> {
     /// All objects with their declared types, constants first.
     objects: Vec<(Symbol, Vec<&'p TypeExpression>)>,
     position: FxHashMap<Symbol, usize>,
-    /// Objects of each declared type, in order and as a set.
     members: FxHashMap<Name, (Vec<Symbol>, FxHashSet<Symbol>)>,
     pub(super) strata: Vec<Stratum<'p>>,
     pub(super) read_by_axioms: FxHashSet<Symbol>,
@@ -161,7 +159,6 @@ impl<'p> World<'p> {
         self.preferences().next().is_some()
     }
 
-    /// Returns a copy of a state with the values of `(is-violated NAME)`, for the metric.
     pub(super) fn with_violations(&self, violated: &[Name], state: &State) -> State {
         let mut state = state.clone();
         let function = self.symbol(&Name::new(IS_VIOLATED));

@@ -164,7 +164,7 @@ fn lists(text: &str, draw: &mut Draw<'_>) -> String {
     format!("{}{new}{}", &text[..start], &text[end..])
 }
 
-/// Deletes, repeats or replaces a part of a JSON document.
+/// Deletes, repeats, swaps, nests or replaces parts of a JSON document.
 fn structure(document: &mut Value, draw: &mut Draw<'_>) {
     let mut paths = Vec::new();
     collect(document, String::new(), &mut paths);
