@@ -36,8 +36,8 @@ pub struct Potential {
     pub values: Vec<Option<Integer>>,
 }
 
-/// A lower bound on the value that a numeric variable must have so that the goal can be reached, as a function
-/// of the values of a few variables (a pattern).
+/// A lower bound on the value that a numeric variable must have so that the goal can be reached. It
+/// is a function of the values of a few variables (a pattern).
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Need {

@@ -1,5 +1,6 @@
-//! Checks an optimality proof (argument) against the ground task, by induction over the steps of plans: the
-//! labels (states with costs) of the argument cover all states that matter. Uses integer arithmetic only.
+//! Checks an optimality proof (argument) against the ground task, by induction over the steps of
+//! plans. The labels (states with costs) of the argument must cover all states that matter. Uses
+//! integer arithmetic only.
 
 use std::rc::Rc;
 
@@ -218,8 +219,8 @@ impl Checker<'_> {
         })
     }
 
-    /// Returns `true` if a lower bound or a label proves that no plan through a state, reached at
-    /// cost `paid`, is cheaper than the claim (without a claim: that no such plan exists).
+    /// Returns `true` if a lower bound or a label proves the claim for all plans through a state
+    /// that is reached at cost `paid`.
     fn is_covered(&self, state: &State, paid: &Integer) -> bool {
         let too_expensive = self.potentials.iter().any(|potential| match (potential.at(state), &self.cost) {
             (None, _) => true,
@@ -243,10 +244,10 @@ impl Checker<'_> {
 
 /// Returns the non-dominated combinations of designs of each operator.
 ///
-/// A combination dominates another one if it costs no more, satisfies every condition that the other one
-/// satisfies, and leaves every number at least as high (equal, if larger numbers may hurt). A label (state of
-/// the proof) that covers the successor by the dominating combination then also covers the successor by the
-/// dominated one.
+/// A combination dominates another one if it costs no more, satisfies every condition that the
+/// other one satisfies, and leaves every number at least as high. (If larger numbers may hurt, the
+/// numbers must be equal.) A label that covers the successor by the dominating combination then
+/// also covers the successor by the dominated one.
 fn choices(model: &Model, monotone: bool) -> Result<Vec<Rc<[Choice]>>, Fault> {
     let mut fronts: FxHashMap<_, Rc<[Choice]>> = FxHashMap::default();
     let mut count = 0_usize;

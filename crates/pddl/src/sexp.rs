@@ -1,7 +1,8 @@
 //! Reads text into a tree of S-expressions, with recovery from unbalanced parentheses.
 //!
-//! The tree is one flat vector in the order of the text: a list is followed by its items and stores the index after
-//! its last item. Reading is iterative, and no destructor recurses, so no text can overflow the stack.
+//! The tree is one flat vector in the order of the text. A list is followed by its items and stores
+//! the index after its last item. Reading is iterative, and no destructor recurses, so no text can
+//! overflow the stack.
 
 use super::ast::Span;
 use super::diagnostic::Sink;

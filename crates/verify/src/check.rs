@@ -96,10 +96,10 @@ impl<'a> Verifier<'a> {
     /// SMT-LIB 2. The proof itself is not checked.
     ///
     /// # Errors
-    /// M121 if the certificate cannot be read, its task or argument is malformed, or its task has
-    /// derived variables, for which there are no verification conditions. If the certificate claims
-    /// that a plan is optimal, also M121 if the task is not faithful to the PDDL files, the plan is
-    /// not as claimed, or a limit is reached.
+    /// M121 if the certificate cannot be read or its task or argument is malformed. Also M121 if
+    /// its task has derived variables, for which there are no verification conditions. For an
+    /// optimality claim, also M121 if the task is not faithful to the PDDL files, the plan is not
+    /// as claimed, or a limit is reached.
     pub fn conditions(&self) -> Result<String, Errors> {
         conditions(self.directory, &|| self.is_over()).map_err(Errors::from)
     }

@@ -26,9 +26,9 @@ const STEP_LIMIT: usize = 64;
 /// transitions are not used.
 const EDGE_LIMIT: usize = 1 << 22;
 
-/// Returns the least number of steps T for which the lower bound `by`, with one of the potentials,
-/// proves that no plan of more than T steps costs less than `cost`. Returns an error if there is no
-/// such T up to [`STEP_LIMIT`].
+/// Returns the least T for which the lower bound `by`, with one of the potentials, proves that no
+/// plan of more than T steps costs less than `cost`. Returns an error if there is no such T up to
+/// [`STEP_LIMIT`].
 pub(super) fn bound(
     model: &Model,
     argument: &Argument,

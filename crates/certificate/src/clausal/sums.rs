@@ -46,7 +46,7 @@ fn comparisons(model: &Model) -> impl Iterator<Item = &Linear> {
 }
 
 /// Returns a number of bits that suffices for a numeric variable: for its values after up to
-/// `steps` steps, and for the sums in comparisons that contain it.
+/// `steps` steps, and for sums in comparisons.
 fn number_width(model: &Model, number: u32, steps: usize) -> Result<usize, String> {
     let initial = &model.numbers[number as usize];
     let (mut least, mut greatest) = (initial.clone(), initial.clone());
@@ -178,8 +178,8 @@ fn compare(
     }
 }
 
-/// A use of a table: the index of an operator's list of slots ([`Model::uses`]), the slots that
-/// select the row, and the index of the table.
+/// Key of a table lookup: index of an operator's list of slots ([`Model::uses`]), slots that select
+/// the row, and index of the table.
 type Kind<'k> = (u32, &'k [u32], u32);
 
 struct Adder<'a> {

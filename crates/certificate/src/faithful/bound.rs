@@ -120,8 +120,8 @@ fn has_distinct_names(rule: &Derived, variables: &[&TypedName]) -> bool {
     variables_in_scope.into_iter().all(|variable| names.insert(&variable.identifier.name))
 }
 
-/// Returns the heads of all instances of a rule whose conditions are possible, except heads that
-/// are already in `axioms.bound`.
+/// Returns the heads of all possible instances of a rule, except heads that are already in
+/// `axioms.bound`.
 fn all_heads(
     world: &World<'_>,
     invariant: &Invariant,
@@ -144,8 +144,8 @@ fn all_heads(
 }
 
 impl Occurrence<'_> {
-    /// Returns the heads of rule instances in which the derived atom `key` matches this occurrence
-    /// and whose conditions are possible, except heads that are already in `axioms.bound`.
+    /// Returns the heads of possible rule instances in which the derived atom `key` matches this
+    /// occurrence, except heads that are already in `axioms.bound`.
     fn heads(
         &self,
         world: &World<'_>,

@@ -165,9 +165,8 @@ impl<'c> Comparison<'c> {
         Ok(())
     }
 
-    /// Checks that the rules of the task and the rules of the PDDL files are equivalent, for each
-    /// derived atom of `Axioms::linked`: a variable of the task on or between dependency cycles.
-    /// Other derived atoms are replaced by their rules.
+    /// Checks for each derived atom of `Axioms::linked` that the rules of the task and of the PDDL
+    /// files are equivalent. Other derived atoms are replaced by their rules.
     pub(super) fn rules(&self) -> Result<()> {
         let task = self.task;
         let mut linked: Vec<&Key> = task.axioms.linked.iter().collect();

@@ -1,5 +1,5 @@
-//! Compares the effects of a case (outcome under a condition) of an action instance with the
-//! effects of an operator, on the variables and numbers of the task.
+//! Compares the effects of a case (outcome of an action instance under a condition) and of an
+//! operator on the variables and numbers of the task.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -110,9 +110,9 @@ impl<'v> Variable<'v> {
         Self { task, own: variable, case, effects, touched, certain, conditional }
     }
 
-    /// Returns `Some(true)` if the case and the operator agree in all states that satisfy `known`, and
-    /// `Some(false)` if they differ in a partial state that extends `known`. Returns `None` if neither is
-    /// proved, for example within [`SPLIT_LIMIT`] partial states.
+    /// Returns `Some(true)` if the case and the operator agree in all states that satisfy `known`.
+    /// Returns `Some(false)` if they differ in a partial state that extends `known`, and `None` if
+    /// neither is proved.
     fn agrees(&self, known: &Known) -> Option<bool> {
         let structure = &self.task.names.structure;
         let mut open = vec![known.clone()];
@@ -180,8 +180,8 @@ impl<'v> Variable<'v> {
     }
 
     /// Returns the value of the variable after the case according to the PDDL files; `None` if it
-    /// is unchanged. An error names a formula whose truth value is needed, or means that it is not
-    /// proved that at most one atom of the variable then holds.
+    /// is unchanged. The error `Open` names a formula whose truth value is needed. `Unknown` means
+    /// that it is not proved that at most one atom of the variable then holds.
     fn expected(&self, known: &Known, current: Value) -> Result<Value, Outcome<'_>> {
         let structure = &self.task.names.structure;
         let after = |key: &Key| {

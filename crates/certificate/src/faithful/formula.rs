@@ -86,8 +86,8 @@ impl Formula {
     }
 }
 
-/// Properties that hold in every state: the mutex groups of each atom, and for each fluent of the
-/// task a factor that makes it an integer.
+/// Properties of every state: the mutex groups of each atom, and for each fluent of the task a
+/// factor that makes its value an integer.
 #[derive(Debug, Default)]
 pub(super) struct Structure {
     pub(super) groups: FxHashMap<Key, SmallVec<[u32; 1]>>,

@@ -41,8 +41,8 @@ pub(super) struct Timeline {
     pub(super) begun: usize,
 }
 
-/// The position of an action relative to the events: the phases in which it starts (`from`) and
-/// ends (`to`), whether start and end coincide with an event, and the times that this permits.
+/// The position of an action relative to the events, and the times that it permits. The action
+/// starts in phase `from` and ends in phase `to`.
 #[derive(Debug, Clone)]
 pub(super) struct Passage {
     from: usize,

@@ -93,8 +93,8 @@ impl Names {
         Ok(names)
     }
 
-    /// Records the layer of each derived variable, and checks that the axioms are stratified: each rule reads only
-    /// derived variables of lower layers, or of its own layer if they are not negated.
+    /// Records the layer of each derived variable and checks that the axioms are stratified. A rule
+    /// may read derived variables of lower layers, and of its own layer if they are not negated.
     fn layers(&mut self, model: &Model) -> Result<()> {
         for (layer, rules) in model.axioms.iter().enumerate() {
             for (head, _) in &rules.rules {

@@ -277,8 +277,8 @@ impl Parser<'_> {
         Mark { needs: self.objects.needs.len(), assigned: self.objects.assigned.len() }
     }
 
-    /// Adds an enclosing `forall` to all effects parsed since `mark`: quantifies their needs (conditions that they
-    /// impose on the state) over `variables`, and adds `variables` to the recorded assignments.
+    /// Adds an enclosing `forall` to all effects parsed since `mark`. Their needs (conditions on
+    /// the state) are quantified over `variables`, and their assignments get these variables.
     pub(super) fn effects_below(&mut self, mark: Mark, variables: &[TypedName]) {
         for (_, need) in &mut self.objects.needs[mark.needs..] {
             let inner = std::mem::replace(need, Condition::And(Vec::new()));
@@ -289,8 +289,8 @@ impl Parser<'_> {
         }
     }
 
-    /// Adds an enclosing `when` to all effects parsed since `mark`: makes their needs (conditions that they impose
-    /// on the state) depend on `condition`, and adds `condition` to the recorded assignments.
+    /// Adds an enclosing `when` to all effects parsed since `mark`. Their needs (conditions on the
+    /// state) then depend on `condition`, and so do their assignments.
     pub(super) fn effects_when(&mut self, mark: Mark, condition: &Condition) {
         for (_, need) in &mut self.objects.needs[mark.needs..] {
             let inner = std::mem::replace(need, Condition::And(Vec::new()));

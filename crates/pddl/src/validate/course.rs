@@ -67,8 +67,8 @@ pub struct NumberBound {
 /// step ends.
 ///
 /// # Errors
-/// Returns a violation if a step is not an action of the domain, if its duration is missing or
-/// violates a constraint at start, or if its effects are undefined or conflict.
+/// Returns a violation if a step is not an action of the domain, or if its effects are undefined or
+/// conflict. Also if its duration is missing or violates a constraint at start.
 pub fn course(domain: &Domain, problem: &Problem, plan: &PlanText) -> Result<Course, Box<Violation>> {
     let world = World::new(domain, problem, &|| false);
     let texts = plan.steps.iter().zip(1..);

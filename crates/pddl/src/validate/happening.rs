@@ -115,9 +115,9 @@ impl<'e, 'p> Execution<'e, 'p> {
         Some((time, Happening { changes, footprint }))
     }
 
-    /// Executes a part of an action in sequential execution: evaluates the part in the current state, applies
-    /// the pending events up to `time`, and then the changes of the part. Events at `time` must not interfere
-    /// with the part.
+    /// Executes a part of an action in sequential execution. Evaluates the part in the current
+    /// state, applies the pending events up to `time`, and then the changes of the part. Events at
+    /// `time` must not interfere with the part.
     pub(super) fn execute(
         &mut self,
         running: &Running<'e, 'p>,

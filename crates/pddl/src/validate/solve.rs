@@ -123,9 +123,9 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         Some((unsolved, undefined))
     }
 
-    /// Chooses what to branch on: an equation that determines an object if there is one, else the atom with the
-    /// fewest facts, else a disjunction, else the first unbound variable. Returns the remaining conditions and the
-    /// options, or `None` if all variables are bound.
+    /// Chooses what to branch on. The order of preference is: an equation that determines an
+    /// object, the atom with the fewest facts, a disjunction, the first unbound variable. Returns
+    /// the remaining conditions and the options, or `None` if all variables are bound.
     fn choice(
         &self,
         mut open: Vec<&'p Condition>,
