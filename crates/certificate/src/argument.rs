@@ -17,9 +17,10 @@ pub struct Argument {
     pub potentials: Vec<Potential>,
     /// Lower bounds on the value that a numeric variable must have so that the goal can be reached.
     pub needs: Vec<Need>,
-    /// The labels: states with the cost of reaching them. They cover (dominate) each reachable state that costs
-    /// less than the claim, unless a potential or a need prunes the state. No label is a goal state that costs
-    /// less than the claim.
+    /// The labels: states with the cost of reaching them. They cover (dominate) each reachable
+    /// state that costs less than the claim, unless a potential or a need prunes the state. No
+    /// label is a goal state that costs less than the claim. Without a claim, these statements hold
+    /// regardless of costs.
     pub labels: Vec<Label>,
 }
 
@@ -35,8 +36,8 @@ pub struct Potential {
     pub values: Vec<Option<Integer>>,
 }
 
-/// A lower bound on the value that a numeric variable must have so that the goal can be reached, as a function
-/// of the values of a few variables (a pattern).
+/// A lower bound on the value that a numeric variable must have so that the goal can be reached. It
+/// is a function of the values of a few variables (a pattern).
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Need {

@@ -1,5 +1,6 @@
-//! Checks an optimality proof (argument) against the ground task, by induction over the steps of plans: the
-//! labels (states with costs) of the argument cover all states that matter. Uses integer arithmetic only.
+//! Checks an optimality proof (argument) against the ground task, by induction over the steps of
+//! plans. The labels (states with costs) of the argument must cover all states that matter. Uses
+//! integer arithmetic only.
 
 use std::rc::Rc;
 
@@ -129,8 +130,8 @@ pub fn check(task: &str, argument: &str, claim: Option<&BigRational>) -> Result<
     })
 }
 
-/// Parses the task and the argument and checks the references in them. Also returns the claimed
-/// cost, converted to a sum of operator costs.
+/// Parses both documents and checks the references in them. Also returns the claim, converted to a
+/// sum of operator costs.
 pub(super) fn parse(
     task: &str,
     argument: &str,
@@ -159,7 +160,6 @@ fn read<T: DeserializeOwned>(document: &'static str, text: &str) -> Result<T, Fa
     serde_json::from_str(text).map_err(|error| form(document, error.to_string()))
 }
 
-/// Converts a metric value to the sum of operator costs, in the integer cost units of the task.
 fn cost(model: &Model, metric: &BigRational) -> Result<Integer, Fault> {
     let scaled = metric * model.objective.scale.to_rational();
     let scaled = if model.objective.maximize { -scaled } else { scaled };
@@ -219,9 +219,8 @@ impl Checker<'_> {
         })
     }
 
-    /// Returns `true` if a plan through a state, reached at cost `paid`, cannot be cheaper than the claim
-    /// (without a claim: cannot exist). This follows from a lower bound, or from a label (state of the proof)
-    /// that covers the state.
+    /// Returns `true` if a lower bound or a label proves the claim for all plans through a state
+    /// that is reached at cost `paid`.
     fn is_covered(&self, state: &State, paid: &Integer) -> bool {
         let too_expensive = self.potentials.iter().any(|potential| match (potential.at(state), &self.cost) {
             (None, _) => true,
@@ -245,10 +244,10 @@ impl Checker<'_> {
 
 /// Returns the non-dominated combinations of designs of each operator.
 ///
-/// A combination dominates another one if it costs no more, satisfies every condition that the other one
-/// satisfies, and leaves every number at least as high (equal, if larger numbers may hurt). A label (state of
-/// the proof) that covers the successor by the dominating combination then also covers the successor by the
-/// dominated one.
+/// A combination dominates another one if it costs no more, satisfies every condition that the
+/// other one satisfies, and leaves every number at least as high. (If larger numbers may hurt, the
+/// numbers must be equal.) A label that covers the successor by the dominating combination then
+/// also covers the successor by the dominated one.
 fn choices(model: &Model, monotone: bool) -> Result<Vec<Rc<[Choice]>>, Fault> {
     let mut fronts: FxHashMap<_, Rc<[Choice]>> = FxHashMap::default();
     let mut count = 0_usize;
@@ -275,8 +274,8 @@ fn choices(model: &Model, monotone: bool) -> Result<Vec<Rc<[Choice]>>, Fault> {
     Ok(choices)
 }
 
-/// Computes the non-dominated combinations of designs of one operator (see [`choices`]). Adds the work, in
-/// comparisons of two combinations, to `comparisons`.
+/// Computes the non-dominated combinations for one operator. Adds the work, in comparisons of two
+/// combinations, to `comparisons`.
 fn front(
     model: &Model,
     operator: &Operator,
@@ -317,8 +316,8 @@ fn quantities(operator: &Operator) -> impl Iterator<Item = &Quantity> {
     operator.condition.comparisons.iter().chain(changes).map(|linear| &linear.quantity)
 }
 
-/// Index of the operators. `by_fact` lists each operator under one of the facts that it requires;
-/// `always` lists the operators that require no fact.
+/// `by_fact` lists each operator under one of the facts that it requires; `always` lists the
+/// operators that require no fact.
 struct Index {
     by_fact: FxHashMap<(u32, u32), Vec<usize>>,
     always: Vec<usize>,

@@ -22,7 +22,7 @@ pub const MAX_DIGITS: usize = 10_000;
 #[derive(Clone, PartialEq, Eq, Hash)]
 pub struct Integer(Repr);
 
-/// Canonical representation: `Small` if and only if the value fits, so that equality is structural.
+/// Canonical: `Small` if and only if the value fits, so that equality is structural.
 #[derive(Clone, PartialEq, Eq, Hash)]
 enum Repr {
     Small(i128),
@@ -69,7 +69,6 @@ impl Integer {
         }
     }
 
-    /// Returns a bit of the two's complement representation; position 0 is the lowest bit.
     pub(crate) fn bit(&self, position: usize) -> bool {
         match &self.0 {
             Small(small) => small >> position.min(127) & 1 == 1,
@@ -77,7 +76,6 @@ impl Integer {
         }
     }
 
-    /// Returns the number of bits in two's complement, including the sign.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "at most 128 leading zeros, and bits that are held in memory"

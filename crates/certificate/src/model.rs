@@ -97,7 +97,8 @@ pub struct Operator {
     pub cost: Quantity,
     /// The duration, scaled by [`Model::time_scale`].
     pub duration: Quantity,
-    /// For a wait operator, the time at which the wait ends, measured from the start of the plan.
+    /// For a wait operator, the time at which the wait ends, measured from the start of the plan
+    /// and scaled by [`Model::time_scale`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub wait: Option<Integer>,
 }

@@ -8,10 +8,8 @@ use crate::model::{self, Condition, Exclusion, Fact, Linear, Literal, Model, Ope
 
 type Found = Result<(), String>;
 
-/// Upper limit on the number of design combinations for a list of slots (parameters that are
-/// designs).
+/// Upper limit on the number of design combinations for a list of slots.
 const CHOICE_LIMIT: usize = 1 << 20;
-/// Upper limit on the number of entries of a table in the argument.
 const TABLE_LIMIT: usize = 1 << 22;
 
 fn require(holds: bool, message: impl FnOnce() -> String) -> Found {
@@ -26,7 +24,6 @@ fn are_distinct(numbers: impl Iterator<Item = u32>) -> bool {
     sorted.len() == count
 }
 
-/// Checks the sizes and indices in a task, except indices of objects and of action schemas.
 pub(super) fn task(model: &Model) -> Found {
     let count = model.variables.len();
     require(model.basic <= count, || "more basic variables than variables".into())?;

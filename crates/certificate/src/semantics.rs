@@ -33,8 +33,6 @@ impl Model {
         self.variables[variable as usize].len() as u32 - 1
     }
 
-    /// Creates a state from the values of the basic variables and the numbers, and evaluates the
-    /// axioms.
     pub(super) fn state(&self, basic: &[u32], numbers: &[Integer]) -> State {
         let mut values = basic.to_vec();
         values.resize(self.variables.len(), 0);
@@ -47,8 +45,7 @@ impl Model {
         self.state(&self.values[..self.basic], &self.numbers)
     }
 
-    /// Computes the derived variables by the axioms: the least fixpoint of the rules, layer by
-    /// layer.
+    /// Computes the least fixpoint of the rules, layer by layer.
     fn derive(&self, state: &mut State) {
         for variable in self.derived_variables() {
             state.values[variable as usize] = self.none(variable);
@@ -69,7 +66,6 @@ impl Model {
         }
     }
 
-    /// Returns the number of suitable designs for each slot of an operator.
     pub(super) fn sizes(&self, operator: &Operator) -> Vec<usize> {
         self.uses[operator.uses as usize].iter().map(|(_, designs)| designs.len()).collect()
     }
@@ -95,8 +91,8 @@ impl Model {
         choices
     }
 
-    /// Returns the value of a quantity for a combination of designs; `sizes` are the numbers of
-    /// suitable designs of the slots.
+    /// Returns the value of a quantity for a combination of designs; `sizes` are those of
+    /// [`Model::sizes`].
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "a row is below the size of its table, see `references`"
@@ -114,7 +110,6 @@ impl Model {
         sum
     }
 
-    /// Returns a lower bound on a quantity over all combinations of designs.
     pub(super) fn least(&self, quantity: &Quantity) -> Integer {
         let tables =
             quantity.tables.iter().filter_map(|(_, table)| self.tables[*table as usize].iter().min());

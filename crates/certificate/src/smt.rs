@@ -41,8 +41,6 @@ struct Writer<'w> {
     monotone: bool,
 }
 
-/// Applies an n-ary operation to parts. Returns `neutral`, the neutral element, if there are no
-/// parts.
 fn join(operation: &str, neutral: &str, parts: impl IntoIterator<Item = String>) -> String {
     let parts: Vec<String> = parts.into_iter().collect();
     match &parts[..] {
@@ -72,7 +70,6 @@ fn literal((own, positive): &Literal) -> String {
     if *positive { fact(*own) } else { format!("(not {})", fact(*own)) }
 }
 
-/// Writes the query whether some state satisfies all assertions; `about` becomes a comment.
 fn question(text: &mut String, about: &str, declarations: &str, assertions: &[String]) {
     let _ = write!(text, "; {about}\n(push)\n{declarations}");
     for assertion in assertions {

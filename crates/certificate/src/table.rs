@@ -1,14 +1,15 @@
-//! Tables of lower bounds over the values of a few variables (abstraction heuristics), and the check that they
-//! are lower bounds.
+//! Tables of lower bounds over the values of a few variables (abstraction heuristics), and the
+//! check that they are lower bounds.
 //!
-//! A potential is a lower bound on the remaining cost under two conditions: it is at most 0 wherever the goal
-//! can hold, and no operator decreases it by more than its cost.
+//! A potential is a lower bound on the remaining cost under two conditions. It is at most 0
+//! wherever the goal can hold, and no operator decreases it by more than its cost.
 //!
-//! A need is a lower bound on the required value of a number under three conditions. Wherever the goal can
-//! hold, the need is at most the value that the goal requires. An operator that never increases the number may
-//! decrease the need, but only by the amount by which it always decreases the number; if it can decrease the
-//! number, it must require that the number stays at least 0. Every other change of the number occurs only where
-//! the need is 0, or leads from an infinite need to an infinite one.
+//! A need is a lower bound on the required value of a number under three conditions. Wherever the
+//! goal can hold, the need is at most the value that the goal requires. An operator that never
+//! increases the number may decrease the need, but only by the amount by which it always decreases
+//! the number. If it can decrease the number, it must require that the number stays at least 0.
+//! Every other change of the number occurs only where the need is 0, or leads from an infinite need
+//! to an infinite one.
 
 use crate::integer::Integer;
 use crate::model::{Conditional, Fact, Linear, Literal, Model, Operator, Quantity};
@@ -58,7 +59,6 @@ impl<'t> Table<'t> {
         self.values[row].as_ref()
     }
 
-    /// Returns all combinations of values that agree with the facts about variables of the pattern.
     #[expect(
         clippy::arithmetic_side_effects,
         clippy::cast_possible_truncation,
@@ -159,7 +159,7 @@ pub(super) fn check_potential(model: &Model, table: &Table<'_>) -> Result<(), St
     })
 }
 
-/// The effect of an operator on a number, as far as it matters for needs (lower bounds on the number).
+/// The effect of an operator on a number, as far as needs depend on it.
 enum Use {
     /// Decreases the number by at least this amount (≥ 0). If the number can decrease, the operator requires
     /// that the result is at least 0.

@@ -194,14 +194,13 @@ impl<'s> Sink<'s> {
         self.source
     }
 
-    /// Returns the number of reported diagnostics, including those beyond [`MAX_DIAGNOSTICS`] that are only counted.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(crate) fn len(&self) -> usize {
         self.diagnostics.len() + self.beyond_limit
     }
 
-    /// Returns `true` if more than [`MAX_DIAGNOSTICS`] diagnostics are stored. Further diagnostics are then only
-    /// counted, so suggestions for them need not be computed.
+    /// If the sink is full, further diagnostics are only counted, so suggestions for them need not
+    /// be computed.
     pub(crate) fn is_full(&self) -> bool {
         self.diagnostics.len() > MAX_DIAGNOSTICS
     }
@@ -210,9 +209,9 @@ impl<'s> Sink<'s> {
         self.beyond_limit > 0 || has_errors(&self.diagnostics)
     }
 
-    /// Returns the collected diagnostics, sorted by position and without successive duplicates. If some were
-    /// only counted, the last stored one is replaced by an error P119 with the number of diagnostics that are
-    /// not shown, including the replaced one.
+    /// Returns the collected diagnostics, sorted by position and without successive duplicates. If
+    /// some were only counted, an error P119 with the number of missing diagnostics replaces the
+    /// last stored one.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(crate) fn finish(mut self) -> Vec<Diagnostic> {
         if let (Some(last), true) = (self.diagnostics.get_mut(MAX_DIAGNOSTICS), self.beyond_limit > 0) {

@@ -142,7 +142,6 @@ impl Shown<'_> {
     }
 }
 
-/// Presents each excerpt to `codespan_reporting` as a file.
 struct Excerpts<'e>(&'e [Excerpt]);
 
 impl<'a> Files<'a> for Excerpts<'_> {

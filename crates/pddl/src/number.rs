@@ -12,7 +12,6 @@ const MAX_DIGITS: usize = 400;
 pub(crate) enum Literal {
     Name,
     Number(BigRational),
-    /// A number that has more than [`MAX_DIGITS`] digits if written without exponent.
     TooLong,
 }
 

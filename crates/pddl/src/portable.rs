@@ -64,7 +64,6 @@ fn declare_total_cost(domain: &mut Domain, problem: &Problem) {
     }
 }
 
-/// Moves objects of the problem that the domain uses to the constants of the domain.
 fn move_constants(domain: &mut Domain, problem: &mut Problem) {
     let mut used: FxHashSet<Name> = FxHashSet::default();
     domain.walk(&mut |node| match node {
@@ -152,8 +151,6 @@ const IMPLIED: [(&str, &str); 12] = [
     ("action-costs", "numeric-fluents"),
 ];
 
-/// Adds the requirement flags of all features that the domain or the problem uses, except those that stated
-/// flags imply.
 fn require(domain: &mut Domain, problem: &Problem) {
     let mut required: FxHashSet<&'static str> = FxHashSet::default();
     required.insert("strips");

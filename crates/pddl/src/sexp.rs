@@ -1,7 +1,8 @@
 //! Reads text into a tree of S-expressions, with recovery from unbalanced parentheses.
 //!
-//! The tree is one flat vector in the order of the text: a list is followed by its items and stores the index after
-//! its last item. Reading is iterative, and no destructor recurses, so no text can overflow the stack.
+//! The tree is one flat vector in the order of the text. A list is followed by its items and stores
+//! the index after its last item. Reading is iterative, and no destructor recurses, so no text can
+//! overflow the stack.
 
 use super::ast::Span;
 use super::diagnostic::Sink;
@@ -50,7 +51,6 @@ pub(super) struct Tree<'s> {
     nodes: Vec<Node>,
 }
 
-/// A list or a symbol of a tree.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Item<'t> {
     tree: &'t Tree<'t>,
@@ -62,7 +62,6 @@ impl<'t> Item<'t> {
         self.tree.nodes[self.index as usize]
     }
 
-    /// Extent in the text, including the parentheses of a list.
     pub(super) fn span(self) -> Span {
         self.node().span
     }
@@ -76,18 +75,15 @@ impl<'t> Item<'t> {
         (!is_list).then(|| &self.tree.text[span.start as usize..span.end as usize])
     }
 
-    /// Items of a list; empty for a symbol.
     #[expect(clippy::arithmetic_side_effects, reason = "an index in the list of nodes")]
     pub(super) fn items(self) -> Items<'t> {
         Items { tree: self.tree, next: self.index + 1, end: self.node().next }
     }
 
-    /// First item of a list, if it is a symbol.
     pub(super) fn head(self) -> Option<&'t str> {
         self.items().next().and_then(Item::symbol)
     }
 
-    /// Returns `true` if the item is a list whose first item is `keyword`, ignoring case.
     pub(super) fn is_headed(self, keyword: &str) -> bool {
         self.head().is_some_and(|head| head.eq_ignore_ascii_case(keyword))
     }
@@ -194,7 +190,6 @@ fn is_space(character: char) -> bool {
 
 struct Reader<'r, 's> {
     nodes: Vec<Node>,
-    /// Indices of the open lists, outermost first.
     open: Vec<u32>,
     sink: &'r mut Sink<'s>,
     /// Byte offset behind the last closing parenthesis.

@@ -5,7 +5,6 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::ast::{Condition, Domain, Name};
 
-/// Number of the stratum of each derived predicate of a domain, from 0.
 #[derive(Debug)]
 pub(crate) struct Strata<'d> {
     level: FxHashMap<&'d Name, usize>,
@@ -16,8 +15,6 @@ pub(crate) struct Strata<'d> {
 pub(crate) struct NegativeCycle<'d>(pub(crate) &'d Name);
 
 impl<'d> Strata<'d> {
-    /// Computes the stratum of each derived predicate. The error is a derived predicate that depends on its
-    /// own negation.
     #[expect(clippy::arithmetic_side_effects, reason = "levels are at most the number of predicates")]
     pub(crate) fn of(domain: &'d Domain) -> Result<Self, NegativeCycle<'d>> {
         let mut level: FxHashMap<&Name, usize> = FxHashMap::default();
@@ -54,7 +51,6 @@ impl<'d> Strata<'d> {
         }
     }
 
-    /// Returns the stratum of a derived predicate; `None` for a basic predicate.
     pub(crate) fn level(&self, name: &Name) -> Option<usize> {
         self.level.get(name).copied()
     }
@@ -63,7 +59,6 @@ impl<'d> Strata<'d> {
 /// Dependency of a derived predicate (first) on another (second). The number is 1 if the dependency is negated, else 0.
 type Dependency<'d> = (&'d Name, &'d Name, usize);
 
-/// Returns the head of the first negated dependency that lies on a cycle; `None` without such a dependency.
 fn on_negative_cycle<'d>(edges: &[Dependency<'d>]) -> Option<&'d Name> {
     let depends = |from: &'d Name, target: &Name| {
         let (mut visited, mut open) = (FxHashSet::from_iter([from]), vec![from]);

@@ -71,9 +71,9 @@ impl TypeHierarchy {
         supertype.alternatives.is_empty() || subtype.alternatives.iter().any(|lower| is_subtype(&lower.name))
     }
 
-    /// Returns `true` if some object can be of both types: an alternative of one type is a subtype of an
-    /// alternative of the other, or the two have a common subtype. An undeclared type overlaps with every
-    /// type.
+    /// Returns `true` if some object can be of both types: an alternative of one is a subtype of an
+    /// alternative of the other, or two alternatives have a common subtype. An undeclared type
+    /// overlaps with every type.
     pub(crate) fn overlap(&self, left: &TypeExpression, right: &TypeExpression) -> bool {
         let common = |left: &Name, right: &Name| {
             self.is_a(left, right) || self.is_a(right, left) || self.have_common_subtype(left, right)
@@ -107,8 +107,6 @@ impl TypeHierarchy {
     }
 }
 
-/// Returns for each type whether it is reachable from the type `from` in zero or more steps. `links` lists
-/// the direct successors of each type.
 fn closure(links: &[Vec<usize>], from: usize) -> Vec<bool> {
     let mut reached = vec![false; links.len()];
     reached[from] = true;

@@ -28,8 +28,6 @@ impl Sequence {
     }
 }
 
-/// Returns the sorted paths of the folders with a `domain.pddl` and a `problem.pddl` that lie directly in one of the
-/// listed folders of the repository.
 fn tasks() -> Vec<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let mut folders: Vec<PathBuf> = [
@@ -122,7 +120,6 @@ fn a_step_changes_the_reduced_problem_as_it_changes_the_whole_one() {
     assert!(possible > 200 && impossible > 200, "{possible} steps are possible, {impossible} are not");
 }
 
-/// Compares `metric_of` with the validator for the plan of one step, with the goal of the problem and without a goal.
 fn check_metric(step: &PlanStep, reduced: (&Domain, &Problem), whole: (&Domain, &Problem)) {
     let mut plan = PlanText::default();
     plan.steps.push(step.clone());

@@ -63,7 +63,6 @@ fn term_text(number: usize, scope: &Scope) -> String {
     term(number, scope).map_or_else(|object| format!("o{object}"), |variable| VARIABLES[variable].to_owned())
 }
 
-/// Extends a scope by all assignments of objects to the given variables.
 fn each(variables: &[usize], scope: &Scope) -> Vec<Scope> {
     let mut scopes = vec![*scope];
     for variable in variables {
@@ -256,7 +255,6 @@ fn chain(length: usize, axiom: &str) -> (Domain, Problem) {
 
 const JOINED: &str = "(or (and (end ?x) (on)) (exists (?y) (and (next ?x ?y) (p ?y))))";
 
-/// Returns the number of calls of `stop` during the validation of a valid plan for [`chain`].
 fn polls(length: usize, axiom: &str) -> u64 {
     let (domain, problem) = chain(length, axiom);
     let plan = PlanText::parse(&Source::new("plan", "(switch)")).expect("a plan");
@@ -292,8 +290,6 @@ fn a_validation_ends_when_stop_returns_true() {
     }
 }
 
-/// Tests quantifiers over more variables than the call stack has frames, with one or two objects per
-/// variable.
 #[test]
 fn quantifiers_may_bind_many_variables() {
     let check = |count: usize, objects: &str, condition: &dyn Fn(&str) -> String| {

@@ -117,7 +117,6 @@ fn source(path: &str) -> Source {
     Source::from_bytes(path, &bytes)
 }
 
-/// Returns the paths of all files below `REAL`; empty if the folder is absent.
 fn files() -> BTreeSet<String> {
     let mut paths = BTreeSet::new();
     let Some(real) = data(REAL) else { return paths };

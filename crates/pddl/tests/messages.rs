@@ -20,7 +20,6 @@ const PROBLEM: &str = "(define (problem p)
   (:goal (at b)))
 ";
 
-/// Replaces the first `right` in the domain or the problem by `wrong` and returns the rendered messages.
 fn messages(right: &str, wrong: &str) -> String {
     assert!(DOMAIN.contains(right) || PROBLEM.contains(right), "{right}");
     let domain = Source::new("domain.pddl", DOMAIN.replacen(right, wrong, 1));

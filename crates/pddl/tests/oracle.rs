@@ -54,7 +54,6 @@ struct State {
     values: [i64; OBJECTS - 1],
 }
 
-/// Returns the objects over which a quantifier ranges: all objects, or only those of the subtype.
 fn range(of_all: bool) -> std::ops::Range<usize> {
     if of_all { 0..OBJECTS } else { 1..OBJECTS }
 }

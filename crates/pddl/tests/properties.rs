@@ -95,7 +95,6 @@ fn condition() -> impl Strategy<Value = String> {
     })
 }
 
-/// Random condition with preferences, which occur below `and` and `forall` only.
 fn soft_condition() -> impl Strategy<Value = String> {
     let leaf = prop_oneof![
         condition(),
@@ -342,7 +341,6 @@ fn the_unmodified_files_have_no_errors() {
     assert_eq!(diagnostics.iter().map(|diagnostic| diagnostic.code).collect::<Vec<_>>(), ["P138"]);
 }
 
-/// Returns the code of the only error of a domain with the given precondition.
 fn only_error(precondition: &str) -> &'static str {
     let text = format!(
         "(define (domain d) (:predicates (p)) (:action a :parameters () :precondition {precondition} :effect (p)))"

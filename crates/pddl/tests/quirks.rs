@@ -30,7 +30,6 @@ fn file(path: &Path) -> Source {
     Source::from_bytes(path.file_name().unwrap_or_default().to_string_lossy(), &bytes)
 }
 
-/// Reads an acceptable domain and problem and returns the codes of the warnings. Panics on errors.
 fn accepted(domain: &Source, problem: &Source) -> Vec<&'static str> {
     match read(domain, problem) {
         Ok((_, _, warnings)) => warnings.iter().map(|warning| warning.code).collect(),

@@ -7,8 +7,7 @@ use pddl::{print_domain, print_problem};
 
 use crate::knowledge::{KnowledgeFiles, ORIGIN, Origin, first_message};
 
-/// Checks that a certificate matches the current files and situation of a mission. Returns a
-/// confirmation, or the first difference as an error.
+/// Returns a confirmation, or the first difference as an error.
 pub(crate) fn about(
     certified: Option<&KnowledgeFiles<'_>>,
     (domain, problem): (&str, &str),

@@ -20,9 +20,10 @@ pub struct VerificationAnswer<'a> {
     verified: bool,
     /// Claim of the certificate: `{"optimal": {"metric": "408"}}`, `"unsolvable"`, or null.
     claim: Option<&'a Claim>,
-    /// Files or mission for which the claim was checked; null if the files cannot be read.
+    /// Files or mission for which the claim was checked; null if the files cannot be read or the
+    /// verification was aborted at a limit.
     subject: Option<&'a Subject>,
-    /// Results of the checked parts, up to the first failure.
+    /// Results of the checked parts. Parts that depend on a failed part may be absent.
     parts: Vec<PartAnswer<'a>>,
 }
 

@@ -92,13 +92,14 @@ impl<'a> Verifier<'a> {
         report
     }
 
-    /// Returns the optimality proof (argument) of the certificate as verification conditions in SMT-LIB 2. The
-    /// proof itself is not checked.
+    /// Returns the optimality proof (argument) of the certificate as verification conditions in
+    /// SMT-LIB 2. The proof itself is not checked.
     ///
     /// # Errors
-    /// M121 if the certificate cannot be read, its argument is malformed, or a limit is reached. Also M121 if
-    /// its ground task is not faithful to its PDDL files, its plan is not as claimed, or its task has derived
-    /// variables, for which there are no verification conditions.
+    /// M121 if the certificate cannot be read or its task or argument is malformed. Also M121 if
+    /// its task has derived variables, for which there are no verification conditions. For an
+    /// optimality claim, also M121 if the task is not faithful to the PDDL files, the plan is not
+    /// as claimed, or a limit is reached.
     pub fn conditions(&self) -> Result<String, Errors> {
         conditions(self.directory, &|| self.is_over()).map_err(Errors::from)
     }
@@ -189,7 +190,6 @@ fn parts(
     parts
 }
 
-/// Returns the knowledge files of a certificate, or `None` if it has none.
 fn written(contents: &[(String, String)]) -> Option<knowledge::KnowledgeFiles<'_>> {
     contents.iter().any(|(name, _)| name == knowledge::ORIGIN).then(|| knowledge::KnowledgeFiles {
         document: text(contents, knowledge::DOCUMENT),

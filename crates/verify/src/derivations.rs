@@ -71,7 +71,6 @@ pub struct Step {
     pub supports: Option<Vec<u32>>,
 }
 
-/// Parses the derivations and interns their names and literals in `symbols`.
 pub(crate) fn read(text: &str, symbols: &mut Symbols) -> Result<Derivation, String> {
     let wrong = |reason: &str| format!("{DERIVATIONS}: {reason}");
     let document: Document = serde_json::from_str(text).map_err(|error| wrong(&error.to_string()))?;

@@ -79,7 +79,6 @@ pub(crate) fn read(directory: &Path) -> Result<(Manifest, Vec<(String, String)>)
     Ok((manifest, contents))
 }
 
-/// Checks the size and the SHA-256 digest of a streamed file, without keeping it in memory.
 fn check_streamed(directory: &Path, file: &File) -> Result<(), String> {
     let File { name, bytes, sha256 } = file;
     let wrong = |what: String| format!("{name}: {what}");

@@ -69,8 +69,9 @@ pub fn is_shipped(name: &str, text: &str) -> bool {
     [(COADAPTATION, rules::COADAPTATION_RULES), (TOMASYS, rules::TOMASYS_RULES)].contains(&(name, text))
 }
 
-/// Describes for each rule file whether it is shipped, a changed version of a shipped file, or another file. Returns an
-/// error if the recorded digest of a shipped rule file differs from the digest of its text, or if this file is missing.
+/// Describes for each rule file whether it is shipped, a changed version of a shipped file, or
+/// another file. Returns an error if the recorded digest of a rule file differs from that of its
+/// text, or if this file is missing.
 fn provenance(origin: &Origin) -> Result<String, String> {
     let mut descriptions = Vec::new();
     for (name, text) in &origin.rules {

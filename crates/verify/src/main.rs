@@ -61,8 +61,7 @@ fn main() -> ExitCode {
     })
 }
 
-/// Verifies the certificate under the limits on time and memory. With `--smt`, writes the
-/// verification conditions first.
+/// With `--smt`, the verification conditions are written first.
 fn run(arguments: &Arguments) -> Result<Verification, Errors> {
     let Arguments { directory, format, smt, time_limit } = arguments.clone();
     let watch = Watch::start(time_limit, move |report| std::process::exit(show(report, format).into()));
@@ -73,7 +72,6 @@ fn run(arguments: &Arguments) -> Result<Verification, Errors> {
     Ok(watch.end(verifier.verify()))
 }
 
-/// Prints the result of the verification and returns the exit status.
 fn show(report: &Verification, format: Format) -> u8 {
     let written = document(&match format {
         Format::Text => report.to_string(),

@@ -134,8 +134,6 @@ pub enum Unchecked {
 }
 
 impl Subject {
-    /// Creates the subject of a certificate with these files, which was compared with the mission
-    /// of this name if there is one.
     pub(crate) fn new(files: &[File], mission: Option<&str>) -> Self {
         let mut lines = String::new();
         for name in SUBJECT {

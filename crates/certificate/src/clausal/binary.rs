@@ -53,7 +53,6 @@ impl Formula {
         sum
     }
 
-    /// Encodes that `number` is at least `least` if all literals of `condition` hold.
     #[expect(clippy::arithmetic_side_effects, reason = "positions in a number whose bits are held in memory")]
     pub(super) fn at_least(&mut self, condition: &[Literal], number: &Bits, least: &Integer) {
         let ordered = ordered(number, least);

@@ -4,8 +4,6 @@ use std::io::{BufRead, Read};
 
 use crate::clausal::literal::Literal;
 
-/// Upper limit on the length of a line, in bytes. The remainder of a longer line is read as the
-/// next line.
 const LINE_LIMIT: u64 = 1 << 22;
 
 /// Reads a line of at most 4 MiB into the buffer `line`; the remainder of a longer line is read by

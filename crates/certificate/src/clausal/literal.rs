@@ -14,8 +14,6 @@ impl Literal {
         (number != 0 && number != i32::MIN).then_some(Self(number))
     }
 
-    /// Returns the positive literal of a variable, or `None` if the variable number is 0 or exceeds
-    /// 31 bits.
     pub(crate) fn of_variable(number: usize) -> Option<Self> {
         i32::try_from(number).ok().and_then(Self::new)
     }

@@ -61,7 +61,6 @@ pub(super) fn check<'c>(
 
 struct Checker {
     literals: Vec<Literal>,
-    /// The range of each clause in `literals`.
     places: Vec<Range<usize>>,
     is_true: Vec<bool>,
     /// The true literals, in order to reset `is_true`.

@@ -22,13 +22,13 @@ pub enum StepBound {
 }
 
 const STEP_LIMIT: usize = 64;
-/// Upper limit on the number of transitions between the rows of a potential (table of lower bounds
-/// on the remaining cost). Potentials with more are not used.
+/// Upper limit on the number of transitions between the rows of a potential. Potentials with more
+/// transitions are not used.
 const EDGE_LIMIT: usize = 1 << 22;
 
-/// Returns the least number of steps T for which the lower bound `by`, with one of the potentials,
-/// proves that no plan of more than T steps costs less than `cost`. Returns an error if there is no
-/// such T up to [`STEP_LIMIT`].
+/// Returns the least T for which the lower bound `by`, with one of the potentials, proves that no
+/// plan of more than T steps costs less than `cost`. Returns an error if there is no such T up to
+/// [`STEP_LIMIT`].
 pub(super) fn bound(
     model: &Model,
     argument: &Argument,
@@ -68,8 +68,8 @@ pub(super) fn check(
     position.ok_or_else(|| format!("a cheaper plan may have more than {steps} steps"))
 }
 
-/// The minimal cost of reaching each row of a potential (table of lower bounds on the remaining cost) in
-/// exactly k steps (Bellman-Ford layers). The number k is the number of calls of `advance`.
+/// The minimal cost of reaching each row of a potential in exactly k steps (Bellman-Ford layers),
+/// where k is the number of calls of `advance`.
 struct Layers<'l> {
     table: &'l Table<'l>,
     /// The transitions between rows: (source row, target row, minimal cost).
@@ -121,14 +121,14 @@ impl<'l> Layers<'l> {
         self.costs = next;
     }
 
-    /// Returns the minimal cost of exactly k steps in the abstraction (k: number of calls of `advance`), or
-    /// `None` if no sequence of k steps exists.
+    /// Returns the minimal cost of exactly k steps in the abstraction, or `None` if no sequence of
+    /// k steps exists.
     fn spent(&self) -> Option<Integer> {
         self.costs.iter().flatten().min().cloned()
     }
 
-    /// Returns the minimum over all rows of the cost of k steps plus the potential (lower bound on the
-    /// remaining cost). Returns `None` if no row that is reachable in k steps can reach the goal.
+    /// Returns the minimum over all rows of the cost of k steps plus the potential. Returns `None`
+    /// if no row that is reachable in k steps can reach the goal.
     fn least(&self) -> Option<Integer> {
         let rows = self.costs.iter().enumerate();
         rows.filter_map(|(row, cost)| Some(cost.as_ref()? + self.table.at_row(row)?)).min()

@@ -19,7 +19,7 @@ const WIDTH_LIMIT: usize = 4_096;
 
 pub(super) struct Sums {
     spent: Bits,
-    /// Upper limit on the accumulated cost: the claimed cost minus 1.
+    /// The claimed cost minus 1.
     limit: Integer,
     numbers: Vec<Bits>,
 }
@@ -46,7 +46,7 @@ fn comparisons(model: &Model) -> impl Iterator<Item = &Linear> {
 }
 
 /// Returns a number of bits that suffices for a numeric variable: for its values after up to
-/// `steps` steps, and for the sums in comparisons that contain it.
+/// `steps` steps, and for sums in comparisons.
 fn number_width(model: &Model, number: u32, steps: usize) -> Result<usize, String> {
     let initial = &model.numbers[number as usize];
     let (mut least, mut greatest) = (initial.clone(), initial.clone());
@@ -178,8 +178,8 @@ fn compare(
     }
 }
 
-/// A use of a table: the index of an operator's list of slots ([`Model::uses`]), the slots that
-/// select the row, and the index of the table.
+/// Key of a table lookup: index of an operator's list of slots ([`Model::uses`]), slots that select
+/// the row, and index of the table.
 type Kind<'k> = (u32, &'k [u32], u32);
 
 struct Adder<'a> {
@@ -189,8 +189,6 @@ struct Adder<'a> {
 }
 
 impl Adder<'_> {
-    /// Encodes the value of a numeric variable after the step, given its bits before the step.
-    /// Returns its bits after the step.
     fn change(&mut self, formula: &mut Formula, before: &Bits, number: u32) -> Result<Bits, String> {
         let changes: Vec<Option<Change<'_>>> =
             self.model.operators.iter().map(|operator| change(operator, number)).collect::<Result<_, _>>()?;
@@ -285,8 +283,6 @@ impl Adder<'_> {
         sum
     }
 
-    /// Encodes the table entry that the operator of this step adds, for the table at position
-    /// `place` of each quantity.
     #[expect(
         clippy::arithmetic_side_effects,
         clippy::cast_possible_truncation,

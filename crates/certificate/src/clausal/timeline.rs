@@ -17,8 +17,8 @@ pub(super) struct Timeline {
     values: Vec<Vec<Literal>>,
     pub(super) operators: Vec<Literal>,
     pub(super) idle: Option<Literal>,
-    /// For each slot (parameter that is a design) and each of its designs, the literal that the design is
-    /// chosen at the latest step.
+    /// For each slot and each of its designs, the literal that the design is chosen at the latest
+    /// step.
     pub(super) chosen: Vec<Vec<Literal>>,
 }
 
@@ -96,8 +96,8 @@ impl Timeline {
         if *positive { literal } else { -literal }
     }
 
-    /// Encodes that the operator of the step has a suitable design in each of its slots (parameters
-    /// that are designs), and that the combination of designs is not excluded.
+    /// Encodes that the operator of the step has a suitable design in each of its slots, and that
+    /// the combination of designs is not excluded.
     fn choose(&mut self, model: &Model, formula: &mut Formula, number: usize) {
         self.chosen = Vec::new();
         for (slot, designs) in model.slots.iter().enumerate() {
@@ -154,7 +154,6 @@ impl Timeline {
     }
 }
 
-/// Formats an operator as a PDDL action; a slot is written as `?` and its number.
 fn show(model: &Model, operator: &Operator) -> String {
     let argument = |argument: &Argument| match argument {
         Argument::Object(number) => format!(" {}", object(model, *number)),

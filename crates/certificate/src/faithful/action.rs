@@ -26,8 +26,6 @@ use pddl::ast::{
     Expression,
 };
 
-/// Returns the cases (outcomes under a condition) of waiting until the next event, for each event
-/// after time 0.
 #[expect(clippy::arithmetic_side_effects, reason = "the place of an event that is held in memory")]
 pub(super) fn waits(timeline: &Timeline, structure: &Structure) -> Result<Vec<Case>, Cause> {
     let mut cases = Vec::new();
@@ -96,8 +94,8 @@ pub(super) fn cases<'r>(
     }
 }
 
-/// Returns the conjunction of a condition and two additional ones. If both additional conditions are true,
-/// which is frequent, the result borrows `condition`.
+/// Returns the conjunction of a condition and two additional ones. Borrows `condition` in the
+/// frequent case that both additional conditions are true.
 fn all_of(condition: &Formula, additional: [Formula; 2]) -> Cow<'_, Formula> {
     if additional.iter().all(|extra| extra.is(true)) {
         return Cow::Borrowed(condition);
@@ -137,8 +135,8 @@ impl<'r> Durative<'r> {
         )
     }
 
-    /// Returns the cases (outcomes under a condition) of an action with duration 0. Start and end are one
-    /// happening, and there are no states to which over-all conditions apply.
+    /// Start and end of an action with duration 0 are one happening. There are no states to which
+    /// over-all conditions apply.
     fn at_once(&self, mut reader: Reader<'r>, structure: &Structure) -> Result<Vec<Case>, Cause> {
         let mut ends = Vec::new();
         for (condition, effect) in
@@ -211,9 +209,9 @@ impl<'r> Durative<'r> {
         Ok(cases)
     }
 
-    /// Returns the cases (outcomes under a condition) of a durative action whose start effects are
-    /// stored in `reader.applied`. Considers the events during the action, the over-all conditions,
-    /// and the end. `known` are the facts and comparisons that hold before the action.
+    /// Returns the cases of a durative action whose start effects are stored in `reader.applied`.
+    /// Considers the events during the action, the over-all conditions, and the end. `known`
+    /// contains the assumptions about the state before the action.
     fn after_start(
         &self,
         reader: &mut Reader<'r>,
@@ -320,8 +318,8 @@ impl Moment {
         truths
     }
 
-    /// Returns the cases (outcomes under a condition) of an action instance. `self` contains the effects of its
-    /// last happening, and `applied` the changes by the start of the action and by events.
+    /// Returns the cases of an action instance. `self` contains the effects of its last happening,
+    /// and `applied` the changes by its start and by events.
     fn last(
         &self,
         structure: &Structure,

@@ -8,11 +8,9 @@ use crate::faithful::relation::Relation;
 
 #[derive(Debug, Default)]
 pub(super) struct Axioms {
-    /// The derived atoms that may hold in a state of the witness (the over-approximation of the
-    /// reachable states).
+    /// The derived atoms that may hold in a state of the witness.
     pub(super) may: FxHashSet<Key>,
-    /// The derived atoms that hold in every state of the witness (the over-approximation of the
-    /// reachable states).
+    /// The derived atoms that hold in every state of the witness.
     pub(super) must: FxHashSet<Key>,
     /// A superset of `may`, from which the candidate objects of variables are taken.
     pub(super) bound: Relation,
@@ -23,8 +21,7 @@ pub(super) struct Axioms {
 }
 
 impl Axioms {
-    /// Returns the truth value of a derived atom if the atom has the same value in all states of
-    /// the witness (the over-approximation of the reachable states).
+    /// Returns the truth value of a derived atom if it is equal in all states of the witness.
     pub(super) fn known(&self, key: &Key) -> Option<bool> {
         match (self.must.contains(key), self.may.contains(key)) {
             (true, _) => Some(true),

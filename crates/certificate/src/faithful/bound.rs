@@ -28,14 +28,12 @@ struct Occurrence<'w> {
     rule: &'w Derived,
     atom: &'w Atom,
     variables: Rc<[&'w TypedName]>,
-    /// The conjuncts of the enclosing conjunctions, which restrict the candidate objects of variables.
     others: Rc<[&'w Condition]>,
     has_distinct_names: bool,
 }
 
-/// Computes an upper bound on the derived atoms that may hold in states of the witness (the
-/// over-approximation of the reachable states), and stores this bound in `axioms.bound`. Fails if
-/// there are too many atoms, or if `stop` returns `true`.
+/// Stores an upper bound on the derived atoms that may hold in states of the witness in
+/// `axioms.bound`. Fails if there are too many atoms, or if `stop` returns `true`.
 pub(super) fn add(
     world: &World<'_>,
     invariant: &Invariant,
@@ -122,8 +120,8 @@ fn has_distinct_names(rule: &Derived, variables: &[&TypedName]) -> bool {
     variables_in_scope.into_iter().all(|variable| names.insert(&variable.identifier.name))
 }
 
-/// Returns the heads of all instances of a rule whose conditions are possible, except heads that
-/// are already in `axioms.bound`.
+/// Returns the heads of all possible instances of a rule, except heads that are already in
+/// `axioms.bound`.
 fn all_heads(
     world: &World<'_>,
     invariant: &Invariant,
@@ -146,8 +144,8 @@ fn all_heads(
 }
 
 impl Occurrence<'_> {
-    /// Returns the heads of rule instances in which the derived atom `key` matches this occurrence
-    /// and whose conditions are possible, except heads that are already in `axioms.bound`.
+    /// Returns the heads of possible rule instances in which the derived atom `key` matches this
+    /// occurrence, except heads that are already in `axioms.bound`.
     fn heads(
         &self,
         world: &World<'_>,
@@ -219,10 +217,9 @@ impl Occurrence<'_> {
 }
 
 impl<'r> Reader<'r> {
-    /// Returns `false` only if a condition holds in no state of the witness (the over-approximation of the
-    /// reachable states) in which at most the derived atoms of `axioms.bound` hold. Implications, universal
-    /// conditions and comparisons are assumed to be possible. So are negations, except those of equalities
-    /// and of basic atoms.
+    /// Returns `false` only if a condition holds in no state of the witness in which at most the
+    /// derived atoms of `axioms.bound` hold. Implications, universal conditions and comparisons are
+    /// assumed to be possible. So are negations, except those of equalities and of basic atoms.
     fn is_possible(&mut self, condition: &'r Condition) -> Result<bool, Cause> {
         self.count()?;
         match condition {

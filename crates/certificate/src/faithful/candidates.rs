@@ -36,8 +36,6 @@ impl Reader<'_> {
         }
     }
 
-    /// Returns the smallest set of candidates among those of the visited conjuncts, or `None` if no
-    /// conjunct restricts the variable; see [`Reader::restricted`].
     fn restricted_by_all<'c>(
         &self,
         name: &Name,
@@ -130,9 +128,8 @@ impl Reader<'_> {
         if !self.world.changes(symbol) {
             return Some(self.world.rows(symbol, key).into_iter().filter_map(|row| of(row)).collect());
         }
-        // Start effects may add atoms that the witness (the over-approximation of the reachable
-        // states) does not contain, so the witness restricts only conditions on the state before
-        // the start.
+        // Start effects may add atoms that the witness does not contain, so the witness restricts
+        // only conditions on the state before the start.
         let is_before = self.applied.truths.is_empty();
         is_before.then(|| self.invariant.rows(symbol, key).filter_map(|key| of(&key.1)).collect())
     }

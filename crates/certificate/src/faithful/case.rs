@@ -21,12 +21,10 @@ pub(super) struct Case {
     /// both added and deleted holds.
     pub(super) effects: Vec<(Formula, Key, bool)>,
     pub(super) changes: BTreeMap<Key, Linear>,
-    /// The range of durations; `None` for instantaneous actions and waits.
     pub(super) length: Option<Length>,
     pub(super) passage: Passage,
 }
 
-/// The simultaneous conditional effects of a happening.
 #[derive(Default)]
 pub(super) struct Moment {
     pub(super) atoms: Vec<(Formula, Key, bool)>,

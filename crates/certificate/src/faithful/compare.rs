@@ -27,8 +27,7 @@ type Result<T> = std::result::Result<T, Obstacle>;
 /// for one case of an action instance ([`Comparison::find`]). A case split replaces a partial state by several.
 const SPLIT_LIMIT: usize = 256;
 
-/// The positions of operators by action name and arguments; an argument is `None` if it is a slot
-/// (chosen design).
+/// Positions of operators by action name and arguments; an argument is `None` if it is a slot.
 type Calls = FxHashMap<(String, Vec<Option<u32>>), Vec<usize>>;
 
 pub(super) struct Comparison<'c> {
@@ -38,8 +37,7 @@ pub(super) struct Comparison<'c> {
     waits: Vec<usize>,
     /// For each action, the sets of parameters that are slots in an operator (`true` for a slot).
     masks: FxHashMap<String, BTreeSet<Vec<bool>>>,
-    /// The metric, as an expression to be minimised; `None` if plans are measured by time or by
-    /// length.
+    /// The metric, to be minimised; `None` if plans are measured by time or by length.
     metric: Option<Linear>,
     timed: bool,
     /// If there are timed events, a common divisor of all their times and of all durations. Otherwise 1, which
@@ -167,9 +165,8 @@ impl<'c> Comparison<'c> {
         Ok(())
     }
 
-    /// Checks that the rules of the task and the rules of the PDDL files are equivalent, for each
-    /// derived atom of `Axioms::linked`: a variable of the task on or between dependency cycles.
-    /// Other derived atoms are replaced by their rules.
+    /// Checks for each derived atom of `Axioms::linked` that the rules of the task and of the PDDL
+    /// files are equivalent. Other derived atoms are replaced by their rules.
     pub(super) fn rules(&self) -> Result<()> {
         let task = self.task;
         let mut linked: Vec<&Key> = task.axioms.linked.iter().collect();
@@ -216,9 +213,8 @@ impl<'c> Comparison<'c> {
         open.is_empty()
     }
 
-    /// Checks that operators simulate a case (outcome under a condition) of an action instance.
-    /// Returns `false` if no operator is needed, because the case does not change the task state
-    /// and its cost is not negative.
+    /// Checks that operators simulate a case. Returns `false` if no operator is needed, because the
+    /// case does not change the task state and its cost is not negative.
     pub(super) fn case(&self, action: &Action, arguments: &[u32], case: &Case) -> Result<bool> {
         let name = || {
             let words = arguments.iter().map(|object| self.task.world.name(*object));
@@ -234,8 +230,6 @@ impl<'c> Comparison<'c> {
         self.find(&self.candidates(action, arguments), case, &instance).map(|()| true)
     }
 
-    /// Checks that wait operators of the task simulate a wait until an event, or that the wait does
-    /// not change the task state.
     pub(super) fn wait(&self, case: &Case) -> Result<()> {
         let name = || {
             let phases = case.truths.iter().filter(|(key, holds)| key.0 == PHASE && **holds);
@@ -254,9 +248,8 @@ impl<'c> Comparison<'c> {
         self.find(&waits, case, &instance)
     }
 
-    /// Checks that in every state in which a case (outcome of an action instance under a condition)
-    /// can be executed, one of the candidate operators simulates the case. Fails if this is not proved
-    /// after [`SPLIT_LIMIT`] partial states.
+    /// Checks that one of the candidate operators simulates the case in every state in which it can
+    /// be executed. Fails if this is not proved after [`SPLIT_LIMIT`] partial states.
     fn find(&self, candidates: &[(&Operator, Vec<u32>)], case: &Case, instance: &Instance<'_>) -> Result<()> {
         let structure = &self.task.names.structure;
         let conditions: Vec<Formula> = candidates
@@ -323,10 +316,10 @@ impl<'c> Comparison<'c> {
         Ok(())
     }
 
-    /// Returns `true` if the clock of the task represents the time after the case (outcome of an action
-    /// instance under a condition). The task may have no clock, or the operator leaves it unchanged or advances
-    /// it by the duration of the case. Otherwise, the operator must set it to a value that represents every
-    /// possible end time (see `timeline`).
+    /// Returns `true` if the clock of the task represents the time after the case. This holds if
+    /// the task has no clock, or if the operator leaves it unchanged or advances it by the duration
+    /// of the case. It also holds if the operator sets it to a value that represents every possible
+    /// end time (see `timeline`).
     fn keeps_time(&self, (operator, choice): (&Operator, &[u32]), case: &Case) -> bool {
         let Some(number) = self.task.names.numbers.get(&timeline::clock()) else { return true };
         // An unchanged clock value represents the later time, too.
@@ -345,9 +338,9 @@ impl<'c> Comparison<'c> {
         }
     }
 
-    /// Returns the minimal increase of the metric by a case (outcome of an action instance under a
-    /// condition). Without a metric, returns the minimal duration if plans are measured by time,
-    /// otherwise 1. Fails if the increase depends on the state.
+    /// Returns the minimal increase of the metric by a case. Without a metric, returns the minimal
+    /// duration if plans are measured by time, otherwise 1. Fails if the increase depends on the
+    /// state.
     fn cost(&self, case: &Case) -> Result<BigRational> {
         let one = BigRational::one();
         let time = |factor: &BigRational| match &case.length {
@@ -372,8 +365,6 @@ impl<'c> Comparison<'c> {
         }
     }
 
-    /// Returns the operators that represent an action with these arguments, each with the designs for its slots
-    /// that yield these arguments.
     fn candidates(&self, action: &Action, arguments: &[u32]) -> Vec<(&'c Operator, Vec<u32>)> {
         let name = action.identifier.name.as_str().to_ascii_lowercase();
         let world = self.task.world;
@@ -392,8 +383,9 @@ impl<'c> Comparison<'c> {
         candidates
     }
 
-    /// Returns the designs for the slots of an operator for which it has these arguments. Returns `None` if the
-    /// arguments do not determine suitable designs, or if their combination is excluded.
+    /// Returns the designs with which an operator has these arguments, as positions in the slots'
+    /// lists of suitable designs. Returns `None` if no designs yield them, if the arguments do not
+    /// determine them, or if their combination is excluded.
     fn choice(&self, operator: &Operator, objects: &[u32]) -> Option<Vec<u32>> {
         let model = self.task.model;
         let uses = &model.uses[operator.uses as usize];
@@ -419,8 +411,7 @@ impl<'c> Comparison<'c> {
     }
 }
 
-/// Returns the rank of a reason for rejecting an operator. The rank increases with the part of the operator
-/// that matches the action instance.
+/// Ranks a reason for rejecting an operator: the more of the operator matches, the higher.
 fn rank(reason: &Obstacle) -> u8 {
     match reason {
         Obstacle::Differs(Difference::NoOperatorFor { .. }) => 0,

@@ -14,8 +14,7 @@ use crate::faithful::verdict::Cause;
 use crate::faithful::world::World;
 use pddl::ast::{Condition, Expression};
 
-/// Computes which derived atoms hold in all states or in no state of the witness (the over-approximation of the
-/// reachable states). `linked` contains the derived atoms that are variables of the task.
+/// `linked` contains the derived atoms that are variables of the task.
 pub(super) fn axioms(
     world: &World<'_>,
     invariant: &Invariant,
@@ -96,8 +95,6 @@ fn take_ends_away<'b>(
     }
 }
 
-/// Returns each derived atom that may hold, with the formula under which it holds. Formulas contain
-/// basic and derived atoms.
 fn bodies(world: &World<'_>, invariant: &Invariant, axioms: &Axioms) -> Result<Vec<(Key, Formula)>, Cause> {
     let mut heads: Vec<Key> = axioms.bound.atoms().cloned().collect();
     heads.sort_unstable();
@@ -143,8 +140,6 @@ fn fixpoint(bodies: &[(Key, Formula)], holds: impl Fn(&Formula, &FxHashSet<Key>)
     fixpoint
 }
 
-/// Returns `true` if a body may hold, given that at most the derived atoms of `may` and at least
-/// the derived atoms of `must` hold.
 fn possible(world: &World<'_>, formula: &Formula, may: &FxHashSet<Key>, must: &FxHashSet<Key>) -> bool {
     match formula {
         Formula::All(parts) => parts.iter().all(|part| possible(world, part, may, must)),
@@ -155,8 +150,6 @@ fn possible(world: &World<'_>, formula: &Formula, may: &FxHashSet<Key>, must: &F
     }
 }
 
-/// Returns `true` if a body certainly holds, given that at least the derived atoms of `must` and at
-/// most the derived atoms of `may` hold.
 fn certain(world: &World<'_>, formula: &Formula, must: &FxHashSet<Key>, may: &FxHashSet<Key>) -> bool {
     match formula {
         Formula::All(parts) => parts.iter().all(|part| certain(world, part, must, may)),

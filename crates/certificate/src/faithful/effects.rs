@@ -1,5 +1,5 @@
-//! Compares the effects of a case (outcome under a condition) of an action instance with the
-//! effects of an operator, on the variables and numbers of the task.
+//! Compares the effects of a case (outcome of an action instance under a condition) and of an
+//! operator on the variables and numbers of the task.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,7 +10,7 @@ use crate::faithful::linear::Linear;
 use crate::faithful::translation::Translation;
 use crate::model::Operator;
 
-/// Upper limit on the number of partial states that are examined when one variable is compared in one case (see
+/// Upper limit on the number of partial states when one variable is compared in one case (see
 /// [`Variable::agrees`]). A case split replaces a partial state by several.
 const SPLIT_LIMIT: usize = 1_024;
 
@@ -22,13 +22,13 @@ pub(super) struct Made<'m> {
 
 pub(super) enum Mismatch {
     Differs(String),
-    /// It is not proved that at most one of these atoms (the values of a variable) holds after the case
-    /// (outcome of an action instance under a condition). Or too many partial states would have to be examined.
+    /// It is not proved that at most one of these atoms (the values of a variable) holds after the
+    /// case. Or too many partial states would have to be examined.
     Unknown(String),
 }
 
-/// Compares the effects of a case (outcome of an action instance) with the effects of an operator,
-/// or with no effects if `operator` is `None`. The clock is not compared.
+/// Compares the effects of a case with those of an operator, or with no effects if `operator` is
+/// `None`. The clock is not compared.
 pub(super) fn compare(
     task: &Translation<'_>,
     case: &Case,
@@ -72,15 +72,12 @@ fn numbers(task: &Translation<'_>, case: &Case, operator: Option<Made<'_>>) -> R
     Ok(())
 }
 
-/// A comparison of the effects of a case (outcome of an action instance under a condition) and of
-/// an operator on one variable.
 struct Variable<'v> {
     task: &'v Translation<'v>,
     own: u32,
     case: &'v Case,
     effects: Vec<&'v (Formula, Key, bool)>,
-    /// The atoms of the variable that the case may change. The key is the value that represents the
-    /// atom.
+    /// The atoms of the variable that the case may change, by their values.
     touched: BTreeMap<u32, &'v Key>,
     certain: Option<u32>,
     conditional: Vec<(Formula, u32)>,
@@ -113,9 +110,9 @@ impl<'v> Variable<'v> {
         Self { task, own: variable, case, effects, touched, certain, conditional }
     }
 
-    /// Returns `Some(true)` if the case and the operator agree in all states that satisfy `known`, and
-    /// `Some(false)` if they differ in a partial state that extends `known`. Returns `None` if neither is
-    /// proved, for example within [`SPLIT_LIMIT`] partial states.
+    /// Returns `Some(true)` if the case and the operator agree in all states that satisfy `known`.
+    /// Returns `Some(false)` if they differ in a partial state that extends `known`, and `None` if
+    /// neither is proved.
     fn agrees(&self, known: &Known) -> Option<bool> {
         let structure = &self.task.names.structure;
         let mut open = vec![known.clone()];
@@ -165,8 +162,6 @@ impl<'v> Variable<'v> {
         self.task.invariant.may_hold(key) && known.atom(&self.task.names.structure, key) != Some(false)
     }
 
-    /// Returns the atoms of the variable that may hold before the case (outcome of an action
-    /// instance under a condition), each with its value (number) in the variable.
     fn possible(&self, known: &'v Known) -> impl Iterator<Item = (u32, &'v Key)> {
         // If one atom of the variable holds, the other atoms do not.
         let holding = known.holding(self.own);
@@ -175,8 +170,6 @@ impl<'v> Variable<'v> {
         possible_atoms.into_iter().flatten().chain(held_atom).filter(|(_, key)| self.may_hold(known, key))
     }
 
-    /// Returns the value of the variable before the case (outcome of an action instance under a
-    /// condition), or `None` if it is unknown.
     fn current(&self, known: &Known) -> Value {
         let structure = &self.task.names.structure;
         match self.possible(known).next() {
@@ -186,10 +179,9 @@ impl<'v> Variable<'v> {
         }
     }
 
-    /// Returns the value of the variable after the case (outcome of an action instance under a
-    /// condition) according to the PDDL files; `None` if it is unchanged. An error names a formula
-    /// whose truth value is needed, or means that it is not proved that at most one atom of the
-    /// variable then holds.
+    /// Returns the value of the variable after the case according to the PDDL files; `None` if it
+    /// is unchanged. The error `Open` names a formula whose truth value is needed. `Unknown` means
+    /// that it is not proved that at most one atom of the variable then holds.
     fn expected(&self, known: &Known, current: Value) -> Result<Value, Outcome<'_>> {
         let structure = &self.task.names.structure;
         let after = |key: &Key| {

@@ -22,13 +22,9 @@ use crate::faithful::formula::Structure;
 use crate::faithful::key::Key;
 use crate::faithful::world::World;
 
-/// Upper limit on the number of partial states that are examined for one case (outcome of an action
-/// instance under a condition) and one group.
 const SPLIT_LIMIT: usize = 1_024;
-/// Upper limit on the number of checks whether a case (outcome of an action instance under a
-/// condition) preserves a group, during the whole search.
+/// Upper limit on the number of checks whether a case preserves a group, during the whole search.
 const SEARCH_LIMIT: usize = 20_000_000;
-/// Upper limit on the number of groups that the search tries for one variable.
 const GROUP_LIMIT: usize = 300;
 
 /// A mutex group: atoms of which at most one holds.
@@ -41,9 +37,8 @@ pub(super) fn holds_initially(world: &World<'_>, group: &Group) -> bool {
     group.iter().all(is_basic) && group.iter().filter(|key| world.holds_initially(key)).count() <= 1
 }
 
-/// Returns `true` if at most one atom of a group holds after a case (outcome of an action
-/// instance), given that at most one holds before the case. `false` means violated or not proved
-/// after [`SPLIT_LIMIT`] partial states.
+/// Returns `true` if at most one atom of a group holds after a case, given that at most one holds
+/// before it. `false` means violated or not proved after [`SPLIT_LIMIT`] partial states.
 pub(super) fn keeps(
     structure: &Structure,
     may_hold: &dyn Fn(&Key) -> bool,
@@ -77,14 +72,11 @@ pub(super) fn keeps(
     open.is_empty()
 }
 
-/// The effect of a case (outcome of an action instance) on mutex groups.
 pub(super) struct Move {
-    /// The atoms that certainly hold before the case (outcome of an action instance under a
-    /// condition).
+    /// Atoms that certainly hold before the case.
     holding: Vec<Key>,
     pub(super) adds: BTreeSet<Key>,
-    /// The atoms that certainly do not hold after the case (outcome of an action instance under a
-    /// condition).
+    /// Atoms that certainly do not hold after the case.
     deletes: Vec<Key>,
 }
 
@@ -104,12 +96,12 @@ impl Move {
         !self.adds.is_empty()
     }
 
-    /// Checks that at most one atom of a mutex group holds after the case (outcome of an action instance under
-    /// a condition), given that at most one holds before the case.
+    /// Checks that at most one atom of a mutex group holds after the case, given that at most one
+    /// holds before it.
     ///
     /// # Errors
-    /// The atoms that the case requires and deletes: if one of them is added to the group, the check may
-    /// succeed. Empty if there is no such atom.
+    /// The atoms that the case requires and deletes: if one of them is added to the group, the
+    /// check may succeed. Empty if there is no such atom.
     pub(super) fn keeps(&self, group: &Group, may_hold: &dyn Fn(&Key) -> bool) -> Result<(), Vec<Key>> {
         let mut added = self.adds.iter().filter(|key| group.contains(*key));
         let Some(key) = added.next() else { return Ok(()) };
@@ -182,8 +174,7 @@ pub(super) fn search(
     groups
 }
 
-/// Numbers the mutex groups of a witness (the over-approximation of the reachable states)
-/// consecutively. The first number is `variables`, the number of variables of the task.
+/// Numbers the mutex groups of a witness. The numbers follow those of the task's variables.
 pub(super) fn numbered(variables: usize, groups: &[Group]) -> impl Iterator<Item = (u32, &Group)> {
     (u32::try_from(variables).unwrap_or(u32::MAX)..).zip(groups)
 }

@@ -12,7 +12,6 @@ use crate::faithful::key::Key;
 use crate::faithful::linear::Linear;
 use crate::faithful::verdict::Cause;
 
-/// Upper limit on the number of partial states into which a condition is split.
 const CASE_LIMIT: usize = 4_096;
 
 /// Upper limit on the nesting depth of a condition after derived atoms are replaced by their rules.
@@ -24,7 +23,6 @@ pub(super) const DEPTH_LIMIT: usize = 300;
 pub(super) enum Formula {
     All(Vec<Formula>),
     Any(Vec<Formula>),
-    /// An atom with its required truth value.
     Atom(Key, bool),
     /// The expression is at least 0, or greater than 0 if the flag (strict) is `true`.
     Compare(Linear, bool),
@@ -88,8 +86,8 @@ impl Formula {
     }
 }
 
-/// Properties that hold in every state: the mutex groups of each atom, and for each fluent of the
-/// task a factor that makes it an integer.
+/// Properties of every state: the mutex groups of each atom, and for each fluent of the task a
+/// factor that makes its value an integer.
 #[derive(Debug, Default)]
 pub(super) struct Structure {
     pub(super) groups: FxHashMap<Key, SmallVec<[u32; 1]>>,
@@ -100,7 +98,6 @@ pub(super) struct Structure {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Known {
     atoms: BTreeMap<Key, bool>,
-    /// For each mutex group, the atom that is known to hold.
     holding: BTreeMap<u32, Key>,
     pub(super) comparisons: Vec<(Linear, bool)>,
 }
@@ -288,7 +285,6 @@ fn unit(structure: &Structure, linear: &Linear) -> Option<BigRational> {
     unit
 }
 
-/// Returns the greatest common divisor of two positive fractions, by Euclid's algorithm.
 fn common(left: &BigRational, right: &BigRational) -> BigRational {
     let (mut left, mut right) = (left.clone(), right.clone());
     while !right.is_zero() {

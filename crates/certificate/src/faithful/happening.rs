@@ -8,7 +8,6 @@ use crate::faithful::formula::Formula;
 use crate::faithful::reads::Reads;
 use pddl::ast::Assignment;
 
-/// The start or the end of an action: the atoms and fluents that it reads, and its effects.
 type Half<'h> = (&'h Reads<'h>, &'h Moment);
 
 pub(super) fn apart(left: Half<'_>, right: Half<'_>) -> Formula {

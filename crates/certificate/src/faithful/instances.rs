@@ -123,8 +123,8 @@ fn extend<'b>(
     Ok(())
 }
 
-/// Adds the instances that extend a binding by objects for its unbound parameters. `typed` contains
-/// the objects of the right type for each unbound parameter.
+/// Adds the instances that extend a binding. `typed` contains the objects of the right type for
+/// each unbound parameter.
 #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
 fn complete(
     world: &World<'_>,

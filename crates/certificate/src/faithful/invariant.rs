@@ -33,7 +33,6 @@ pub(super) const WITNESS_FORMAT: &str = "metaplan-witness/1";
 /// unbounded.
 const WIDENING_THRESHOLD: u32 = 8;
 
-/// The JSON format of a witness, i.e. of an over-approximation of the reachable states.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct WitnessFile {
@@ -57,8 +56,7 @@ pub(super) struct Invariant {
 }
 
 impl Invariant {
-    /// Creates the witness (the over-approximation of the reachable states) that contains only the
-    /// initial state. The clock is unbounded.
+    /// Creates the witness that contains only the initial state. The clock is unbounded.
     pub(super) fn initial(world: &World<'_>) -> Self {
         let atoms = world.initial_atoms().filter(|key| world.changes(key.0)).collect();
         let values = world.initial_values().filter(|(key, _)| key.0 != CLOCK);
@@ -143,8 +141,6 @@ impl Invariant {
         self.atoms.contains(key)
     }
 
-    /// Iterates over the atoms of a predicate that may hold. `place` optionally restricts the
-    /// argument at a position to an object.
     pub(super) fn rows(&self, predicate: u32, place: Option<(usize, u32)>) -> impl Iterator<Item = &Key> {
         self.atoms.rows(predicate, place)
     }
@@ -153,7 +149,6 @@ impl Invariant {
         self.atoms.count(predicate, place)
     }
 
-    /// Returns a fluent as an expression, or its value if the interval is a single value.
     pub(super) fn fluent(&self, key: Key) -> Linear {
         match self.numbers.get(&key).and_then(Interval::value) {
             Some(value) => Linear::constant(value.clone()),
@@ -185,8 +180,6 @@ impl Invariant {
         }
     }
 
-    /// Returns an interval that contains the values of an expression in all states of the witness
-    /// (the over-approximation of the reachable states) that satisfy `known`.
     fn range(&self, linear: &Linear, known: &Known) -> Interval {
         let mut range = linear.range(|key| self.numbers.get(key));
         for (own, _) in &known.comparisons {
@@ -214,8 +207,8 @@ impl Invariant {
         at_end.map(|(_, key, _)| key).chain(at_start.map(|(key, _)| key))
     }
 
-    /// Checks that the witness (the over-approximation of the reachable states) contains all states
-    /// after a case (outcome of an action instance), and that the case preserves the mutex groups.
+    /// Checks that the witness contains all states after a case, and that the case preserves the
+    /// mutex groups.
     pub(super) fn admits(
         &self,
         world: &World<'_>,
@@ -244,12 +237,9 @@ impl Invariant {
     }
 }
 
-/// A witness (the over-approximation of the reachable states) during its computation by fixpoint iteration with
-/// widening.
 pub(super) struct Widening {
     pub(super) invariant: Invariant,
-    /// For each fluent and each end of its interval (`true` for the upper end), the number of times that this
-    /// end has moved.
+    /// Number of moves of each end of an interval (`true`: upper end).
     moves: FxHashMap<(Key, bool), u32>,
 }
 
@@ -258,8 +248,6 @@ impl Widening {
         Self { invariant: Invariant::initial(world), moves: FxHashMap::default() }
     }
 
-    /// Extends the invariant by the states after a case (outcome of an action instance). Returns
-    /// `true` if the invariant has changed.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer moves than passes over the task")]
     pub(super) fn include(&mut self, structure: &Structure, case: &Case) -> bool {
         let mut news = false;

@@ -18,7 +18,6 @@ impl Length {
         self.most.as_ref().filter(|most| **most == self.least)
     }
 
-    /// Returns the greatest lower bound on `factor` times the duration. Fails if there is no lower bound.
     pub(super) fn least_times(&self, factor: &BigRational) -> Result<BigRational, Cause> {
         if !factor.is_negative() {
             return Ok(&self.least * factor);

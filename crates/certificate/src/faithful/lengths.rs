@@ -8,7 +8,6 @@ use crate::faithful::reader::Reader;
 use crate::faithful::verdict::Cause;
 use pddl::ast::{Comparison, DurationConstraint};
 
-/// An end of an interval of durations; the flag is `true` if the end itself is excluded.
 type End = (BigRational, bool);
 
 impl<'r> Reader<'r> {

@@ -7,14 +7,13 @@ use num_traits::{One, Signed, Zero};
 
 use crate::faithful::key::Key;
 
-/// A linear expression: a sum of fluents with nonzero factors, plus a constant.
+/// A sum of fluents with nonzero factors, plus a constant.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Linear {
     pub(super) factors: BTreeMap<Key, BigRational>,
     pub(super) constant: BigRational,
 }
 
-/// A closed interval of rationals; a missing end is unbounded.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(super) struct Interval {
     pub(super) low: Option<BigRational>,

@@ -71,8 +71,6 @@ use verdict::Obstacle;
 pub use verdict::{Cause, Difference, Faithful};
 use world::World;
 
-/// Upper limit on the number of iterations when a witness (the over-approximation of the reachable
-/// states) is computed.
 const ROUND_LIMIT: usize = 10_000;
 
 type Result<T> = std::result::Result<T, Obstacle>;
@@ -171,9 +169,8 @@ impl<'f> Files<'f> {
         if (self.stop)() { Err(Cause::Stopped) } else { Ok(()) }
     }
 
-    /// Returns the cases (outcomes under a condition) of an action instance. The cases cover all
-    /// executions of the instance in states that satisfy the invariant. An empty list proves that
-    /// the instance is executable in no such state.
+    /// The cases cover all executions of the instance in states that satisfy the invariant. An
+    /// empty list proves that the instance is executable in no such state.
     fn cases(&self, instance: &Instance, invariant: &Invariant, axioms: &Axioms) -> Result<Vec<Case>> {
         self.stopped()?;
         if instance.requires.iter().any(|key| !invariant.may_hold(key)) {
@@ -246,8 +243,8 @@ impl<'f> Files<'f> {
         Ok(exclusive::search(&self.world, &may_hold, broken, &moves, self.stop))
     }
 
-    /// Calls `visit` with the effects on mutex groups of each wait, and of those cases (outcomes
-    /// under a condition) of each action instance that may add an atom.
+    /// Calls `visit` with the effects on mutex groups of each wait, and of those cases of each
+    /// action instance that may add an atom.
     fn each_move(&self, invariant: &Invariant, axioms: &Axioms, visit: &mut dyn FnMut(Move)) -> Result<()> {
         let structure = &self.names.structure;
         let waits = action::waits(&self.world.timeline, structure)?;
@@ -310,7 +307,6 @@ impl<'f> Files<'f> {
         Ok(self.world.timeline.unit(durations.iter()))
     }
 
-    /// Returns `true` if an instance that may be executable has a minimal duration other than 0.
     fn takes_time(&self, invariant: &Invariant, axioms: &Axioms) -> Result<bool> {
         for instance in &self.instances {
             if matches!(self.domain.actions[instance.action].body, ActionBody::Durative { .. }) {
@@ -341,8 +337,8 @@ fn is_plain(action: &Action) -> bool {
     }
 }
 
-/// Returns the atoms of changing predicates that are conjuncts of an instance's condition (for a
-/// durative action, of its start condition).
+/// Returns the conjuncts of an instance's condition (for a durative action, of its start condition)
+/// that are atoms of changing predicates.
 fn requires(world: &World<'_>, action: &Action, arguments: &[u32]) -> std::result::Result<Vec<Key>, Cause> {
     let mut atoms = Vec::new();
     match &action.body {

@@ -20,8 +20,8 @@ use crate::faithful::world::World;
 use pddl::ast::{Arithmetic, Atom, Comparison, Condition, Expression, Name, Term, TypedName};
 
 const SIZE_LIMIT: usize = 200_000;
-/// Upper limit on the number of parts that are evaluated for an instance, counting repeated
-/// evaluations (see [`Reader::unfold`]).
+/// Upper limit on the number of parts that one reader evaluates, counting repeated evaluations (see
+/// [`Reader::unfold`]).
 const WORK_LIMIT: usize = 16 * SIZE_LIMIT;
 const VARIABLE_LIMIT: usize = 10_000;
 /// Maximum nesting depth, counted from the outermost derived atom, at which derived atoms are replaced by their
@@ -32,7 +32,7 @@ const UNFOLDING_LIMIT: usize = 100;
 /// Key of the fluent `total-time`, which only metrics contain.
 pub(super) const TOTAL_TIME: Key = (u32::MAX, SmallVec::new_const());
 
-/// The changes by the start effects of a durative action and by events since its start: new truth values of
+/// Changes since the state before the action, by start effects and events: new truth values of
 /// atoms, and new values of fluents.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Applied {
@@ -40,8 +40,8 @@ pub(super) struct Applied {
     pub(super) changes: BTreeMap<Key, Linear>,
 }
 
-/// The stack of bound variables of a quantifier. For each variable, its remaining candidates and
-/// the object of the outer variable that it shadows.
+/// The bound variables of a quantifier: the remaining candidates of each variable, and the object
+/// of the outer variable that it shadows.
 type Levels = Vec<(std::vec::IntoIter<u32>, Option<u32>)>;
 
 pub(super) struct Reader<'r> {
@@ -50,11 +50,10 @@ pub(super) struct Reader<'r> {
     pub(super) axioms: &'r Axioms,
     pub(super) binding: FxHashMap<&'r Name, u32>,
     pub(super) applied: Applied,
-    /// The range of durations of the instance; `None` for an instantaneous action.
     pub(super) length: Option<Length>,
     pub(super) is_metric: bool,
-    /// Whether the condition of a conditional effect (`when`) is evaluated. An undefined comparison
-    /// there is not supported.
+    /// Whether the condition of a conditional effect (`when`) is evaluated. Undefined comparisons
+    /// are not supported there.
     pub(super) in_when: bool,
     /// Whether derived atoms are kept instead of being replaced by their rules.
     pub(super) opaque: bool,
@@ -68,7 +67,6 @@ pub(super) struct Reader<'r> {
 struct Unfolding {
     /// The derived atoms whose rules are being evaluated, outermost first.
     path: Vec<Key>,
-    /// The nesting depth at which the outermost derived atom is evaluated.
     base: usize,
     /// An atom nested deeper than [`UNFOLDING_LIMIT`]. Its condition is computed separately, before
     /// the evaluation that found the atom is repeated.
@@ -196,9 +194,8 @@ impl<'r> Reader<'r> {
     }
 
     /// Calls `visit` for every binding of the variables `bound`, until `visit` returns `false`.
-    /// Bindings under which `within` is false in every state of the witness (the over-approximation
-    /// of the reachable states) may be skipped. Returns `false` if `visit` did, otherwise `true`.
-    /// Fails if a size limit is exceeded.
+    /// Bindings under which `within` is false in every state of the witness may be skipped. Returns
+    /// `false` if `visit` did, otherwise `true`.
     pub(super) fn each(
         &mut self,
         bound: &'r [TypedName],
@@ -227,8 +224,6 @@ impl<'r> Reader<'r> {
         }
     }
 
-    /// Binds the innermost variable that has another candidate to this candidate. Returns `false`
-    /// if no variable has another candidate.
     #[expect(clippy::arithmetic_side_effects, reason = "an entry for each of the first variables")]
     fn next_binding(&mut self, bound: &'r [TypedName], open: &mut Levels) -> bool {
         while !open.is_empty() {
@@ -286,8 +281,7 @@ impl<'r> Reader<'r> {
     }
 
     /// Returns `true` if a derived predicate depends on start effects or on events during the
-    /// action. The facts of the witness (the over-approximation of the reachable states) then do
-    /// not apply to this predicate.
+    /// action. Facts of the witness then do not apply to it.
     pub(super) fn is_touched(&self, symbol: u32) -> bool {
         let touched = self.applied.truths.keys().chain(self.applied.changes.keys());
         self.axioms.depends(symbol, touched.map(|key| key.0))
@@ -454,7 +448,7 @@ impl<'r> Reader<'r> {
 }
 
 /// Returns the condition that a basic (not derived) atom has the given truth value, simplified by
-/// static facts and the witness (the over-approximation of the reachable states).
+/// static facts and the witness.
 pub(super) fn atom(world: &World<'_>, invariant: &Invariant, key: Key, holds: bool) -> Formula {
     if !world.changes(key.0) {
         return Formula::truth(world.holds_initially(&key) == holds);

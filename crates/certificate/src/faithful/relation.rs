@@ -8,8 +8,6 @@ use crate::faithful::key::Key;
 pub(super) struct Relation {
     atoms: FxHashSet<Key>,
     rows: FxHashMap<u32, Vec<Key>>,
-    /// For each predicate, argument position and object, the indices of the matching atoms in
-    /// `rows`.
     rows_with: FxHashMap<(u32, usize, u32), Vec<usize>>,
 }
 

@@ -25,7 +25,6 @@ use crate::faithful::linear::Linear;
 
 pub(super) type Truths = BTreeMap<Key, bool>;
 
-/// All timed initial literals with the same time.
 #[derive(Debug, Clone)]
 pub(super) struct Event {
     pub(super) time: BigRational,
@@ -42,9 +41,8 @@ pub(super) struct Timeline {
     pub(super) begun: usize,
 }
 
-/// The position of an action relative to the events: the phases (periods between events) in which it
-/// starts (`from`) and ends (`to`), whether start and end coincide with an event, and the times that
-/// this permits.
+/// The position of an action relative to the events, and the times that it permits. The action
+/// starts in phase `from` and ends in phase `to`.
 #[derive(Debug, Clone)]
 pub(super) struct Passage {
     from: usize,
@@ -70,7 +68,6 @@ pub(super) fn clock() -> Key {
 }
 
 impl Timeline {
-    /// Adds a timed initial literal. It replaces an earlier literal with the same atom and time.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "phases are counted from 0, and each but the first one begins with an event"
@@ -101,8 +98,6 @@ impl Timeline {
         self.events.get(phase).map(|event| &event.time)
     }
 
-    /// Returns all possible passages of an action with this duration, i.e. its possible positions
-    /// relative to the events.
     pub(super) fn passages(&self, duration: &BigRational) -> Vec<Passage> {
         if self.is_empty() {
             let end = (duration.clone(), false);
@@ -183,16 +178,14 @@ impl Range {
 }
 
 impl Passage {
-    /// Returns the passage (position relative to the events) of waiting until the event that begins
-    /// a phase.
     pub(super) fn wait(phase: usize, time: &BigRational) -> Self {
         let end = (time.clone(), false);
         Self { from: phase, to: phase, at_start: false, at_end: false, latest: None, end }
     }
 
-    /// Returns the condition on the state and the clock before an action with this passage
-    /// (position relative to the events): the phase matches, and the clock is between 0 and the
-    /// latest start time. Without events, the condition is true.
+    /// Returns the condition on phase and clock before an action with this passage: the phase
+    /// matches, and the clock is between 0 and the latest start time. Without events, the condition
+    /// is true.
     pub(super) fn condition(&self, timeline: &Timeline) -> Formula {
         if timeline.is_empty() {
             return Formula::truth(true);
@@ -233,8 +226,6 @@ impl Passage {
         (self.at_end && self.to > self.from).then(|| &timeline.events[self.to - 1])
     }
 
-    /// Returns the effects of an action with this passage (position relative to the events) on the atoms of
-    /// the phases and on the atom `waited`. Empty if there are no events.
     pub(super) fn truths(&self, timeline: &Timeline) -> Truths {
         if timeline.is_empty() {
             return Truths::new();

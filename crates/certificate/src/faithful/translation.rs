@@ -17,13 +17,11 @@ use crate::model::{self, Condition, Fact, Literal, Model};
 
 const SIZE_LIMIT: usize = 200_000;
 
-/// Upper limit on the total number of parts of all translated conditions.
+/// Upper limit on the number of parts of the rules of derived variables, after unfolding, in total.
 const TOTAL_LIMIT: usize = 16 * SIZE_LIMIT;
 
 type Result<T> = std::result::Result<T, Obstacle>;
 
-/// The correspondence between the facts and numbers of the task and the atoms and fluents of the
-/// PDDL files.
 pub(super) struct Names {
     /// For each variable and value, the atom; `None` for the last value of a variable and for atoms
     /// that the PDDL files do not contain.
@@ -33,7 +31,6 @@ pub(super) struct Names {
     pub(super) numbers: FxHashMap<Key, u32>,
     pub(super) structure: Structure,
     pub(super) linked: FxHashSet<Key>,
-    /// For each derived variable, the axiom layer that computes its value.
     layers: FxHashMap<u32, usize>,
 }
 
@@ -96,8 +93,8 @@ impl Names {
         Ok(names)
     }
 
-    /// Records the layer of each derived variable, and checks that the axioms are stratified: each rule reads only
-    /// derived variables of lower layers, or of its own layer if they are not negated.
+    /// Records the layer of each derived variable and checks that the axioms are stratified. A rule
+    /// may read derived variables of lower layers, and of its own layer if they are not negated.
     fn layers(&mut self, model: &Model) -> Result<()> {
         for (layer, rules) in model.axioms.iter().enumerate() {
             for (head, _) in &rules.rules {
@@ -129,7 +126,6 @@ impl Names {
         self.keys[fact.0 as usize][fact.1 as usize].as_ref()
     }
 
-    /// Iterates over the values of a variable that are atoms of the PDDL files: value and atom.
     pub(super) fn atoms(&self, variable: u32) -> impl Iterator<Item = (u32, &Key)> {
         (0..).zip(&self.keys[variable as usize]).filter_map(|(value, key)| Some((value, key.as_ref()?)))
     }
@@ -142,8 +138,7 @@ pub(super) struct Translation<'t> {
     pub(super) invariant: &'t Invariant,
     pub(super) axioms: &'t Axioms,
     possible: Vec<Vec<(u32, &'t Key)>>,
-    /// For each derived variable whose atom is not in `Axioms::linked`: the formula that replaces
-    /// the variable.
+    /// The formulas that replace derived variables whose atoms are not in `Axioms::linked`.
     unfolded: BTreeMap<u32, Formula>,
     bodies: FxHashMap<u32, Vec<&'t Condition>>,
 }
@@ -172,8 +167,6 @@ impl<'t> Translation<'t> {
         Ok(translation)
     }
 
-    /// Iterates over the values of a variable whose atoms may hold in the witness (the
-    /// over-approximation of the reachable states): value and atom.
     pub(super) fn possible(&self, variable: u32) -> impl Iterator<Item = (u32, &'t Key)> {
         self.possible[variable as usize].iter().copied()
     }
@@ -244,7 +237,6 @@ impl<'t> Translation<'t> {
         self.bodies.get(&variable).into_iter().flatten().copied()
     }
 
-    /// Returns the condition under which the rules of the task derive a variable.
     pub(super) fn rules(&self, variable: u32) -> Formula {
         Formula::junction(self.bodies(variable).map(|body| self.condition(body, &[], &[])), false)
     }

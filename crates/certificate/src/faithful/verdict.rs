@@ -7,8 +7,7 @@ use thiserror::Error;
 pub enum Faithful {
     /// The task is faithful: it permits every plan of the PDDL files, at no more cost.
     Yes {
-        /// Number of action instances that may be executable in a state of the witness (the
-        /// over-approximation of the reachable states).
+        /// Number of action instances that may be executable in a state of the witness.
         instances: usize,
         /// Number of those instances that need no operator, because they do not change the task
         /// state and their cost is not negative.
@@ -23,7 +22,7 @@ pub enum Faithful {
     Undecided(Cause),
 }
 
-/// A difference that refutes the task or the witness (the over-approximation of the reachable
+/// A difference that refutes the task or the witness (an over-approximation of the reachable
 /// states).
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
@@ -77,8 +76,8 @@ pub enum Difference {
         /// The derived atom.
         atom: String,
     },
-    /// The witness (the over-approximation of the reachable states) does not contain the initial
-    /// state, or an action instance leads out of the witness.
+    /// The witness does not contain the initial state, or an action instance leads out of the
+    /// witness.
     #[error("the witness does not cover all reachable values of {what}")]
     Witness {
         /// The atom or number that is outside the witness.
@@ -90,7 +89,7 @@ pub enum Difference {
         /// The atoms of the group.
         atoms: String,
     },
-    /// The witness (the over-approximation of the reachable states) is malformed.
+    /// The witness is malformed.
     #[error("it is not a witness: {reason}")]
     WitnessForm {
         /// Description of the error.
@@ -128,7 +127,7 @@ pub enum Cause {
         /// The values of the variable.
         atoms: String,
     },
-    /// The time or memory limit was reached, or the user cancelled the check.
+    /// The check was cancelled: `stop` returned `true`.
     #[error("the comparison of the task with the files was stopped")]
     Stopped,
 }
@@ -139,7 +138,6 @@ impl Cause {
     }
 }
 
-/// The reason for ending the check before all instances are compared.
 #[derive(Debug)]
 pub(super) enum Obstacle {
     Differs(Difference),

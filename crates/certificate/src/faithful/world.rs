@@ -18,16 +18,14 @@ pub(super) struct World<'w> {
     types: TypeHierarchy,
     symbols: FxHashMap<Name, u32>,
     names: Vec<Name>,
-    /// The objects with their types; an object may be declared with several types.
     objects: Vec<(u32, Vec<&'w TypeExpression>)>,
     by_name: FxHashMap<u32, usize>,
     facts: FxHashSet<Key>,
-    /// The arguments of the initial facts of each predicate, without the changes by events at time 0. For
-    /// each predicate, argument position and object, `rows_with` contains the indices of the matching rows.
+    /// Arguments of the initial facts of each predicate, without the changes by events at time 0.
+    /// `rows_with` contains the indices of rows by predicate, argument position and object.
     rows: FxHashMap<u32, Vec<Vec<u32>>>,
     rows_with: FxHashMap<(u32, usize, u32), Vec<usize>>,
     values: FxHashMap<Key, BigRational>,
-    /// The predicates and functions that an action or a timed event changes.
     changing: FxHashSet<u32>,
     pub(super) timeline: Timeline,
     rules: FxHashMap<u32, Vec<&'w Derived>>,
@@ -173,8 +171,6 @@ impl<'w> World<'w> {
         self.symbols.get(name).copied().ok_or_else(|| undeclared(name))
     }
 
-    /// Returns the object that a term denotes. Fails if a variable is unbound or a constant is
-    /// undeclared.
     pub(super) fn object(&self, term: &Term, binding: &FxHashMap<&Name, u32>) -> Result<u32, Cause> {
         self.bound(term, binding).ok_or_else(|| match term {
             Term::Variable(identifier) => Cause::unsupported(format!("{}, which is free", identifier.name)),
@@ -280,8 +276,6 @@ impl<'w> World<'w> {
         }
     }
 
-    /// Returns the arguments of the initial facts of a predicate, without the changes by events at time 0.
-    /// `place` optionally restricts the argument at a position to an object.
     pub(super) fn rows(&self, predicate: u32, place: Option<(usize, u32)>) -> Vec<&Vec<u32>> {
         let Some(rows) = self.rows.get(&predicate) else { return Vec::new() };
         match place {

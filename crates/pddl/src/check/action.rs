@@ -138,8 +138,8 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Reports a derived predicate in an effect or in the initial state: it follows from its axioms and
-    /// cannot be set.
+    /// A derived predicate follows from its axioms, so neither effects nor the initial state can
+    /// set it.
     pub(super) fn check_basic(&mut self, atom: &'a Atom) {
         let Identifier { name, span } = &atom.predicate;
         if self.symbols.derived.contains(name) {

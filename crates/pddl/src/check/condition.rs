@@ -41,7 +41,6 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Declares the variables of a quantifier in `scope` while `body` checks the quantified part.
     pub(super) fn quantified(
         &mut self,
         variables: &'a [TypedName],
@@ -227,7 +226,6 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Returns the type of a term; reports undeclared variables and objects and returns `None` for them.
     pub(super) fn term(&mut self, term: &'a Term, scope: &Scope<'a>) -> Option<ArgumentType<'a>> {
         match term {
             Term::Variable(Identifier { name, span }) => {

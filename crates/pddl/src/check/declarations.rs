@@ -206,8 +206,6 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Checks that the parameters of an action, an axiom or a quantifier have declared types and different
-    /// names.
     pub(super) fn parameters(&mut self, parameters: &[TypedName]) {
         let mut declared: FxHashMap<&Name, Span> = FxHashMap::default();
         for parameter in parameters {

@@ -21,17 +21,18 @@ const UNDECLARED_CODES: [&str; 5] = ["P120", "P121", "P122", "P123", "P136"];
 /// knowledge base provides these predicates.
 const MIN_TEMPLATE_PREDICATES: usize = 3;
 
-/// Checks a domain without a problem. Returns errors and warnings. For a template of PLANTA's `OWLToPDDL` (a domain
-/// with undeclared names `inferred-…`), one error P134 replaces the messages about undeclared types, predicates,
-/// functions and objects.
+/// Checks a domain without a problem. Returns errors and warnings. For a template of PLANTA's
+/// `OWLToPDDL` (a domain with at least three undeclared names `inferred-…`), one error P134
+/// replaces the messages about undeclared types, predicates, functions and objects.
 pub fn check_domain(domain: &Domain, source: &Source) -> Vec<Diagnostic> {
     let symbols = Symbols::of(domain, None);
     check_domain_with(domain, source, &symbols).0
 }
 
-/// Checks a domain and a problem. Returns errors and warnings. Messages about the domain come first. For a template
-/// of PLANTA's `OWLToPDDL` (a domain with undeclared names `inferred-…`), one error P134 replaces the messages
-/// about undeclared types, predicates, functions and objects.
+/// Checks a domain and a problem. Returns errors and warnings. Messages about the domain come
+/// first. For a template of PLANTA's `OWLToPDDL` (a domain with at least three undeclared names
+/// `inferred-…`), one error P134 replaces the messages about undeclared types, predicates,
+/// functions and objects.
 pub fn check(
     domain: &Domain,
     domain_source: &Source,
@@ -71,7 +72,7 @@ pub(super) fn objective(
     checker.sink.finish()
 }
 
-/// Returns the messages about a domain, and `true` if the domain is a template for PLANTA's `OWLToPDDL`.
+/// Also returns `true` if the domain is a template for PLANTA's `OWLToPDDL`.
 fn check_domain_with(domain: &Domain, source: &Source, symbols: &Symbols<'_>) -> (Vec<Diagnostic>, bool) {
     let mut checker = Checker::new(symbols, source);
     checker.in_domain = true;
@@ -108,8 +109,7 @@ struct Checker<'a> {
     sink: Sink<'a>,
     /// Undeclared predicates and functions `inferred-…`; PLANTA's `OWLToPDDL` would declare such predicates.
     undeclared_inferred: FxHashSet<&'a Name>,
-    /// Whether the checked file is the domain. A domain should use only its own constants, not objects of a
-    /// problem.
+    /// A domain should use only its own constants, not objects of a problem.
     in_domain: bool,
     in_durative_action: bool,
 }
@@ -124,8 +124,6 @@ impl<'a> Checker<'a> {
         Self { symbols, sink, undeclared_inferred, in_domain: false, in_durative_action: false }
     }
 
-    /// Reports an undeclared name. Suggests the most similar name among `candidates`, if one is similar and
-    /// the sink is not full.
     fn undeclared<'n>(
         &mut self,
         code: &'static str,

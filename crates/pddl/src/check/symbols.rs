@@ -11,14 +11,12 @@ pub(super) struct Object<'a> {
     pub(super) is_constant: bool,
 }
 
-/// Declared symbols of a domain and a problem, by name. Of several declarations of a predicate or a function,
-/// the first counts.
+/// Of several declarations of a predicate or a function, the first counts.
 #[derive(Debug)]
 pub(super) struct Symbols<'a> {
     pub(super) types: TypeHierarchy,
     pub(super) predicates: FxHashMap<&'a Name, &'a Declaration>,
     pub(super) functions: FxHashMap<&'a Name, &'a Declaration>,
-    /// Predicates that represent object fluents.
     pub(super) object_fluents: FxHashSet<&'a Name>,
     pub(super) derived: FxHashSet<&'a Name>,
     pub(super) objects: FxHashMap<&'a Name, Object<'a>>,

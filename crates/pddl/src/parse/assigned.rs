@@ -10,8 +10,6 @@ use super::fluents::Assigned;
 type Renaming = FxHashMap<Name, Identifier>;
 
 impl Parser<'_> {
-    /// Returns the conditions under which no two assignments of an action give different values to one object
-    /// fluent at one time.
     pub(super) fn uniqueness_conditions(&mut self, assigned: &[Assigned]) -> Vec<(EffectTime, Condition)> {
         let mut needs = Vec::new();
         for (position, first) in assigned.iter().enumerate() {
@@ -90,7 +88,6 @@ fn consistency(first: &Assigned, second: &Assigned) -> Option<Condition> {
     Some(if variables.is_empty() { need } else { Condition::ForAll(variables, Box::new(need)) })
 }
 
-/// Returns whether two terms are equal, and `None` if this is not statically known.
 fn known_equality(left: &Term, right: &Term) -> Option<bool> {
     match (left, right) {
         (Term::Constant(left), Term::Constant(right)) => Some(left.name == right.name),

@@ -207,7 +207,6 @@ impl Parser<'_> {
         Some(Action { identifier, parameters, body, preferences, span: section.span() })
     }
 
-    /// Returns the name of an action and its fields: each keyword, which is one of `keys`, with its value.
     fn action_fields<'t>(
         &mut self,
         section: Item<'t>,

@@ -11,7 +11,6 @@ use super::{Parser, list_start};
 type TimedConditions = Vec<(ConditionTime, Condition)>;
 type TimedEffects = Vec<(EffectTime, Effect)>;
 
-/// Splits `(at start (…))`, `(over all (…))` or `(at end (…))` into time and content. `None` for other items.
 pub(super) fn timed(item: Item<'_>) -> Option<(ConditionTime, Item<'_>)> {
     if !is_timed(item) {
         return None;

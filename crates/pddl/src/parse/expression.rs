@@ -45,7 +45,6 @@ impl Parser<'_> {
         }
     }
 
-    /// Parses `(predicate terms)`. `description` names the expected construct in messages, with its article.
     pub(super) fn atom(&mut self, item: Item<'_>, description: &str) -> Option<Atom> {
         let Some(first) = item.items().next() else {
             self.expected(item, description);

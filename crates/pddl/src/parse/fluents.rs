@@ -5,8 +5,6 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use crate::ast::{Atom, Condition, Declaration, Domain, EffectTime, Identifier, Name, Span, Term, TypedName};
 use crate::types::TypeHierarchy;
 
-/// Declared object fluents, and the object-fluent terms of the condition, effect or action that is being
-/// parsed.
 #[derive(Default)]
 pub(super) struct Objects {
     /// Predicates that represent object fluents, by name. The last parameter is the value.
@@ -16,7 +14,6 @@ pub(super) struct Objects {
     pub(super) prefix: Option<String>,
     pub(super) count: usize,
     pub(super) is_open: bool,
-    /// Object-fluent terms of the condition or effect that is being parsed.
     pub(super) values: Vec<Value>,
     /// Time of the effect that is being parsed; `None` in an instantaneous action.
     pub(super) time: Option<EffectTime>,
@@ -74,7 +71,6 @@ pub(super) struct Assigned {
     pub(super) arguments: Vec<Term>,
     /// `None` for `undefined`.
     pub(super) value: Option<Term>,
-    /// Variables of the enclosing quantifiers.
     pub(super) variables: Vec<TypedName>,
     /// Generated variables for the values of object-fluent terms within the assignment.
     pub(super) values: Vec<TypedName>,

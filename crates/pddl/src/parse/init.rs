@@ -7,7 +7,6 @@ use crate::sexp::Item;
 use super::{Parser, at_start, list_start};
 
 impl Parser<'_> {
-    /// Parses one entry of `:init`. A conjunction yields several elements.
     pub(super) fn initial(&mut self, item: Item<'_>, elements: &mut Vec<InitialElement>) {
         if !item.is_list() {
             self.expected(item, "a fact").help("a fact is in parentheses: `(predicate object)`");

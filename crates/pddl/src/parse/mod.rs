@@ -46,7 +46,6 @@ pub fn parse_problem_of(domain: &Domain, source: &Source) -> (Option<Problem>, V
     (parsed.tree, parsed.diagnostics)
 }
 
-/// Parses a single expression of a metric: `total-time`, `(energy)`, `(+ (energy) (* 2 total-time))`.
 pub(super) fn expression(source: &Source) -> Parsed<Expression> {
     parse_top(source, |parser, top| {
         let mut items: Vec<_> = top.collect();
@@ -111,7 +110,6 @@ fn parse_top<'s, T>(
 
 struct Parser<'s> {
     sink: Sink<'s>,
-    /// Interned names: one allocation per spelling.
     names: FxHashMap<Box<str>, Name>,
     declarations_intact: bool,
     /// Whether a section was reported as unknown. A missing section may then be a misspelt one.
@@ -120,7 +118,6 @@ struct Parser<'s> {
 }
 
 impl Parser<'_> {
-    /// Returns the `(define …)` of a text and reports everything outside of it.
     fn define<'t>(&mut self, top: sexp::Items<'t>) -> Option<Item<'t>> {
         let mut define = None;
         for item in top {
@@ -159,7 +156,6 @@ impl Parser<'_> {
         Identifier { name: self.name(written), span }
     }
 
-    /// Parses a name. `description` names the expected construct in messages, with its article.
     fn name_item(&mut self, item: Item<'_>, description: &str) -> Option<Identifier> {
         match item.symbol() {
             Some(symbol) if !symbol.starts_with(['?', ':']) => Some(self.identifier(symbol, item.span())),
@@ -174,7 +170,8 @@ impl Parser<'_> {
         }
     }
 
-    /// Reports a syntax error at the beginning of an item: `description` was expected instead of the item.
+    /// Reports a syntax error at the beginning of an item. `description` names the expected
+    /// construct, with its article.
     fn expected(&mut self, item: Item<'_>, description: &str) -> &mut Diagnostic {
         let actual = match item.symbol() {
             Some(symbol) => format!("`{symbol}`"),
@@ -195,8 +192,6 @@ impl Parser<'_> {
         self.sink.error("P113", at_start(item), format!("{construct} are not supported"))
     }
 
-    /// Returns the `N` operands of a list. Any other number of operands is an error that shows the correct
-    /// `form`.
     fn operands<'t, const N: usize>(&mut self, list: Item<'t>, form: &str) -> Option<[Item<'t>; N]> {
         let operands: Vec<_> = list.rest().collect();
         let count = operands.len();

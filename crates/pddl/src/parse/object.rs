@@ -23,8 +23,6 @@ use super::{Parser, at_start};
 const UNDEFINED: &str = "undefined";
 
 impl Parser<'_> {
-    /// Declares an object fluent as a predicate with an additional parameter for the value. Reports a
-    /// repeated declaration.
     pub(super) fn object_fluent(
         &mut self,
         mut declaration: Declaration,
@@ -48,7 +46,6 @@ impl Parser<'_> {
         domain.predicates.push(declaration);
     }
 
-    /// Reports names that denote both an object fluent and another predicate or function.
     pub(super) fn object_fluents_clash(&mut self, domain: &Domain) {
         for name in &domain.object_fluents {
             let namesakes = domain.predicates.iter().filter(|candidate| candidate.identifier.name == *name);
@@ -113,7 +110,6 @@ impl Parser<'_> {
         item.head().is_some_and(|head| self.objects.contains(&Name::new(head)))
     }
 
-    /// Reports an object fluent in place of a predicate or a number. Always returns `None`.
     pub(super) fn misplaced_object_fluent<T>(&mut self, item: Item<'_>, name: &Name) -> Option<T> {
         self.sink
             .error("P106", at_start(item), format!("`{name}` is a function with an object as its value"))
@@ -148,7 +144,6 @@ impl Parser<'_> {
         Some(term)
     }
 
-    /// Returns the function and the arguments of an object-fluent term; reports a wrong number of arguments.
     fn object_term(&mut self, item: Item<'_>) -> Option<(Identifier, Vec<Term>)> {
         let function = self.name_item(item.items().next()?, "a function")?;
         let message_count = self.sink.len();
@@ -282,8 +277,8 @@ impl Parser<'_> {
         Mark { needs: self.objects.needs.len(), assigned: self.objects.assigned.len() }
     }
 
-    /// Adds an enclosing `forall` to all effects parsed since `mark`: quantifies their needs (conditions that they
-    /// impose on the state) over `variables`, and adds `variables` to the recorded assignments.
+    /// Adds an enclosing `forall` to all effects parsed since `mark`. Their needs (conditions on
+    /// the state) are quantified over `variables`, and their assignments get these variables.
     pub(super) fn effects_below(&mut self, mark: Mark, variables: &[TypedName]) {
         for (_, need) in &mut self.objects.needs[mark.needs..] {
             let inner = std::mem::replace(need, Condition::And(Vec::new()));
@@ -294,8 +289,8 @@ impl Parser<'_> {
         }
     }
 
-    /// Adds an enclosing `when` to all effects parsed since `mark`: makes their needs (conditions that they impose
-    /// on the state) depend on `condition`, and adds `condition` to the recorded assignments.
+    /// Adds an enclosing `when` to all effects parsed since `mark`. Their needs (conditions on the
+    /// state) then depend on `condition`, and so do their assignments.
     pub(super) fn effects_when(&mut self, mark: Mark, condition: &Condition) {
         for (_, need) in &mut self.objects.needs[mark.needs..] {
             let inner = std::mem::replace(need, Condition::And(Vec::new()));
@@ -360,7 +355,6 @@ fn variables_and_atoms(values: Vec<Value>) -> (Vec<TypedName>, Vec<Condition>) {
     values.into_iter().map(|value| (value.variable, Condition::Atom(value.atom))).unzip()
 }
 
-/// Returns the condition that each object-fluent term in `values` has a value.
 fn has_value(values: Vec<Value>) -> Condition {
     let (variables, parts) = variables_and_atoms(values);
     Condition::Exists(variables, Box::new(conjunction(parts)))

@@ -7,7 +7,6 @@ use super::Parser;
 use super::list_start;
 use super::typed::Entries;
 
-/// Sections that a problem has at most once, each with its position. `None` for sections not yet parsed.
 #[derive(Default)]
 struct UniqueSections {
     domain: Option<Identifier>,
@@ -79,7 +78,6 @@ impl Parser<'_> {
         }
     }
 
-    /// Returns `true` if the section is the first of its kind; otherwise reports the repetition.
     fn first(&mut self, section: Item<'_>, place: &mut Option<Span>) -> bool {
         let span = list_start(section);
         if let Some(earlier) = place.replace(span) {

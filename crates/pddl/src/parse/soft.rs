@@ -6,7 +6,6 @@ use crate::sexp::Item;
 use super::durative::{is_conjunction, timed};
 use super::{Parser, list_start};
 
-/// Unparsed preference with its context.
 struct RawPreference<'t> {
     variables: Vec<TypedName>,
     time: Option<ConditionTime>,
@@ -161,8 +160,6 @@ impl Parser<'_> {
         Some(RawPreference { variables, time, name: name?, body, whole: item })
     }
 
-    /// Returns the name of a preference, if it has one, and its unparsed condition. `None` after a reported
-    /// error.
     pub(super) fn named_preference<'t>(&mut self, item: Item<'t>) -> Option<(Option<Identifier>, Item<'t>)> {
         let mut operands = item.rest();
         match (operands.next(), operands.next(), operands.next()) {

@@ -8,7 +8,6 @@ use super::Parser;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Entries {
     Variables,
-    /// Names of objects, constants or types.
     Names,
 }
 
@@ -74,7 +73,6 @@ impl Parser<'_> {
         TypeExpression { alternatives: alternatives.collect() }
     }
 
-    /// Returns the type with the given name. `object` is represented by an empty list of alternatives.
     fn named_type(&mut self, name: &str, span: Span) -> TypeExpression {
         if name.eq_ignore_ascii_case("object") {
             return TypeExpression::default();

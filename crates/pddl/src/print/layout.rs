@@ -51,7 +51,6 @@ impl Doc {
         self
     }
 
-    /// Puts a keyword before the opening parenthesis.
     #[expect(clippy::arithmetic_side_effects, reason = "widths of what is written in memory")]
     pub(super) fn after(mut self, keyword: &str) -> Self {
         keyword.clone_into(&mut self.keyword);

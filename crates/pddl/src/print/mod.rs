@@ -71,7 +71,6 @@ pub(crate) fn constraint_text(constraint: &crate::ast::Constraint) -> String {
     soft::constraint(constraint, false).on_one_line()
 }
 
-/// Formats the declaration of a predicate or function: `(at ?x - robot)`.
 pub(crate) fn signature(declaration: &Declaration) -> String {
     let parameters = typed("?", &declaration.parameters);
     let space = if parameters.is_empty() { "" } else { " " };

@@ -11,7 +11,6 @@ pub(super) fn is_of_goal(constraint: &Constraint) -> bool {
     constraint.preference.is_some() && matches!(constraint.trajectory, Trajectory::AtEnd(_))
 }
 
-/// Returns the conjunction of a condition and preferences; the condition alone if there are no preferences.
 pub(super) fn with(hard: &Condition, soft: impl Iterator<Item = Doc>) -> Doc {
     let mut soft = soft.peekable();
     if soft.peek().is_none() {
@@ -39,8 +38,6 @@ pub(super) fn constraint(constraint: &Constraint, in_goal: bool) -> Doc {
     quantified(&constraint.variables, body)
 }
 
-/// Converts a preference of an action with its quantifiers. With `is_timed`, the condition has a time
-/// specifier.
 pub(super) fn preference(preference: &Preference, is_timed: bool) -> Doc {
     let Preference { variables, name, time, condition: body, .. } = preference;
     let body = if is_timed { timed_condition(&(*time, body.clone())) } else { condition(body) };

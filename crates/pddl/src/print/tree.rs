@@ -109,7 +109,6 @@ fn when(time: EffectTime) -> &'static str {
     }
 }
 
-/// Converts `:duration`. `at start` is the default and omitted.
 pub(super) fn duration(constraints: &[DurationConstraint]) -> Doc {
     let constraint = |constraint: &DurationConstraint| {
         let bound = [text("?duration"), expression(&constraint.expression)];

@@ -83,7 +83,6 @@ pub fn advance_each(
     (metric, steps.iter().map(|step| advance_from(&initial, step, false)).collect())
 }
 
-/// Executes a step in the state of `initial`.
 fn advance_from(
     initial: &Execution<'_, '_>,
     step: &PlanStep,
@@ -178,8 +177,6 @@ pub fn metric_after(domain: &Domain, problem: &Problem, total_time: &BigRational
     metric(&world, &execution.state, total_time)
 }
 
-/// Returns the metric value if a plan ended in `state` after `total_time`. `None` without a metric or if the
-/// value is undefined.
 pub(super) fn metric(world: &World<'_>, state: &State, total_time: &BigRational) -> Option<BigRational> {
     let metric = world.problem.metric.as_ref()?;
     let evaluator = Evaluator { total_time: Some(total_time), ..Evaluator::new(world, state) };

@@ -29,14 +29,13 @@ pub(super) struct Axiom<'p> {
 pub(super) struct Occurrence<'p> {
     pub(super) axiom: usize,
     pub(super) atom: &'p Atom,
-    /// Variables of the enclosing quantifiers, outermost first.
     pub(super) variables: Vec<&'p [TypedName]>,
     /// Enclosing conjunctions, each with the index of the conjunct that contains the atom.
     pub(super) conjunctions: Vec<(&'p [Condition], usize)>,
 }
 
-/// Returns the strata of a domain, lowest first. Axioms that depend on their own negation cannot be
-/// stratified. The checker rejects them; here they all belong to one stratum.
+/// Returns the strata of a domain, lowest first. If an axiom depends on its own negation, which the
+/// checker rejects, all axioms form one stratum.
 #[expect(clippy::arithmetic_side_effects, reason = "levels are at most the number of predicates")]
 pub(super) fn strata(domain: &Domain) -> Vec<Stratum<'_>> {
     let levels = Strata::of(domain).ok();
@@ -90,8 +89,9 @@ struct Walk<'w, 'p> {
 }
 
 impl<'p> Walk<'_, 'p> {
-    /// Records the atoms of the stratum's predicates below `condition`. Returns `true` if the condition is
-    /// opaque: it mentions such a predicate in a part into which new facts cannot be joined.
+    /// Records the occurrences of the stratum's predicates in `condition`. Returns `true` if the
+    /// condition is opaque: it mentions such a predicate in a part into which new facts cannot be
+    /// joined.
     fn visit(&mut self, condition: &'p Condition) -> bool {
         let mut is_opaque = false;
         match condition {
@@ -127,7 +127,6 @@ impl<'p> Walk<'_, 'p> {
         is_opaque
     }
 
-    /// Returns `true` if one of `variables` shadows an enclosing variable.
     fn hides(&self, variables: &[TypedName]) -> bool {
         let enclosing = self.variables.iter().copied().chain([&self.derived.head.parameters[..]]).flatten();
         let enclosing: FxHashSet<&Name> = enclosing.map(|entry| &entry.identifier.name).collect();

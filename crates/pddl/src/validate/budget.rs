@@ -31,7 +31,6 @@ impl<'s> Budget<'s> {
         Self { stop, steps_left: Cell::new(STRIDE), is_spent: Cell::new(false) }
     }
 
-    /// Counts one loop step. Returns `true` if the loop must end.
     pub(super) fn is_spent(&self) -> bool {
         let steps_left = self.steps_left.get();
         if steps_left > 0 {
@@ -48,7 +47,6 @@ impl<'s> Budget<'s> {
         self.is_spent.get()
     }
 
-    /// Returns `result`, or an error if the execution that computed `result` was interrupted.
     pub(super) fn check<T>(&self, result: T) -> Result<T, Interrupted> {
         if self.is_spent.get() { Err(Interrupted) } else { Ok(result) }
     }

@@ -16,7 +16,6 @@ pub(super) fn changeable_functions(domain: &Domain) -> FxHashSet<&Name> {
     functions
 }
 
-/// Predicates that actions, timed initial literals or axioms can change.
 pub(super) fn changeable_predicates<'p>(domain: &'p Domain, problem: &'p Problem) -> FxHashSet<&'p Name> {
     let mut predicates: FxHashSet<&Name> = FxHashSet::default();
     predicates.extend(domain.derived.iter().map(|axiom| &axiom.head.identifier.name));

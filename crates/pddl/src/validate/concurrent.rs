@@ -119,7 +119,6 @@ fn starts<'e, 'p>(
     Ok(starts)
 }
 
-/// All happenings at one time, each with its step; `None` for events.
 #[derive(Default)]
 struct Simultaneous<'e, 'p> {
     happenings: Vec<(Option<&'e Step<'p>>, Happening)>,

@@ -63,11 +63,12 @@ pub struct NumberBound {
     pub bound: BigRational,
 }
 
-/// Executes a plan and records the numbers. A step without a start time begins when the preceding step ends.
+/// Executes a plan and records the numbers. A step without a start time begins when the preceding
+/// step ends.
 ///
 /// # Errors
-/// Returns a violation if a step is not an action of the domain, if its duration is missing or violates the
-/// domain's constraints, or if its effects are undefined or conflict.
+/// Returns a violation if a step is not an action of the domain, or if its effects are undefined or
+/// conflict. Also if its duration is missing or violates a constraint at start.
 pub fn course(domain: &Domain, problem: &Problem, plan: &PlanText) -> Result<Course, Box<Violation>> {
     let world = World::new(domain, problem, &|| false);
     let texts = plan.steps.iter().zip(1..);
@@ -155,8 +156,6 @@ impl<'e, 'p> Follower<'e, 'p> {
         self.course.moments.push(CourseMoment { metric, ..moment });
     }
 
-    /// Applies the effects of an action at its start or its end. Returns the changed functions with their new
-    /// values.
     fn apply_effects(
         &mut self,
         running: &Running<'e, 'p>,

@@ -30,8 +30,8 @@ pub(super) fn derive_facts(world: &World<'_>, state: &mut State) {
     }
 }
 
-/// An instance of an axiom with an opaque condition (one into which new facts cannot be joined). Until its
-/// condition holds, the instance is re-evaluated when a fact arrives that was missing.
+/// An instance of an axiom with an opaque condition. Until its condition holds, the instance is
+/// re-evaluated when a fact arrives that was missing.
 struct WaitingInstance {
     axiom: usize,
     arguments: Arguments,
@@ -52,10 +52,8 @@ struct Closure<'c, 'p> {
     world: &'c World<'p>,
     stratum: &'c Stratum<'p>,
     state: &'c mut State,
-    /// New facts whose consequences have not been derived.
     agenda: Vec<Ground>,
     instances: Vec<WaitingInstance>,
-    /// Index in `instances` by axiom and arguments.
     numbers: FxHashMap<(usize, Arguments), usize>,
     waiting: Waiting,
 }
@@ -89,9 +87,9 @@ impl<'p> Closure<'_, 'p> {
         }
     }
 
-    /// Returns the head arguments for which the condition of an axiom holds, ignoring its opaque parts (those
-    /// into which new facts cannot be joined). A seed restricts the solutions to those in which the
-    /// occurrence matches the given fact.
+    /// Returns the head arguments for which the condition of an axiom holds, ignoring its opaque
+    /// parts. A seed restricts the solutions to those in which the occurrence matches the given
+    /// fact.
     fn heads(&self, axiom: usize, seed: Option<(&Occurrence<'p>, &Arguments)>) -> Vec<Arguments> {
         let Axiom { derived, opaque } = &self.stratum.axioms[axiom];
         let derived: &'p Derived = derived;
@@ -125,8 +123,8 @@ impl<'p> Closure<'_, 'p> {
         heads
     }
 
-    /// Derives the heads of an axiom. If the condition has opaque parts (into which new facts cannot be
-    /// joined), a head is derived only after its whole condition has been evaluated.
+    /// Derives the heads of an axiom. If the condition has opaque parts, a head is derived only
+    /// after its whole condition has been evaluated.
     fn conclude(&mut self, axiom: usize, heads: Vec<Arguments>) {
         let is_opaque = !self.stratum.axioms[axiom].opaque.is_empty();
         for arguments in heads {
@@ -144,8 +142,6 @@ impl<'p> Closure<'_, 'p> {
         }
     }
 
-    /// Derives the head of an instance if its whole condition holds. Otherwise the instance waits for the
-    /// missing facts.
     fn evaluate(&mut self, number: usize) {
         let WaitingInstance { axiom, arguments, evaluations } = &mut self.instances[number];
         *evaluations = evaluations.saturating_add(1);

@@ -93,8 +93,6 @@ fn change(kind: Assignment, value: BigRational) -> Result<Change, Undefined> {
 }
 
 impl Changes {
-    /// Combines a numeric change with the earlier changes of the same function. Returns an error if the
-    /// changes do not commute, or if their combination is too large.
     fn record(&mut self, target: Ground, change: Change) -> Result<(), EffectError> {
         let combined = match (self.numeric.get(&target), change) {
             (None, change) => change,
@@ -113,8 +111,6 @@ impl Changes {
         Ok(())
     }
 
-    /// Adds further changes at the same time, for example those of a simultaneous action. Returns an error if
-    /// numeric changes do not commute, or if their combination is too large.
     pub(super) fn merge(&mut self, other: Self) -> Result<(), EffectError> {
         self.added.extend(other.added);
         self.deleted.extend(other.deleted);
@@ -159,7 +155,6 @@ impl Changes {
     }
 }
 
-/// Deletes facts, then adds facts, so that additions take precedence.
 fn change_facts(added: FxHashSet<Ground>, deleted: FxHashSet<Ground>, state: &mut State) {
     for (predicate, arguments) in deleted {
         if let Some(tuples) = state.facts.get_mut(&predicate) {

@@ -19,7 +19,6 @@ use super::world::{Arguments, State, Symbol, World};
 pub(super) enum Undefined {
     Function(String),
     Division,
-    /// A number whose numerator or denominator has more than [`BITS_LIMIT`] bits.
     Size,
     /// `?duration` or `total-time` in a context that does not define it.
     Place,
@@ -63,7 +62,6 @@ pub(super) struct Evaluator<'e, 'p> {
     pub(super) world: &'e World<'p>,
     pub(super) state: &'e State,
     pub(super) duration: Option<&'e BigRational>,
-    /// Value of `total-time`, in the metric only.
     pub(super) total_time: Option<&'e BigRational>,
     /// Addresses of subconditions that count as true while [`Evaluator::solve`] searches for bindings.
     pub(super) ignored: Option<&'e FxHashSet<*const Condition>>,

@@ -26,7 +26,6 @@ pub(super) struct Execution<'e, 'p> {
     /// Future timed initial literals: time, atom, and whether the atom becomes true. Sorted by descending
     /// time, so the next one is last.
     pub(super) pending: Vec<(BigRational, Ground, bool)>,
-    /// Time and footprint (read and write sets) of the most recent events.
     pub(super) last_event: Option<(BigRational, Footprint)>,
     pub(super) record: Record,
 }
@@ -188,8 +187,8 @@ impl<'e, 'p> Execution<'e, 'p> {
         Err(step.violation(time, ViolationKind::Duration, message))
     }
 
-    /// Checks the conditions of an action at its start, its over-all conditions, or its conditions at the end
-    /// together with the duration constraints at end. An unsatisfied or undefined condition is a violation.
+    /// Checks the conditions of an action that apply at `when`; at the end also the duration
+    /// constraints at end. An unsatisfied or undefined condition is a violation.
     pub(super) fn check(
         &self,
         running: &Running<'e, 'p>,
@@ -264,9 +263,9 @@ impl<'e, 'p> Execution<'e, 'p> {
         Ok(changes)
     }
 
-    /// Applies the changes of a happening to the state. Recomputes the derived facts if a changed fact or
-    /// function occurs in a condition of an axiom. Returns a violation if a changed function has no value or
-    /// its new value is too large.
+    /// Applies the changes of a happening to the state. Recomputes the derived facts if a changed
+    /// fact or function occurs in a condition of an axiom. Returns a violation if an increased or
+    /// scaled function has no value, or if its new value is too large.
     pub(super) fn apply(
         &mut self,
         step: &Step<'p>,

@@ -23,7 +23,6 @@ pub(super) enum Part {
     Whole,
 }
 
-/// Changes of a happening and its footprint (read and write sets).
 #[derive(Debug, Default)]
 pub(super) struct Happening {
     pub(super) changes: Changes,
@@ -31,8 +30,6 @@ pub(super) struct Happening {
 }
 
 impl Running<'_, '_> {
-    /// Returns the part that the first happening of the action executes: the start, or the whole action if it
-    /// takes no time.
     pub(super) fn first_part(&self) -> Part {
         if is_durative(&self.instance) && !self.duration.is_zero() { Part::Start } else { Part::Whole }
     }
@@ -75,8 +72,6 @@ impl<'e, 'p> Execution<'e, 'p> {
         Ok(start)
     }
 
-    /// Applies all pending events (timed initial literals) before `time`, and with `inclusive` also those at
-    /// `time`.
     pub(super) fn apply_events_until(&mut self, time: &BigRational, inclusive: bool) {
         let is_due = |next: &BigRational| next < time || (inclusive && next == time);
         while self.next_timed().is_some_and(is_due) {
@@ -92,7 +87,6 @@ impl<'e, 'p> Execution<'e, 'p> {
         }
     }
 
-    /// Applies the facts of events (timed initial literals) and updates the derived facts.
     pub(super) fn apply_events(&mut self, changes: Changes) {
         let concerns_axioms = changes.concern(&self.world.read_by_axioms);
         changes.apply_facts(&mut self.state);
@@ -101,8 +95,8 @@ impl<'e, 'p> Execution<'e, 'p> {
         }
     }
 
-    /// Removes the pending events (timed initial literals) of the next event time and returns them as one
-    /// happening with this time. `None` if no events are pending.
+    /// Removes the pending events of the next event time and returns them as one happening with
+    /// this time. `None` if no events are pending.
     pub(super) fn take_next_timed(&mut self) -> Option<(BigRational, Happening)> {
         let time = self.next_timed()?.clone();
         let mut changes = Changes::default();
@@ -121,9 +115,9 @@ impl<'e, 'p> Execution<'e, 'p> {
         Some((time, Happening { changes, footprint }))
     }
 
-    /// Executes a part of an action in sequential execution: evaluates the part in the current state, applies
-    /// the pending events up to `time`, and then the changes of the part. Events at `time` must not interfere
-    /// with the part.
+    /// Executes a part of an action in sequential execution. Evaluates the part in the current
+    /// state, applies the pending events up to `time`, and then the changes of the part. Events at
+    /// `time` must not interfere with the part.
     pub(super) fn execute(
         &mut self,
         running: &Running<'e, 'p>,

@@ -109,7 +109,6 @@ impl Footprint {
         footprint
     }
 
-    /// Returns the footprint of timed initial literals, which read nothing.
     pub(super) fn of_event(changes: &Changes) -> Self {
         let (added, deleted) = (changes.added.iter().cloned(), changes.deleted.iter().cloned());
         Self { added: added.collect(), deleted: deleted.collect(), ..Self::default() }
@@ -158,7 +157,6 @@ enum Use<'c> {
     Value(&'c Atom),
 }
 
-/// Callback that receives each read fact or function and the variables of the enclosing quantifiers.
 type OnUse<'f, 'c> = &'f mut dyn FnMut(Use<'c>, &[&'c TypedName]);
 
 fn uses_of_condition<'c>(condition: &'c Condition, hidden: &mut Vec<&'c TypedName>, on_use: OnUse<'_, 'c>) {

@@ -97,10 +97,10 @@ pub fn metric_of(domain: &Domain, problem: &Problem, plan: &PlanText) -> Option<
     judge_readings(&world, plan, &Options::default()).metric
 }
 
-/// Executes all readings of a plan (choices of one schema for each step that fits several), if there are several
-/// but not more than [`MAX_READINGS`], and returns the best verdict. If no reading is valid, or the readings are
-/// too many, executes the plan with the first schema that can start for each step. After an interruption, the
-/// verdict is meaningless.
+/// Executes all readings of a plan (choices of one schema for each ambiguous step) and returns the
+/// best valid verdict. If no reading is valid, or if there are more than [`MAX_READINGS`], executes
+/// the plan with the first schema that can start for each step. After an interruption, the verdict
+/// is meaningless.
 #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
 fn judge_readings(world: &World<'_>, plan: &PlanText, options: &Options) -> Verdict {
     let steps: Vec<_> =
@@ -138,8 +138,6 @@ fn judge<'p>(world: &World<'p>, steps: &[Step<'p>], options: &Options) -> Verdic
     Verdict { valid: violation.is_none(), total_time, metric, values, violation }
 }
 
-/// Returns `true` if `candidate` is better than `incumbent`, another valid verdict, by the metric, or by the total time
-/// if there is no metric.
 fn is_better(problem: &Problem, candidate: &Verdict, incumbent: &Verdict) -> bool {
     match (&problem.metric, &candidate.metric, &incumbent.metric) {
         (Some(metric), Some(candidate), Some(incumbent)) => match metric.direction {

@@ -30,14 +30,14 @@ pub struct PlanStep {
 }
 
 impl PlanText {
-    /// Reads one step per line: `(move a b)` or `0.000: (move a b) [5.000]`. Comments begin with `;`. If the text
-    /// contains `Solution Found`, only the lines after its last occurrence are read, and lines that begin with
-    /// neither a parenthesis nor a digit are ignored.
+    /// Reads one step per line: `(move a b)` or `0.000: (move a b) [5.000]`. Comments begin with
+    /// `;`. If the text contains `Solution Found`, only the lines after its last occurrence are
+    /// read, and lines that begin with neither an opening parenthesis nor a digit are ignored.
     ///
     /// # Errors
     ///
-    /// Returns an error for each remaining line that is neither a step, empty nor a comment, but at most 201
-    /// errors. A text of more than 4 GB gives a single error.
+    /// Returns an error for each remaining line that is neither a step, empty nor a comment, but at
+    /// most 201 errors. A text of more than 4 GB gives a single error.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions in a text in memory, which are at most its length"

@@ -11,7 +11,6 @@ pub(super) struct Running<'e, 'p> {
     pub(super) step: &'e Step<'p>,
     pub(super) instance: Instance<'p>,
     pub(super) start: BigRational,
-    /// Exact duration, in the domain's time unit.
     pub(super) duration: BigRational,
     /// End time. Because the plan may state a rounded duration, the end can differ from `start` plus
     /// `duration`.

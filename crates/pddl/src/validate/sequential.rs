@@ -69,7 +69,6 @@ fn finish<'e, 'p>(
     execution.execute(running, Part::End, &running.end)
 }
 
-/// Checks that a step does not start before the end of the preceding one, up to the tolerance.
 fn check_start(
     execution: &Execution<'_, '_>,
     step: &Step<'_>,

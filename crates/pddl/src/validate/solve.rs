@@ -17,18 +17,14 @@ pub(super) type OnSolution<'f, 'p> = &'f mut dyn FnMut(&Bindings<'p>, Option<&Un
 type Goals<'p> = (Vec<&'p Condition>, Option<Undefined>);
 
 struct Branch<'e, 'p> {
-    /// Conditions that remain to be solved after any of the options.
     open: Vec<&'p Condition>,
     undefined: Option<Undefined>,
-    /// Number of variables declared before the choice.
     declared: usize,
     options: Choices<'e, 'p>,
-    /// Positions of the variables that the current option has bound.
     bound: Vec<usize>,
 }
 
 enum Choices<'e, 'p> {
-    /// Candidate objects of the variable at a position.
     Objects(usize, Box<dyn Iterator<Item = Symbol> + 'e>),
     Facts(&'p Atom, Box<dyn Iterator<Item = &'e Arguments> + 'e>),
     Alternatives(std::slice::Iter<'p, Condition>),
@@ -127,9 +123,9 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         Some((unsolved, undefined))
     }
 
-    /// Chooses what to branch on: an equation that determines an object if there is one, else the atom with the
-    /// fewest facts, else a disjunction, else the first unbound variable. Returns the remaining conditions and the
-    /// options, or `None` if all variables are bound.
+    /// Chooses what to branch on. The order of preference is: an equation that determines an
+    /// object, the atom with the fewest facts, a disjunction, the first unbound variable. Returns
+    /// the remaining conditions and the options, or `None` if all variables are bound.
     fn choice(
         &self,
         mut open: Vec<&'p Condition>,

@@ -26,7 +26,6 @@ pub(super) struct Instance<'p> {
 }
 
 impl Step<'_> {
-    /// Returns the step as written, without its times.
     pub(super) fn show(&self) -> String {
         let words: Vec<_> =
             std::iter::once(&self.text.action).chain(&self.text.arguments).map(Name::as_str).collect();
@@ -50,9 +49,9 @@ impl Step<'_> {
     }
 }
 
-/// Finds all schemas that fit the name and the objects of a step. Of several schemas, those are omitted whose
-/// condition at start equates different objects, unless this holds for all of them. `instances` is empty if no
-/// schema fits.
+/// Finds all schemas that fit the name and the objects of a step. A schema whose condition at start
+/// requires two different objects to be equal is omitted, unless this holds for all of them.
+/// `instances` is empty if no schema fits.
 pub(super) fn resolve<'p>(world: &World<'p>, number: usize, text: &'p PlanStep) -> Step<'p> {
     let objects: Option<Vec<Symbol>> = text.arguments.iter().map(|name| world.object(name)).collect();
     let schemas = world.domain.actions.iter().filter(|action| action.identifier.name == text.action);
@@ -129,8 +128,6 @@ pub(super) fn conditions<'p>(
     single.into_iter().chain(several)
 }
 
-/// Effects that an action has at the given time. Effects of an instantaneous action count as effects at
-/// start.
 pub(super) fn effects<'p>(
     instance: &Instance<'p>,
     when: EffectTime,
@@ -145,7 +142,6 @@ pub(super) fn effects<'p>(
     single.into_iter().chain(several)
 }
 
-/// Returns the violation of a step that is not an instance of any schema, with the reason.
 pub(super) fn unresolved(world: &World<'_>, step: &Step<'_>, time: &BigRational) -> Box<Violation> {
     let name = &step.text.action;
     let mut same_name = world.domain.actions.iter().filter(|action| action.identifier.name == *name);

@@ -10,7 +10,6 @@ pub(super) fn changeable(world: &World<'_>) -> FxHashSet<Symbol> {
     changeable_functions(world.domain).into_iter().map(|name| world.symbol(name)).collect()
 }
 
-/// Returns the values of all functions that some action can change, sorted by name.
 pub(super) fn changeable_values(world: &World<'_>, state: &State) -> Vec<(String, BigRational)> {
     let symbols = changeable(world);
     let changeable = state.values.iter().filter(|((symbol, _), _)| symbols.contains(symbol));

@@ -26,14 +26,12 @@ impl<'e, 'p> Trace<'e, 'p> {
         (self.facts.into_inner(), self.predicates.into_inner())
     }
 
-    /// Records that a fact does not hold, if its predicate belongs to the stratum.
     pub(super) fn missed(&self, name: &Name, fact: (Symbol, Arguments)) {
         if self.stratum.contains(name) {
             self.facts.borrow_mut().push(fact);
         }
     }
 
-    /// Records that all facts of a predicate are read, if the predicate belongs to the stratum.
     pub(super) fn read(&self, name: &Name, predicate: Symbol) {
         if self.stratum.contains(name) && !self.predicates.borrow().contains(&predicate) {
             self.predicates.borrow_mut().push(predicate);

@@ -99,7 +99,6 @@ struct TrajectoryEvaluator<'j, 'p> {
 }
 
 impl<'p> TrajectoryEvaluator<'_, 'p> {
-    /// Returns for each state of the trajectory whether a condition holds in it.
     fn holds(&self, condition: &'p Condition, bindings: &mut Bindings<'p>) -> Vec<bool> {
         let holds = |moment: &Moment| {
             Evaluator::new(self.world, &moment.state).holds(condition, bindings) == Ok(true)
@@ -150,8 +149,9 @@ impl<'p> TrajectoryEvaluator<'_, 'p> {
     }
 }
 
-/// Returns `true` if a condition holds in the state that persists at time `from`, and in all states that
-/// begin at `from` or later and whose times satisfy `is_included`. `holds` has one entry per state.
+/// Returns `true` if a condition holds in the state that persists at time `from`, and in all later
+/// states whose times satisfy `is_included`. A state that begins at `from` counts as later. `holds`
+/// has one entry per state.
 fn lasts(
     holds: &[bool],
     times: &[&BigRational],

@@ -17,13 +17,11 @@ use super::changeable::changeable_predicates;
 
 const IS_VIOLATED: &str = "is-violated";
 
-/// Interned name: equal names have equal numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) struct Symbol(u32);
 
 pub(super) type Arguments = SmallVec<[Symbol; 4]>;
 
-/// Predicate, argument position (column), and object at this position.
 type ColumnKey = (Symbol, usize, Symbol);
 
 #[derive(Debug)]
@@ -37,11 +35,9 @@ pub(super) struct World<'p> {
     /// All objects with their declared types, constants first.
     objects: Vec<(Symbol, Vec<&'p TypeExpression>)>,
     position: FxHashMap<Symbol, usize>,
-    /// Objects of each declared type, in order and as a set.
     members: FxHashMap<Name, (Vec<Symbol>, FxHashSet<Symbol>)>,
     pub(super) strata: Vec<Stratum<'p>>,
     pub(super) read_by_axioms: FxHashSet<Symbol>,
-    /// Predicates that actions, timed initial literals or axioms can change.
     changeable: FxHashSet<Symbol>,
     /// Facts of the fixed predicates, which no plan changes, indexed by argument position and object.
     fixed: FxHashMap<ColumnKey, Vec<Arguments>>,
@@ -152,7 +148,6 @@ impl<'p> World<'p> {
         }
     }
 
-    /// Names of all preferences. A name can occur several times.
     fn preferences(&self) -> impl Iterator<Item = &'p Name> + use<'p> {
         let constraints = self.domain.constraints.iter().chain(&self.problem.constraints);
         let constraint_names = constraints.filter_map(|constraint| constraint.preference.as_ref());
@@ -164,7 +159,6 @@ impl<'p> World<'p> {
         self.preferences().next().is_some()
     }
 
-    /// Returns a copy of a state with the values of `(is-violated NAME)`, for the metric.
     pub(super) fn with_violations(&self, violated: &[Name], state: &State) -> State {
         let mut state = state.clone();
         let function = self.symbol(&Name::new(IS_VIOLATED));
@@ -216,7 +210,6 @@ impl<'p> World<'p> {
         Box::new(self.objects.iter().map(|(object, _)| *object).filter(|object| self.is_a(*object, target)))
     }
 
-    /// Returns the object of a type that has exactly one object, else `None`.
     pub(super) fn only_object(&self, target: &TypeExpression) -> Option<Symbol> {
         let mut objects = self.objects_of(target);
         objects.next().filter(|_| objects.next().is_none())

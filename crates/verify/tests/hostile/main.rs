@@ -11,8 +11,7 @@ use std::time::{Duration, Instant};
 use metaplan_verify::Verifier;
 use mutate::{Draw, Files, certificates, mutate, write};
 
-/// The stack size of a test thread, in bytes. The program has four times as much, although tests
-/// are not optimised.
+/// A quarter of the stack of the program, although tests are not optimised.
 const STACK: usize = 2 << 20;
 
 const TIME_LIMIT: Duration = Duration::from_secs(20);

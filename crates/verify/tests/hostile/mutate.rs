@@ -6,7 +6,6 @@ use std::path::Path;
 use metaplan_verify::digest::digest;
 use serde_json::{Value, json};
 
-/// The files of a certificate: contents by name.
 pub type Files = BTreeMap<String, Vec<u8>>;
 
 const REPETITION_LIMIT: usize = 300;
@@ -45,7 +44,6 @@ impl Draw<'_> {
     }
 }
 
-/// Reads all certificates in the subfolders of a folder.
 pub fn certificates(folder: &Path) -> Vec<Files> {
     let entries = |path: &Path| {
         let mut paths: Vec<_> =
@@ -166,7 +164,7 @@ fn lists(text: &str, draw: &mut Draw<'_>) -> String {
     format!("{}{new}{}", &text[..start], &text[end..])
 }
 
-/// Deletes, repeats or replaces a part of a JSON document.
+/// Deletes, repeats, swaps, nests or replaces parts of a JSON document.
 fn structure(document: &mut Value, draw: &mut Draw<'_>) {
     let mut paths = Vec::new();
     collect(document, String::new(), &mut paths);
@@ -225,7 +223,6 @@ fn collect(value: &Value, path: String, paths: &mut Vec<String>) {
     paths.push(path);
 }
 
-/// Writes the files of a certificate into an empty directory.
 pub fn write(directory: &Path, files: &Files) {
     for (name, text) in files {
         std::fs::write(directory.join(name), text).expect("a file");
