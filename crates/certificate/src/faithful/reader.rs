@@ -142,7 +142,12 @@ impl<'r> Reader<'r> {
         if self.size <= SIZE_LIMIT && self.work <= WORK_LIMIT {
             return Ok(());
         }
-        Err(Cause::TooMany { what: "parts of the conditions of one instance".into(), limit: SIZE_LIMIT })
+        let (what, limit) = if self.size > SIZE_LIMIT {
+            ("parts of the conditions of one instance", SIZE_LIMIT)
+        } else {
+            ("evaluated parts of the conditions of one instance", WORK_LIMIT)
+        };
+        Err(Cause::TooMany { what: what.into(), limit })
     }
 
     fn junction(

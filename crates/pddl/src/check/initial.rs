@@ -70,7 +70,7 @@ impl<'a> Checker<'a> {
             self.sink.warning("P139", span, "this fact is stated and denied; it holds").related(
                 source,
                 place,
-                "the negation is here",
+                if held_before { "the fact is here" } else { "the negation is here" },
             );
         }
     }

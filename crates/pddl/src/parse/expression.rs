@@ -138,7 +138,7 @@ impl Parser<'_> {
         let expression = self.expression(item)?;
         let value = evaluate(&expression);
         if value.is_none() {
-            self.sink.error("P106", at_start(item), "the initial value is not a number, or too long a one");
+            self.sink.error("P106", at_start(item), "the value is not a number, or the number is too long");
         }
         value
     }
