@@ -28,8 +28,9 @@ fn without_names(message: &str) -> String {
     outside
 }
 
-/// Writes a certificate for a claim of optimality or unsolvability. Asserts that verification succeeds if the
-/// claim is true and fails otherwise.
+/// Writes and verifies a certificate for a claim of optimality or unsolvability. Verification must
+/// fail if the oracle refutes the claim, and succeed otherwise. Exceeded limits, and claims without
+/// a certificate, are only counted.
 pub fn check(
     case: &Case,
     (mission, problem): (&Mission, &Problem),

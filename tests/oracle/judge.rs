@@ -57,14 +57,13 @@ pub struct Case {
     pub domain: String,
     pub problem: String,
     pub mode: Mode,
-    /// `true` if larger values are better.
     pub maximize: bool,
     pub truth: Truth,
     pub execute: Executor,
     /// Whether a certificate is written and verified, in sequential mode only.
     pub certify: bool,
     pub limit: Duration,
-    /// Time limit of the second run, in which the search uses all its parts from the start.
+    /// Time limit of the second run, which has no thresholds.
     pub second_limit: Duration,
 }
 
@@ -83,7 +82,6 @@ pub struct Tally {
     pub tasks: usize,
     pub counts: BTreeMap<String, usize>,
     pub failures: Vec<Failure>,
-    /// Total time of planning.
     pub planning: Duration,
     /// Total time of writing and verifying certificates.
     pub certificates: Duration,
@@ -100,7 +98,7 @@ struct Solved {
     solution: Solution,
     /// Whether plans without a metric are measured by their total time.
     timed: bool,
-    /// The ground task, if a certificate is to be written.
+    /// The ground task of a sequential run with the default thresholds, for a certificate.
     task: Option<Planned>,
 }
 
@@ -158,8 +156,7 @@ pub fn plan_text(steps: &[Step]) -> PlanText {
     PlanText { steps: steps.iter().map(step).collect() }
 }
 
-/// Returns the validator's options for a mode. Sequential plans are checked without tolerance, because their
-/// times are exact.
+/// Sequential plans are checked without tolerance, because their times are exact.
 pub fn options(mode: &Mode) -> Options {
     match mode {
         Mode::Sequential => Options::default().with_tolerance(BigRational::zero()),
@@ -181,8 +178,7 @@ pub fn read(domain: &str, problem: &str) -> Result<(Mission, Problem), Errors> {
     Ok((mission, problem))
 }
 
-/// Returns planner settings. The head start of the search varies with the name of the task, so that all
-/// engines are used.
+/// The head start of the search varies with the name of the task, so that all engines are used.
 fn config(name: &str, limits: Limits, thresholds: Thresholds) -> Config {
     let sum: usize = name.bytes().map(usize::from).sum();
     let config = Config::default().with_limits(limits);
@@ -301,7 +297,6 @@ pub fn compare(maximize: bool, left: &BigRational, right: &BigRational) -> std::
     if maximize { right.cmp(left) } else { left.cmp(right) }
 }
 
-/// Runs the planner on a task, compares its answers with the truth, and records the result.
 pub fn judge(case: &Case, tally: &mut Tally) {
     tally.tasks += 1;
     tally.count(match &case.truth {
@@ -392,7 +387,6 @@ fn check_witness(case: &Case, mission: &Mission, problem: &Problem, tally: &mut 
     }
 }
 
-/// Compares the planner's status, cost and lower bound with the correct answer.
 fn check_claim(case: &Case, solved: &Solved, tally: &mut Tally) {
     let solution = &solved.solution;
     let cost = solution.plan.as_ref().map(|plan| rational(&plan.cost));
@@ -474,7 +468,6 @@ fn check_plan(
     }
 }
 
-/// Returns an integer from an environment variable; `default` if the variable is not set or is no integer.
 pub fn setting(name: &str, default: u64) -> u64 {
     std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
 }

@@ -20,7 +20,6 @@ const GREENHOUSE: &str = "tests/program/greenhouse/mission.toml";
 /// Script of the page that surrounds the tested pages. It collects the results for the pages in the frames.
 const QUESTIONS: &str = include_str!("browser.js");
 
-/// Returns the path of the browser, if one is installed.
 pub fn browser() -> Option<PathBuf> {
     program(Resource::Browser, &NAMES)
 }

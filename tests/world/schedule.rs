@@ -91,18 +91,15 @@ impl Faults {
         Self { late, observes, belated: share(8), forgets: random.bool(), ..self }
     }
 
-    /// Removes the kinds of faults that were introduced after the first seeds of violations had been recorded.
     pub fn of_earlier_kinds(self) -> Self {
         Self { late: 0, observes: 0, belated: 0, forgets: false, ..self }
     }
 
-    /// Allows the loss of the effects sent at the start.
     pub fn with_lost_start(self) -> Self {
         Self { start: true, ..self }
     }
 }
 
-/// A message in transit.
 #[derive(Debug, Clone)]
 pub enum Message {
     Effect(Effect),
@@ -117,7 +114,6 @@ enum Step {
     Deliberate(Vec<Value>),
 }
 
-/// A running schedule.
 pub struct Schedule<'a> {
     pristine: &'a Loop,
     control: Loop,
@@ -158,7 +154,6 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    /// Enables the log, for a schedule with a known violation.
     pub fn with_log(self) -> Self {
         Self { log: Some(Vec::new()), ..self }
     }
@@ -170,9 +165,8 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    /// Runs the schedule to its end.
-    ///
-    /// Returns the first violation. With the log, the fault rates and the last messages follow.
+    /// Runs the schedule to its end or its first violation. With the log, the message ends with the
+    /// fault rates and the last messages.
     pub fn run(mut self) -> Result<(), String> {
         self.deliberate();
         for now in 1..=STEPS.0 + STEPS.1 {
@@ -300,7 +294,6 @@ impl<'a> Schedule<'a> {
         STEP * u32::try_from(self.now).unwrap_or(u32::MAX)
     }
 
-    /// Sends a report of the robot to the loop. The report can be lost.
     fn report(&mut self, mut event: Value) {
         if self.faults.numbered {
             self.line += 1;

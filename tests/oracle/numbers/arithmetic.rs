@@ -92,7 +92,6 @@ impl<'r> Builder<'r> {
         Expr::Function(applied(one_of(self.rng, &self.fluents), &[]))
     }
 
-    /// Returns a random static expression: a number, a function, a product or a quotient.
     fn static_expression(&mut self, thing: Option<Term>) -> Expr {
         match (self.rng.u32(0..8), thing) {
             (0 | 1, Some(thing)) => Expr::Function(applied(self.of_thing[0], &[thing])),

@@ -62,7 +62,7 @@ pub struct Instance {
     pub end: Option<Moment>,
 }
 
-/// A ground task. The atoms and the numbers that actions change have indices.
+/// A ground task. Only atoms and numbers that actions change have indices.
 #[derive(Debug, Default)]
 pub struct Ground {
     pub instances: Vec<Instance>,
@@ -73,7 +73,6 @@ pub struct Ground {
     /// Initial values of the numbers; `None` if undefined.
     pub numbers: Vec<Option<Number>>,
     pub metric: Option<Value>,
-    /// Further measures of plans, in addition to the metric.
     pub objectives: Vec<Value>,
 }
 
@@ -148,7 +147,7 @@ impl Grounder<'_> {
             .all(|condition| greatest(condition) != Some(bound.len() - 1) || !self.fails(condition, bound))
     }
 
-    /// Returns `true` if a condition is static and does not hold.
+    /// Returns `true` if a condition is static, and false or undefined.
     fn fails(&mut self, condition: &Condition, bound: &[usize]) -> bool {
         if !self.is_static(condition) {
             return false;

@@ -47,7 +47,6 @@ pub fn text_of(value: &Number) -> Option<String> {
     })
 }
 
-/// An argument: a parameter of the action or an object, by its number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Term {
     Parameter(usize),

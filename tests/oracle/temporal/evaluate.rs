@@ -96,7 +96,7 @@ impl World {
         Ok(atoms)
     }
 
-    /// Returns the truth value of a condition in a state. `bound` contains the objects of the variables.
+    /// `bound` contains the objects of the variables.
     pub fn holds(&self, condition: &Condition, state: &State, bound: &[usize]) -> Result<bool, Obstacle> {
         let atoms = self.derived(state)?;
         self.holds_with(condition, atoms, state, &mut bound.to_vec())

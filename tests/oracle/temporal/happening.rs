@@ -23,7 +23,7 @@ pub type Atoms = u128;
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct State {
-    /// Atoms of all predicates that are not derived and that hold in the state.
+    /// The true atoms of predicates that are not derived.
     pub atoms: Atoms,
     pub values: Vec<Option<Q>>,
 }
@@ -61,7 +61,6 @@ pub struct World {
     pub events: Vec<(Q, Happening)>,
 }
 
-/// The part of an action that takes place in a happening.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum End {
     Start,
@@ -215,7 +214,7 @@ impl World {
         self.values[function]
     }
 
-    /// Returns the happening of a ground action in the given state. Fails if a condition does not hold.
+    /// Fails if a condition does not hold in `state`.
     pub fn happening(&self, instance: usize, end: End, state: &State) -> Result<Happening, Obstacle> {
         let (action, bound) = &self.instances[instance];
         let action: &Action = &self.task.actions[*action];
@@ -313,8 +312,8 @@ impl World {
     }
 }
 
-/// Combines the active numeric effects of one happening to one change per number. Fails if the effects
-/// conflict.
+/// Combines the active numeric effects of one happening to one change per number. Fails if the
+/// effects conflict or divide by zero.
 fn combined(effects: &[(usize, Operation, Q)]) -> Result<Vec<(usize, Change)>, Obstacle> {
     let mut changes: Vec<(usize, Change)> = Vec::new();
     for (at, operation, value) in effects {

@@ -82,7 +82,6 @@ pub fn executor(world: World, unit: Option<Q>) -> Executor {
     })
 }
 
-/// Returns the task of a seed with its correct answer; for concurrent plans if `unit` is given.
 fn case(name: &str, seed: u64, unit: Option<Q>) -> Case {
     case_of(format!("{name}-{seed}"), Maker::make(seed, unit), unit)
 }
@@ -145,7 +144,6 @@ fn batteries_that_are_charged() {
     run(100, case).finish();
 }
 
-/// Returns the kinds and the texts of the failures of a task.
 fn kinds(task: &Task, unit: Option<Q>) -> (Vec<&'static str>, String) {
     // The oracle panics if its own plan is invalid, which is a failure to be shrunk as well.
     let case = std::panic::catch_unwind(|| case_of("smaller".into(), task.clone(), unit));

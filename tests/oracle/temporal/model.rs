@@ -9,8 +9,8 @@ use num_rational::Ratio;
 
 use crate::judge::decimal;
 
-/// Rational number for values and times. After each operation, numerator and denominator are checked to be
-/// below 2^30, so no operation overflows.
+/// Rational number for values and times. The oracles keep numerator and denominator below 2^30, so
+/// that no operation overflows.
 pub type Q = Ratio<i64>;
 
 pub fn q(number: i64) -> Q {

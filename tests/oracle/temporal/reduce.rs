@@ -1,10 +1,9 @@
-//! Relevance analysis of numbers: numbers that nothing reads and that only increase or decrease become action
-//! costs.
+//! Relevance analysis of numbers: numbers of the metric that nothing reads and that only increase
+//! or decrease become action costs.
 
 use super::happening::{Obstacle, State, World, fit};
 use super::model::{Body, Condition, Effect, Expression, Measure, Operation, Q, q};
 
-/// Role of a number in the search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     Kept,

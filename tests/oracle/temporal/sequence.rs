@@ -62,7 +62,7 @@ pub struct Search<'w> {
 }
 
 impl<'w> Search<'w> {
-    /// Builds the graph with at most `cap` nodes.
+    /// Builds the graph. Stops expanding nodes when there are more than `cap` nodes.
     pub fn new(world: &'w World, cap: usize) -> Self {
         let reduction = Reduction::new(world);
         let mut search = Self {

@@ -4,9 +4,8 @@ use fastrand::Rng;
 
 use super::{Action, Amount, Constraint, Effect, Formula, Moment, State, Task};
 
-/// Index of the number that the metric contains (`total-cost`).
+/// Index of `total-cost` in [`State::numbers`].
 pub(super) const PAID: usize = 2;
-/// Latest start time of an enumerated action.
 const LAST_START: i64 = 3;
 /// Number of random plans with three actions. Shorter plans are enumerated exhaustively.
 const LONG_PLANS: usize = 200;

@@ -288,7 +288,6 @@ pub fn trajectories(seed: u64) -> Sample {
     task.sample(rng)
 }
 
-/// Returns a random task with numbers and chosen durations.
 pub fn durations(seed: u64) -> Sample {
     let mut rng = Rng::with_seed(seed);
     let rng = &mut rng;

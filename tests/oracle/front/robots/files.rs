@@ -13,8 +13,7 @@ const CHANGES: &str = "(:derived (unset ?f - function) (not (exists (?d - functi
       :effect (and (not (at_work ?old ?f)) (at_work ?new ?f) (increase (total-cost) (change ?new))))\n";
 
 impl Robot {
-    /// Returns the knowledge base as Turtle. In the renamed form, functions and designs get the prefix `k`,
-    /// which the name map removes.
+    /// In the renamed form, functions and designs get the prefix `k`, which the name map removes.
     pub(super) fn document(
         form: Form,
         functions: usize,
