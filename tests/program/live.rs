@@ -13,7 +13,6 @@ use crate::common::{metaplan_in, root};
 /// Timeout for each expected event, which is generous for busy machines.
 const TIMEOUT: Duration = Duration::from_secs(60);
 
-/// A running loop with a live HTTP server (`metaplan run --serve`).
 pub struct Run {
     child: Child,
     stdin: Option<ChildStdin>,
@@ -57,7 +56,6 @@ impl Run {
         self.handled(last);
     }
 
-    /// Receives all answers until the line with this number is handled.
     fn handled(&mut self, line: u64) -> Vec<Value> {
         let mut answers = Vec::new();
         loop {
@@ -79,7 +77,6 @@ impl Run {
         stream
     }
 
-    /// Requests a path with a finite response and returns head and body of the response.
     pub fn get(&self, path: &str, headers: &str) -> (String, String) {
         let mut text = String::new();
         self.request(path, headers).read_to_string(&mut text).expect("an answer");
@@ -98,7 +95,6 @@ impl Run {
         Events(reader)
     }
 
-    /// Closes standard input. Asserts that the program ends with status 0.
     pub fn end(mut self) {
         drop(self.stdin.take());
         assert!(self.child.wait().expect("it ends").success());
@@ -112,7 +108,6 @@ impl Drop for Run {
     }
 }
 
-/// A stream of server-sent events from the live server.
 pub struct Events(BufReader<TcpStream>);
 
 impl Events {
@@ -154,7 +149,6 @@ impl Events {
         }
     }
 
-    /// Returns the events up to the first one that satisfies the predicate. Panics if the stream ends before.
     pub fn until(&mut self, is_last: impl Fn(&Value) -> bool) -> Vec<Value> {
         self.until_or_end(is_last).expect("it does not end before")
     }
@@ -298,7 +292,7 @@ fn clients_that_do_not_read_are_disconnected_and_do_not_block() {
     while run.events().until_or_end(|news| news["heard"] == json!(last)).is_none() {
         assert!(started.elapsed() < TIMEOUT, "it always ends before");
     }
-    // The client that did not read was disconnected after a small part of the data.
+    // The client that did not read was disconnected before it had received half of the data.
     let mut bytes = Vec::new();
     let ended = idle.read_to_end(&mut bytes);
     assert!(ended.is_ok() || ended.is_err_and(|error| error.kind() == ErrorKind::ConnectionReset));

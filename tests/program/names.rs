@@ -310,7 +310,7 @@ fn missions_with_optional_declarations_have_no_warnings() {
     }
 }
 
-/// Components can be objects as well. Names of the knowledge base take precedence over object names.
+/// Components can be objects as well. They then have two names.
 #[test]
 fn components_have_object_and_individual_names() {
     let copy = declared();

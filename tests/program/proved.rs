@@ -15,7 +15,6 @@ use crate::common::{Outcome, copy_folder, metaplan_in, root};
 
 const STORED: &str = "crates/verify/tests/certificates";
 
-/// Returns `true` if the programs of the proved checker are in PATH.
 fn has_checker() -> bool {
     program(Resource::Proved, &["metaplan-proved-check"]).is_some()
 }
@@ -148,7 +147,7 @@ fn reason_without_a_theorem_is_printed() {
     assert!(outcome.status == 30 && outcome.stdout.ends_with(line), "{outcome:#?}");
 }
 
-/// The evidence reaches the second program, and the time limit ends both.
+/// The evidence reaches the second program, and the time limit ends the first one.
 #[test]
 #[cfg(unix)]
 fn programs_are_called_with_certificate_and_evidence() {

@@ -16,7 +16,6 @@ use crate::probabilistic::{coadaptation, dark, mission, places};
 /// Maps each place to its neighbours in numeric order, with the lengths of the ways in metres.
 type Graph = BTreeMap<String, Vec<(String, f64)>>;
 
-/// State of the bidirectional search from one end.
 #[derive(Default)]
 struct Side {
     /// Places whose distance is final.

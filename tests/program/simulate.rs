@@ -244,9 +244,9 @@ fn units_are_shown() {
     }
 }
 
-/// In the tutorial's knowledge base, the requirements of actions depend on their context: no light in the
-/// dark aisle, and a gentle grip for fragile items. The baseline strategies request no design that violates a
-/// requirement, and complete every possible action.
+/// In the tutorial's knowledge base, the requirements of actions depend on their context: no light
+/// in the dark aisle, and a gentle grip for fragile items. The strategies `greedy` and `random`
+/// request no design that violates a requirement, and accomplish the mission.
 #[test]
 fn greedy_control_observes_requirements() {
     let directory = tempfile::tempdir().expect("a directory");
