@@ -18,7 +18,6 @@ use std::time::{Duration, Instant};
 
 use serde::Deserialize;
 
-/// Files and folders that are copied from the workspace.
 const COPIED_PATHS: [&str; 17] = [
     "Cargo.toml",
     "Cargo.lock",
@@ -117,7 +116,7 @@ fn prune(from: &Path, to: &Path) {
     }
 }
 
-/// Copies a file or folder, except build results (`target`) and the files whose copies are in `faulty_files`.
+/// Copies a file or folder, except the files whose copies are in `faulty_files`.
 fn copy(from: &Path, to: &Path, faulty_files: &BTreeMap<PathBuf, String>) {
     if from.is_dir() {
         for entry in std::fs::read_dir(from).expect("a directory") {

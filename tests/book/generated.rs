@@ -24,7 +24,6 @@ const PARTS: [Part; 8] = [
     ("docs/reference/tomasys.md", "values", || terms("owl:DatatypeProperty")),
 ];
 
-/// Returns one test per generated part, and one for the picture of the tutorial.
 pub fn trials() -> Vec<Trial> {
     let mut trials: Vec<Trial> = PARTS
         .into_iter()

@@ -13,7 +13,6 @@ struct Entry {
     text: String,
 }
 
-/// Returns the sections for all commands, with tables of their arguments and options.
 pub fn commands() -> String {
     let mut text = String::new();
     for (name, _) in subcommands(&help(&[])) {

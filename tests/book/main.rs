@@ -59,8 +59,7 @@ fn main() -> ExitCode {
     libtest_mimic::run(&arguments, trials).exit_code()
 }
 
-/// Returns the paths of the README, the pages of the book, and the pages of other packages whose programs are
-/// built with these tests.
+/// Returns the paths of the README, the pages of the book, and the README of `metaplan-verify`.
 fn pages() -> Vec<String> {
     let mut pages = vec!["README.md".to_owned(), "crates/verify/README.md".to_owned()];
     let mut folders = vec![PathBuf::from("docs")];

@@ -3,7 +3,6 @@
 use pulldown_cmark::{CodeBlockKind, Event, Options, Parser, Tag, TagEnd};
 use test_resources::{Resource, data_path, in_path};
 
-/// Kind of a block, which determines how the block is checked.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Kind {
     Console,
@@ -32,7 +31,6 @@ impl Block {
         matches!(self.kind, Kind::Console | Kind::Script)
     }
 
-    /// Returns `true` if this machine can run the block.
     pub fn is_run(&self) -> bool {
         self.has_commands() && self.missing().next().is_none()
     }
@@ -69,7 +67,6 @@ fn is_available(name: &str) -> bool {
     }
 }
 
-/// Returns the resource that contains a program or fixture.
 pub fn resource(name: &str) -> Resource {
     if FIXTURES.iter().any(|fixture| fixture.name == name) {
         return Resource::PublicData;

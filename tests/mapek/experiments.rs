@@ -186,7 +186,6 @@ fn the_battery_of_the_uuv_drops() {
     );
 }
 
-/// An action that has reported full progress but has not ended is not cancelled.
 #[test]
 fn an_action_with_full_progress_is_not_cancelled() {
     for (mission, change) in [
@@ -344,7 +343,7 @@ fn the_goal_changes_and_actions_fail() {
         let answers = feed(&mut ugv, &format!(r#"{{"event":"action_failed","action":{action}}}"#));
         assert!(answers.iter().any(|answer| answer.effect().is_some()), "{answers:?}");
     }
-    // After three consecutive failures planning pauses. It is tried again after a change of the situation.
+    // After three consecutive failures, planning pauses until the situation changes.
     check(
         &mut ugv,
         &[(r#"{"event":"action_failed","action":4}"#, &["no plan: failed"]), (r#"{"event":"tick"}"#, &[])],

@@ -52,8 +52,8 @@ const PROBLEM: &str = "
 (define (problem fleet) (:domain suave) (:init) (:goal (inspected)) (:metric minimize (total-time)))
 ";
 
-/// Returns a directory with the files of the mission and the manifest `m.toml`. `None` if the real knowledge
-/// bases are absent.
+/// Returns a directory with the files of the mission and the manifest `m.toml`. `None` without the
+/// real knowledge bases.
 pub fn files() -> Option<tempfile::TempDir> {
     let real = test_resources::data("real/owl")?;
     let directory = tempfile::tempdir().expect("a directory");

@@ -100,7 +100,6 @@ impl Robot {
         }
     }
 
-    /// Sends all further lines, waits for the end of the program, and reads the state from its journal.
     fn finish(&mut self, mut program: Program, story: &Story, journal: &Path) {
         self.send_lines(&mut program, story, usize::MAX);
         drop(program.stdin);

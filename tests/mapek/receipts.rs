@@ -181,12 +181,10 @@ fn react(ugv: &mut Loop, line: &str) -> Vec<Answer> {
     ugv.react(&metaplan::mapek::Observation::parse(line), now)
 }
 
-/// Delivers the failure of a reconfiguration without checking the reaction.
 fn fail_quietly(ugv: &mut Loop, effect: u64) {
     react(ugv, &format!(r#"{{"event":"reconfiguration_failed","effect":{effect}}}"#));
 }
 
-/// The loop implements the table of states and messages in `docs/reference/events.md`.
 #[test]
 fn the_loop_implements_the_documented_table() {
     let page = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/reference/events.md");
@@ -235,7 +233,6 @@ fn the_loop_implements_the_documented_table() {
     assert_eq!(count, 16);
 }
 
-/// Returns `true` if the lidar design was reported as unrealisable.
 fn lidar_refused(ugv: &Loop) -> bool {
     let snapshot = ugv.snapshot().0;
     let added = snapshot["added"].as_array().expect("statements");

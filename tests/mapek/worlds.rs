@@ -9,7 +9,6 @@ use metaplan::mapek::{Loop, Settings};
 use metaplan::setup::Setup;
 use num_rational::BigRational;
 
-/// Requirements of a design according to the knowledge base.
 #[derive(Debug, Clone)]
 pub struct Design {
     pub name: String,
@@ -18,7 +17,6 @@ pub struct Design {
     pub bounds: Vec<(String, Option<BigRational>, Option<BigRational>)>,
 }
 
-/// A mission with the possible reports of its robot.
 pub struct Place {
     pub name: String,
     /// A started loop that has not received any event.

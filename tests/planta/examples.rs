@@ -112,8 +112,8 @@ fn written(domain: &Domain, problem: &Problem) -> (Domain, Problem) {
 /// Names of examples with tens of thousands of transitions, whose exploration takes minutes.
 const LARGE: [&str; 2] = ["suave", "testFeatures/otherConstantsInDomain"];
 
-/// Checks that three tasks have the same state space: the narrowed task (the planner's input), the export,
-/// and the converter's files.
+/// Checks that three tasks have the same state space: the narrowed task (the planner's input), the
+/// export, and the converter's files, as far as `expectation` demands.
 fn compare(Example { name, input, created, expectation }: &Example) {
     let mission = input.mission();
     let (filled, _) = mission.filled().unwrap_or_else(|messages| panic!("{}", text_of(&messages)));

@@ -36,7 +36,7 @@ fn grid(real: &Path, nodes: &str, with_designs: bool) -> Input {
     }
 }
 
-/// Returns the optimal plan as JSON. Panics unless optimality is proved.
+/// Panics unless optimality is proved.
 fn plan(input: &Input, options: &[&str]) -> Value {
     let (status, stdout, stderr) =
         metaplan(&input.arguments("plan", &[&["--format", "json"], options].concat()));

@@ -80,7 +80,6 @@ fn used_codes_and_listed_codes_agree() {
     assert_eq!(exported_codes, all_listed.into_iter().collect::<Vec<_>>(), "each code once, in order");
 }
 
-/// Entries of the tables are sentences, and their meaning, cause and remedy differ.
 #[test]
 fn entries_of_tables_are_sentences() {
     for Code { code, meaning, cause, remedy } in codes::all() {

@@ -44,7 +44,7 @@ fn read(root: &Path, page: &Path) -> String {
     expanded
 }
 
-/// Target of a link, relative to the root; `None` if it is outside the project.
+/// Returns the target of a link, relative to the root; `None` if it is outside the project.
 fn within(page: &Path, target: &str) -> Option<PathBuf> {
     let mut path = page.parent().unwrap_or(Path::new("")).to_owned();
     for part in Path::new(target).components() {
