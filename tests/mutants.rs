@@ -57,7 +57,6 @@ enum Tests {
 /// default).
 type Oracle = (Tests, &'static str, u32);
 
-/// Files with lists of faults, each with the tests that must detect these faults.
 const SUITES: [(&str, &[Oracle]); 2] = [
     ("tests/oracle/mutants.toml", &ORACLES),
     ("tests/world/mutants.toml", &[(Tests::World, "violates", 1_000)]),
@@ -215,7 +214,7 @@ fn compile_tests(home: &Path, tests: Tests) -> PathBuf {
     program.expect("a program")
 }
 
-/// Returns `true` if the tests of an oracle pass with one fault switched on; fault 0 means no fault.
+/// Fault 0 means no fault.
 fn passes(
     programs: &[(Tests, PathBuf)],
     home: &Path,

@@ -92,7 +92,6 @@ fn codes() -> String {
     text
 }
 
-/// Returns the table of the classes or properties (`kind`) of the TOMASys metamodel, with their descriptions.
 fn terms(kind: &str) -> String {
     let metamodel = std::fs::read_to_string(root().join("ontology/kb/tomasys.ttl")).expect("the metamodel");
     let is_property = kind != "owl:Class";

@@ -7,7 +7,6 @@ use crate::common::metaplan;
 /// Options that all commands have. The page describes them only once.
 const COMMON: [&str; 4] = ["--format", "-q, --quiet", "-v, --verbose", "-h, --help"];
 
-/// An argument or option of a command (`head`), with its description.
 struct Entry {
     head: String,
     text: String,
@@ -34,7 +33,6 @@ fn help(command: &[&str]) -> String {
     outcome.stdout
 }
 
-/// Returns the names and descriptions of the commands in a help text, except `help`.
 fn subcommands(help: &str) -> Vec<(String, String)> {
     let Some((_, command_lines)) = help.split_once("\nCommands:\n") else { return Vec::new() };
     let lines = command_lines.lines().take_while(|line| !line.is_empty());

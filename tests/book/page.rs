@@ -22,7 +22,7 @@ pub struct Block {
     pub text: String,
     /// Programs and fixtures that the block needs; without them the block is not run.
     pub needs: Vec<String>,
-    /// Number of seconds for which the standard input of the last command stays open.
+    /// Seconds for which the standard input of the last command stays open.
     pub input_ends_after: Option<u32>,
 }
 
@@ -35,7 +35,6 @@ impl Block {
         self.has_commands() && self.missing().next().is_none()
     }
 
-    /// Programs and fixtures that the block needs but this machine lacks.
     pub fn missing(&self) -> impl Iterator<Item = String> {
         self.needs.iter().filter(|name| !is_available(name)).cloned()
     }
@@ -98,7 +97,6 @@ pub fn blocks(page: &str) -> Vec<Block> {
     blocks
 }
 
-/// Creates an empty block at `line` from its fence and the comment before it.
 fn block(line: usize, fence: &str, comment: &str) -> Block {
     let mark = |name: &str| {
         let argument = comment.trim().strip_prefix("<!--")?.trim_start().strip_prefix(name)?;

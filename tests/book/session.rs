@@ -105,8 +105,7 @@ impl Session {
     }
 }
 
-/// Compares a block with the results of its commands. Takes one result, output and status, per command from
-/// the iterator.
+/// Takes one result, output and status, per command from the iterator.
 fn compare<'a>(block: &Block, steps: &[Step], results: &mut impl Iterator<Item = (&'a str, i32)>) -> Outcome {
     let (mut text, mut faults) = (String::new(), Vec::new());
     if steps.is_empty() {

@@ -53,7 +53,7 @@ fn number(text: &str) -> Option<BigRational> {
     literal.as_rational()
 }
 
-/// Applies a recorded step of a run. Skips steps that a robot cannot report.
+/// Skips steps that a robot cannot report.
 fn apply_step(configurator: &mut Configurator, step: &Value) {
     let text = |key: &str| step[key].as_str().unwrap_or_default();
     match (text("op"), text("message")) {

@@ -70,7 +70,6 @@ fn fresh(
     )
 }
 
-/// Returns the functions that the loop's knowledge base grounds, each with its design.
 fn at_work(control: &Loop) -> Vec<(String, String)> {
     let knowledge = control.beliefs().mission().knowledge().expect("a knowledge base");
     let mut pairs = Vec::new();
@@ -234,8 +233,7 @@ impl<'a> Life<'a> {
     }
 }
 
-/// Delivers a few random lines to each of `lives` robots, which are distributed over all missions, and checks
-/// the invariants. `missions` is the number of generated missions. Returns the number of lines.
+/// `missions` is the number of generated missions. Returns the number of lines.
 fn check(lives: u64, missions: u64) -> usize {
     let mut places = shipped();
     places.extend(suave());

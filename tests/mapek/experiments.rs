@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use crate::common::{control, feed};
 
-/// Formats an answer briefly, without reasons; `None` for irrelevant answers.
+/// Returns `None` for irrelevant answers.
 fn words(answer: &Answer) -> Option<String> {
     Some(match answer {
         Answer::Inferred { designs, objectives } => {
@@ -39,8 +39,7 @@ fn words(answer: &Answer) -> Option<String> {
     })
 }
 
-/// Delivers lines to a loop and compares the answers with the expected ones. The line `start` starts the
-/// loop.
+/// The line `start` starts the loop.
 fn check(control: &mut Loop, script: &[(&str, &[&str])]) {
     for (line, expected) in script {
         let answers = if *line == "start" { control.start() } else { feed(control, line) };

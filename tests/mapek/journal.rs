@@ -78,7 +78,6 @@ fn numbered(events: &[&str]) -> Vec<String> {
     events.iter().enumerate().map(line).collect()
 }
 
-/// Effects that the robot has received from the loop, by number.
 #[derive(Debug, Default, PartialEq)]
 pub struct Robot {
     pub effects: BTreeMap<u64, Effect>,
@@ -129,8 +128,6 @@ pub fn state(control: &Loop) -> serde_json::Value {
     state
 }
 
-/// Runs the script without a disturbance. Returns the final state, the robot with its effects, and the
-/// directory of the journal.
 fn undisturbed(pristine: &Loop) -> (serde_json::Value, Robot, tempfile::TempDir) {
     let directory = tempfile::tempdir().expect("a directory");
     let (mut journal, mut control, _, answers) = open(directory.path(), pristine);

@@ -229,7 +229,6 @@ impl Program {
         writeln!(self.stdin, "{line}").expect("a pipe");
     }
 
-    /// Returns the answers up to `handled`, without line numbers.
     fn answers(&self) -> Vec<Value> {
         let mut answers = Vec::new();
         loop {

@@ -74,7 +74,6 @@ impl Program {
     }
 }
 
-/// Effects that the robot has received from the program, and the final state of the program.
 #[derive(Debug, Default, PartialEq)]
 struct Robot {
     effects: BTreeMap<u64, Value>,

@@ -86,7 +86,7 @@ pub fn shipped() -> Vec<Place> {
     ["ugv", "uuv", "ugv_plain", "uuv_plain", "camara_like"].map(place).into()
 }
 
-/// Returns the mission with SUAVE's own knowledge base; `None` without the public test data.
+/// Returns `None` without the public test data.
 pub fn suave() -> Option<Place> {
     let directory = crate::fleet::files()?;
     Some(Place::new("suave", &directory.path().join("m.toml"), Vec::new(), false))
@@ -118,13 +118,11 @@ pub fn generated(seed: u64) -> Place {
     Place::new(&format!("generated {seed}"), &directory.path().join("m.toml"), depends, true)
 }
 
-/// Returns a directory with the files of a generated mission, including the manifest `m.toml`.
 pub fn own_files(seed: u64) -> tempfile::TempDir {
     files(seed).0
 }
 
-/// Writes the files of a generated mission. Returns their directory, and pairs of a component and a component
-/// that it depends on.
+/// Returns the directory, and pairs of a component and a component that it depends on.
 fn files(seed: u64) -> (tempfile::TempDir, Vec<(String, String)>) {
     let mut random = Rng::with_seed(seed);
     let (functions, components) = (random.usize(1..=2), random.usize(3..=5));

@@ -15,7 +15,6 @@ use crate::judge::{read, setting};
 const FACTS: usize = 5;
 const LENGTH: usize = 5;
 
-/// Bit set of the facts that hold.
 type State = u32;
 
 /// Pair of bit sets of facts: required and forbidden facts of a condition, or added and deleted facts of an
@@ -139,7 +138,7 @@ impl Task {
         }
     }
 
-    /// Returns all plans with at most [`LENGTH`] steps from `actions` that cost exactly `cost`.
+    /// Returns only plans that cost exactly `cost`.
     fn plans(&self, actions: &BTreeSet<usize>, cost: u32) -> Vec<Vec<usize>> {
         let (mut plans, mut open) = (Vec::new(), vec![(self.initial, 0, Vec::new())]);
         while let Some((state, paid, steps)) = open.pop() {

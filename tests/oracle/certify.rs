@@ -13,7 +13,6 @@ pub enum Planned {
     Exact(Box<ExactTask>),
 }
 
-/// Removes the parts of a message in parentheses, which contain names of the task.
 fn without_names(message: &str) -> String {
     let mut depth = 0_usize;
     let mut outside = String::new();

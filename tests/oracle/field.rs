@@ -117,7 +117,6 @@ fn b1_all_pairs() {
     }
 }
 
-/// An operand is undefined in a conditional effect whose condition does not hold.
 #[test]
 fn b1_undefined_operand() {
     let domain = "(define (domain d) (:requirements :adl :fluents :durative-actions)

@@ -72,7 +72,6 @@ pub const SHORT: Duration = Duration::from_millis(300);
 
 #[derive(Debug)]
 pub struct Failure {
-    /// Short description of the kind of contradiction, by which failures are counted.
     pub kind: &'static str,
     pub text: String,
 }
@@ -83,7 +82,6 @@ pub struct Tally {
     pub counts: BTreeMap<String, usize>,
     pub failures: Vec<Failure>,
     pub planning: Duration,
-    /// Total time of writing and verifying certificates.
     pub certificates: Duration,
 }
 
@@ -241,8 +239,7 @@ impl Tally {
         *self.counts.entry(key.into()).or_default() += 1;
     }
 
-    /// Records a failure. Saves the files of the task to the directory `ORACLE_SAVE`, if this variable is
-    /// set.
+    /// Saves the files of the task to the directory `ORACLE_SAVE`, if this variable is set.
     pub fn fail(&mut self, case: &Case, kind: &'static str, reason: &str) {
         let Case { name, domain, problem, mode, truth, .. } = case;
         let mode = match mode {
@@ -283,7 +280,6 @@ impl Tally {
         text
     }
 
-    /// Ends a test: prints the summary and panics with the first five failures, if any.
     #[allow(clippy::print_stdout)]
     pub fn finish(&self) {
         println!("{}", self.summary());
@@ -369,7 +365,6 @@ fn judge_answer(
     }
 }
 
-/// Checks that the validator accepts the oracle's plan with the oracle's value.
 fn check_witness(case: &Case, mission: &Mission, problem: &Problem, tally: &mut Tally) {
     let (Truth::Best(cost, plan) | Truth::NoBest(cost, plan) | Truth::Open(Some((cost, plan)))) = &case.truth
     else {
@@ -439,7 +434,6 @@ fn check_claim(case: &Case, solved: &Solved, tally: &mut Tally) {
     }
 }
 
-/// Checks that a reported plan is valid and has the claimed cost, by the oracle's executor and by the validator.
 fn check_plan(
     case: &Case,
     (mission, problem): (&Mission, &Problem),
@@ -472,13 +466,11 @@ pub fn setting(name: &str, default: u64) -> u64 {
     std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
 }
 
-/// Returns `true` if the run must end because of a failure (`ORACLE_STOP` is set).
 pub fn is_over(tally: &Tally) -> bool {
     !tally.failures.is_empty() && std::env::var_os("ORACLE_STOP").is_some()
 }
 
-/// Runs [`judge`] on the cases of `ORACLE_TASKS` seeds (default: `default`), starting at `ORACLE_FROM`. Stops
-/// at the first failure if `ORACLE_STOP` is set.
+/// `default` is the default of `ORACLE_TASKS`.
 pub fn run(default: u64, cases: impl Fn(u64) -> Vec<Case>) -> Tally {
     let (from, tasks) = (setting("ORACLE_FROM", 0), setting("ORACLE_TASKS", default));
     let mut tally = Tally::default();

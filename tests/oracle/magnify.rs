@@ -92,13 +92,13 @@ fn domain(text: &str, factors: bool) -> String {
     words.join(" ")
 }
 
-/// Exit status and processor time (in seconds) of a run of the program.
+/// Exit status, and processor time in seconds.
 struct Run {
     status: i32,
     time: f64,
 }
 
-/// Runs the program and measures it. Unless `once`, a run under 1 s is repeated twice, and the median counts.
+/// Unless `once`, a run under 1 s is repeated twice, and the median counts.
 fn run(arguments: &[&str], once: bool) -> Run {
     let script = "import resource as r, subprocess as s, sys\n\
         def once():\n \
@@ -138,8 +138,7 @@ fn all_runs(directory: &Path, name: &str) -> [Run; 3] {
     [planned, certified, verified]
 }
 
-/// Returns the parameters of the generated missions: family, places or pipelines, designs, functions, goals,
-/// seed.
+/// Parameters: family, places or pipelines, designs, functions, goals, seed.
 fn sizes() -> Vec<[usize; 6]> {
     let mut sizes = Vec::new();
     for seed in 1..=4 {
@@ -165,8 +164,7 @@ fn sizes() -> Vec<[usize; 6]> {
     sizes
 }
 
-/// Generates a mission with the tool and writes its variants with decimals. Returns the name of the mission;
-/// `None` if python3 does not start.
+/// Returns the name of the mission; `None` if python3 does not start.
 fn generate(tool: &Path, directory: &Path, size: &[usize; 6], encoding: &str) -> Option<String> {
     let [family, n, m, k, goals, seed] = size;
     let family = ["ugv", "uuv"][*family];

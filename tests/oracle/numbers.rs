@@ -57,7 +57,7 @@ impl Puzzle {
         self.task.metric.as_ref().is_some_and(|(maximize, _)| *maximize)
     }
 
-    /// Converts a sequential plan (instance numbers) to steps without gaps between them.
+    /// The steps have no gaps between them.
     fn steps(&self, plan: &[usize]) -> Vec<Step> {
         let mut clock = model::whole(0);
         let step = |number: &usize| {
@@ -139,7 +139,6 @@ fn task(seed: u64) -> Task {
     if rng.u32(0..5) < 3 { missions::mission(&mut rng) } else { arithmetic::arithmetic(&mut rng) }
 }
 
-/// Compares the planner with the oracle on the task of a seed, with a certificate for even seeds.
 fn judge_seed(seed: u64, tally: &mut Tally) {
     judge_task(seed, &task(seed), tally);
 }

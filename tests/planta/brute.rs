@@ -175,7 +175,8 @@ impl Task {
         }
     }
 
-    /// Declares variables under unique names in `scope`. Returns the names and the conditions on their types.
+    /// The variables get unique names in `scope`. Returns the names and the conditions on their
+    /// types.
     fn declare(&mut self, list: &[pddl::ast::TypedName], scope: &mut Binding) -> (Vec<String>, Vec<Part>) {
         let mut names = Vec::new();
         let mut type_conditions = Vec::new();
@@ -338,7 +339,7 @@ impl Task {
         facts
     }
 
-    /// Explores all reachable states breadth-first. Returns `None` if there are more than `limit` states.
+    /// Returns `None` if there are more than `limit` states.
     pub fn explore(&self, limit: usize) -> Option<StateSpace> {
         let changed = self.changed_predicates();
         let fixed = self.initial.iter().filter(|(name, _)| !changed.contains(*name));

@@ -19,7 +19,6 @@ struct Example {
     expectation: Expectation,
 }
 
-/// Relation between Metaplan's answer and the converter's output files.
 #[derive(PartialEq)]
 enum Expectation {
     /// The state spaces are equal.
@@ -81,8 +80,7 @@ fn examples(real: &Path) -> Vec<Example> {
     ]
 }
 
-/// Returns the number of steps of an optimal plan by the program; `None` if the program proves that there is
-/// no plan.
+/// Returns `None` if the program proves that there is no plan.
 fn planned(input: &Input) -> Option<usize> {
     let (status, stdout, stderr) = metaplan(&input.arguments("plan", &["--format", "json"]));
     let answer: Value =

@@ -17,7 +17,7 @@ use crate::situations::run;
 const CLASSES: [&str; 5] = ["Ca", "Cb", "Cc", "Cd", "Ce"];
 const PROPERTIES: [&str; 2] = ["pa", "pb"];
 const INDIVIDUALS: [&str; 2] = ["i1", "i2"];
-/// Maximum number of states of a task. Larger tasks are skipped.
+/// Larger tasks are skipped.
 const MAX_STATES: usize = 300;
 
 struct Texts {
@@ -162,8 +162,7 @@ struct Comparison {
     least_steps: Option<usize>,
 }
 
-/// Compares the state spaces of the narrowed task and the exported task. Returns `None` if there are too many
-/// states.
+/// Returns `None` if there are too many states.
 fn compare(texts: &Texts, name: &str) -> Option<Comparison> {
     let directory = tempfile::tempdir().expect("a directory");
     let mission = texts.write(directory.path()).mission();

@@ -10,7 +10,6 @@ use test_resources::data;
 
 use crate::common::{copy_folder, edit, metaplan, metaplan_in, root};
 
-/// Returns a copy of the mission `ward`, or `None` if the test data are not available.
 fn ward(large: bool) -> Option<tempfile::TempDir> {
     let folder = data("field3/newcomer3/ward")?;
     let directory = tempfile::tempdir().expect("a directory");

@@ -167,7 +167,7 @@ pub fn copy_folder(from: &Path, to: &Path) {
     }
 }
 
-/// Replaces all occurrences of a text in a file. Panics if there is no occurrence.
+/// Replaces all occurrences. Panics without any occurrence.
 pub fn edit(directory: &Path, file: &str, old: &str, new: &str) {
     let path = directory.join(file);
     let text = std::fs::read_to_string(&path).expect("the file is read");

@@ -111,7 +111,6 @@ impl Drop for Run {
 pub struct Events(BufReader<TcpStream>);
 
 impl Events {
-    /// Returns the kind and the data of the next event; `None` at the end of the stream.
     fn next(&mut self) -> Option<(String, Value)> {
         let (mut kind, mut data) = ("message".to_owned(), None);
         loop {
@@ -265,7 +264,7 @@ fn late_clients_receive_the_current_state() {
     }
 }
 
-/// Returns the peak memory of the process in kB, on systems that report it.
+/// In kB.
 fn memory(run: &Run) -> Option<u64> {
     let status = std::fs::read_to_string(format!("/proc/{}/status", run.child.id())).ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

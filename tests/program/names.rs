@@ -16,15 +16,14 @@ const MANIFEST: &str = "missions/uuv.toml";
 const PROBLEM: &str = "encodings/uuv/problem.pddl";
 const KB: &str = "ontology/kb/uuv.ttl";
 
-/// Copies the mission `uuv` and declares functions and designs in its problem.
 fn declared() -> tempfile::TempDir {
     let copy = copy_of_mission("uuv");
     edit(copy.path(), PROBLEM, "(:objects ", &format!("(:objects {OBJECTS} "));
     copy
 }
 
-/// Copies the mission `uuv` like `declared`. Renames functions, designs and actions in the knowledge base,
-/// and adds these entries to the name map.
+/// Renames functions, designs and actions in the knowledge base, and adds `entries` to the name
+/// map.
 fn renamed(entries: &str) -> tempfile::TempDir {
     let copy = declared();
     let mut text = std::fs::read_to_string(copy.path().join(KB)).expect("the knowledge base");

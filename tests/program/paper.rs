@@ -6,7 +6,6 @@ use serde_json::{Value, json};
 use crate::common::{Outcome, metaplan, metaplan_in};
 use crate::real::real;
 
-/// Returns the files of the Metaplan paper and the options for SUAVE's knowledge base, if available.
 fn paper() -> Option<([String; 2], Vec<String>)> {
     let real = real()?.display().to_string();
     let file = |name: &str| format!("{real}/pddl/suave_metaplan/suave_extended_metaplan_{name}.pddl");

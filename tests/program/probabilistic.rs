@@ -115,7 +115,7 @@ fn least_time(mission: &Coadaptation, risk: Risk) -> Option<BigRational> {
     (!solution.infinite.contains(0)).then(|| solution.values[0].clone())
 }
 
-/// Returns the optimal cost of the planner; `None` if the planner proves that there is no plan.
+/// Returns `None` if the planner proves that there is no plan.
 fn planned(mission: &Mission) -> Option<f64> {
     let (problem, _) = mission.filled().expect("filled");
     let task = mission.ground(&problem, &[], &planner::Limits::none()).expect("ground");
@@ -151,8 +151,7 @@ impl Agreement {
     }
 }
 
-/// Compares the planner with the model checker on random pairs of places, until `count` pairs have a plan.
-/// Returns `None` if the map is not available.
+/// Continues until `count` pairs have a plan. Returns `None` if the map is not available.
 fn pairs_of_the_map(count: usize) -> Option<Agreement> {
     let map = std::fs::read_to_string(data("real/map/map-p2cp3.json")?).expect("readable");
     let (_directory, setup) = mission(&map, &MapOptions { dark: dark(), ..places("l1", "l18") });
@@ -212,7 +211,7 @@ fn random_map(random: &mut Random) -> (String, usize) {
     (json!({ "map": nodes, "time": time }).to_string(), n)
 }
 
-/// Compares the planner with the model checker on random missions, until `count` of them have a plan.
+/// Continues until `count` missions have a plan.
 fn generated_missions(count: usize) -> Agreement {
     let mut random = Random(11);
     let mut agreement = Agreement::default();

@@ -175,7 +175,6 @@ fn missing_programs_are_reported_with_a_remedy() {
     }
 }
 
-/// Returns the page, if `proved/page.sh` has built it.
 fn page() -> Option<PathBuf> {
     let page = root().join("docs/verify.html");
     if page.is_file() {

@@ -17,7 +17,6 @@ fn codes_in(text: &str) -> BTreeSet<String> {
     words.filter(is_code).map(str::to_owned).collect()
 }
 
-/// Returns the crate of a file if this crate has a table of codes.
 fn owner(path: &str) -> Option<&'static str> {
     let folder = path
         .trim_start_matches("crates/")

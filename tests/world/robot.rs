@@ -14,7 +14,6 @@ pub struct Action {
     pub number: u64,
     /// Number of the last effect that requested or resumed the action.
     request: u64,
-    /// Completed work steps.
     pub done: u32,
     pub suspended: bool,
     pub to: String,

@@ -48,7 +48,6 @@ pub struct Faults {
     pub forgets: bool,
     /// Whether the effects sent at the start can be lost, too.
     pub start: bool,
-    /// Whether event lines have sequence numbers.
     pub numbered: bool,
     /// Whether planning runs in parallel to the processing of events.
     pub beside: bool,

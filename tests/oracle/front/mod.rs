@@ -40,11 +40,9 @@ pub struct Sample {
 /// Plans that brute force enumerated, with the best value among them (`None` without a plan).
 #[derive(Debug, Clone)]
 pub enum Reference {
-    /// All plans were enumerated.
     All(Option<BigRational>),
     /// All plans up to this value were enumerated; smaller values are better.
     UpTo(i64, Option<BigRational>),
-    /// Only some plans were enumerated.
     Some(Option<BigRational>),
 }
 
@@ -70,11 +68,10 @@ impl Answer {
 /// A generator of samples; `None` if it has no sample for a seed.
 type Samples = Box<dyn FnMut(u64) -> Option<Sample>>;
 
-/// Number of situations per robot. All situations of a robot share its knowledge base, which is read once.
+/// All situations of a robot share its knowledge base, which is read once.
 const SITUATIONS: u64 = 15;
 
-/// Exports a mission as `export --to pddl` does. Returns the mission of the exported files, and
-/// their texts: domain, problem.
+/// Exports a mission as `export --to pddl` does. The texts are domain and problem.
 fn exported(mission: &Mission) -> (Mission, [String; 2]) {
     let (problem, _) = mission.filled().unwrap_or_else(|messages| panic!("{messages:#?}"));
     let (domain, problem) = portable(mission.domain(), &problem);
@@ -85,7 +82,7 @@ fn exported(mission: &Mission) -> (Mission, [String; 2]) {
     (mission.unwrap_or_else(|messages| panic!("{messages:#?}\n{}\n{}", texts[0], texts[1])), texts)
 }
 
-/// Plans a mission. If the mission is refused, returns the codes of the messages as an error.
+/// If the mission is refused, returns the codes of the messages as an error.
 fn plan(mission: &Mission, mode: &Mode, thresholds: Thresholds) -> Result<Answer, String> {
     let (problem, _) = mission.filled().unwrap_or_else(|messages| panic!("{messages:#?}"));
     let limits = Limits::none().with_thresholds(thresholds);

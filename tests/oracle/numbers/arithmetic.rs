@@ -13,9 +13,7 @@ struct Builder<'r> {
     task: Task,
     rng: &'r mut Rng,
     styles: Vec<Style>,
-    /// Functions without parameters that actions change.
     fluents: Vec<usize>,
-    /// Functions without parameters that no action changes.
     constants: Vec<usize>,
     /// Two functions with a thing as their argument: a static one, and one that actions change.
     of_thing: [usize; 2],

@@ -83,7 +83,6 @@ pub fn number(rng: &mut Rng, styles: &[Style]) -> Number {
     }
 }
 
-/// Returns `true` with probability 1/`times`.
 pub fn once_in(rng: &mut Rng, times: u32) -> bool {
     rng.u32(0..times) == 0
 }

@@ -54,8 +54,7 @@ impl<'g> Measures<'g> {
         State { atoms: atoms.clone(), numbers: numbers.clone(), time: Number::zero() }
     }
 
-    /// Returns the values of all measures in a state that is reached after `steps` steps; `None` if a value
-    /// is undefined.
+    /// Returns `None` if a value is undefined.
     pub fn of(&self, state: &State, steps: i64) -> Option<Vec<Number>> {
         let results = self.values.iter().map(|measure| match measure {
             Measure::Expression(value) => number(value, state),
@@ -232,7 +231,6 @@ pub struct Space {
     pub initial: Vec<Number>,
     pub edges: Vec<Vec<Edge>>,
     pub goals: Vec<bool>,
-    /// Minimum number of steps to each state.
     pub depths: Vec<usize>,
     /// Whether all reachable states are included, because no budget was exceeded.
     pub complete: bool,

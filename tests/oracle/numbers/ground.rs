@@ -68,9 +68,8 @@ pub struct Ground {
     pub instances: Vec<Instance>,
     pub by_name: HashMap<(String, Vec<String>), usize>,
     pub goal: Vec<Test>,
-    /// Initial truth values of the atoms.
     pub atoms: Vec<bool>,
-    /// Initial values of the numbers; `None` if undefined.
+    /// Initial values; `None` if undefined.
     pub numbers: Vec<Option<Number>>,
     pub metric: Option<Value>,
     pub objectives: Vec<Value>,
@@ -86,7 +85,7 @@ pub struct Grounder<'t> {
     ground: Ground,
 }
 
-/// Grounds a task. Returns `None` if there are more than `max_instances` instances.
+/// Returns `None` if there are more than `max_instances` instances.
 pub fn ground(task: &Task, objectives: &[Expr], max_instances: usize) -> Option<Ground> {
     let mut grounder = Grounder {
         task,

@@ -16,7 +16,6 @@ pub const PLACE: usize = 0;
 pub const FUNCTION: usize = 1;
 pub const DESIGN: usize = 2;
 
-/// Indices of the predicates and functions.
 #[derive(Debug, Clone, Copy)]
 pub struct Names {
     pub at: usize,
@@ -61,7 +60,7 @@ pub fn mission(rng: &mut Rng) -> Task {
     mission_with(rng, designs)
 }
 
-/// Returns a random mission. `designs` is the number of designs of the first function.
+/// `designs` is the number of designs of the first function.
 pub fn mission_with(rng: &mut Rng, designs: usize) -> Task {
     let mut builder = Builder::new(rng, designs);
     builder.values();
@@ -206,8 +205,7 @@ impl<'r> Builder<'r> {
         }
     }
 
-    /// Adds one to `max_slots` design slots to an action, with their parameters and conditions. Returns the
-    /// function and the design of each slot.
+    /// Adds one to `max_slots` design slots. Returns the function and the design of each slot.
     pub fn slots(&mut self, action: &mut Action, max_slots: usize) -> Vec<(Term, Term)> {
         let count = self.rng.usize(1..=max_slots.min(self.functions.len()));
         // In rare cases, all slots with a constant function have the same function.
@@ -335,7 +333,6 @@ impl<'r> Builder<'r> {
         }
     }
 
-    /// Returns the effects at the end of an action, or the only effects of an instantaneous action.
     pub fn finally(action: &mut Action) -> &mut Vec<Effect> {
         match &mut action.lasting {
             Some(lasting) => &mut lasting.end.effects,

@@ -12,7 +12,6 @@ use super::ground::{Ground, Test, ground};
 use super::model::{Action, Applied, Condition, Expr, Number, Relation, Task, applied, whole};
 use super::step::{State, execute, number};
 
-/// Maximum number of instances of a task for random walks.
 const MAX_INSTANCES: usize = 20_000;
 
 /// Candidates for conjuncts of the goal.
@@ -73,8 +72,6 @@ fn walk(ground: &Ground, observed: &mut Vec<Vec<Number>>, rng: &mut Rng) -> Stat
     state
 }
 
-/// Replaces each open comparison by a comparison with an observed value, or with a random value if no value
-/// was observed.
 fn close(task: &mut Task, observed: &[Vec<Number>], rng: &mut Rng) {
     let mut close_all = |conditions: &mut Vec<Condition>| {
         for condition in conditions {
@@ -139,7 +136,6 @@ fn compare(rng: &mut Rng, relation: Relation, expression: Expr, value: &Number) 
     }
 }
 
-/// Returns conditions that hold or almost hold in a state.
 fn goal(wishes: &Wishes, open: &Ground, state: &State, rng: &mut Rng) -> Vec<Condition> {
     let mut goal = Vec::new();
     for ((predicate, objects), test) in wishes.atoms.iter().zip(&open.goal) {

@@ -10,7 +10,6 @@ use super::model::{Action, Atom, Body, Effect, Expression, Fluent, Operation, Pa
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Obstacle {
-    /// The semantics forbids the action, for the given reason.
     Blocked(&'static str),
     /// A number exceeds the range of the oracle, so the result is unknown.
     TooLarge,
@@ -18,7 +17,6 @@ pub enum Obstacle {
 
 pub const UNDEFINED: Obstacle = Obstacle::Blocked("a value is undefined");
 
-/// Bit set of ground atoms.
 pub type Atoms = u128;
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -115,7 +113,7 @@ impl Happening {
         Ok(after)
     }
 
-    /// Returns the union of two happenings, which must not interfere.
+    /// The happenings must not interfere.
     fn joined(mut self, other: Self) -> Result<Self, Obstacle> {
         self.reads |= other.reads;
         self.reads_values |= other.reads_values;

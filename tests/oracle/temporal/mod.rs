@@ -90,14 +90,13 @@ fn case_of(name: String, task: Task, unit: Option<Q>) -> Case {
     case_up_to(if unit.is_none() { CAP } else { OVERLAP_CAP }, name, task, unit)
 }
 
-/// Returns a sequential task with derived predicates and its correct answer. `None` if the task of the seed
-/// has no derived predicate.
+/// Returns `None` if the task of the seed has no derived predicate.
 pub fn with_derived(seed: u64) -> Option<Case> {
     let task = Maker::make(seed, None);
     (!task.axioms.is_empty()).then(|| case_of(format!("derived-{seed}"), task, None))
 }
 
-/// Returns a task with its correct answer. The answer is open if the oracle would exceed `cap` nodes.
+/// The answer is open if the oracle would exceed `cap` nodes.
 fn case_up_to(cap: usize, name: String, task: Task, unit: Option<Q>) -> Case {
     let world = World::new(task);
     let truth = match unit {

@@ -93,7 +93,6 @@ pub enum Effect {
     Forall(usize, Vec<Effect>),
 }
 
-/// Conditions and effects of one end of an action.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Part {
     pub condition: Condition,
@@ -113,7 +112,7 @@ pub struct Action {
     pub body: Body,
 }
 
-/// An axiom of a derived predicate. The first variables of the condition are the arguments of the predicate.
+/// The first variables of the condition are the arguments of the predicate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axiom {
     pub predicate: usize,
@@ -134,7 +133,7 @@ pub enum Measure {
 pub struct Task {
     pub types: usize,
     pub objects: Vec<usize>,
-    /// Name and arity of each predicate, including derived predicates.
+    /// Names and arities, including derived predicates.
     pub predicates: Vec<(String, usize)>,
     pub functions: Vec<(String, usize)>,
     /// Axioms in the order of their strata.
@@ -196,7 +195,7 @@ impl Task {
         }
     }
 
-    /// Formats a condition in which `depth` variables are bound.
+    /// `depth` is the number of bound variables.
     fn condition(&self, condition: &Condition, depth: usize) -> String {
         let list = |word: &str, parts: &[Condition]| {
             let parts: String =
@@ -230,7 +229,7 @@ impl Task {
         }
     }
 
-    /// Formats an effect with a time specifier, which is empty for instantaneous actions.
+    /// The time specifier is empty for instantaneous actions.
     fn effect(&self, effect: &Effect, time: &str, depth: usize) -> String {
         let at = |text: String| if time.is_empty() { text } else { format!("({time} {text})") };
         let list = |parts: &[Effect], depth: usize| {

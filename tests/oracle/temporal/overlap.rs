@@ -223,7 +223,6 @@ impl Search<'_> {
         happening.changes.iter().any(|(at, change)| relative(change) && self.reduction.keeps(*at))
     }
 
-    /// Returns `true` if the end of an instance may increase or scale a relevant number.
     fn has_cumulative_end(&self, instance: usize) -> bool {
         fn collect_relative(effects: &[Effect], functions: &mut Vec<usize>) {
             for effect in effects {
@@ -283,7 +282,6 @@ impl Search<'_> {
         }
     }
 
-    /// Completes the tick once all starts are chosen: applies its happenings and adds edges to the graph.
     fn finish(&mut self, from: usize, state: &State, tick: &Tick) -> Result<(), Obstacle> {
         let mut after = state.clone();
         // The events have been applied already. Applying them again is harmless, because nothing at this tick

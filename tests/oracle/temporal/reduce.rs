@@ -14,11 +14,9 @@ pub enum Role {
     Unread,
 }
 
-/// Reduction of states to relevant numbers, and the parts of the metric.
 #[derive(Debug)]
 pub struct Reduction {
     roles: Vec<Role>,
-    /// Weight of the total time in the metric.
     pub time: Q,
     /// Cost of each action: 1 if plans are measured by their number of steps, otherwise 0.
     pub step: Q,

@@ -55,7 +55,7 @@ struct Happening {
 }
 
 impl Happening {
-    /// Returns the start or the end of an action with a given duration. `None` if its effects conflict.
+    /// Returns `None` if the effects conflict.
     fn new(action: &Action, moment: Moment, duration: i64) -> Option<Self> {
         let mut happening = Self::default();
         for (_, condition) in action.conditions.iter().filter(|(at, _)| *at == moment) {

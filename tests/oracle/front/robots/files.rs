@@ -4,7 +4,6 @@ use std::fmt::Write as _;
 
 use super::{CHARGING, Design, FULL, Form, Robot, Situation};
 
-/// Actions of the explicit form that choose and replace designs.
 const CHANGES: &str = "(:derived (unset ?f - function) (not (exists (?d - functiondesign) (at_work ?d ?f))))
    (:action set :parameters (?f - function ?d - functiondesign)
       :precondition (and (unset ?f) (fd_solve_f ?d ?f) (fd_available ?d)) :effect (at_work ?d ?f))
