@@ -53,7 +53,6 @@ fn number(text: &str) -> Option<BigRational> {
     literal.as_rational()
 }
 
-/// Skips steps that a robot cannot report.
 fn apply_step(configurator: &mut Configurator, step: &Value) {
     let text = |key: &str| step[key].as_str().unwrap_or_default();
     match (text("op"), text("message")) {

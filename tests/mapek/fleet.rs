@@ -51,7 +51,6 @@ const PROBLEM: &str = "
 (define (problem fleet) (:domain suave) (:init) (:goal (inspected)) (:metric minimize (total-time)))
 ";
 
-/// Returns `None` without the real knowledge bases.
 pub fn files() -> Option<tempfile::TempDir> {
     let real = test_resources::data("real/owl")?;
     let directory = tempfile::tempdir().expect("a directory");

@@ -28,7 +28,6 @@ fn event(control: &mut Loop, event: &str, field: &str, number: u64) -> Vec<Answe
 
 const KINECT_FAILS: &str = r#"{"event":"component_status","component":"c_kinect","status":"FALSE"}"#;
 
-/// A report of progress that was in transit does not acknowledge a reconfiguration during the action.
 #[test]
 fn a_report_in_transit_acknowledges_nothing() {
     let mut ugv = control("ugv");
@@ -116,7 +115,6 @@ fn of_two_acknowledged_reconfigurations_the_later_one_counts() {
     }
 }
 
-/// For a robot without acknowledgements, the start of an action implies only the reconfigurations before its request.
 #[test]
 fn a_start_implies_earlier_reconfigurations_without_acknowledgements() {
     let mut ugv = control("ugv");

@@ -19,7 +19,6 @@ pub struct Design {
 
 pub struct Place {
     pub name: String,
-    /// A started loop that has not received any event.
     pub started: Loop,
     pub components: Vec<String>,
     /// Attributes with possible values: on and around their bounds, and beyond. Without any bounds, all measured
@@ -86,7 +85,6 @@ pub fn shipped() -> Vec<Place> {
     ["ugv", "uuv", "ugv_plain", "uuv_plain", "camara_like"].map(place).into()
 }
 
-/// Returns `None` without the public test data.
 pub fn suave() -> Option<Place> {
     let directory = crate::fleet::files()?;
     Some(Place::new("suave", &directory.path().join("m.toml"), Vec::new(), false))
@@ -112,7 +110,6 @@ const DOMAIN: &str = "(define (domain m) (:requirements :typing :fluents :durati
   (:durative-action work :parameters (?p - place) :duration (= ?duration (+ 2 (usage)))
     :condition (over all (robot_at ?p)) :effect (at end (done ?p))))";
 
-/// Returns a mission with random designs, bounds and dependencies, on a ring of places.
 pub fn generated(seed: u64) -> Place {
     let (directory, depends) = files(seed);
     Place::new(&format!("generated {seed}"), &directory.path().join("m.toml"), depends, true)

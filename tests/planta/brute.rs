@@ -339,7 +339,6 @@ impl Task {
         facts
     }
 
-    /// Returns `None` if there are more than `limit` states.
     pub fn explore(&self, limit: usize) -> Option<StateSpace> {
         let changed = self.changed_predicates();
         let fixed = self.initial.iter().filter(|(name, _)| !changed.contains(*name));

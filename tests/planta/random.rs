@@ -162,7 +162,6 @@ struct Comparison {
     least_steps: Option<usize>,
 }
 
-/// Returns `None` if there are too many states.
 fn compare(texts: &Texts, name: &str) -> Option<Comparison> {
     let directory = tempfile::tempdir().expect("a directory");
     let mission = texts.write(directory.path()).mission();
@@ -177,7 +176,6 @@ fn compare(texts: &Texts, name: &str) -> Option<Comparison> {
     Some(Comparison { least_steps: exported.least_steps })
 }
 
-/// Compares the first `tasks` sufficiently small tasks, with seeds from `seed` on.
 fn compare_many(seed: u64, tasks: usize) {
     let outcomes = (seed..).filter_map(|seed| compare(&texts(seed), &format!("seed {seed}")));
     let solvable = outcomes.take(tasks).filter(|comparison| comparison.least_steps.is_some()).count();

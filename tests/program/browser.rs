@@ -9,7 +9,6 @@ use test_resources::{Resource, program};
 use crate::common::{metaplan, metaplan_in, root};
 use crate::live::Run;
 
-/// Names of the Chromium executable, in order of preference.
 const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "chrome"];
 /// Screen widths in pixels: a desktop and a telephone.
 const WIDTHS: [u32; 2] = [1280, 400];

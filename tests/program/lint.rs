@@ -127,8 +127,6 @@ fn missing_and_negative_numbers_are_warnings() {
     );
 }
 
-/// If there is no plan, `plan` lists the missing numbers, and `explain` gives these numbers as the reason why
-/// an available design is not applicable.
 #[test]
 fn missing_numbers_are_listed_if_there_is_no_plan() {
     let directory = tempfile::tempdir().expect("a directory");

@@ -309,7 +309,6 @@ fn missions_with_optional_declarations_have_no_warnings() {
     }
 }
 
-/// Components can be objects as well. They then have two names.
 #[test]
 fn components_have_object_and_individual_names() {
     let copy = declared();
@@ -333,8 +332,6 @@ fn components_have_object_and_individual_names() {
     assert_eq!(outcome.status, 2, "{outcome:#?}");
 }
 
-/// A journal can be resumed only with the same name map. The position of the map in the manifest does not
-/// matter.
 #[test]
 fn journals_depend_on_the_name_map() {
     let copy = renamed(ENTRIES);

@@ -16,7 +16,6 @@ fn paper() -> Option<([String; 2], Vec<String>)> {
     Some(([file("domain"), file("problem")], options.collect()))
 }
 
-/// Name map from SUAVE's designs to the designs of the paper.
 const MAP: [(&str, &str); 4] = [
     ("fd_spiral_*", "fd_search_*"),
     ("fd_all_thrusters", "fd_maintain_motion"),

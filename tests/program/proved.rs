@@ -71,7 +71,6 @@ fn both_checkers_reject_a_worse_plan() {
     assert!(!outcome.stdout.contains("theorem     failed"), "{outcome:#?}");
 }
 
-/// Writes programs of the proved checker that run these lines of shell.
 fn stubs(prepare: &str, check: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, script) in [("metaplan-proved-prepare", prepare), ("metaplan-proved-check", check)] {
@@ -147,7 +146,6 @@ fn reason_without_a_theorem_is_printed() {
     assert!(outcome.status == 30 && outcome.stdout.ends_with(line), "{outcome:#?}");
 }
 
-/// The evidence reaches the second program, and the time limit ends the first one.
 #[test]
 #[cfg(unix)]
 fn programs_are_called_with_certificate_and_evidence() {

@@ -238,7 +238,6 @@ fn unreadable_documents_are_input_errors() {
     check(&run(&["convert", "absent.ttl", "--to", "turtle"], ""), 3, &["O101"]);
 }
 
-/// Control characters of a file are escaped, and its content cannot imitate a message.
 #[test]
 fn hostile_rule_files_are_escaped() {
     let directory = tempfile::tempdir().expect("a directory");

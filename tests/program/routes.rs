@@ -111,7 +111,6 @@ fn read(map: &str) -> (Graph, BTreeSet<String>) {
     (graph, measured_places)
 }
 
-/// Returns the minimum energy from each place to the goal, by solving the decision process.
 fn least_energy(mission: &Coadaptation) -> BTreeMap<usize, f64> {
     let process = Process::<f64>::new(mission, Risk::default(), &["energy"]);
     let explored = explore(&process, &Bounds::default()).expect("explored");

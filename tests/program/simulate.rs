@@ -171,8 +171,6 @@ fn simulate_lidar_outage(unit: &str, settle: u32) -> Vec<Value> {
     log.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect()
 }
 
-/// Times in the log are seconds, for every time unit of the domain. The setting `settle` is in seconds as
-/// well.
 #[test]
 fn clock_of_the_loop_is_in_seconds() {
     for (unit, second, settle) in [

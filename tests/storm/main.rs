@@ -57,7 +57,6 @@ for line in sys.stdin:
     print(json.dumps(out), flush=True)
 "#;
 
-/// Returns `None` if Storm is not installed.
 fn storm(questions: &[Value]) -> Option<Vec<Value>> {
     let python = python_with(Resource::Stormpy, "STORM_PYTHON", "stormpy")?;
     let mut child = Command::new(&python)

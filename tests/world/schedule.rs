@@ -273,7 +273,7 @@ impl<'a> Schedule<'a> {
     /// Returns the maximum number of steps for which the robot may move with a design that the delivered reports
     /// forbid. `None` while messages about designs may be lost, refused or late.
     fn bound(&self) -> Option<u64> {
-        // Two deadlines and one step each way: the effect is repeated once, and then abandoned.
+        // Two deadlines of 20 steps and a margin: the effect is repeated once, and then abandoned.
         let deadlines = 2 * 20 + 6;
         let is_reliable = self.faults.lost == 0
             && self.faults.refuses == 0
@@ -335,7 +335,6 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    /// Delivers a line or a timer to the loop, checks the reaction, and continues the deliberation.
     fn deliver(&mut self, line: &str) -> Result<(), String> {
         if line != Observation::TIMER {
             self.log(|| format!("loop hears {line}"));

@@ -54,7 +54,6 @@ impl<'g> Measures<'g> {
         State { atoms: atoms.clone(), numbers: numbers.clone(), time: Number::zero() }
     }
 
-    /// Returns `None` if a value is undefined.
     pub fn of(&self, state: &State, steps: i64) -> Option<Vec<Number>> {
         let results = self.values.iter().map(|measure| match measure {
             Measure::Expression(value) => number(value, state),

@@ -85,7 +85,6 @@ pub struct Grounder<'t> {
     ground: Ground,
 }
 
-/// Returns `None` if there are more than `max_instances` instances.
 pub fn ground(task: &Task, objectives: &[Expr], max_instances: usize) -> Option<Ground> {
     let mut grounder = Grounder {
         task,

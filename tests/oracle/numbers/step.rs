@@ -82,7 +82,6 @@ pub fn execute(instance: &Instance, state: &State) -> Option<State> {
     Some(after)
 }
 
-/// Returns `None` if a condition of an effect is undefined.
 fn active_acts<'a>(acts: &'a [Act], state: &State, active: &mut Vec<&'a Act>) -> Option<()> {
     for act in acts {
         if let Act::When(tests, inner) = act {

@@ -132,7 +132,6 @@ fn check_horizon(
     }
 }
 
-/// Returns two or three random objectives.
 pub fn objectives(puzzle: &Puzzle, rng: &mut Rng) -> Vec<Expr> {
     let task = &puzzle.task;
     let mut candidates: Vec<Expr> = Vec::new();

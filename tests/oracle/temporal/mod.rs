@@ -70,7 +70,6 @@ pub fn maximizes(task: &Task) -> bool {
     matches!(task.measure, Measure::Metric { maximize: true, .. })
 }
 
-/// Returns an executor of sequential plans, or of concurrent plans with the given separation.
 pub fn executor(world: World, unit: Option<Q>) -> Executor {
     Box::new(move |steps| {
         let plan = schedule_of(&world, steps)?;

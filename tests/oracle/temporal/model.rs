@@ -148,7 +148,6 @@ pub struct Task {
     pub measure: Measure,
 }
 
-/// Formats a number in PDDL syntax.
 pub fn number(value: Q) -> String {
     if value < q(0) { format!("(- {})", decimal(&big(-value))) } else { decimal(&big(value)) }
 }

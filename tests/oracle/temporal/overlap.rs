@@ -26,7 +26,6 @@ use crate::judge::Truth;
 
 const INTERFERES: Obstacle = Obstacle::Blocked("happenings that interfere are too close");
 
-/// Returns `None` for an instantaneous action.
 fn over_all(world: &World, instance: usize) -> Option<(&Condition, &[usize])> {
     let (action, objects) = &world.instances[instance];
     match &world.task.actions[*action].body {

@@ -55,7 +55,6 @@ struct Happening {
 }
 
 impl Happening {
-    /// Returns `None` if the effects conflict.
     fn new(action: &Action, moment: Moment, duration: i64) -> Option<Self> {
         let mut happening = Self::default();
         for (_, condition) in action.conditions.iter().filter(|(at, _)| *at == moment) {
