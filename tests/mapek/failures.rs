@@ -90,7 +90,6 @@ fn scenarios(robot: &Robot) -> Vec<(String, Simulation)> {
     scenarios
 }
 
-/// Returns a failure of components within a time interval, and optionally their common recovery.
 fn once(failing: &[&str], time: (f64, f64), recovery: Option<(f64, f64)>) -> Vec<Disturbance> {
     let disturbance = |at: f64, within: f64| Disturbance {
         at: Some(at),

@@ -138,7 +138,7 @@ impl Task {
         }
     }
 
-    /// Returns only plans that cost exactly `cost`.
+    /// Returns the plans with at most [`LENGTH`] steps that cost exactly `cost`.
     fn plans(&self, actions: &BTreeSet<usize>, cost: u32) -> Vec<Vec<usize>> {
         let (mut plans, mut open) = (Vec::new(), vec![(self.initial, 0, Vec::new())]);
         while let Some((state, paid, steps)) = open.pop() {

@@ -2,8 +2,8 @@
 //! replaced by decimals of 16 significant digits.
 //!
 //! The missions come from a script in the test data (needs python3). Distances are multiplied by
-//! square roots. The battery gets a decimal more, and other numbers are multiplied by decimals.
-//! Consumption does not grow, so a solvable mission remains solvable. The factors are close to 1,
+//! square roots. A decimal is added to the charge and the capacity of the battery. Other numbers
+//! are multiplied by decimals. Consumption does not grow, so a solvable mission remains solvable. The factors are close to 1,
 //! so that the same designs can be used.
 //!
 //! There are two variants. The factors in the domain (weights of the metric) remain integers, or

@@ -18,7 +18,6 @@ pub struct StateSpace {
     /// Transitions: state, action, next state. States are written with only the atoms that actions can
     /// change.
     pub steps: BTreeSet<(Text, Text, Text)>,
-    /// Length of a shortest plan, if there is a plan.
     pub least_steps: Option<usize>,
 }
 

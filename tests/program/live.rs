@@ -157,7 +157,6 @@ fn note(text: &str) -> String {
     json!({"event": "note", "text": text}).to_string()
 }
 
-/// Returns the loop's answers among the messages, without progress reports.
 fn answers_in(messages: &[Value]) -> Vec<&Value> {
     messages
         .iter()

@@ -18,7 +18,6 @@ type Graph = BTreeMap<String, Vec<(String, f64)>>;
 
 #[derive(Default)]
 struct Side {
-    /// Places whose distance is final.
     settled: BTreeSet<String>,
     distances: BTreeMap<String, f64>,
     routes: BTreeMap<String, Vec<String>>,

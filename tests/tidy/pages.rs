@@ -5,7 +5,6 @@ use std::path::{Component, Path, PathBuf};
 
 use pulldown_cmark::{Event, Options, Parser, Tag, TagEnd};
 
-/// Maximum number of lines of README. Details belong to the book.
 const README_LINES: usize = 200;
 
 const NO_PAGES: [&str; 3] = ["target", ".git", "node_modules"];

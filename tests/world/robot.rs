@@ -38,7 +38,6 @@ pub struct Robot {
     /// Reconfigurations that were refused since the last successful one. If the successful one failed after its
     /// acknowledgement, it is included, and so are those refused before it.
     pub refused: BTreeSet<u64>,
-    /// Reconfigurations that were refused before the last successful one.
     refused_before: BTreeSet<u64>,
     /// Answers to effects, reports of late failures, and reports of ended actions, kept for repetition.
     pub past_reports: Vec<Value>,

@@ -1,5 +1,5 @@
-//! Differential test of all front ends and compilations. A mission and its export by `export --to
-//! pddl` must have the same optimum, and a brute-force oracle must not refute it.
+//! Differential test of all front ends and compilations. A mission and its export by
+//! `export --to pddl` must have the same optimum, and a brute-force oracle must not refute it.
 //!
 //! Either the mission or its export is planned with the default thresholds, and the other with
 //! [`Thresholds::NONE`]. Without thresholds, tasks that are small enough for brute force also reach

@@ -68,9 +68,7 @@ pub enum Condition {
     All(Vec<Condition>),
     Any(Vec<Condition>),
     Imply(Box<Condition>, Box<Condition>),
-    /// Holds for each object of a type.
     Forall(usize, Box<Condition>),
-    /// Holds for some object of a type.
     Exists(usize, Box<Condition>),
 }
 
@@ -89,7 +87,6 @@ pub enum Effect {
     Delete(Atom),
     Change(Operation, Fluent, Expression),
     When(Condition, Vec<Effect>),
-    /// Effects for each object of a type.
     Forall(usize, Vec<Effect>),
 }
 

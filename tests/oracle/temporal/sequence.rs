@@ -36,7 +36,6 @@ type Clock = (Q, bool);
 /// irrelevant and set to 0.
 type Node = (State, usize, Clock);
 
-/// An action or a wait, which leads from one node to another.
 #[derive(Debug, Clone)]
 pub struct Edge {
     pub from: usize,
