@@ -3,8 +3,8 @@
 //!
 //! The missions come from a script in the test data (needs python3). Distances are multiplied by
 //! square roots. A decimal is added to the charge and the capacity of the battery. Other numbers
-//! are multiplied by decimals. Consumption does not grow, so a solvable mission remains solvable. The factors are close to 1,
-//! so that the same designs can be used.
+//! are multiplied by decimals. Consumption does not grow, so a solvable mission remains solvable.
+//! The factors are close to 1, so that the same designs can be used.
 //!
 //! There are two variants. The factors in the domain (weights of the metric) remain integers, or
 //! they become decimals as well. Products of three numbers of 16 digits exceed the planner's
