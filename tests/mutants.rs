@@ -18,7 +18,6 @@ use std::time::{Duration, Instant};
 
 use serde::Deserialize;
 
-/// Files and folders that are copied from the workspace.
 const COPIED_PATHS: [&str; 17] = [
     "Cargo.toml",
     "Cargo.lock",
@@ -58,7 +57,6 @@ enum Tests {
 /// default).
 type Oracle = (Tests, &'static str, u32);
 
-/// Files with lists of faults, each with the tests that must detect these faults.
 const SUITES: [(&str, &[Oracle]); 2] = [
     ("tests/oracle/mutants.toml", &ORACLES),
     ("tests/world/mutants.toml", &[(Tests::World, "violates", 1_000)]),
@@ -117,7 +115,7 @@ fn prune(from: &Path, to: &Path) {
     }
 }
 
-/// Copies a file or folder, except build results (`target`) and the files whose copies are in `faulty_files`.
+/// Copies a file or folder, except the files whose copies are in `faulty_files`.
 fn copy(from: &Path, to: &Path, faulty_files: &BTreeMap<PathBuf, String>) {
     if from.is_dir() {
         for entry in std::fs::read_dir(from).expect("a directory") {
@@ -216,7 +214,7 @@ fn compile_tests(home: &Path, tests: Tests) -> PathBuf {
     program.expect("a program")
 }
 
-/// Returns `true` if the tests of an oracle pass with one fault switched on; fault 0 means no fault.
+/// Fault 0 means no fault.
 fn passes(
     programs: &[(Tests, PathBuf)],
     home: &Path,

@@ -74,8 +74,6 @@ fn plans_have_the_arguments_of_the_plain_domain() {
     assert!(shipped("ugv", &|_| {}).adaptation().is_none());
 }
 
-/// A random mission in both forms: a map with contexts, functions with designs, quality bounds, a battery,
-/// and costs of design changes.
 struct Generated {
     knowledge: String,
     explicit: String,

@@ -33,7 +33,7 @@ t:fg a t:FunctionGrounding ; t:solvesO t:o ; t:typeFD s:fd_all_thrusters .
 s:c_thruster_1 t:c_status \"FALSE\" .
 ";
 
-/// Wall and processor time in milliseconds.
+/// In milliseconds.
 #[derive(Clone, Copy, Debug)]
 struct Times {
     wall: f64,
@@ -42,12 +42,10 @@ struct Times {
 
 struct Peer {
     class_path: String,
-    /// Directory of the real knowledge bases.
     owl: PathBuf,
 }
 
 impl Peer {
-    /// Finds Pellet and the test data. Returns `None` if something is missing.
     fn find() -> Option<Self> {
         let owl = data("real/owl")?;
         program(Resource::Java, &["java"])?;

@@ -6,7 +6,6 @@ use std::fmt::Write as _;
 use metaplan::schemas::{FORMATS, schema};
 use serde_json::{Map, Value};
 
-/// Returns the tables of fields for all output formats.
 pub fn answers() -> String {
     let mut text = String::new();
     for (name, about, _) in FORMATS {
@@ -41,12 +40,10 @@ pub fn answers() -> String {
     text
 }
 
-/// Returns the table of all keys of a manifest.
 pub fn manifest() -> String {
     keys("manifest")
 }
 
-/// Returns the table of all keys of a study.
 pub fn study() -> String {
     keys("study")
 }
@@ -67,7 +64,6 @@ struct Row {
     default: String,
 }
 
-/// Builder of the rows of a table of fields, in the order of the schema.
 struct Table<'a> {
     definitions: &'a Value,
     format: &'a str,

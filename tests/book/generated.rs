@@ -24,7 +24,6 @@ const PARTS: [Part; 8] = [
     ("docs/reference/tomasys.md", "values", || terms("owl:DatatypeProperty")),
 ];
 
-/// Returns one test per generated part, and one for the picture of the tutorial.
 pub fn trials() -> Vec<Trial> {
     let mut trials: Vec<Trial> = PARTS
         .into_iter()
@@ -93,7 +92,6 @@ fn codes() -> String {
     text
 }
 
-/// Returns the table of the classes or properties (`kind`) of the TOMASys metamodel, with their descriptions.
 fn terms(kind: &str) -> String {
     let metamodel = std::fs::read_to_string(root().join("ontology/kb/tomasys.ttl")).expect("the metamodel");
     let is_property = kind != "owl:Class";

@@ -7,13 +7,11 @@ use crate::common::metaplan;
 /// Options that all commands have. The page describes them only once.
 const COMMON: [&str; 4] = ["--format", "-q, --quiet", "-v, --verbose", "-h, --help"];
 
-/// An argument or option of a command (`head`), with its description.
 struct Entry {
     head: String,
     text: String,
 }
 
-/// Returns the sections for all commands, with tables of their arguments and options.
 pub fn commands() -> String {
     let mut text = String::new();
     for (name, _) in subcommands(&help(&[])) {
@@ -35,7 +33,6 @@ fn help(command: &[&str]) -> String {
     outcome.stdout
 }
 
-/// Returns the names and descriptions of the commands in a help text, except `help`.
 fn subcommands(help: &str) -> Vec<(String, String)> {
     let Some((_, command_lines)) = help.split_once("\nCommands:\n") else { return Vec::new() };
     let lines = command_lines.lines().take_while(|line| !line.is_empty());

@@ -59,8 +59,6 @@ fn main() -> ExitCode {
     libtest_mimic::run(&arguments, trials).exit_code()
 }
 
-/// Returns the paths of the README, the pages of the book, and the pages of other packages whose programs are
-/// built with these tests.
 fn pages() -> Vec<String> {
     let mut pages = vec!["README.md".to_owned(), "crates/verify/README.md".to_owned()];
     let mut folders = vec![PathBuf::from("docs")];
@@ -79,8 +77,7 @@ fn pages() -> Vec<String> {
     pages
 }
 
-/// Runs the pages that `docs/SUMMARY.md` lists, in order, in one copy of the project, as a reader of the
-/// whole book would.
+/// Runs the listed pages in order in one copy of the project, as a reader of the whole book would.
 fn pages_in_one_clone() -> Result<(), Failed> {
     let summary = std::fs::read_to_string(root().join("docs/SUMMARY.md")).expect("the summary");
     let links = summary.lines().filter_map(|line| line.split_once("](")?.1.split_once(')'));
@@ -118,8 +115,7 @@ impl Page {
         self.blocks.iter().any(Block::has_commands)
     }
 
-    /// Creates the test of this page. The kind of the test, which the runner prints, lists missing programs
-    /// and fixtures.
+    /// The kind of the test, which the runner prints, lists missing programs and fixtures.
     fn trial(self) -> Trial {
         let mut missing: Vec<String> = self.blocks.iter().flat_map(Block::missing).collect();
         missing.sort();

@@ -3,7 +3,6 @@
 use pulldown_cmark::{CodeBlockKind, Event, Options, Parser, Tag, TagEnd};
 use test_resources::{Resource, data_path, in_path};
 
-/// Kind of a block, which determines how the block is checked.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Kind {
     Console,
@@ -23,7 +22,7 @@ pub struct Block {
     pub text: String,
     /// Programs and fixtures that the block needs; without them the block is not run.
     pub needs: Vec<String>,
-    /// Number of seconds for which the standard input of the last command stays open.
+    /// Seconds for which the standard input of the last command stays open.
     pub input_ends_after: Option<u32>,
 }
 
@@ -32,12 +31,10 @@ impl Block {
         matches!(self.kind, Kind::Console | Kind::Script)
     }
 
-    /// Returns `true` if this machine can run the block.
     pub fn is_run(&self) -> bool {
         self.has_commands() && self.missing().next().is_none()
     }
 
-    /// Programs and fixtures that the block needs but this machine lacks.
     pub fn missing(&self) -> impl Iterator<Item = String> {
         self.needs.iter().filter(|name| !is_available(name)).cloned()
     }
@@ -69,7 +66,6 @@ fn is_available(name: &str) -> bool {
     }
 }
 
-/// Returns the resource that contains a program or fixture.
 pub fn resource(name: &str) -> Resource {
     if FIXTURES.iter().any(|fixture| fixture.name == name) {
         return Resource::PublicData;
@@ -101,7 +97,6 @@ pub fn blocks(page: &str) -> Vec<Block> {
     blocks
 }
 
-/// Creates an empty block at `line` from its fence and the comment before it.
 fn block(line: usize, fence: &str, comment: &str) -> Block {
     let mark = |name: &str| {
         let argument = comment.trim().strip_prefix("<!--")?.trim_start().strip_prefix(name)?;

@@ -27,7 +27,6 @@ struct Step {
     shown: String,
 }
 
-/// Result of running a block.
 pub struct Outcome {
     /// Text of the block with the actual output of its commands.
     pub text: String,
@@ -35,7 +34,6 @@ pub struct Outcome {
 }
 
 impl Session {
-    /// Returns `true` if this machine has a Unix shell.
     pub fn is_possible() -> bool {
         cfg!(unix) && Command::new("sh").args(["-c", "true"]).status().is_ok()
     }
@@ -52,7 +50,6 @@ impl Session {
         Self { directory, path: folders.join(":") }
     }
 
-    /// Runs blocks in order. Returns an outcome per block.
     pub fn run(&self, blocks: &[&Block]) -> Vec<Outcome> {
         for fixture in FIXTURES
             .iter()
@@ -108,8 +105,7 @@ impl Session {
     }
 }
 
-/// Compares a block with the results of its commands. Takes one result, output and status, per command from
-/// the iterator.
+/// Takes one result, output and status, per command from the iterator.
 fn compare<'a>(block: &Block, steps: &[Step], results: &mut impl Iterator<Item = (&'a str, i32)>) -> Outcome {
     let (mut text, mut faults) = (String::new(), Vec::new());
     if steps.is_empty() {

@@ -15,7 +15,7 @@ pub fn control(name: &str) -> Loop {
     Loop::new(mission, settings).expect("the mission can be planned for")
 }
 
-/// Delivers an event line 100 ms after the previous line and returns the answers.
+/// Delivers an event line 100 ms after the previous line.
 pub fn feed(control: &mut Loop, line: &str) -> Vec<Answer> {
     let now = control.beliefs().now() + Duration::from_millis(100);
     control.handle(&Observation::parse(line), now)

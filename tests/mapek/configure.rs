@@ -53,7 +53,6 @@ fn number(text: &str) -> Option<BigRational> {
     literal.as_rational()
 }
 
-/// Applies a recorded step of a run. Skips steps that a robot cannot report.
 fn apply_step(configurator: &mut Configurator, step: &Value) {
     let text = |key: &str| step[key].as_str().unwrap_or_default();
     match (text("op"), text("message")) {
@@ -148,8 +147,8 @@ fn choices_equal_those_of_mros_except_for_listed_differences() {
     assert_eq!(cycles, 80);
 }
 
-/// Knowledge base with two functions. Their best designs both use the arm, and together exceed the energy
-/// budget.
+/// Knowledge base with two functions. Their best designs both use the arm, and together need 9
+/// units of energy.
 pub const ROBOT: &str = r"
 @prefix t: <http://metacontrol.org/tomasys#> .
 @prefix owl: <http://www.w3.org/2002/07/owl#> .
@@ -172,7 +171,6 @@ pub fn robot() -> Knowledge {
     robot_with("")
 }
 
-/// Reads [`ROBOT`] with additional statements.
 pub fn robot_with(statements: &str) -> Knowledge {
     let directory = tempfile::tempdir().expect("a directory");
     let file = directory.path().join("robot.ttl");

@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use crate::common::{control, feed};
 
-/// Formats an answer briefly, without reasons; `None` for irrelevant answers.
+/// Returns `None` for irrelevant answers.
 fn words(answer: &Answer) -> Option<String> {
     Some(match answer {
         Answer::Inferred { designs, objectives } => {
@@ -39,8 +39,7 @@ fn words(answer: &Answer) -> Option<String> {
     })
 }
 
-/// Delivers lines to a loop and compares the answers with the expected ones. The line `start` starts the
-/// loop.
+/// The line `start` starts the loop.
 fn check(control: &mut Loop, script: &[(&str, &[&str])]) {
     for (line, expected) in script {
         let answers = if *line == "start" { control.start() } else { feed(control, line) };
@@ -186,7 +185,6 @@ fn the_battery_of_the_uuv_drops() {
     );
 }
 
-/// An action that has reported full progress but has not ended is not cancelled.
 #[test]
 fn an_action_with_full_progress_is_not_cancelled() {
     for (mission, change) in [
@@ -344,7 +342,7 @@ fn the_goal_changes_and_actions_fail() {
         let answers = feed(&mut ugv, &format!(r#"{{"event":"action_failed","action":{action}}}"#));
         assert!(answers.iter().any(|answer| answer.effect().is_some()), "{answers:?}");
     }
-    // After three consecutive failures planning pauses. It is tried again after a change of the situation.
+    // After three consecutive failures, planning pauses until the situation changes.
     check(
         &mut ugv,
         &[(r#"{"event":"action_failed","action":4}"#, &["no plan: failed"]), (r#"{"event":"tick"}"#, &[])],

@@ -90,7 +90,6 @@ fn scenarios(robot: &Robot) -> Vec<(String, Simulation)> {
     scenarios
 }
 
-/// Returns a failure of components within a time interval, and optionally their common recovery.
 fn once(failing: &[&str], time: (f64, f64), recovery: Option<(f64, f64)>) -> Vec<Disturbance> {
     let disturbance = |at: f64, within: f64| Disturbance {
         at: Some(at),
@@ -124,8 +123,7 @@ struct Comparison {
     worse: Vec<u64>,
 }
 
-/// Simulates a scenario with all strategies for the given number of seeds. Returns the figures of the loop,
-/// and its comparison with each other strategy.
+/// Returns the figures of the loop, and its comparison with each other strategy.
 fn play(setup: &Setup, settings: &Simulation, seeds: u64) -> (String, Vec<Comparison>) {
     let (mission, control) = (setup.mission.clone(), setup.settings.clone());
     let experiment = Experiment::new(mission, control, settings.clone(), setup.time_unit);
@@ -166,8 +164,7 @@ fn mean_cost_and_count(runs: &[Run]) -> String {
     format!("{:.2} ({})", done.iter().sum::<f64>() / done.len() as f64, done.len())
 }
 
-/// Simulates all scenarios of a robot and prints a table. For each other strategy, returns the numbers of
-/// missions in which the loop is better and worse.
+/// For each other strategy, returns the numbers of missions in which the loop is better and worse.
 fn table(robot: &Robot, seeds: u64) -> BTreeMap<&'static str, (usize, usize)> {
     let setup = setup(robot);
     let mut total: BTreeMap<&str, (usize, usize)> = BTreeMap::new();

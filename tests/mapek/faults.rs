@@ -49,8 +49,8 @@ enum Outcome {
     Sound(Value, Vec<Answer>),
 }
 
-/// Creates a temporary directory, in memory if possible. The tests open hundreds of thousands of journals and
-/// flush each to disk.
+/// Creates a temporary directory, in memory if possible. The tests open hundreds of thousands of
+/// journals and flush each to disk.
 pub fn temporary_directory() -> tempfile::TempDir {
     let memory = Path::new("/dev/shm");
     let in_memory = memory.is_dir().then(|| tempfile::tempdir_in(memory).ok()).flatten();

@@ -23,7 +23,6 @@ domain = "domain.pddl"
 problem = "problem.pddl"
 "#;
 
-/// Rule that makes a design unrealisable if the measured visibility is below the design's estimate.
 const RULES: &str = r"
 @prefix t: <http://metacontrol.org/tomasys#> .
 @prefix s: <http://www.metacontrol.org/suave#> .
@@ -52,8 +51,6 @@ const PROBLEM: &str = "
 (define (problem fleet) (:domain suave) (:init) (:goal (inspected)) (:metric minimize (total-time)))
 ";
 
-/// Returns a directory with the files of the mission and the manifest `m.toml`. `None` if the real knowledge
-/// bases are absent.
 pub fn files() -> Option<tempfile::TempDir> {
     let real = test_resources::data("real/owl")?;
     let directory = tempfile::tempdir().expect("a directory");
@@ -84,8 +81,6 @@ fn measurement(robot: usize, round: usize) -> Observation {
     Observation::parse(&format!(r#"{{"event":"measured","attribute":"water_visibility","value":{value}}}"#))
 }
 
-/// Delivers a measurement to every robot in each round. Returns all reaction times and the number of
-/// reconfigurations.
 fn feed(fleet: &mut [Loop], rounds: std::ops::Range<usize>) -> (Vec<Duration>, usize) {
     let (mut times, mut reconfigurations) = (Vec::new(), 0);
     for round in rounds {

@@ -63,7 +63,6 @@ const INVALID: [&str; 14] = [
     r#"{"event":"tick","extra":1}"#,
 ];
 
-/// Generator of random events.
 pub struct Fuzz {
     pub world: &'static World,
     pub random: fastrand::Rng,
@@ -82,14 +81,13 @@ impl Fuzz {
         Self { world, random, compare_every: 10, pristine: control(world.mission) }
     }
 
-    /// Creates a loop and starts it.
     pub fn begin(&self) -> Loop {
         let mut control = self.pristine.clone();
         control.start();
         control
     }
 
-    /// Generates the next line. The flag is `true` if the line is valid.
+    /// The flag is `true` if the line is valid.
     pub fn next(&mut self, control: &Loop) -> (String, bool) {
         let random = &mut self.random;
         if random.u32(..10) == 0 {
@@ -148,7 +146,6 @@ impl Fuzz {
     }
 }
 
-/// Delivers `count` random lines to a new loop and checks the invariants after each line. Returns the loop.
 pub fn run(world: &'static World, seed: u64, count: usize) -> Loop {
     let mut fuzz = Fuzz::new(world, seed);
     let mut loop_ = fuzz.begin();
@@ -158,7 +155,6 @@ pub fn run(world: &'static World, seed: u64, count: usize) -> Loop {
     loop_
 }
 
-/// Delivers one random line and checks the invariants. Returns the answers.
 pub fn step(control: &mut Loop, fuzz: &mut Fuzz, number: usize) -> Vec<Answer> {
     let (line, valid) = fuzz.next(control);
     let before = (!valid).then(|| without_counters(control));

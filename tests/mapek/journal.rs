@@ -1,5 +1,6 @@
-//! Tests of the journal within one process: after a cut at any byte, the loop is restored, and no
-//! acknowledged effect is repeated. Damaged journals and journals of another mission are refused.
+//! Tests of the journal within one process: after a cut at any byte of the last two lines, the loop
+//! is restored, and no acknowledged effect is repeated. Damaged journals and journals of another
+//! mission are refused.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -12,7 +13,7 @@ use crate::common::control;
 
 pub const POLICY: Policy = Policy { sync: Sync::Never, snapshot_every: 7 };
 
-/// Returns the reports of a robot during the UGV mission, with every kind of event.
+/// Returns the reports of a robot during the UGV mission. One of them is invalid.
 pub fn script() -> Vec<String> {
     let events = [
         r#""event":"action_started","action":1"#,
@@ -77,7 +78,6 @@ fn numbered(events: &[&str]) -> Vec<String> {
     events.iter().enumerate().map(line).collect()
 }
 
-/// Effects that the robot has received from the loop, by number.
 #[derive(Debug, Default, PartialEq)]
 pub struct Robot {
     pub effects: BTreeMap<u64, Effect>,
@@ -128,8 +128,6 @@ pub fn state(control: &Loop) -> serde_json::Value {
     state
 }
 
-/// Runs the script without a disturbance. Returns the final state, the robot with its effects, and the
-/// directory of the journal.
 fn undisturbed(pristine: &Loop) -> (serde_json::Value, Robot, tempfile::TempDir) {
     let directory = tempfile::tempdir().expect("a directory");
     let (mut journal, mut control, _, answers) = open(directory.path(), pristine);

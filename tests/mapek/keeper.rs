@@ -28,7 +28,7 @@ fn keeper() -> Keeper {
     keeper_of(robot(), Wishes::default())
 }
 
-/// Returns random lines with sequence numbers and times. Some are invalid, and some are repeated.
+/// Returns random lines with sequence numbers and times. Some are invalid.
 fn script(seed: u64, length: usize) -> Vec<String> {
     let mut random = fastrand::Rng::with_seed(seed);
     let mut pick = |words: &[&str]| words[random.usize(..words.len())].to_owned();
@@ -229,7 +229,6 @@ impl Program {
         writeln!(self.stdin, "{line}").expect("a pipe");
     }
 
-    /// Returns the answers up to `handled`, without line numbers.
     fn answers(&self) -> Vec<Value> {
         let mut answers = Vec::new();
         loop {

@@ -74,7 +74,6 @@ impl Program {
     }
 }
 
-/// Effects that the robot has received from the program, and the final state of the program.
 #[derive(Debug, Default, PartialEq)]
 struct Robot {
     effects: BTreeMap<u64, Value>,
@@ -100,7 +99,6 @@ impl Robot {
         }
     }
 
-    /// Sends all further lines, waits for the end of the program, and reads the state from its journal.
     fn finish(&mut self, mut program: Program, story: &Story, journal: &Path) {
         self.send_lines(&mut program, story, usize::MAX);
         drop(program.stdin);

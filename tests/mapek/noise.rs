@@ -1,5 +1,5 @@
-//! Tests of noisy sensors and components, with the settings of shipped missions and with filters from a
-//! manifest.
+//! Tests of noisy sensors and components, with the settings of the UGV mission and with filters
+//! from a manifest.
 
 use std::path::Path;
 use std::time::Duration;

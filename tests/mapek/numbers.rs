@@ -14,7 +14,7 @@ fn ugv() -> Loop {
     control
 }
 
-/// Delivers a line and checks whether it is accepted (`None`), a duplicate, stale, or an error with a code.
+/// `expected` is `None` for an accepted line.
 fn check(control: &mut Loop, line: &str, expected: Option<&str>) {
     let kind = |answer: &Answer| match answer {
         Answer::Duplicate { .. } => Some("duplicate".to_owned()),
@@ -70,8 +70,6 @@ fn very_many_gaps_make_old_numbers_stale() {
     check(&mut ugv, r#"{"event":"tick","seq":607}"#, None);
 }
 
-/// Reports a failure of the Kinect for even `number` and its recovery for odd `number`. Nothing is
-/// acknowledged.
 fn flap(control: &mut Loop, number: u64) {
     let status = if number.is_multiple_of(2) { "FALSE" } else { "TRUE" };
     feed(

@@ -60,7 +60,7 @@ fn suspension_can_be_preferred() {
     let answers = ugv.deliberate();
     let effects: Vec<String> = kinds(&answers).into_iter().filter(|kind| kind.contains("re")).collect();
     assert_eq!(effects, ["plan_requested", "reconfigure", "inferred", "resume_action"]);
-    // An action whose design recovers before the decision continues unchanged.
+    // An action whose design recovers before the decision is resumed.
     let mut ugv = with(|settings| settings.with_safe_reaction(SafeReaction::Suspend));
     react(&mut ugv, &status("c_kinect", "FALSE"));
     react(&mut ugv, &status("c_kinect", "OK"));

@@ -28,7 +28,6 @@ fn event(control: &mut Loop, event: &str, field: &str, number: u64) -> Vec<Answe
 
 const KINECT_FAILS: &str = r#"{"event":"component_status","component":"c_kinect","status":"FALSE"}"#;
 
-/// A report of progress that was in transit does not acknowledge a reconfiguration during the action.
 #[test]
 fn a_report_in_transit_acknowledges_nothing() {
     let mut ugv = control("ugv");
@@ -116,7 +115,6 @@ fn of_two_acknowledged_reconfigurations_the_later_one_counts() {
     }
 }
 
-/// For a robot without acknowledgements, the start of an action implies only the reconfigurations before its request.
 #[test]
 fn a_start_implies_earlier_reconfigurations_without_acknowledgements() {
     let mut ugv = control("ugv");
@@ -181,12 +179,10 @@ fn react(ugv: &mut Loop, line: &str) -> Vec<Answer> {
     ugv.react(&metaplan::mapek::Observation::parse(line), now)
 }
 
-/// Delivers the failure of a reconfiguration without checking the reaction.
 fn fail_quietly(ugv: &mut Loop, effect: u64) {
     react(ugv, &format!(r#"{{"event":"reconfiguration_failed","effect":{effect}}}"#));
 }
 
-/// The loop implements the table of states and messages in `docs/reference/events.md`.
 #[test]
 fn the_loop_implements_the_documented_table() {
     let page = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/reference/events.md");
@@ -235,7 +231,6 @@ fn the_loop_implements_the_documented_table() {
     assert_eq!(count, 16);
 }
 
-/// Returns `true` if the lidar design was reported as unrealisable.
 fn lidar_refused(ugv: &Loop) -> bool {
     let snapshot = ugv.snapshot().0;
     let added = snapshot["added"].as_array().expect("statements");

@@ -47,7 +47,6 @@ fn faults(answers: &[Answer]) -> Vec<Option<String>> {
     answers.iter().filter_map(fault).collect()
 }
 
-/// Asserts that the only effects are suspensions and cancellations, and that no line is refused.
 fn nothing_begins(answers: &[Answer]) {
     for effect in answers.iter().filter_map(Answer::effect) {
         let stops = matches!(effect.command, Command::Suspend { .. } | Command::Cancel { .. });

@@ -167,7 +167,7 @@ const BRIGHT: &str = r#"{"event":"measured","attribute":"ambient_light","value":
 #[ignore = "measures; only a release build is of interest"]
 fn lines_a_second() {
     let pristine = control("ugv");
-    // For profiles of one row.
+    // `METAPLAN_RATE` selects rows, for example for a profile.
     let subject = std::env::var("METAPLAN_RATE").unwrap_or_default();
     for rate in RATES.iter().filter(|rate| rate.subject.contains(&subject)) {
         for (place, with_journal) in [false, true].into_iter().enumerate() {

@@ -9,7 +9,6 @@ use metaplan::mapek::{Loop, Settings};
 use metaplan::setup::Setup;
 use num_rational::BigRational;
 
-/// Requirements of a design according to the knowledge base.
 #[derive(Debug, Clone)]
 pub struct Design {
     pub name: String,
@@ -18,10 +17,8 @@ pub struct Design {
     pub bounds: Vec<(String, Option<BigRational>, Option<BigRational>)>,
 }
 
-/// A mission with the possible reports of its robot.
 pub struct Place {
     pub name: String,
-    /// A started loop that has not received any event.
     pub started: Loop,
     pub components: Vec<String>,
     /// Attributes with possible values: on and around their bounds, and beyond. Without any bounds, all measured
@@ -88,7 +85,6 @@ pub fn shipped() -> Vec<Place> {
     ["ugv", "uuv", "ugv_plain", "uuv_plain", "camara_like"].map(place).into()
 }
 
-/// Returns the mission with SUAVE's own knowledge base; `None` without the public test data.
 pub fn suave() -> Option<Place> {
     let directory = crate::fleet::files()?;
     Some(Place::new("suave", &directory.path().join("m.toml"), Vec::new(), false))
@@ -114,19 +110,16 @@ const DOMAIN: &str = "(define (domain m) (:requirements :typing :fluents :durati
   (:durative-action work :parameters (?p - place) :duration (= ?duration (+ 2 (usage)))
     :condition (over all (robot_at ?p)) :effect (at end (done ?p))))";
 
-/// Returns a mission with random designs, bounds and dependencies, on a ring of places.
 pub fn generated(seed: u64) -> Place {
     let (directory, depends) = files(seed);
     Place::new(&format!("generated {seed}"), &directory.path().join("m.toml"), depends, true)
 }
 
-/// Returns a directory with the files of a generated mission, including the manifest `m.toml`.
 pub fn own_files(seed: u64) -> tempfile::TempDir {
     files(seed).0
 }
 
-/// Writes the files of a generated mission. Returns their directory, and pairs of a component and a component
-/// that it depends on.
+/// Returns the directory, and pairs of a component and a component that it depends on.
 fn files(seed: u64) -> (tempfile::TempDir, Vec<(String, String)>) {
     let mut random = Rng::with_seed(seed);
     let (functions, components) = (random.usize(1..=2), random.usize(3..=5));

@@ -15,7 +15,6 @@ use crate::judge::{read, setting};
 const FACTS: usize = 5;
 const LENGTH: usize = 5;
 
-/// State as the bit set of the facts that hold.
 type State = u32;
 
 /// Pair of bit sets of facts: required and forbidden facts of a condition, or added and deleted facts of an
@@ -139,7 +138,7 @@ impl Task {
         }
     }
 
-    /// Returns all plans with at most [`LENGTH`] steps from `actions` that cost exactly `cost`.
+    /// Returns the plans with at most [`LENGTH`] steps that cost exactly `cost`.
     fn plans(&self, actions: &BTreeSet<usize>, cost: u32) -> Vec<Vec<usize>> {
         let (mut plans, mut open) = (Vec::new(), vec![(self.initial, 0, Vec::new())]);
         while let Some((state, paid, steps)) = open.pop() {
@@ -160,8 +159,8 @@ impl Task {
     }
 }
 
-/// Compares the reported alternatives with the enumeration. Returns `true` if the report claims to be
-/// complete, and `None` if the planner did not prove an optimum.
+/// Compares the reported alternatives with the enumeration. Returns `true` if the report claims to
+/// be complete, and `None` if there is no report.
 fn check(seed: u64) -> Option<bool> {
     let task = Task::new(seed);
     let (domain, problem) = task.files();

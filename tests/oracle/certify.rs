@@ -13,7 +13,6 @@ pub enum Planned {
     Exact(Box<ExactTask>),
 }
 
-/// Removes the parts of a message in parentheses, which contain names of the task.
 fn without_names(message: &str) -> String {
     let mut depth = 0_usize;
     let mut outside = String::new();
@@ -28,8 +27,9 @@ fn without_names(message: &str) -> String {
     outside
 }
 
-/// Writes a certificate for a claim of optimality or unsolvability. Asserts that verification succeeds if the
-/// claim is true and fails otherwise.
+/// Writes and verifies a certificate for a claim of optimality or unsolvability. Verification must
+/// fail if the oracle refutes the claim, and succeed otherwise. Exceeded limits, and claims without
+/// a certificate, are only counted.
 pub fn check(
     case: &Case,
     (mission, problem): (&Mission, &Problem),

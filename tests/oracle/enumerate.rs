@@ -68,7 +68,6 @@ fn times(world: &World, durations: &[Q]) -> Vec<Q> {
     borders
 }
 
-/// Returns the duration of an instance in the initial state; `None` if the duration is undefined or negative.
 fn duration(world: &World, instance: usize) -> Option<Q> {
     let (action, objects) = &world.instances[instance];
     match &world.task.actions[*action].body {
@@ -125,8 +124,7 @@ impl Enumeration<'_> {
         Some(executed)
     }
 
-    /// Executes the extensions of a plan by up to `steps` further actions, in random order. Ends when the
-    /// limit on the number of plans is reached or a disagreement was found.
+    /// Ends when the limit on the number of plans is reached or a disagreement was found.
     fn extend(&mut self, plan: &Schedule, steps: usize) {
         let clock = plan.last().map_or(q(0), |(_, start, length)| start + length);
         let mut candidates: Vec<(usize, Q, Q)> = Vec::new();

@@ -97,7 +97,6 @@ fn b1_conditional_start_conflict() {
     }
 }
 
-/// Every pair of numeric effects, at the start and at the end. Some pairs conflict.
 #[test]
 fn b1_all_pairs() {
     let effects =
@@ -118,7 +117,6 @@ fn b1_all_pairs() {
     }
 }
 
-/// An operand is undefined in a conditional effect whose condition does not hold.
 #[test]
 fn b1_undefined_operand() {
     let domain = "(define (domain d) (:requirements :adl :fluents :durative-actions)
@@ -256,7 +254,6 @@ fn one_action(functions: &str, condition: &str, values: &str) -> (String, String
     (domain, format!("(define (problem p) (:domain d) (:init {values}) (:goal (done)))"))
 }
 
-/// Conditions contain products of decimals with many digits.
 #[test]
 fn n1_products() {
     let cases = [
@@ -277,7 +274,6 @@ fn n1_products() {
     }
 }
 
-/// A cheap action has a product of decimals as its condition; the alternative is costly.
 #[test]
 fn n1_cheap_and_dear() {
     let domain = "(define (domain d) (:requirements :fluents) (:predicates (done)) (:functions (total-cost) (a) (b) (c))
@@ -387,7 +383,6 @@ fn a_function_has_one_design_at_a_time() {
     check("designs-together", (domain, &problem("d1")), together);
 }
 
-/// A linear condition has coefficients of 10^18.
 #[test]
 fn n2_coefficients() {
     let domain = "(define (domain d) (:requirements :fluents) (:predicates (done) (ready)) (:functions (x) (y) (z))

@@ -57,14 +57,13 @@ pub struct Case {
     pub domain: String,
     pub problem: String,
     pub mode: Mode,
-    /// `true` if larger values are better.
     pub maximize: bool,
     pub truth: Truth,
     pub execute: Executor,
     /// Whether a certificate is written and verified, in sequential mode only.
     pub certify: bool,
     pub limit: Duration,
-    /// Time limit of the second run, in which the search uses all its parts from the start.
+    /// Time limit of the second run, which has no thresholds.
     pub second_limit: Duration,
 }
 
@@ -73,7 +72,6 @@ pub const SHORT: Duration = Duration::from_millis(300);
 
 #[derive(Debug)]
 pub struct Failure {
-    /// Short description of the kind of contradiction, by which failures are counted.
     pub kind: &'static str,
     pub text: String,
 }
@@ -83,9 +81,7 @@ pub struct Tally {
     pub tasks: usize,
     pub counts: BTreeMap<String, usize>,
     pub failures: Vec<Failure>,
-    /// Total time of planning.
     pub planning: Duration,
-    /// Total time of writing and verifying certificates.
     pub certificates: Duration,
 }
 
@@ -100,7 +96,7 @@ struct Solved {
     solution: Solution,
     /// Whether plans without a metric are measured by their total time.
     timed: bool,
-    /// The ground task, if a certificate is to be written.
+    /// The ground task of a sequential run with the default thresholds, for a certificate.
     task: Option<Planned>,
 }
 
@@ -158,8 +154,7 @@ pub fn plan_text(steps: &[Step]) -> PlanText {
     PlanText { steps: steps.iter().map(step).collect() }
 }
 
-/// Returns the validator's options for a mode. Sequential plans are checked without tolerance, because their
-/// times are exact.
+/// Sequential plans are checked without tolerance, because their times are exact.
 pub fn options(mode: &Mode) -> Options {
     match mode {
         Mode::Sequential => Options::default().with_tolerance(BigRational::zero()),
@@ -181,8 +176,7 @@ pub fn read(domain: &str, problem: &str) -> Result<(Mission, Problem), Errors> {
     Ok((mission, problem))
 }
 
-/// Returns planner settings. The head start of the search varies with the name of the task, so that all
-/// engines are used.
+/// The head start of the search varies with the name of the task, so that all engines are used.
 fn config(name: &str, limits: Limits, thresholds: Thresholds) -> Config {
     let sum: usize = name.bytes().map(usize::from).sum();
     let config = Config::default().with_limits(limits);
@@ -245,8 +239,7 @@ impl Tally {
         *self.counts.entry(key.into()).or_default() += 1;
     }
 
-    /// Records a failure. Saves the files of the task to the directory `ORACLE_SAVE`, if this variable is
-    /// set.
+    /// Saves the files of the task to the directory `ORACLE_SAVE`, if this variable is set.
     pub fn fail(&mut self, case: &Case, kind: &'static str, reason: &str) {
         let Case { name, domain, problem, mode, truth, .. } = case;
         let mode = match mode {
@@ -287,7 +280,6 @@ impl Tally {
         text
     }
 
-    /// Ends a test: prints the summary and panics with the first five failures, if any.
     #[allow(clippy::print_stdout)]
     pub fn finish(&self) {
         println!("{}", self.summary());
@@ -301,7 +293,6 @@ pub fn compare(maximize: bool, left: &BigRational, right: &BigRational) -> std::
     if maximize { right.cmp(left) } else { left.cmp(right) }
 }
 
-/// Runs the planner on a task, compares its answers with the truth, and records the result.
 pub fn judge(case: &Case, tally: &mut Tally) {
     tally.tasks += 1;
     tally.count(match &case.truth {
@@ -374,7 +365,6 @@ fn judge_answer(
     }
 }
 
-/// Checks that the validator accepts the oracle's plan with the oracle's value.
 fn check_witness(case: &Case, mission: &Mission, problem: &Problem, tally: &mut Tally) {
     let (Truth::Best(cost, plan) | Truth::NoBest(cost, plan) | Truth::Open(Some((cost, plan)))) = &case.truth
     else {
@@ -392,7 +382,6 @@ fn check_witness(case: &Case, mission: &Mission, problem: &Problem, tally: &mut 
     }
 }
 
-/// Compares the planner's status, cost and lower bound with the correct answer.
 fn check_claim(case: &Case, solved: &Solved, tally: &mut Tally) {
     let solution = &solved.solution;
     let cost = solution.plan.as_ref().map(|plan| rational(&plan.cost));
@@ -445,7 +434,6 @@ fn check_claim(case: &Case, solved: &Solved, tally: &mut Tally) {
     }
 }
 
-/// Checks that a reported plan is valid and has the claimed cost, by the oracle's executor and by the validator.
 fn check_plan(
     case: &Case,
     (mission, problem): (&Mission, &Problem),
@@ -474,18 +462,15 @@ fn check_plan(
     }
 }
 
-/// Returns an integer from an environment variable; `default` if the variable is not set or is no integer.
 pub fn setting(name: &str, default: u64) -> u64 {
     std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
 }
 
-/// Returns `true` if the run must end because of a failure (`ORACLE_STOP` is set).
 pub fn is_over(tally: &Tally) -> bool {
     !tally.failures.is_empty() && std::env::var_os("ORACLE_STOP").is_some()
 }
 
-/// Runs [`judge`] on the cases of `ORACLE_TASKS` seeds (default: `default`), starting at `ORACLE_FROM`. Stops
-/// at the first failure if `ORACLE_STOP` is set.
+/// `default` is the default of `ORACLE_TASKS`.
 pub fn run(default: u64, cases: impl Fn(u64) -> Vec<Case>) -> Tally {
     let (from, tasks) = (setting("ORACLE_FROM", 0), setting("ORACLE_TASKS", default));
     let mut tally = Tally::default();

@@ -1,13 +1,14 @@
-//! Benchmark: slowdown of planning, certifying and verifying if all numbers of a mission are replaced by
-//! decimals of 16 significant digits.
+//! Benchmark: slowdown of planning, certifying and verifying if all numbers of a mission are
+//! replaced by decimals of 16 significant digits.
 //!
-//! The missions come from a script in the test data (needs python3). Distances are multiplied by square roots, other numbers by
-//! decimals. Consumption does not grow and the battery holds slightly more, so a solvable mission remains solvable. The replaced
-//! numbers preserve the order of compared values, so the same designs can be used.
+//! The missions come from a script in the test data (needs python3). Distances are multiplied by
+//! square roots. A decimal is added to the charge and the capacity of the battery. Other numbers
+//! are multiplied by decimals. Consumption does not grow, so a solvable mission remains solvable.
+//! The factors are close to 1, so that the same designs can be used.
 //!
-//! There are two variants. The factors in the domain (weights of the metric) remain integers, or they become
-//! decimals as well. Products of three numbers of 16 digits exceed the planner's integers, so the second
-//! variant is planned with rational numbers.
+//! There are two variants. The factors in the domain (weights of the metric) remain integers, or
+//! they become decimals as well. Products of three numbers of 16 digits exceed the planner's
+//! integers, so the second variant is planned with rational numbers.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -33,13 +34,11 @@ fn fraction(name: &str) -> f64 {
     ((hash ^ (hash >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// Formats a number with [`DIGITS`] significant digits.
 fn written(value: f64) -> String {
     let integer_digits = (value.log10().floor() as i64 + 1).max(0) as usize;
     format!("{value:.digits$}", digits = DIGITS - integer_digits.min(DIGITS))
 }
 
-/// Returns the replacement for the value of a function with these arguments.
 fn magnified(function: &str, arguments: &[&str], value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
@@ -52,7 +51,8 @@ fn magnified(function: &str, arguments: &[&str], value: f64) -> String {
     let fraction_of_name = fraction(&format!("{function} {}", sorted.join(" ")));
     written(match function {
         "dist" => value * (1.0 - fraction_of_name / 20.0).sqrt(),
-        // Both functions get the same factor, otherwise recharging would not fill the battery.
+        // The same number is added to both functions, otherwise recharging would not fill the
+        // battery.
         "battery" | "capacity" => value + fraction("battery") / 4.0,
         "visibility" => value * (1.0 + fraction_of_name / 50.0),
         _ => value * (1.0 - fraction_of_name / 50.0),
@@ -92,13 +92,13 @@ fn domain(text: &str, factors: bool) -> String {
     words.join(" ")
 }
 
-/// Exit status and processor time (in seconds) of a run of the program.
+/// Exit status, and processor time in seconds.
 struct Run {
     status: i32,
     time: f64,
 }
 
-/// Runs the program and measures it. Unless `once`, a run under 1 s is repeated twice, and the median counts.
+/// Unless `once`, a run under 1 s is repeated twice, and the median counts.
 fn run(arguments: &[&str], once: bool) -> Run {
     let script = "import resource as r, subprocess as s, sys\n\
         def once():\n \
@@ -138,8 +138,7 @@ fn all_runs(directory: &Path, name: &str) -> [Run; 3] {
     [planned, certified, verified]
 }
 
-/// Returns the parameters of the generated missions: family, places or pipelines, designs, functions, goals,
-/// seed.
+/// Parameters: family, places or pipelines, designs, functions, goals, seed.
 fn sizes() -> Vec<[usize; 6]> {
     let mut sizes = Vec::new();
     for seed in 1..=4 {
@@ -165,8 +164,7 @@ fn sizes() -> Vec<[usize; 6]> {
     sizes
 }
 
-/// Generates a mission with the tool and writes its variants with decimals. Returns the name of the mission;
-/// `None` if python3 does not start.
+/// Returns the name of the mission; `None` if python3 does not start.
 fn generate(tool: &Path, directory: &Path, size: &[usize; 6], encoding: &str) -> Option<String> {
     let [family, n, m, k, goals, seed] = size;
     let family = ["ugv", "uuv"][*family];

@@ -57,7 +57,7 @@ impl Puzzle {
         self.task.metric.as_ref().is_some_and(|(maximize, _)| *maximize)
     }
 
-    /// Converts a sequential plan to steps without gaps between them. The plan consists of instance numbers.
+    /// The steps have no gaps between them.
     fn steps(&self, plan: &[usize]) -> Vec<Step> {
         let mut clock = model::whole(0);
         let step = |number: &usize| {
@@ -105,7 +105,6 @@ impl Puzzle {
     }
 }
 
-/// Returns an executor of sequential plans, which computes the value of a plan.
 fn executor(ground: Rc<Ground>) -> Executor {
     Box::new(move |steps: &[Step]| {
         let measures = Measures::new(&ground);
@@ -140,8 +139,6 @@ fn task(seed: u64) -> Task {
     if rng.u32(0..5) < 3 { missions::mission(&mut rng) } else { arithmetic::arithmetic(&mut rng) }
 }
 
-/// Compares the planner with the oracle on the task of a seed, with a certificate for even seeds. Other
-/// variants and further objectives are checked for one quarter of the seeds each.
 fn judge_seed(seed: u64, tally: &mut Tally) {
     judge_task(seed, &task(seed), tally);
 }

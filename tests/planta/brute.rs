@@ -18,7 +18,6 @@ pub struct StateSpace {
     /// Transitions: state, action, next state. States are written with only the atoms that actions can
     /// change.
     pub steps: BTreeSet<(Text, Text, Text)>,
-    /// Length of a shortest plan, if there is a plan.
     pub least_steps: Option<usize>,
 }
 
@@ -175,7 +174,8 @@ impl Task {
         }
     }
 
-    /// Declares variables under unique names in `scope`. Returns the names and the conditions on their types.
+    /// The variables get unique names in `scope`. Returns the names and the conditions on their
+    /// types.
     fn declare(&mut self, list: &[pddl::ast::TypedName], scope: &mut Binding) -> (Vec<String>, Vec<Part>) {
         let mut names = Vec::new();
         let mut type_conditions = Vec::new();
@@ -338,7 +338,6 @@ impl Task {
         facts
     }
 
-    /// Explores all reachable states breadth-first. Returns `None` if there are more than `limit` states.
     pub fn explore(&self, limit: usize) -> Option<StateSpace> {
         let changed = self.changed_predicates();
         let fixed = self.initial.iter().filter(|(name, _)| !changed.contains(*name));

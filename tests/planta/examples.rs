@@ -19,7 +19,6 @@ struct Example {
     expectation: Expectation,
 }
 
-/// Relation between Metaplan's answer and the converter's output files.
 #[derive(PartialEq)]
 enum Expectation {
     /// The state spaces are equal.
@@ -81,8 +80,7 @@ fn examples(real: &Path) -> Vec<Example> {
     ]
 }
 
-/// Returns the number of steps of an optimal plan by the program; `None` if the program proves that there is
-/// no plan.
+/// Returns `None` if the program proves that there is no plan.
 fn planned(input: &Input) -> Option<usize> {
     let (status, stdout, stderr) = metaplan(&input.arguments("plan", &["--format", "json"]));
     let answer: Value =
@@ -112,8 +110,8 @@ fn written(domain: &Domain, problem: &Problem) -> (Domain, Problem) {
 /// Names of examples with tens of thousands of transitions, whose exploration takes minutes.
 const LARGE: [&str; 2] = ["suave", "testFeatures/otherConstantsInDomain"];
 
-/// Checks that three tasks have the same state space: the narrowed task (the planner's input), the export,
-/// and the converter's files.
+/// Checks that three tasks have the same state space: the narrowed task (the planner's input), the
+/// export, and the converter's files, as far as `expectation` demands.
 fn compare(Example { name, input, created, expectation }: &Example) {
     let mission = input.mission();
     let (filled, _) = mission.filled().unwrap_or_else(|messages| panic!("{}", text_of(&messages)));

@@ -17,7 +17,7 @@ use crate::situations::run;
 const CLASSES: [&str; 5] = ["Ca", "Cb", "Cc", "Cd", "Ce"];
 const PROPERTIES: [&str; 2] = ["pa", "pb"];
 const INDIVIDUALS: [&str; 2] = ["i1", "i2"];
-/// Maximum number of states of a task. Larger tasks are skipped.
+/// Larger tasks are skipped.
 const MAX_STATES: usize = 300;
 
 struct Texts {
@@ -162,8 +162,6 @@ struct Comparison {
     least_steps: Option<usize>,
 }
 
-/// Compares the state spaces of the narrowed task and the exported task. Returns `None` if there are too many
-/// states.
 fn compare(texts: &Texts, name: &str) -> Option<Comparison> {
     let directory = tempfile::tempdir().expect("a directory");
     let mission = texts.write(directory.path()).mission();
@@ -178,7 +176,6 @@ fn compare(texts: &Texts, name: &str) -> Option<Comparison> {
     Some(Comparison { least_steps: exported.least_steps })
 }
 
-/// Compares the first `tasks` sufficiently small tasks, with seeds from `seed` on.
 fn compare_many(seed: u64, tasks: usize) {
     let outcomes = (seed..).filter_map(|seed| compare(&texts(seed), &format!("seed {seed}")));
     let solvable = outcomes.take(tasks).filter(|comparison| comparison.least_steps.is_some()).count();

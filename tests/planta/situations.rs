@@ -36,7 +36,7 @@ fn grid(real: &Path, nodes: &str, with_designs: bool) -> Input {
     }
 }
 
-/// Returns the optimal plan as JSON. Panics unless optimality is proved.
+/// Panics unless optimality is proved.
 fn plan(input: &Input, options: &[&str]) -> Value {
     let (status, stdout, stderr) =
         metaplan(&input.arguments("plan", &[&["--format", "json"], options].concat()));
@@ -186,7 +186,6 @@ fn missing_knowledge_base_is_reported_with_a_remedy() {
     assert!(stderr.contains("M215") && stderr.contains("`inferred-SolvesF`"), "{stderr}");
 }
 
-/// Returns the argument lists of a predicate's facts in the initial state.
 fn facts<'p>(problem: &'p Problem, predicate: &str) -> Vec<Vec<&'p str>> {
     let name = |term: &'p Term| match term {
         Term::Variable(identifier) | Term::Constant(identifier) => identifier.name.as_str(),

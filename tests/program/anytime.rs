@@ -10,8 +10,6 @@ use test_resources::data;
 
 use crate::common::{copy_folder, edit, metaplan, metaplan_in, root};
 
-/// Copies the mission `ward` into a temporary directory, with its larger problem if `large`. Returns `None`
-/// if the test data are not available.
 fn ward(large: bool) -> Option<tempfile::TempDir> {
     let folder = data("field3/newcomer3/ward")?;
     let directory = tempfile::tempdir().expect("a directory");
@@ -22,7 +20,6 @@ fn ward(large: bool) -> Option<tempfile::TempDir> {
     Some(directory)
 }
 
-/// Returns missions, each as a directory and a manifest in this directory.
 fn missions() -> Vec<(PathBuf, &'static str)> {
     let ward = ward(false).map(|directory| (directory.keep(), "mission.toml"));
     let shipped = ["missions/templates/warehouse/mission.toml", "missions/ugv.toml", "missions/uuv.toml"];
@@ -114,7 +111,6 @@ fn partial_explanations_are_printed_on_a_signal() {
     assert!(text.contains("limit was reached"), "{text}");
 }
 
-/// An incomplete Pareto front contains the points found until the limit, and is not reported as optimal.
 #[test]
 fn fronts_at_a_limit_have_the_points_found_so_far() {
     let Some(directory) = ward(true) else { return };

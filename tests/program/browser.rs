@@ -9,7 +9,6 @@ use test_resources::{Resource, program};
 use crate::common::{metaplan, metaplan_in, root};
 use crate::live::Run;
 
-/// Names of the Chromium executable, in order of preference.
 const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "chrome"];
 /// Screen widths in pixels: a desktop and a telephone.
 const WIDTHS: [u32; 2] = [1280, 400];
@@ -20,7 +19,6 @@ const GREENHOUSE: &str = "tests/program/greenhouse/mission.toml";
 /// Script of the page that surrounds the tested pages. It collects the results for the pages in the frames.
 const QUESTIONS: &str = include_str!("browser.js");
 
-/// Returns the path of the browser, if one is installed.
 pub fn browser() -> Option<PathBuf> {
     program(Resource::Browser, &NAMES)
 }

@@ -6,7 +6,6 @@ use serde_json::{Value, json};
 
 use crate::common::{Outcome, metaplan, metaplan_in, root, verify_in};
 
-/// Runs the program with `--certificate` and returns the directory of the certificate.
 pub fn certificate(directory: &Path, arguments: &[&str]) -> String {
     let target = directory.join("certificate").display().to_string();
     let plan_arguments: Vec<&str> = arguments.iter().copied().chain(["--certificate", &target]).collect();
@@ -432,8 +431,9 @@ fn unsupported_features_get_no_certificate() {
     assert!(!directory.path().join("c").exists());
 }
 
-/// A conflict between a conditional and an unconditional start effect excludes only the case in which the
-/// condition holds. If the grounder lost the whole action, no certificate could be written.
+/// A conflict between a conditional and an unconditional start effect excludes only the case in
+/// which the condition holds. If the grounder loses the whole action, no certificate may be
+/// written.
 #[test]
 fn a_lost_action_is_never_certified() {
     let action = "(:durative-action a :parameters () :duration (= ?duration 2) :condition (and)

@@ -79,7 +79,6 @@ fn ready_is_followed_by_progress_during_search() {
     assert!(kinds[..end].contains(&"plan_requested"), "{kinds:?}");
 }
 
-/// Domain for which 20 objects yield hundreds of thousands of ground operators.
 const WIDE: &str = "(define (domain wide) (:predicates (p ?a ?b) (q ?a ?b ?c ?d) (done))
     (:action a :parameters (?a ?b ?c ?d) :precondition (and (p ?a ?b) (p ?c ?d)) :effect (q ?a ?b ?c ?d))
     (:action b :parameters (?a ?b ?c ?d) :precondition (q ?a ?b ?c ?d) :effect (done)))";

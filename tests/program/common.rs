@@ -6,7 +6,6 @@ use std::sync::OnceLock;
 
 use serde_json::Value;
 
-/// Exit status and output of a run.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Outcome {
     pub status: i32,
@@ -15,7 +14,6 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// Parses standard output as JSON.
     pub fn json(&self) -> Value {
         serde_json::from_str(&self.stdout).unwrap_or_else(|error| panic!("{error}: {self:#?}"))
     }
@@ -48,12 +46,10 @@ pub fn without_progress(text: &str) -> String {
     text.split_inclusive('\n').filter(|line| !is_progress(line)).collect()
 }
 
-/// Returns the root directory of the project.
 pub fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Runs the program in the root directory of the project.
 pub fn metaplan(arguments: &[&str]) -> Outcome {
     metaplan_in(&root(), arguments, "")
 }
@@ -68,7 +64,6 @@ pub fn program() -> PathBuf {
     }
 }
 
-/// Runs the program in a directory with a text as standard input.
 pub fn metaplan_in(directory: &Path, arguments: &[&str], input: &str) -> Outcome {
     outcome(&program(), directory, arguments, input)
 }
@@ -103,7 +98,6 @@ pub fn verifier() -> &'static Path {
     })
 }
 
-/// Runs a program in a directory with a text as standard input.
 pub fn outcome(program: &Path, directory: &Path, arguments: &[&str], input: &str) -> Outcome {
     use std::io::{Seek as _, Write as _};
     // Standard input is a file instead of a pipe, so that `run` answers each line before it reads the next
@@ -144,7 +138,6 @@ pub fn processor_time(directory: &Path, arguments: &[&str]) -> f64 {
     text.trim().parse().unwrap_or_else(|error| panic!("{error}: {output:?}"))
 }
 
-/// Copies a mission's files into a temporary directory in which they can be edited.
 pub fn copy_of_mission(name: &str) -> tempfile::TempDir {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let files = [
@@ -162,7 +155,6 @@ pub fn copy_of_mission(name: &str) -> tempfile::TempDir {
     directory
 }
 
-/// Copies a folder recursively.
 pub fn copy_folder(from: &Path, to: &Path) {
     std::fs::create_dir_all(to).expect("a folder");
     for entry in std::fs::read_dir(from).expect("a folder").map(|entry| entry.expect("an entry")) {
@@ -175,7 +167,7 @@ pub fn copy_folder(from: &Path, to: &Path) {
     }
 }
 
-/// Replaces all occurrences of a text in a file. Panics if there is no occurrence.
+/// Replaces all occurrences. Panics without any occurrence.
 pub fn edit(directory: &Path, file: &str, old: &str, new: &str) {
     let path = directory.join(file);
     let text = std::fs::read_to_string(&path).expect("the file is read");

@@ -1,5 +1,4 @@
-//! Tests of `metaplan configure` and `metaplan run --configure` with SUAVE's knowledge base, and of rejected
-//! arguments.
+//! Tests of `metaplan configure` and `metaplan run --configure`, and of rejected arguments.
 
 use test_resources::data;
 

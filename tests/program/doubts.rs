@@ -5,8 +5,7 @@ use std::path::Path;
 
 use crate::common::{Outcome, copy_of_mission, edit, metaplan, metaplan_in, root};
 
-/// Runs `metaplan plan` on a copy of a mission after a replacement in one file. Standard error must contain
-/// all `words`.
+/// Standard error must contain all `words`.
 fn check(mission: &str, (file, old, new): (&str, &str, &str), words: &[&str]) -> Outcome {
     let copy = copy_of_mission(mission.trim_end_matches("_plain"));
     for plain in [

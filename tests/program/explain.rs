@@ -14,7 +14,6 @@ fn explain(arguments: &[&str]) -> Value {
     answer
 }
 
-/// Returns the name, the relation, the bound and the resulting cost of each change in an answer.
 fn changes(answer: &Value) -> Vec<Value> {
     let change =
         |change: &Value| json!([change["name"], change["relation"], change["bound"], change["then"]["cost"]]);

@@ -21,7 +21,7 @@ impl Random {
 const COMPONENTS: u64 = 4;
 const ATTRIBUTES: u64 = 2;
 
-/// A bound on an attribute: an upper bound if `is_most`, otherwise a lower bound.
+/// An upper bound if `is_most`, otherwise a lower bound.
 #[derive(Debug, Clone, Copy)]
 struct Bound {
     attribute: u64,
@@ -46,8 +46,6 @@ struct Design {
 }
 
 impl Design {
-    /// Returns `true` if the design is available by definition: required components work, bounds hold, and
-    /// not both components of `both` have failed.
     fn is_available(&self, failed: &BTreeSet<u64>, measured: &[u64]) -> bool {
         self.components.is_disjoint(failed)
             && self.bounds.iter().all(|bound| bound.holds(measured))

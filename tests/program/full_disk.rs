@@ -55,8 +55,8 @@ fn of_kind<'a>(answers: &'a [Value], kind: &str) -> Vec<&'a Value> {
     answers.iter().filter(|answer| answer["answer"] == kind).collect()
 }
 
-/// Runs a loop with both values of the setting `unrecorded`. `command` runs the loop with `adaptation.toml`.
-/// The journal directory is appended to the command.
+/// Runs a loop with both values of the setting `unrecorded`, which `set` writes. The journal
+/// directory is appended to `command`.
 fn check(directory: &Path, set: &dyn Fn(&str), command: &[&str], is_file: bool) {
     let context = format!("{command:?}, {is_file}");
     set("stop");

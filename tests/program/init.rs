@@ -5,7 +5,6 @@ use std::path::Path;
 
 use crate::common::{headlines, metaplan_in, root};
 
-/// Creates a mission from a template and checks the costs of its plans, without a scenario and in each scenario.
 fn check(template: &str, cost: &str, scenarios: &[(&str, &str)]) {
     let directory = tempfile::tempdir().expect("a directory");
     let here = directory.path();

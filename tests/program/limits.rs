@@ -68,8 +68,7 @@ fn signals_end_the_program_while_it_reads() {
     }
 }
 
-/// Returns the domain and the problem of a round trip through a number of places. The optimum takes long to
-/// prove.
+/// A round trip whose optimum takes long to prove. Returns the domain and the problem.
 #[cfg(unix)]
 pub fn round_trip(places: u32) -> (String, String) {
     use std::fmt::Write as _;

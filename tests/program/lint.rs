@@ -4,7 +4,6 @@ use std::path::Path;
 
 use crate::common::{Outcome, edit, metaplan, metaplan_in};
 
-/// Runs `metaplan lint` on the warehouse mission after textual changes, with text and with JSON output.
 fn check(changes: &[(&str, &str, &str)], status: i32, words: &[&str]) -> Outcome {
     let directory = tempfile::tempdir().expect("a directory");
     let here = directory.path();
@@ -77,8 +76,6 @@ fn unused_names_are_warnings() {
     );
 }
 
-/// `lint` warns of missing or negative numbers that make a design or an action unusable, and reports their
-/// positions.
 #[test]
 fn missing_and_negative_numbers_are_warnings() {
     let misspelt = (
@@ -130,8 +127,6 @@ fn missing_and_negative_numbers_are_warnings() {
     );
 }
 
-/// If there is no plan, `plan` lists the missing numbers, and `explain` gives these numbers as the reason why
-/// an available design is not applicable.
 #[test]
 fn missing_numbers_are_listed_if_there_is_no_plan() {
     let directory = tempfile::tempdir().expect("a directory");

@@ -13,7 +13,6 @@ use crate::common::{metaplan_in, root};
 /// Timeout for each expected event, which is generous for busy machines.
 const TIMEOUT: Duration = Duration::from_secs(60);
 
-/// A running loop with a live HTTP server (`metaplan run --serve`).
 pub struct Run {
     child: Child,
     stdin: Option<ChildStdin>,
@@ -57,7 +56,6 @@ impl Run {
         self.handled(last);
     }
 
-    /// Receives all answers until the line with this number is handled.
     fn handled(&mut self, line: u64) -> Vec<Value> {
         let mut answers = Vec::new();
         loop {
@@ -79,7 +77,6 @@ impl Run {
         stream
     }
 
-    /// Requests a path with a finite response and returns head and body of the response.
     pub fn get(&self, path: &str, headers: &str) -> (String, String) {
         let mut text = String::new();
         self.request(path, headers).read_to_string(&mut text).expect("an answer");
@@ -98,7 +95,6 @@ impl Run {
         Events(reader)
     }
 
-    /// Closes standard input. Asserts that the program ends with status 0.
     pub fn end(mut self) {
         drop(self.stdin.take());
         assert!(self.child.wait().expect("it ends").success());
@@ -112,11 +108,9 @@ impl Drop for Run {
     }
 }
 
-/// A stream of server-sent events from the live server.
 pub struct Events(BufReader<TcpStream>);
 
 impl Events {
-    /// Returns the kind and the data of the next event; `None` at the end of the stream.
     fn next(&mut self) -> Option<(String, Value)> {
         let (mut kind, mut data) = ("message".to_owned(), None);
         loop {
@@ -154,7 +148,6 @@ impl Events {
         }
     }
 
-    /// Returns the events up to the first one that satisfies the predicate. Panics if the stream ends before.
     pub fn until(&mut self, is_last: impl Fn(&Value) -> bool) -> Vec<Value> {
         self.until_or_end(is_last).expect("it does not end before")
     }
@@ -164,7 +157,6 @@ fn note(text: &str) -> String {
     json!({"event": "note", "text": text}).to_string()
 }
 
-/// Returns the loop's answers among the messages, without progress reports.
 fn answers_in(messages: &[Value]) -> Vec<&Value> {
     messages
         .iter()
@@ -271,7 +263,7 @@ fn late_clients_receive_the_current_state() {
     }
 }
 
-/// Returns the peak memory of the process in kB, on systems that report it.
+/// In kB.
 fn memory(run: &Run) -> Option<u64> {
     let status = std::fs::read_to_string(format!("/proc/{}/status", run.child.id())).ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
@@ -298,7 +290,7 @@ fn clients_that_do_not_read_are_disconnected_and_do_not_block() {
     while run.events().until_or_end(|news| news["heard"] == json!(last)).is_none() {
         assert!(started.elapsed() < TIMEOUT, "it always ends before");
     }
-    // The client that did not read was disconnected after a small part of the data.
+    // The client that did not read was disconnected before it had received half of the data.
     let mut bytes = Vec::new();
     let ended = idle.read_to_end(&mut bytes);
     assert!(ended.is_ok() || ended.is_err_and(|error| error.kind() == ErrorKind::ConnectionReset));

@@ -3,8 +3,8 @@
 
 use crate::common::{headlines, metaplan_in, root};
 
-/// Appends lines to a manifest, from line 9 on. Asserts that all commands reject the manifest with the
-/// message `expected`.
+/// The lines begin at line 9 of the manifest. All commands must reject it with the message
+/// `expected`.
 fn check(lines: &str, expected: &str) {
     let directory = tempfile::tempdir().expect("a directory");
     let root = root().display().to_string();

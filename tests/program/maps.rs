@@ -148,7 +148,6 @@ fn all_errors_of_a_map_are_reported() {
     }
 }
 
-/// Pictures show the places at their coordinates, with the y axis upwards.
 #[test]
 fn places_are_drawn_at_their_coordinates() {
     let directory = tempfile::tempdir().expect("a directory");

@@ -124,7 +124,6 @@ fn all_unknown_names_of_a_scenario_are_reported_together() {
     );
 }
 
-/// `plan` and `run` also report all errors in the parts of a scenario that they use.
 #[test]
 fn all_errors_of_a_situation_are_reported_together() {
     let directory = tempfile::tempdir().expect("a directory");

@@ -8,7 +8,6 @@ use serde_json::{Value, json};
 use crate::certificate::{MISSIONS, certificate, change, verify};
 use crate::common::metaplan;
 
-/// Deterministic pseudorandom numbers (`SplitMix64`).
 struct Random(u64);
 
 impl Random {
@@ -161,7 +160,6 @@ fn edit_json(text: &str, edit: impl FnOnce(&mut Value)) -> String {
     if document == original { text.to_owned() } else { document.to_string() }
 }
 
-/// Returns the name and the new text of the file that a kind of change modifies.
 fn mutant(kind: &str, original: &Original, random: &mut Random) -> (String, String) {
     let name = match kind {
         "literal of the formula" => "formula.cnf",
@@ -210,7 +208,6 @@ fn mutant(kind: &str, original: &Original, random: &mut Random) -> (String, Stri
     (name.to_owned(), changed)
 }
 
-/// Returns `true` if a claim agrees with the planner's result for the files of the certificate.
 fn is_true(claim: &Value, target: &Path) -> bool {
     let files = ["domain.pddl", "problem.pddl"].map(|name| target.join(name).display().to_string());
     let answer = metaplan(&["plan", &files[0], &files[1], "--format", "json", "--quiet"]).json();

@@ -16,15 +16,14 @@ const MANIFEST: &str = "missions/uuv.toml";
 const PROBLEM: &str = "encodings/uuv/problem.pddl";
 const KB: &str = "ontology/kb/uuv.ttl";
 
-/// Copies the mission `uuv` and declares functions and designs in its problem.
 fn declared() -> tempfile::TempDir {
     let copy = copy_of_mission("uuv");
     edit(copy.path(), PROBLEM, "(:objects ", &format!("(:objects {OBJECTS} "));
     copy
 }
 
-/// Copies the mission `uuv` like `declared`. Renames functions, designs and actions in the knowledge base,
-/// and adds these entries to the name map.
+/// Renames functions, designs and actions in the knowledge base, and adds `entries` to the name
+/// map.
 fn renamed(entries: &str) -> tempfile::TempDir {
     let copy = declared();
     let mut text = std::fs::read_to_string(copy.path().join(KB)).expect("the knowledge base");
@@ -310,7 +309,6 @@ fn missions_with_optional_declarations_have_no_warnings() {
     }
 }
 
-/// Components can be objects as well. Names of the knowledge base take precedence over object names.
 #[test]
 fn components_have_object_and_individual_names() {
     let copy = declared();
@@ -334,8 +332,6 @@ fn components_have_object_and_individual_names() {
     assert_eq!(outcome.status, 2, "{outcome:#?}");
 }
 
-/// A journal can be resumed only with the same name map. The position of the map in the manifest does not
-/// matter.
 #[test]
 fn journals_depend_on_the_name_map() {
     let copy = renamed(ENTRIES);

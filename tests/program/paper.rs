@@ -6,7 +6,6 @@ use serde_json::{Value, json};
 use crate::common::{Outcome, metaplan, metaplan_in};
 use crate::real::real;
 
-/// Returns the files of the Metaplan paper and the options for SUAVE's knowledge base, if available.
 fn paper() -> Option<([String; 2], Vec<String>)> {
     let real = real()?.display().to_string();
     let file = |name: &str| format!("{real}/pddl/suave_metaplan/suave_extended_metaplan_{name}.pddl");
@@ -17,7 +16,6 @@ fn paper() -> Option<([String; 2], Vec<String>)> {
     Some(([file("domain"), file("problem")], options.collect()))
 }
 
-/// Name map from SUAVE's designs to the designs of the paper.
 const MAP: [(&str, &str); 4] = [
     ("fd_spiral_*", "fd_search_*"),
     ("fd_all_thrusters", "fd_maintain_motion"),

@@ -25,7 +25,6 @@ struct Run {
     memory: f64,
 }
 
-/// Runs the program and measures its processor time and memory. Needs python3.
 fn run(directory: &Path, arguments: &[&str]) -> Run {
     let script = "import json, resource as r, subprocess as s, sys\n\
         o = s.run(sys.argv[1:], stdout=s.PIPE, stderr=s.PIPE)\n\
@@ -207,7 +206,6 @@ fn planning_with_a_chain_of_derived_facts_keeps_the_limit() {
     limited(chain(700).path(), &PLAN, 1.0);
 }
 
-/// Creates a round trip whose optimum takes long to prove, with a manifest.
 fn trip(places: u32) -> tempfile::TempDir {
     let (domain, problem) = round_trip(places);
     let directory = files(&domain, &problem);

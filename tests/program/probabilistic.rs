@@ -17,7 +17,6 @@ use test_resources::data;
 
 use crate::common::{metaplan, metaplan_in, root};
 
-/// Creates the mission of an imported map in a temporary directory.
 pub fn mission(map: &str, options: &MapOptions) -> (tempfile::TempDir, Setup) {
     let files = import_map("map", map, options).expect("a map");
     let directory = tempfile::tempdir().expect("a directory");
@@ -45,7 +44,6 @@ pub fn dark() -> Vec<(String, String)> {
     pairs.iter().map(|(a, b)| ((*a).to_owned(), (*b).to_owned())).collect()
 }
 
-/// Returns the exact answer of the model checker to a question about the PRISM model of a mission.
 fn answer(mission: &Coadaptation, risk: Risk, question: &str) -> Outcome {
     let model = program(mission, risk);
     let options = Options::default().with_exactness(Exactness::Always);
@@ -117,7 +115,7 @@ fn least_time(mission: &Coadaptation, risk: Risk) -> Option<BigRational> {
     (!solution.infinite.contains(0)).then(|| solution.values[0].clone())
 }
 
-/// Returns the optimal cost of the planner; `None` if the planner proves that there is no plan.
+/// Returns `None` if the planner proves that there is no plan.
 fn planned(mission: &Mission) -> Option<f64> {
     let (problem, _) = mission.filled().expect("filled");
     let task = mission.ground(&problem, &[], &planner::Limits::none()).expect("ground");
@@ -129,7 +127,7 @@ fn planned(mission: &Mission) -> Option<f64> {
     }
 }
 
-/// Asserts that the planner and the model checker agree. Returns `true` if there is a plan.
+/// Returns `true` if there is a plan.
 fn agree(label: &str, setup: &Setup, risk: Risk) -> bool {
     let (process, plan) = (least_time(&coadaptation(setup), risk), planned(&setup.mission));
     let is_equal = match (&process, plan) {
@@ -153,8 +151,7 @@ impl Agreement {
     }
 }
 
-/// Compares the planner with the model checker on random pairs of places, until `count` pairs have a plan.
-/// Returns `None` if the map is not available.
+/// Continues until `count` pairs have a plan. Returns `None` if the map is not available.
 fn pairs_of_the_map(count: usize) -> Option<Agreement> {
     let map = std::fs::read_to_string(data("real/map/map-p2cp3.json")?).expect("readable");
     let (_directory, setup) = mission(&map, &MapOptions { dark: dark(), ..places("l1", "l18") });
@@ -214,7 +211,7 @@ fn random_map(random: &mut Random) -> (String, usize) {
     (json!({ "map": nodes, "time": time }).to_string(), n)
 }
 
-/// Compares the planner with the model checker on random missions, until `count` of them have a plan.
+/// Continues until `count` missions have a plan.
 fn generated_missions(count: usize) -> Agreement {
     let mut random = Random(11);
     let mut agreement = Agreement::default();
@@ -261,7 +258,6 @@ fn process_and_planner_agree_on_many_missions() {
     println!("pairs of the map: {:?}", pairs_of_the_map(300));
 }
 
-/// Runs `metaplan compare` on an imported map. Returns the first comparison of the answer.
 fn compared(map: &str, options: &MapOptions, extra_arguments: &[&str]) -> Value {
     let (directory, _) = mission(map, options);
     let arguments = [&["compare", "camara.toml", "--format", "json"], extra_arguments].concat();

@@ -15,7 +15,6 @@ use crate::common::{Outcome, copy_folder, metaplan_in, root};
 
 const STORED: &str = "crates/verify/tests/certificates";
 
-/// Returns `true` if the programs of the proved checker are in PATH.
 fn has_checker() -> bool {
     program(Resource::Proved, &["metaplan-proved-check"]).is_some()
 }
@@ -72,7 +71,6 @@ fn both_checkers_reject_a_worse_plan() {
     assert!(!outcome.stdout.contains("theorem     failed"), "{outcome:#?}");
 }
 
-/// Writes programs of the proved checker that run these lines of shell.
 fn stubs(prepare: &str, check: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, script) in [("metaplan-proved-prepare", prepare), ("metaplan-proved-check", check)] {
@@ -148,7 +146,6 @@ fn reason_without_a_theorem_is_printed() {
     assert!(outcome.status == 30 && outcome.stdout.ends_with(line), "{outcome:#?}");
 }
 
-/// The evidence reaches the second program, and the time limit ends both.
 #[test]
 #[cfg(unix)]
 fn programs_are_called_with_certificate_and_evidence() {
@@ -176,7 +173,6 @@ fn missing_programs_are_reported_with_a_remedy() {
     }
 }
 
-/// Returns the page, if `proved/page.sh` has built it.
 fn page() -> Option<PathBuf> {
     let page = root().join("docs/verify.html");
     if page.is_file() {

@@ -114,8 +114,6 @@ fn lost_designs_are_answered_before_planning() {
     resumed.end();
 }
 
-/// After the filter's delay, a recovery takes effect and a better plan is searched for, without further
-/// input.
 #[test]
 fn timers_run_without_input() {
     let directory = tempfile::tempdir().expect("a directory");

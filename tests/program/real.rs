@@ -7,7 +7,6 @@ use crate::common::{metaplan, metaplan_in};
 use serde_json::Value;
 use test_resources::data;
 
-/// Returns the directory of the real files, if the test data contains them.
 pub fn real() -> Option<PathBuf> {
     data("real")
 }

@@ -238,7 +238,6 @@ fn unreadable_documents_are_input_errors() {
     check(&run(&["convert", "absent.ttl", "--to", "turtle"], ""), 3, &["O101"]);
 }
 
-/// Control characters of a file are escaped, and its content cannot imitate a message.
 #[test]
 fn hostile_rule_files_are_escaped() {
     let directory = tempfile::tempdir().expect("a directory");
@@ -339,8 +338,8 @@ fn ineffective_updates_are_reported() {
     check(&change("--assert", ":A rdfs:subClassOf [ a owl:Class ; owl:unionOf ( :B :C ) ] ."), 0, &["O301"]);
 }
 
-/// A rule that derives ever larger values ends each command within 2 s of processor time, also with default
-/// limits. The message contains the rule and the value.
+/// A rule that derives ever larger values ends each command within 2 s of processor time, with
+/// default limits. The message contains the rule and the value.
 #[test]
 fn diverging_rules_end_every_command() {
     let directory = tempfile::tempdir().expect("a temporary directory");

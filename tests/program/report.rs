@@ -112,7 +112,6 @@ fn all_causes_of_an_unavailable_design_are_listed() {
     check(&["--fail", "c_kinect", "--set", "ambient_light=0.9"], true, true);
 }
 
-/// Returns the times and the values of the points of a curve in a picture.
 fn values(picture: &str) -> Vec<(f64, f64)> {
     let document = Document::parse(picture).expect("XML");
     let points = document.descendants().filter(|node| node.attribute("class") == Some("point"));

@@ -16,10 +16,8 @@ use crate::probabilistic::{coadaptation, dark, mission, places};
 /// Maps each place to its neighbours in numeric order, with the lengths of the ways in metres.
 type Graph = BTreeMap<String, Vec<(String, f64)>>;
 
-/// State of the bidirectional search from one end.
 #[derive(Default)]
 struct Side {
-    /// Places whose distance is final.
     settled: BTreeSet<String>,
     distances: BTreeMap<String, f64>,
     routes: BTreeMap<String, Vec<String>>,
@@ -112,7 +110,6 @@ fn read(map: &str) -> (Graph, BTreeSet<String>) {
     (graph, measured_places)
 }
 
-/// Returns the minimum energy from each place to the goal, by solving the decision process.
 fn least_energy(mission: &Coadaptation) -> BTreeMap<usize, f64> {
     let process = Process::<f64>::new(mission, Risk::default(), &["energy"]);
     let explored = explore(&process, &Bounds::default()).expect("explored");

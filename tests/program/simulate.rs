@@ -171,8 +171,6 @@ fn simulate_lidar_outage(unit: &str, settle: u32) -> Vec<Value> {
     log.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect()
 }
 
-/// Times in the log are seconds, for every time unit of the domain. The setting `settle` is in seconds as
-/// well.
 #[test]
 fn clock_of_the_loop_is_in_seconds() {
     for (unit, second, settle) in [
@@ -244,9 +242,9 @@ fn units_are_shown() {
     }
 }
 
-/// In the tutorial's knowledge base, the requirements of actions depend on their context: no light in the
-/// dark aisle, and a gentle grip for fragile items. The baseline strategies request no design that violates a
-/// requirement, and complete every possible action.
+/// In the tutorial's knowledge base, the requirements of actions depend on their context: no light
+/// in the dark aisle, and a gentle grip for fragile items. The strategies `greedy` and `random`
+/// request no design that violates a requirement, and accomplish the mission.
 #[test]
 fn greedy_control_observes_requirements() {
     let directory = tempfile::tempdir().expect("a directory");

@@ -20,7 +20,6 @@ fn sweep(study: &str, results: &Path, options: &[&str]) -> crate::common::Outcom
     metaplan(&arguments)
 }
 
-/// Merges the shards of a study. Returns the merged table and the JSON answer.
 fn merged(study: &str, results: &Path) -> (String, Value) {
     let csv = results.join("table.csv");
     let outcome = sweep(study, results, &["--merge", "--csv", &csv.to_string_lossy()]);

@@ -5,7 +5,6 @@ use std::path::Path;
 
 use crate::common::{Outcome, copy_folder, copy_of_mission, edit, headlines, metaplan, metaplan_in, root};
 
-/// Returns all files below a folder.
 fn texts(folder: &Path) -> Vec<std::path::PathBuf> {
     let entries = fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path());
     entries.flat_map(|path| if path.is_dir() { texts(&path) } else { vec![path] }).collect()

@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::common::{metaplan, root};
 
-/// Parses a trace. Returns the spans by name, each with its fields at the end of the span.
+/// Returns the spans by name, each with its fields at the end of the span.
 fn spans(text: &str) -> BTreeMap<String, Vec<Value>> {
     let events: Vec<Value> = serde_json::from_str(text).expect("JSON");
     let mut spans: BTreeMap<String, Vec<Value>> = BTreeMap::new();

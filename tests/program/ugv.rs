@@ -3,8 +3,6 @@
 
 use crate::common::{copy_of_mission, edit, metaplan, metaplan_in, steps};
 
-/// Runs `metaplan plan` with these arguments. Checks steps, cost, the proof of optimality, and the plan by
-/// validation.
 fn check(arguments: &[&str], expected: &[&str], cost: i64) {
     let directory = crate::common::root();
     check_in(&directory, arguments, expected, cost);

@@ -4,7 +4,6 @@ use std::process::Command;
 
 use crate::common::root;
 
-/// Returns the output of a command with the given value of the variable `COLUMNS`, or without the variable.
 fn answer(arguments: &[&str], columns: Option<&str>) -> String {
     let mut program = Command::new(env!("CARGO_BIN_EXE_metaplan"));
     program.args(arguments).current_dir(root()).env_remove("COLUMNS");

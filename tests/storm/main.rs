@@ -57,7 +57,6 @@ for line in sys.stdin:
     print(json.dumps(out), flush=True)
 "#;
 
-/// Returns Storm's answers to the questions; `None` if Storm is not installed.
 fn storm(questions: &[Value]) -> Option<Vec<Value>> {
     let python = python_with(Resource::Stormpy, "STORM_PYTHON", "stormpy")?;
     let mut child = Command::new(&python)
@@ -83,8 +82,7 @@ fn storm(questions: &[Value]) -> Option<Vec<Value>> {
     )
 }
 
-/// Returns the value that Metaplan's model checker computes for a property, with its lower and upper bound. `None` if
-/// the value is infinite.
+/// Returns the value with its lower and upper bound; `None` if the value is infinite.
 fn ours(model: &Model, text: &str, exactness: Exactness) -> Option<(f64, f64, f64)> {
     let options = Options::default().with_exactness(exactness);
     let report = check(model, &property::parse(text).expect("a property"), &options).expect("an answer");
@@ -196,7 +194,7 @@ fn larger(battery: &str, case: &Case) -> (Coadaptation, Risk) {
     (coadaptation, risk)
 }
 
-/// Value of a property, with the number of states and processor times in seconds.
+/// Processor times are in seconds.
 struct Run {
     states: usize,
     value: f64,

@@ -10,7 +10,6 @@ use petgraph::algo::tarjan_scc;
 use petgraph::graphmap::DiGraphMap;
 use syn::visit::{self, Visit};
 
-/// Crates that must not have import cycles.
 const CRATES: [&str; 15] = [
     "crates/diagnostics/src",
     "crates/pddl/src",

@@ -17,7 +17,6 @@ fn codes_in(text: &str) -> BTreeSet<String> {
     words.filter(is_code).map(str::to_owned).collect()
 }
 
-/// Returns the crate of a file if this crate has a table of codes.
 fn owner(path: &str) -> Option<&'static str> {
     let folder = path
         .trim_start_matches("crates/")
@@ -80,7 +79,6 @@ fn used_codes_and_listed_codes_agree() {
     assert_eq!(exported_codes, all_listed.into_iter().collect::<Vec<_>>(), "each code once, in order");
 }
 
-/// Entries of the tables are sentences, and their meaning, cause and remedy differ.
 #[test]
 fn entries_of_tables_are_sentences() {
     for Code { code, meaning, cause, remedy } in codes::all() {

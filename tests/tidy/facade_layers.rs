@@ -46,8 +46,6 @@ fn actual_imports(files: &[(String, String)]) -> BTreeMap<String, BTreeSet<Strin
     modules
 }
 
-/// Returns the differences between the source files and ARCHITECTURE.md, and between its picture and its
-/// table.
 fn differences(documented: &Documented, actual: &BTreeMap<String, BTreeSet<String>>) -> Vec<String> {
     let mut differences = Vec::new();
     let no_modules = BTreeSet::new();

@@ -124,7 +124,6 @@ impl Patterns {
     }
 }
 
-/// Returns `part` per `base` units of `whole`, rounded up.
 fn rate(part: u64, whole: u64, base: u64) -> u64 {
     (part * base).div_ceil(whole.max(1))
 }

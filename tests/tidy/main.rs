@@ -79,7 +79,6 @@ fn files() -> Vec<(String, String)> {
         .collect()
 }
 
-/// Applies `offends` to the path and the text of each file. Fails with the list of all violations.
 fn check(rule: &str, offends: impl Fn(&str, &str) -> Vec<String>) {
     let offenders: Vec<String> = files().iter().flat_map(|(path, text)| offends(path, text)).collect();
     assert!(offenders.is_empty(), "{rule}:\n{}", offenders.join("\n"));
@@ -193,7 +192,7 @@ fn folders_do_not_use_forbidden_names() {
     });
 }
 
-/// Otherwise a test that lacks a resource would count as passed, without a trace.
+/// A test that lacks a resource must not count as passed silently.
 #[test]
 fn tests_request_resources_from_their_crate() {
     check("only crates/test-resources finds test data and reports missing resources", |path, text| {

@@ -18,7 +18,6 @@ fn manifest(folder: &Path) -> Table {
     text(&folder.join("Cargo.toml").display().to_string()).parse().expect("TOML")
 }
 
-/// Returns the folders and the manifests of all packages of the workspace that are published.
 fn published() -> Vec<(PathBuf, Table)> {
     let workspace = manifest(Path::new(""));
     let mut folders = vec![PathBuf::new()];

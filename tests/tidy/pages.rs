@@ -5,7 +5,6 @@ use std::path::{Component, Path, PathBuf};
 
 use pulldown_cmark::{Event, Options, Parser, Tag, TagEnd};
 
-/// Maximum number of lines of README. Details belong to the book.
 const README_LINES: usize = 200;
 
 const NO_PAGES: [&str; 3] = ["target", ".git", "node_modules"];
@@ -44,7 +43,7 @@ fn read(root: &Path, page: &Path) -> String {
     expanded
 }
 
-/// Target of a link, relative to the root; `None` if it is outside the project.
+/// Returns the target of a link, relative to the root; `None` if it is outside the project.
 fn within(page: &Path, target: &str) -> Option<PathBuf> {
     let mut path = page.parent().unwrap_or(Path::new("")).to_owned();
     for part in Path::new(target).components() {

@@ -1,6 +1,4 @@
-//! Oracle of a simulation: checks the demands of [`crate`]. The oracle uses the designs, the delivered messages and the
-//! state of the robot. Demands (a), (f), (g) and (h) also read the beliefs of the loop. Demand (b) compares its
-//! believed design.
+//! Oracle of a simulation: checks the demands of [`crate`], except the comparison of states in (e).
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,33 +9,29 @@ use crate::robot::{Action, Robot};
 use crate::schedule::Message;
 use crate::{DESIGNS, FUNCTION, GOAL};
 
-/// State of the oracle: the content of the delivered messages, and the demands that follow from them.
 #[derive(Debug, Default)]
 pub struct Judge {
-    /// Components that have failed according to the reports that were delivered to the loop.
+    /// Components that have failed according to the delivered reports.
     failed: BTreeSet<String>,
-    /// Designs whose reconfiguration the robot has refused or the loop has abandoned, without a later report about the
+    /// Designs whose reconfiguration failed or was abandoned, without a later report about the
     /// design.
     refused: BTreeSet<String>,
     requested: BTreeMap<u64, Effect>,
     superseded: BTreeSet<u64>,
     given_up: BTreeSet<u64>,
-    /// Design that the loop must believe, derived from the messages by the table of
-    /// `docs/reference/events.md`.
     belief: Belief,
-    /// Whether the last delivered observation of the function's design was outdated on arrival. Observations
-    /// have no time stamp, so no loop can detect this.
+    /// Whether an outdated observation has determined the believed design. No loop can detect this,
+    /// because observations have no time stamp.
     is_misled: bool,
     /// Failed reconfigurations after which the loop has observed the design of the function.
     observed_failures: BTreeSet<u64>,
-    /// Whether an outdated observation determined the design before the last reconfiguration.
+    /// Value of `is_misled` when the last reconfiguration was acknowledged.
     was_misled: bool,
     started: BTreeSet<u64>,
     progressed: BTreeSet<u64>,
-    /// Action that the loop still waits for after its deadline, according to its own report.
+    /// Action that the loop waits for although its deadline has passed.
     awaited: Option<u64>,
     ended: BTreeSet<u64>,
-    /// Last decision of the loop about plans, including that the goal is reached.
     plan: Plan,
     /// Failed component that the moving robot uses, and the number of consecutive steps with this motion.
     forbidden: Option<(&'static str, u64)>,
@@ -109,7 +103,6 @@ impl Judge {
         self.is_misled &= self.belief.design != robot.design;
     }
 
-    /// Records an answer (line of output) of the loop.
     pub fn note(&mut self, answer: &Answer) {
         match answer {
             Answer::Effect(effect) => {
@@ -222,9 +215,10 @@ impl Judge {
         }
     }
 
-    /// Demand (f): if a line makes the design of the action under way unusable, the answers before planning contain a
-    /// safe effect: a change to the best other design, suspension or cancellation. No effect is needed if the best
-    /// design is already on its way or in use. `before` is the moving action before the line, with its design.
+    /// Demand (f): if a line makes the design of the running action unusable, the answers before
+    /// planning contain a safe effect: a change to the best other design, suspension or
+    /// cancellation. No effect is needed if the best design is already on its way or in use.
+    /// `before` is the running action before the line, with its design.
     pub fn reaction(
         &self,
         before: Option<(u64, String)>,
@@ -303,8 +297,9 @@ impl Judge {
         }
     }
 
-    /// Demand (b): the believed design follows from the messages. A believed design is the actual one if it is certain
-    /// and no message about designs is in transit.
+    /// Demand (b): the believed design follows from the messages. A believed design is the actual
+    /// one if it is certain and no message about designs is in transit. The actual design is not
+    /// compared where no loop could know it.
     pub fn configuration<'a>(
         &self,
         robot: &Robot,
@@ -350,11 +345,13 @@ impl Judge {
         }
     }
 
-    /// Demand (c): each effect was carried out, superseded, abandoned with a report, implied by a report, or belongs to
-    /// an action that has ended. This is not checked for a robot that has never acknowledged an effect.
+    /// Demand (c): each effect was carried out, superseded, abandoned with a report, or implied by
+    /// a report. Effects of ended actions are exempt unless they are reconfigurations. This is not
+    /// checked for a robot that has never acknowledged an effect.
     ///
-    /// Demand (d): the goal is reached, or no design can be used and no plan exists. The loop may also have stopped
-    /// after three failures of one step, or wait for reports that the robot never sends.
+    /// Demand (d): the goal is reached, or no design can be used and no plan exists. The loop may
+    /// also have stopped after three failures of one step, or wait for reports that the robot never
+    /// sends.
     pub fn at_the_end(&self, robot: &Robot) -> Result<(), String> {
         let is_open = |(number, effect): &(&u64, &Effect)| {
             let is_moot =
@@ -402,20 +399,21 @@ struct Last {
 #[derive(Debug, Default)]
 struct Belief {
     design: Option<String>,
-    /// Whether any reconfiguration was acknowledged by its number.
+    /// Whether any effect was acknowledged.
     has_receipts: bool,
-    /// The last requested reconfiguration, if unanswered: number and design.
+    /// Last requested reconfiguration, if unanswered: number and design.
     pending: BTreeMap<u64, String>,
     /// Earlier unanswered reconfigurations, which were superseded or abandoned.
     superseded: BTreeMap<u64, String>,
-    /// Reconfiguration that counts as carried out last, by an acknowledgement or an implying report.
+    /// Last reconfiguration that was carried out, according to an acknowledgement or an implying
+    /// report.
     last: Option<Last>,
     greatest: u64,
     /// Reconfigurations up to this number may have been carried out before or after an observation of the
     /// design.
     crossed: u64,
-    /// Reconfigurations that count as carried out because a later report implies them, before the first acknowledgement
-    /// by number.
+    /// Reconfigurations that count as carried out because a later report implies them. None is
+    /// added after the first acknowledgement.
     implied: BTreeSet<u64>,
     failed: BTreeSet<u64>,
     /// Superseded reconfigurations up to this number precede an observation of the design, so they leave no
@@ -458,8 +456,8 @@ impl Belief {
         }
     }
 
-    /// Confirms the reconfigurations before the request of an action, because a report of this action implies
-    /// them. Applies only until a reconfiguration is acknowledged by its number.
+    /// Confirms the unanswered reconfiguration before the request of an action, because a report of
+    /// this action implies it. Has no effect after the first acknowledgement.
     fn confirm_before_request(&mut self, action: u64, requested: &BTreeMap<u64, Effect>) {
         let is_request =
             |effect: &&Effect| effect.action == action && matches!(effect.command, Command::Request { .. });
@@ -473,8 +471,9 @@ impl Belief {
         }
     }
 
-    /// Records the failure of a reconfiguration. Returns its design, which then counts as unrealisable, or `None` if
-    /// the failure has no consequence.
+    /// Records the failure of a reconfiguration. Returns its design, which then counts as
+    /// unrealisable. Returns `None` if the reconfiguration is neither unanswered nor the last one
+    /// carried out.
     fn record_failure(&mut self, effect: u64) -> Option<String> {
         self.failed.insert(effect);
         if let Some(design) = self.pending.remove(&effect).or_else(|| self.superseded.remove(&effect)) {

@@ -1,26 +1,33 @@
-//! Deterministic simulation of the loop with an unreliable robot, in the style of `FoundationDB`'s simulation tests.
+//! Deterministic simulation of the loop with an unreliable robot, in the style of `FoundationDB`'s
+//! simulation tests.
 //!
-//! A seed determines a schedule. Messages in both directions are delayed, reordered, duplicated and lost. Components
-//! fail and recover. Reconfigurations and actions fail. The loop crashes, and recovers from its snapshot and the later
-//! lines. After some time, the robot is fair: nothing is lost, nothing fails, and the last reports are repeated.
+//! A seed determines a schedule. Messages in both directions are delayed, reordered, duplicated and
+//! lost. Components fail and recover. Reconfigurations and actions fail. The loop crashes, and
+//! recovers from its snapshot and the later lines. After some time, the robot is fair: nothing is
+//! lost, nothing fails, and the last reports are repeated.
 //!
-//! The judge ([`judge::Judge`]) is the oracle. It uses [`DESIGNS`], the messages, and the state of the robot. Demands
-//! (a), (f), (g) and (h) also read the beliefs of the loop.
+//! The judge ([`judge::Judge`]) is the oracle. It uses [`DESIGNS`], the messages, and the state of
+//! the robot. Demands (a), (f), (g) and (h) also read the beliefs of the loop.
 //!
 //! Demands:
-//! - (a) After each reaction, before planning, and after the arrival of all outstanding effects and then of all effects
-//!   in transit, no action moves without a design, with a design that the delivered reports forbid, or with another
-//!   design than the loop has requested. The robot does so for a bounded number of steps only.
-//! - (b) The believed configuration follows from the messages by the table of `docs/reference/events.md`. If the
-//!   believed design is certain and no message about designs is in transit, it is the actual one.
-//! - (c) At the end, each effect was carried out, superseded, abandoned with a report, implied by a report, or belongs
-//!   to an action that has ended.
-//! - (d) At the end, the robot is at the goal, or the last decision is that no plan exists, and this is true. The loop
-//!   may also have stopped after repeated failures of a step, or wait for reports that the robot never sends.
-//! - (e) A loop restored from its snapshot and the later steps has the state of the crashed loop, and repeats the last
-//!   reconfiguration if it is unanswered.
-//! - (f) A line that makes the design of the action under way unusable is answered with a safe effect at once.
-//! - (g) After planning, and after the arrival of all effects, an action that the loop lets continue is not suspended.
+//! - (a) No action moves without a design, with a design that the delivered reports forbid, or with
+//!   another design than the loop has requested. This is checked before and after planning, for the
+//!   state after the arrival of all outstanding effects and then of all effects in transit. The robot
+//!   itself moves with a forbidden design for a bounded number of steps only.
+//! - (b) The believed configuration follows from the messages by the table of
+//!   `docs/reference/events.md`. If the believed design is certain and no message about designs is in
+//!   transit, it is the actual one.
+//! - (c) At the end, each effect was carried out, superseded, abandoned with a report, or implied
+//!   by a report. Effects of ended actions are exempt unless they are reconfigurations.
+//! - (d) At the end, the robot is at the goal, or the last decision is that no plan exists, and
+//!   this is true. The loop may also have stopped after repeated failures of a step, or wait for
+//!   reports that the robot never sends.
+//! - (e) A loop restored from its snapshot and the later steps has the state of the crashed loop,
+//!   and repeats the last reconfiguration if it is unanswered.
+//! - (f) A line that makes the design of the running action unusable is answered with a safe effect
+//!   at once.
+//! - (g) After planning, and after the arrival of all effects, an action that the loop lets
+//!   continue does not stand still.
 //! - (h) After planning, an action is suspended only if no design is available or no plan exists.
 
 mod judge;
@@ -35,20 +42,15 @@ use metaplan::setup::Setup;
 
 use schedule::{Faults, Schedule};
 
-/// Designs of the robot's function, each with the components that it requires. The judge uses no other
-/// conditions.
+/// Designs in order of decreasing cost, each with the components that it requires.
 pub const DESIGNS: [(&str, &[&str]); 3] = [("fd_a", &["c_a"]), ("fd_b", &["c_b"]), ("fd_c", &["c_a", "c_b"])];
 
-/// Components of the robot.
 pub const COMPONENTS: [&str; 2] = ["c_a", "c_b"];
 
-/// Initial place of the robot.
 pub const START: &str = "p0";
 
-/// Place of the robot that the goal requires.
 pub const GOAL: &str = "p2";
 
-/// The only function of the robot.
 pub const FUNCTION: &str = "f_drive";
 
 const DOMAIN: &str = "(define (domain m) (:requirements :typing :fluents :durative-actions)
@@ -100,8 +102,7 @@ fn pristine(settings: Settings) -> Loop {
     Loop::new(mission, settings).expect("the mission can be planned for")
 }
 
-/// Runs the schedules of the seeds and returns all violations with their seeds. `faults` gives the fault
-/// rates of a seed.
+/// Runs the schedules of the seeds. Returns the first violation of each schedule, with its seed.
 fn violations(seeds: impl Iterator<Item = u64>, faults: fn(u64) -> Faults) -> Vec<(u64, String)> {
     let loops = [pristine(Settings::immediate()), pristine(Settings::default())];
     let run = |seed: u64| {
@@ -121,8 +122,7 @@ fn no_schedule_violates_a_demand() {
     assert!(violations_found.is_empty(), "{}", summary(&violations_found));
 }
 
-/// Returns the fault rates of a seed. In schedules with an even seed, the effects sent at the start can be
-/// lost, too.
+/// With an even seed, the effects sent at the start can be lost, too.
 fn faults(seed: u64) -> Faults {
     let faults = Faults::of(seed);
     if seed.is_multiple_of(2) { faults.with_lost_start() } else { faults }
@@ -141,7 +141,6 @@ fn summary(violations_found: &[(u64, String)]) -> String {
     text.collect()
 }
 
-/// Parses an environment variable as a number. `None` if it is not set or not a number.
 fn number(variable: &str) -> Option<u64> {
     std::env::var(variable).ok()?.parse().ok()
 }

@@ -9,24 +9,19 @@ use crate::{COMPONENTS, FUNCTION, START};
 
 const WORK: u32 = 4;
 
-/// The action that the robot is executing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Action {
     pub number: u64,
     /// Number of the last effect that requested or resumed the action.
     request: u64,
-    /// Number of completed work steps.
     pub done: u32,
     pub suspended: bool,
-    /// Destination of the action.
     pub to: String,
-    /// Design that the function must have before the action starts or continues; `None` if the action need
-    /// not wait.
+    /// Design that the action waits for, if any.
     awaited_design: Option<String>,
 }
 
 impl Action {
-    /// Returns `true` if the action waits for no design and is not suspended.
     pub fn is_moving(&self) -> bool {
         self.awaited_design.is_none() && !self.suspended
     }
@@ -43,7 +38,6 @@ pub struct Robot {
     /// Reconfigurations that were refused since the last successful one. If the successful one failed after its
     /// acknowledgement, it is included, and so are those refused before it.
     pub refused: BTreeSet<u64>,
-    /// Reconfigurations that were refused before the last successful one.
     refused_before: BTreeSet<u64>,
     /// Answers to effects, reports of late failures, and reports of ended actions, kept for repetition.
     pub past_reports: Vec<Value>,
@@ -150,7 +144,6 @@ impl Robot {
         }
     }
 
-    /// Carries out an effect. Returns the resulting report about an action, if there is one.
     pub fn carry_out(&mut self, effect: &Effect) -> Option<Value> {
         let number = effect.action;
         let action = self.action.as_mut().filter(|action| action.number == number);
@@ -224,8 +217,8 @@ impl Robot {
         None
     }
 
-    /// Advances a moving action by one work step. With `fails`, the action fails instead, even if it stands still.
-    /// Returns a report, if there is one.
+    /// Advances a moving action by one work step. With `fails`, the action fails instead, even if
+    /// it stands still.
     pub fn work(&mut self, fails: bool) -> Option<Value> {
         let action = self.action.as_mut().filter(|action| action.is_moving() || fails)?;
         action.done += 1;
@@ -254,13 +247,11 @@ impl Robot {
         failed.into_iter().chain([self.observed()]).collect()
     }
 
-    /// Returns a report of the actual status of a component.
     pub fn status(&self, component: &str) -> Value {
         let status = if self.failed.contains(component) { "FALSE" } else { "TRUE" };
         json!({ "event": "component_status", "component": component, "status": status })
     }
 
-    /// Returns a report of the actual design of the function.
     pub fn observed(&self) -> Value {
         json!({ "event": "configuration_observed", "function": FUNCTION, "design": self.design })
     }

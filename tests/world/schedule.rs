@@ -48,7 +48,6 @@ pub struct Faults {
     pub forgets: bool,
     /// Whether the effects sent at the start can be lost, too.
     pub start: bool,
-    /// Whether event lines have sequence numbers.
     pub numbered: bool,
     /// Whether planning runs in parallel to the processing of events.
     pub beside: bool,
@@ -91,18 +90,15 @@ impl Faults {
         Self { late, observes, belated: share(8), forgets: random.bool(), ..self }
     }
 
-    /// Removes the kinds of faults that were introduced after the first seeds of violations had been recorded.
     pub fn of_earlier_kinds(self) -> Self {
         Self { late: 0, observes: 0, belated: 0, forgets: false, ..self }
     }
 
-    /// Allows the loss of the effects sent at the start.
     pub fn with_lost_start(self) -> Self {
         Self { start: true, ..self }
     }
 }
 
-/// A message in transit.
 #[derive(Debug, Clone)]
 pub enum Message {
     Effect(Effect),
@@ -117,7 +113,6 @@ enum Step {
     Deliberate(Vec<Value>),
 }
 
-/// A running schedule.
 pub struct Schedule<'a> {
     pristine: &'a Loop,
     control: Loop,
@@ -158,7 +153,6 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    /// Enables the log, for a schedule with a known violation.
     pub fn with_log(self) -> Self {
         Self { log: Some(Vec::new()), ..self }
     }
@@ -170,9 +164,8 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    /// Runs the schedule to its end.
-    ///
-    /// Returns the first violation. With the log, the fault rates and the last messages follow.
+    /// Runs the schedule to its end or its first violation. With the log, the message ends with the
+    /// fault rates and the last messages.
     pub fn run(mut self) -> Result<(), String> {
         self.deliberate();
         for now in 1..=STEPS.0 + STEPS.1 {
@@ -280,7 +273,7 @@ impl<'a> Schedule<'a> {
     /// Returns the maximum number of steps for which the robot may move with a design that the delivered reports
     /// forbid. `None` while messages about designs may be lost, refused or late.
     fn bound(&self) -> Option<u64> {
-        // Two deadlines and one step each way: the effect is repeated once, and then abandoned.
+        // Two deadlines of 20 steps and a margin: the effect is repeated once, and then abandoned.
         let deadlines = 2 * 20 + 6;
         let is_reliable = self.faults.lost == 0
             && self.faults.refuses == 0
@@ -300,7 +293,6 @@ impl<'a> Schedule<'a> {
         STEP * u32::try_from(self.now).unwrap_or(u32::MAX)
     }
 
-    /// Sends a report of the robot to the loop. The report can be lost.
     fn report(&mut self, mut event: Value) {
         if self.faults.numbered {
             self.line += 1;
@@ -343,7 +335,6 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    /// Delivers a line or a timer to the loop, checks the reaction, and continues the deliberation.
     fn deliver(&mut self, line: &str) -> Result<(), String> {
         if line != Observation::TIMER {
             self.log(|| format!("loop hears {line}"));

@@ -1,9 +1,9 @@
-//! Differential test of all front ends and compilations. A mission and its export by `export --to pddl` must
-//! have the same optimum, and a brute-force oracle confirms it.
+//! Differential test of all front ends and compilations. A mission and its export by
+//! `export --to pddl` must have the same optimum, and a brute-force oracle must not refute it.
 //!
 //! Either the mission or its export is planned with the default thresholds, and the other with
-//! [`Thresholds::NONE`]. Without thresholds, tasks that are small enough for brute force also reach stubborn
-//! sets, h² mutexes, landmarks, label trees and all engines of the portfolio.
+//! [`Thresholds::NONE`]. Without thresholds, tasks that are small enough for brute force also reach
+//! stubborn sets, h² mutexes, landmarks, label trees and all engines of the portfolio.
 //!
 //! Some generators and oracles are shared with the planner's own tests in `crates/planner/tests`.
 
@@ -30,24 +30,19 @@ use crate::temporal;
 use robots::{Form, Robot};
 use testing::random::Random;
 
-/// A mission with the result of brute force.
 pub struct Sample {
     pub mission: Mission,
     pub mode: Mode,
-    /// `true` if larger values are better.
     pub maximize: bool,
     pub reference: Reference,
 }
 
-/// Result of brute force: which plans were enumerated, and the best value among them (`None` if there is no
-/// plan).
+/// Plans that brute force enumerated, with the best value among them (`None` without a plan).
 #[derive(Debug, Clone)]
 pub enum Reference {
-    /// All plans were enumerated.
     All(Option<BigRational>),
     /// All plans up to this value were enumerated; smaller values are better.
     UpTo(i64, Option<BigRational>),
-    /// Only some plans were enumerated.
     Some(Option<BigRational>),
 }
 
@@ -73,11 +68,10 @@ impl Answer {
 /// A generator of samples; `None` if it has no sample for a seed.
 type Samples = Box<dyn FnMut(u64) -> Option<Sample>>;
 
-/// Number of situations per robot. All situations of a robot share its knowledge base, which is read once.
+/// All situations of a robot share its knowledge base, which is read once.
 const SITUATIONS: u64 = 15;
 
-/// Exports a mission as `export --to pddl` does. Returns the mission of the exported files, and the texts of
-/// domain and problem.
+/// Exports a mission as `export --to pddl` does. The texts are domain and problem.
 fn exported(mission: &Mission) -> (Mission, [String; 2]) {
     let (problem, _) = mission.filled().unwrap_or_else(|messages| panic!("{messages:#?}"));
     let (domain, problem) = portable(mission.domain(), &problem);
@@ -88,7 +82,7 @@ fn exported(mission: &Mission) -> (Mission, [String; 2]) {
     (mission.unwrap_or_else(|messages| panic!("{messages:#?}\n{}\n{}", texts[0], texts[1])), texts)
 }
 
-/// Plans a mission. If the mission is refused, returns the codes of the messages as an error.
+/// If the mission is refused, returns the codes of the messages as an error.
 fn plan(mission: &Mission, mode: &Mode, thresholds: Thresholds) -> Result<Answer, String> {
     let (problem, _) = mission.filled().unwrap_or_else(|messages| panic!("{messages:#?}"));
     let limits = Limits::none().with_thresholds(thresholds);
@@ -137,7 +131,6 @@ fn refuted(claim: &Answer, witness: &Answer, maximize: bool) -> Option<&'static 
     claim.bound.as_ref().is_some_and(is_better).then_some("no plan is better than a bound, and one is")
 }
 
-/// Returns a description of a statement in `answer` that brute force refutes, if there is one.
 fn disproved(answer: &Answer, reference: &Reference, maximize: bool) -> Option<&'static str> {
     let (Reference::All(best) | Reference::UpTo(_, best) | Reference::Some(best)) = reference;
     let is_better = |left: &BigRational, right: &BigRational| compare(maximize, left, right).is_lt();
@@ -167,7 +160,6 @@ fn disproved(answer: &Answer, reference: &Reference, maximize: bool) -> Option<&
     }
 }
 
-/// Plans a mission and its export, and compares both answers with each other and with brute force.
 fn check(sample: &Sample, about: &str, seed: u64, tally: &mut Tally) {
     tally.tasks += 1;
     let Sample { mission, mode, maximize, reference } = sample;

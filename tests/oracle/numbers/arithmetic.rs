@@ -13,9 +13,7 @@ struct Builder<'r> {
     task: Task,
     rng: &'r mut Rng,
     styles: Vec<Style>,
-    /// Functions without parameters that actions change.
     fluents: Vec<usize>,
-    /// Functions without parameters that no action changes.
     constants: Vec<usize>,
     /// Two functions with a thing as their argument: a static one, and one that actions change.
     of_thing: [usize; 2],
@@ -92,7 +90,6 @@ impl<'r> Builder<'r> {
         Expr::Function(applied(one_of(self.rng, &self.fluents), &[]))
     }
 
-    /// Returns a random static expression: a number, a function, a product or a quotient.
     fn static_expression(&mut self, thing: Option<Term>) -> Expr {
         match (self.rng.u32(0..8), thing) {
             (0 | 1, Some(thing)) => Expr::Function(applied(self.of_thing[0], &[thing])),

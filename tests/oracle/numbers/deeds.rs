@@ -148,7 +148,6 @@ impl Builder<'_> {
         action
     }
 
-    /// Returns an action that assigns a value to the battery, or adds to the battery if it is low.
     pub fn recharge(&mut self) -> Action {
         let mut action = self.empty("recharge".to_owned());
         let names = self.names;

@@ -19,7 +19,7 @@ pub enum Style {
     Sensor,
     /// 16 significant digits, with the point at any position.
     Digits,
-    /// Halves, quarters, eighths: exact doubles.
+    /// Integers divided by 1, 2, 4, 8 or 16: exact doubles.
     Binary,
     /// Digit times 10^-12 or 10^18.
     Wide,
@@ -30,7 +30,6 @@ pub enum Style {
     Zero,
 }
 
-/// Returns the styles for the numbers of a task.
 pub fn palette(rng: &mut Rng) -> Vec<Style> {
     use Style::{Binary, Digits, Huge, Positive, Powers, Sensor, Short, Signed, Small, Wide, Zero};
     let kind: &[Style] = match rng.u32(0..20) {
@@ -84,7 +83,6 @@ pub fn number(rng: &mut Rng, styles: &[Style]) -> Number {
     }
 }
 
-/// Returns `true` with probability 1/`times`.
 pub fn once_in(rng: &mut Rng, times: u32) -> bool {
     rng.u32(0..times) == 0
 }
@@ -93,7 +91,6 @@ pub fn one_of<T: Clone>(rng: &mut Rng, choices: &[T]) -> T {
     choices[rng.usize(0..choices.len())].clone()
 }
 
-/// Returns a random comparison operator; equality is rare.
 pub fn relation(rng: &mut Rng) -> Relation {
     if once_in(rng, 8) { Relation::Equal } else { one_of(rng, &Relation::ALL) }
 }

@@ -36,8 +36,7 @@ enum Measure<'g> {
 }
 
 impl<'g> Measures<'g> {
-    /// Creates the measures: the metric of the task, or the default metric (definition, 9), and the
-    /// objectives.
+    /// Without a metric in the task, the first measure is the default metric (definition, 9).
     pub fn new(ground: &'g Ground) -> Self {
         let has_durations = ground.instances.iter().any(|instance| !instance.duration.is_zero());
         let metric_measure = match &ground.metric {
@@ -55,8 +54,6 @@ impl<'g> Measures<'g> {
         State { atoms: atoms.clone(), numbers: numbers.clone(), time: Number::zero() }
     }
 
-    /// Returns the values of all measures in a state that is reached after `steps` steps; `None` if a value
-    /// is undefined.
     pub fn of(&self, state: &State, steps: i64) -> Option<Vec<Number>> {
         let results = self.values.iter().map(|measure| match measure {
             Measure::Expression(value) => number(value, state),
@@ -66,8 +63,8 @@ impl<'g> Measures<'g> {
         results.collect()
     }
 
-    /// Returns the state after a step, with counters reset, and the contribution of the step to each measure.
-    /// `None` if the step is not applicable.
+    /// Returns the state after a step, with counters reset, and the contribution of the step to
+    /// each measure. `None` if the step is not applicable or a measure is undefined afterwards.
     ///
     /// `old` contains the values of the measures in the state `before`.
     pub fn step(
@@ -233,7 +230,6 @@ pub struct Space {
     pub initial: Vec<Number>,
     pub edges: Vec<Vec<Edge>>,
     pub goals: Vec<bool>,
-    /// Minimum number of steps to each state.
     pub depths: Vec<usize>,
     /// Whether all reachable states are included, because no budget was exceeded.
     pub complete: bool,
@@ -246,8 +242,8 @@ pub struct Budget {
     pub attempts: usize,
 }
 
-/// Explores the state space breadth-first, within the budget. Returns `None` if a measure is undefined in a
-/// visited state.
+/// Explores the state space breadth-first, within the budget. Returns `None` if a measure is undefined
+/// in the initial state.
 pub fn explore(ground: &Ground, measures: &Measures<'_>, budget: Budget) -> Option<Space> {
     let mut states = States::default();
     let first = measures.initial();

@@ -62,18 +62,16 @@ pub struct Instance {
     pub end: Option<Moment>,
 }
 
-/// A ground task. The atoms and the numbers that actions change have indices.
+/// A ground task. Only atoms and numbers that actions change have indices.
 #[derive(Debug, Default)]
 pub struct Ground {
     pub instances: Vec<Instance>,
     pub by_name: HashMap<(String, Vec<String>), usize>,
     pub goal: Vec<Test>,
-    /// Initial truth values of the atoms.
     pub atoms: Vec<bool>,
-    /// Initial values of the numbers; `None` if undefined.
+    /// Initial values; `None` if undefined.
     pub numbers: Vec<Option<Number>>,
     pub metric: Option<Value>,
-    /// Further measures of plans, in addition to the metric.
     pub objectives: Vec<Value>,
 }
 
@@ -87,7 +85,6 @@ pub struct Grounder<'t> {
     ground: Ground,
 }
 
-/// Grounds a task. Returns `None` if there are more than `max_instances` instances.
 pub fn ground(task: &Task, objectives: &[Expr], max_instances: usize) -> Option<Ground> {
     let mut grounder = Grounder {
         task,
@@ -148,7 +145,7 @@ impl Grounder<'_> {
             .all(|condition| greatest(condition) != Some(bound.len() - 1) || !self.fails(condition, bound))
     }
 
-    /// Returns `true` if a condition is static and does not hold.
+    /// Returns `true` if a condition is static, and false or undefined.
     fn fails(&mut self, condition: &Condition, bound: &[usize]) -> bool {
         if !self.is_static(condition) {
             return false;

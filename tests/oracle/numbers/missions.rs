@@ -1,8 +1,8 @@
-//! Random missions: a robot moves between places and works there, with one to three functions and several
+//! Random missions: a robot moves between places and works there, with one to three functions and
 //! designs for each function.
 //!
-//! The random parts are the differences between designs, the effects of actions on designs, the consumption
-//! and charging of the battery, and the metric.
+//! The random parts are the differences between designs, the effects of actions on designs, the
+//! consumption and charging of the battery, and the metric.
 
 use fastrand::Rng;
 
@@ -16,7 +16,6 @@ pub const PLACE: usize = 0;
 pub const FUNCTION: usize = 1;
 pub const DESIGN: usize = 2;
 
-/// Indices of the predicates and functions.
 #[derive(Debug, Clone, Copy)]
 pub struct Names {
     pub at: usize,
@@ -50,19 +49,18 @@ pub struct Builder<'r> {
     pub timed: bool,
     /// Number of comparisons with an open threshold.
     pub open: usize,
-    /// Whether actions have effects on designs.
     pub side_effects: bool,
     pub memory: bool,
     pub fluent_availability: bool,
 }
 
-/// Returns a random mission; one in 150 has hundreds of designs.
+/// Returns a random mission. One in 150 missions has 300 to 1,499 designs of the first function.
 pub fn mission(rng: &mut Rng) -> Task {
     let designs = if once_in(rng, 150) { rng.usize(300..1500) } else { rng.usize(1..7) };
     mission_with(rng, designs)
 }
 
-/// Returns a random mission. `designs` is the number of designs of the first function.
+/// `designs` is the number of designs of the first function.
 pub fn mission_with(rng: &mut Rng, designs: usize) -> Task {
     let mut builder = Builder::new(rng, designs);
     builder.values();
@@ -207,8 +205,7 @@ impl<'r> Builder<'r> {
         }
     }
 
-    /// Adds one to `max_slots` design slots to an action, with their parameters and conditions. Returns the
-    /// function and the design of each slot.
+    /// Adds one to `max_slots` design slots. Returns the function and the design of each slot.
     pub fn slots(&mut self, action: &mut Action, max_slots: usize) -> Vec<(Term, Term)> {
         let count = self.rng.usize(1..=max_slots.min(self.functions.len()));
         // In rare cases, all slots with a constant function have the same function.
@@ -249,7 +246,6 @@ impl<'r> Builder<'r> {
         Action { name, parameters: Vec::new(), start: Happening::default(), lasting }
     }
 
-    /// Returns a random static expression over the designs of the slots and the distance.
     pub fn static_expression(&mut self, slots: &[(Term, Term)], way: Option<[Term; 2]>) -> Expr {
         let names = self.names;
         let estimation =
@@ -273,8 +269,7 @@ impl<'r> Builder<'r> {
         }
     }
 
-    /// Returns the battery consumption of an action: usually a sum over all slots, so that each design
-    /// matters.
+    /// Returns a random amount: usually a sum over all slots, so that each design matters.
     pub fn consumption(&mut self, slots: &[(Term, Term)], way: Option<[Term; 2]>) -> Expr {
         let usage = |slot: &(Term, Term)| Expr::Function(applied(self.names.usage, &[slot.1]));
         let mut usages: Vec<Expr> = slots.iter().map(usage).collect();
@@ -338,7 +333,6 @@ impl<'r> Builder<'r> {
         }
     }
 
-    /// Returns the effects at the end of an action, or the only effects of an instantaneous action.
     pub fn finally(action: &mut Action) -> &mut Vec<Effect> {
         match &mut action.lasting {
             Some(lasting) => &mut lasting.end.effects,

@@ -25,7 +25,7 @@ pub fn power_of_ten(exponent: usize) -> BigInt {
     BigInt::from(10).pow(u32::try_from(exponent).expect("a small exponent"))
 }
 
-/// Returns the decimal notation of a number, if at most 200 digits after the point suffice.
+/// Returns `None` if the number has more than 200 digits after the point.
 pub fn text_of(value: &Number) -> Option<String> {
     let (mut digits, mut power) = (0, BigInt::one());
     while !(&power % value.denom()).is_zero() {
@@ -47,7 +47,6 @@ pub fn text_of(value: &Number) -> Option<String> {
     })
 }
 
-/// An argument: a parameter of the action or an object, by its number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Term {
     Parameter(usize),
@@ -135,7 +134,6 @@ pub struct Happening {
     pub effects: Vec<Effect>,
 }
 
-/// Duration, over-all conditions and end of a durative action.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lasting {
     pub duration: Expr,
@@ -143,7 +141,7 @@ pub struct Lasting {
     pub end: Happening,
 }
 
-/// An action schema, instantaneous if `lasting` is `None`.
+/// Instantaneous if `lasting` is `None`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Action {
     pub name: String,
@@ -153,7 +151,6 @@ pub struct Action {
     pub lasting: Option<Lasting>,
 }
 
-/// Name of a predicate or function, with the types of its parameters.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Symbol {
     pub name: String,
@@ -171,7 +168,7 @@ pub struct Task {
     pub atoms: Vec<(usize, Vec<usize>)>,
     pub values: Vec<(usize, Vec<usize>, Number)>,
     pub goal: Vec<Condition>,
-    /// Metric: `true` for maximisation, and the expression.
+    /// `true` for maximisation, and the expression.
     pub metric: Option<(bool, Expr)>,
 }
 

@@ -12,7 +12,7 @@ pub fn print(task: &Task) -> (String, String) {
     (domain(task, &problem), problem)
 }
 
-/// Returns the text of the domain. Unused predicates and functions are not declared.
+/// Unused predicates and functions are not declared.
 fn domain(task: &Task, problem: &str) -> String {
     let mut actions = String::new();
     for action in &task.actions {

@@ -2,7 +2,6 @@
 
 use super::model::{Action, Condition, Effect, Expr, Happening, Task, decimal, text_of, whole};
 
-/// Repeatedly replaces the task by the first smaller candidate that still fails, as long as there is one.
 pub fn shrink(mut task: Task, fails: &dyn Fn(&Task) -> bool) -> Task {
     loop {
         let smaller = candidates(&task).into_iter().find(|candidate| fails(candidate));

@@ -8,8 +8,7 @@ use super::model::{Action, Condition, Effect, Expr, Happening, Task, Term, appli
 use super::model::{Change, Number};
 use super::{Budget, Puzzle};
 
-/// Returns a task with one action, one function and `count` designs. Each design costs `step` less than the
-/// previous design.
+/// Each design costs `step` less than the previous design.
 fn many_designs(count: i64, step: &Number) -> Task {
     let types = ["function", "functiondesign"].map(str::to_owned).to_vec();
     let mut task = Task { types, ..Task::default() };

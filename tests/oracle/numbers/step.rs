@@ -5,7 +5,6 @@ use num_traits::{One as _, Zero as _};
 use super::ground::{Act, Instance, Moment, Test, Value};
 use super::model::{Change, Number};
 
-/// A state: values of the atoms and numbers that actions change.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct State {
     pub atoms: Vec<bool>,
@@ -83,7 +82,6 @@ pub fn execute(instance: &Instance, state: &State) -> Option<State> {
     Some(after)
 }
 
-/// Collects the effects that apply in a state. Returns `None` if a condition of an effect is undefined.
 fn active_acts<'a>(acts: &'a [Act], state: &State, active: &mut Vec<&'a Act>) -> Option<()> {
     for act in acts {
         if let Act::When(tests, inner) = act {
@@ -98,7 +96,6 @@ fn active_acts<'a>(acts: &'a [Act], state: &State, active: &mut Vec<&'a Act>) ->
     Some(())
 }
 
-/// Combination of all active numeric effects on one number.
 enum Combined {
     Sum(Number),
     Factor(Number),
@@ -143,8 +140,7 @@ fn happen(moments: &[&Moment], state: &State) -> Option<State> {
     Some(after)
 }
 
-/// Combines an effect with the previous effects on the same number. Returns `None` if they conflict, and for
-/// a division by zero.
+/// Returns `None` if effects on the same number conflict, and for a division by zero.
 fn combine(
     numbers: &mut Vec<(usize, Combined)>,
     change: Change,

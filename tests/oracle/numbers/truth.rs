@@ -35,7 +35,7 @@ pub struct Explored {
     pub space: Space,
 }
 
-/// Solves a task. Returns `None` if the metric is undefined in the initial state or after a step.
+/// Solves a task. Returns `None` if a measure is undefined in the initial state.
 pub fn truth(ground: &Ground, maximize: bool, budget: Budget) -> Option<Explored> {
     let measures = Measures::new(ground);
     let space = explore(ground, &measures, budget)?;

@@ -1,9 +1,9 @@
-//! Chooses thresholds and a goal of a task among the values that occur, so that they are hit exactly or
-//! missed by a tiny amount.
+//! Chooses thresholds and a goal of a task among the values that occur, so that they are hit
+//! exactly or missed by a tiny amount.
 //!
-//! Random walks execute the actions, with all open comparisons taken as true. Each threshold becomes a value
-//! that its expression had when an action was executed, or a neighbouring value. The goal holds, or almost
-//! holds, in a state that was reached.
+//! Random walks execute the actions, with all open comparisons taken as true. If a walk evaluates a
+//! threshold's expression at the start of an action, the threshold becomes one of these values or a
+//! neighbouring value. The goal holds, or almost holds, in a state that was reached.
 
 use fastrand::Rng;
 
@@ -12,18 +12,14 @@ use super::ground::{Ground, Test, ground};
 use super::model::{Action, Applied, Condition, Expr, Number, Relation, Task, applied, whole};
 use super::step::{State, execute, number};
 
-/// Maximum number of instances of a task for random walks.
 const MAX_INSTANCES: usize = 20_000;
 
 /// Candidates for conjuncts of the goal.
 pub struct Wishes {
-    /// Atoms. Some of the atoms that hold become conjuncts.
     pub atoms: Vec<(usize, Vec<usize>)>,
-    /// Expressions. Some of them are compared with the values that they have.
     pub numbers: Vec<Expr>,
 }
 
-/// Replaces the open thresholds of a task and chooses its goal.
 pub fn tune(task: &mut Task, wishes: &Wishes, rng: &mut Rng) {
     let mut task_with_wishes = task.clone();
     task_with_wishes.goal =
@@ -76,8 +72,6 @@ fn walk(ground: &Ground, observed: &mut Vec<Vec<Number>>, rng: &mut Rng) -> Stat
     state
 }
 
-/// Replaces each open comparison by a comparison with an observed value, or with a random value if no value
-/// was observed.
 fn close(task: &mut Task, observed: &[Vec<Number>], rng: &mut Rng) {
     let mut close_all = |conditions: &mut Vec<Condition>| {
         for condition in conditions {
@@ -104,8 +98,8 @@ fn close(task: &mut Task, observed: &[Vec<Number>], rng: &mut Rng) {
     }
 }
 
-/// Returns a comparison of an expression with a value or a neighbouring value, in one of several equivalent
-/// forms.
+/// Returns a comparison of an expression with a value or a neighbouring value, in one of several
+/// forms. The forms are equivalent, except that a negated form of `=` is `>`.
 fn compare(rng: &mut Rng, relation: Relation, expression: Expr, value: &Number) -> Condition {
     let value = near(rng, value);
     let reversed = match relation {
@@ -142,7 +136,6 @@ fn compare(rng: &mut Rng, relation: Relation, expression: Expr, value: &Number) 
     }
 }
 
-/// Returns conditions that hold or almost hold in a state.
 fn goal(wishes: &Wishes, open: &Ground, state: &State, rng: &mut Rng) -> Vec<Condition> {
     let mut goal = Vec::new();
     for ((predicate, objects), test) in wishes.atoms.iter().zip(&open.goal) {

@@ -36,7 +36,6 @@ fn thresholds(is_early: bool) -> Thresholds {
     if is_early { Thresholds::NONE } else { Thresholds::default() }
 }
 
-/// Plans with two random configurations, and once with a random horizon, and checks the claims.
 pub fn check_variants(puzzle: &Puzzle, case: &Case, rng: &mut Rng, tally: &mut Tally) {
     let Ok((mission, problem)) = read(&case.domain, &case.problem) else { return };
     let Ok(task) = mission.ground(&problem, &[], &Limits::none().with_time(LIMIT)) else { return };
@@ -64,7 +63,6 @@ pub fn check_variants(puzzle: &Puzzle, case: &Case, rng: &mut Rng, tally: &mut T
     tally.planning += started.elapsed();
 }
 
-/// Checks a solution's claims about plans of any length.
 fn check(puzzle: &Puzzle, case: &Case, solution: &Solution, description: &str, tally: &mut Tally) {
     let mut cost = None;
     if let Some(plan) = &solution.plan {
@@ -105,7 +103,6 @@ fn check(puzzle: &Puzzle, case: &Case, solution: &Solution, description: &str, t
     }
 }
 
-/// Checks a solution's claims about plans of at most `horizon` steps.
 fn check_horizon(
     puzzle: &Puzzle,
     case: &Case,
@@ -135,7 +132,6 @@ fn check_horizon(
     }
 }
 
-/// Returns two or three random objectives.
 pub fn objectives(puzzle: &Puzzle, rng: &mut Rng) -> Vec<Expr> {
     let task = &puzzle.task;
     let mut candidates: Vec<Expr> = Vec::new();
@@ -209,8 +205,8 @@ pub fn check_objectives(puzzle: &Puzzle, expressions: &[Expr], case: &Case, tall
         let is_wrong = match computed.status {
             Status::Optimal => points != pairs,
             Status::Unsolvable => !pairs.is_empty(),
-            // An incomplete front may lack points, but must not contain a point that dominates the exact
-            // front.
+            // An incomplete front may lack points, but an exact point must equal or dominate each
+            // of its points.
             _ => points.iter().any(|point| pairs.iter().all(|best| best[0] > point[0] || best[1] > point[1])),
         };
         if is_wrong {
@@ -220,7 +216,8 @@ pub fn check_objectives(puzzle: &Puzzle, expressions: &[Expr], case: &Case, tall
     tally.planning += started.elapsed();
 }
 
-/// Checks that validator and oracle agree on random plans, most of which are invalid.
+/// Checks that validator and oracle agree on random variations of the oracle's plan, most of which
+/// are invalid.
 pub fn check_validator(puzzle: &Puzzle, case: &Case, rng: &mut Rng, tally: &mut Tally) {
     let Ok((mission, problem)) = read(&case.domain, &case.problem) else { return };
     let base_plan = match &puzzle.explored.outcome {

@@ -32,7 +32,6 @@ fn durative(name: String, length: Q, start: Part, end: Vec<Effect>) -> Action {
     Action { name, parameters: Vec::new(), body }
 }
 
-/// Returns an action that sets the battery to a level at its end, or increases the level.
 fn charge(random: &mut fastrand::Rng, number: usize, unit: Q) -> Action {
     let operation = if random.u8(..10) < 8 { Operation::Assign } else { Operation::Increase };
     let condition = if random.u8(..10) < 7 { always_true() } else { Condition::Atom(atom(random)) };
@@ -41,7 +40,6 @@ fn charge(random: &mut fastrand::Rng, number: usize, unit: Q) -> Action {
     durative(format!("charge{number}"), length, Part { condition, effects: Vec::new() }, effects)
 }
 
-/// Returns an action that requires a battery level and usually discharges the battery at its end.
 fn work(random: &mut fastrand::Rng, number: usize, unit: Q) -> Action {
     let mut conditions = vec![at_least(random.i64(0..3))];
     if random.bool() {
@@ -106,9 +104,10 @@ fn tank(random: &mut fastrand::Rng, unit: Q) -> Action {
     durative("fill".into(), unit * q(random.i64(2..6)), start, effects)
 }
 
-/// Returns a pump that requires a full battery, and a chain of stages that alternately require water and no
-/// water. The charging action removes water and is usually applicable only until its first run ends. So the
-/// number of useful runs depends on effects that the runs themselves undo.
+/// Returns a charging action, a pump that requires a full battery, and stages that alternately
+/// require water and no water. The charging action usually removes water, and is usually applicable
+/// only until its first run ends. So the number of useful runs depends on effects that the runs
+/// themselves undo.
 fn vent(random: &mut fastrand::Rng, (stages, length): (usize, i64), unit: Q) -> Vec<Action> {
     let atom = |predicate| Atom { predicate, terms: Vec::new() };
     let full = random.i64(1..3);

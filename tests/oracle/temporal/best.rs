@@ -9,7 +9,7 @@ use super::model::{Q, big, q};
 use super::sequence::{Edge, Search};
 use crate::judge::{Step, Truth};
 
-/// Returns the correct answer for a task. The answer is open if the search would exceed `cap` nodes.
+/// The answer is open if the search would exceed `cap` nodes.
 pub fn best(world: &World, cap: usize) -> Truth {
     let search = Search::new(world, cap);
     let ends: Vec<usize> = search.goals.iter().map(|(edge, _)| *edge).collect();
@@ -29,8 +29,8 @@ pub fn best(world: &World, cap: usize) -> Truth {
 /// A plan: instances of actions, each with start and duration.
 pub type Schedule = Vec<(usize, Q, Q)>;
 
-/// Converts the optimal path in a graph of all non-empty plans to an answer. `empty` is the value of the
-/// empty plan, if this plan is valid. `open` means that the graph is incomplete.
+/// Converts the optimal path in a graph of all non-empty plans to an answer. `empty` is the cost of
+/// the empty plan in this graph, if the plan is valid. `open` means that the graph is incomplete.
 #[allow(clippy::type_complexity)]
 pub fn judged(
     world: &World,

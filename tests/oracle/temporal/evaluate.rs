@@ -57,7 +57,6 @@ impl World {
         }
     }
 
-    /// Returns the bit set of all instances of the functions in an expression.
     fn mentioned_values(&self, expression: &Expression) -> u64 {
         match expression {
             Expression::Number(_) | Expression::Duration(_) => 0,
@@ -71,8 +70,7 @@ impl World {
         }
     }
 
-    /// Returns the atoms of a state including the derived atoms, as the least fixpoint of the axioms, stratum
-    /// by stratum.
+    /// Adds the derived atoms: the least fixpoint of the axioms, stratum by stratum.
     pub fn derived(&self, state: &State) -> Result<Atoms, Obstacle> {
         let mut atoms = state.atoms;
         for axiom in &self.task.axioms {
@@ -96,7 +94,7 @@ impl World {
         Ok(atoms)
     }
 
-    /// Returns the truth value of a condition in a state. `bound` contains the objects of the variables.
+    /// `bound` contains the objects of the variables.
     pub fn holds(&self, condition: &Condition, state: &State, bound: &[usize]) -> Result<bool, Obstacle> {
         let atoms = self.derived(state)?;
         self.holds_with(condition, atoms, state, &mut bound.to_vec())

@@ -2,7 +2,7 @@
 
 use super::model::{Q, q};
 
-/// A directed graph. Node 0 is the source.
+/// Node 0 is the source.
 #[derive(Debug, Default)]
 pub struct Graph {
     pub nodes: usize,

@@ -10,7 +10,6 @@ use super::model::{Action, Atom, Body, Effect, Expression, Fluent, Operation, Pa
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Obstacle {
-    /// The semantics forbids the action, for the given reason.
     Blocked(&'static str),
     /// A number exceeds the range of the oracle, so the result is unknown.
     TooLarge,
@@ -18,12 +17,11 @@ pub enum Obstacle {
 
 pub const UNDEFINED: Obstacle = Obstacle::Blocked("a value is undefined");
 
-/// Bit set of ground atoms.
 pub type Atoms = u128;
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct State {
-    /// Atoms of all predicates that are not derived and that hold in the state.
+    /// The true atoms of predicates that are not derived.
     pub atoms: Atoms,
     pub values: Vec<Option<Q>>,
 }
@@ -61,7 +59,6 @@ pub struct World {
     pub events: Vec<(Q, Happening)>,
 }
 
-/// The part of an action that takes place in a happening.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum End {
     Start,
@@ -116,7 +113,7 @@ impl Happening {
         Ok(after)
     }
 
-    /// Returns the union of two happenings, which must not interfere.
+    /// The happenings must not interfere.
     fn joined(mut self, other: Self) -> Result<Self, Obstacle> {
         self.reads |= other.reads;
         self.reads_values |= other.reads_values;
@@ -215,7 +212,7 @@ impl World {
         self.values[function]
     }
 
-    /// Returns the happening of a ground action in the given state. Fails if a condition does not hold.
+    /// Fails if a condition does not hold in `state`.
     pub fn happening(&self, instance: usize, end: End, state: &State) -> Result<Happening, Obstacle> {
         let (action, bound) = &self.instances[instance];
         let action: &Action = &self.task.actions[*action];
@@ -313,8 +310,8 @@ impl World {
     }
 }
 
-/// Combines the active numeric effects of one happening to one change per number. Fails if the effects
-/// conflict.
+/// Combines the active numeric effects of one happening to one change per number. Fails if the
+/// effects conflict or divide by zero.
 fn combined(effects: &[(usize, Operation, Q)]) -> Result<Vec<(usize, Change)>, Obstacle> {
     let mut changes: Vec<(usize, Change)> = Vec::new();
     for (at, operation, value) in effects {

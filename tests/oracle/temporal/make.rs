@@ -1,7 +1,8 @@
 //! Tiny random tasks that combine all temporal and logical features.
 //!
-//! Times of events are sums of durations, or slightly earlier or later, so that events coincide with ends of actions. Undefined values
-//! occur only where the definition is clear: in comparisons that are conjuncts, and in operands.
+//! Times of events are sums of durations, or slightly earlier or later, so that events coincide
+//! with ends of actions. Undefined values occur only where the definition is clear: in comparisons
+//! that are conjuncts, and in numeric effects.
 
 use super::model::{
     Action, Atom, Axiom, Body, Comparison, Condition, Effect, Expression, Fluent, Measure, Operation, Part,
@@ -17,8 +18,8 @@ pub(super) const COST: usize = 3;
 /// Frequencies of the features of a task, in percent.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Flavour {
-    /// For concurrent plans, unit of which all durations and times of events are multiples. `None` for
-    /// sequential plans.
+    /// For concurrent plans, all durations and times of events are multiples of this unit. `None`
+    /// for sequential plans.
     pub(super) unit: Option<Q>,
     pub(super) durative: u8,
     pub(super) conditional: u8,
@@ -46,12 +47,10 @@ pub(super) fn always_true() -> Condition {
 }
 
 impl Maker {
-    /// Returns the task of a seed; for concurrent plans if `unit` is given.
     pub fn make(seed: u64, unit: Option<Q>) -> Task {
         Self::build(seed, unit, false)
     }
 
-    /// Returns a task whose actions have design parameters, on which durations and costs depend.
     pub fn with_designs(seed: u64) -> Task {
         Self::build(seed, None, true)
     }
@@ -142,7 +141,8 @@ impl Maker {
         self.measure();
     }
 
-    /// Declares derived predicates: the transitive closure of a binary predicate, or a random condition.
+    /// With a probability of 30 %, declares a derived predicate with a random condition. Sometimes
+    /// also declares the transitive closure of a binary predicate.
     fn axioms(&mut self) {
         if !self.chance(30) {
             return;
@@ -173,7 +173,7 @@ impl Maker {
         self.is_derived(predicate) || self.designs.is_some_and(|(solves, _)| solves == predicate)
     }
 
-    /// Returns a random atom. `set` excludes predicates that effects and events must not change.
+    /// `set` excludes predicates that effects and events must not change.
     fn atom(&mut self, variables: usize, set: bool) -> Atom {
         let mut predicate = self.random.usize(..self.task.predicates.len());
         while set && self.is_fixed(predicate) {

@@ -70,7 +70,6 @@ pub fn maximizes(task: &Task) -> bool {
     matches!(task.measure, Measure::Metric { maximize: true, .. })
 }
 
-/// Returns an executor of sequential plans, or of concurrent plans with the given separation.
 pub fn executor(world: World, unit: Option<Q>) -> Executor {
     Box::new(move |steps| {
         let plan = schedule_of(&world, steps)?;
@@ -82,7 +81,6 @@ pub fn executor(world: World, unit: Option<Q>) -> Executor {
     })
 }
 
-/// Returns the task of a seed with its correct answer; for concurrent plans if `unit` is given.
 fn case(name: &str, seed: u64, unit: Option<Q>) -> Case {
     case_of(format!("{name}-{seed}"), Maker::make(seed, unit), unit)
 }
@@ -91,14 +89,13 @@ fn case_of(name: String, task: Task, unit: Option<Q>) -> Case {
     case_up_to(if unit.is_none() { CAP } else { OVERLAP_CAP }, name, task, unit)
 }
 
-/// Returns a sequential task with derived predicates and its correct answer. `None` if the task of the seed
-/// has no derived predicate.
+/// Returns `None` if the task of the seed has no derived predicate.
 pub fn with_derived(seed: u64) -> Option<Case> {
     let task = Maker::make(seed, None);
     (!task.axioms.is_empty()).then(|| case_of(format!("derived-{seed}"), task, None))
 }
 
-/// Returns a task with its correct answer. The answer is open if the oracle would exceed `cap` nodes.
+/// The answer is open if the oracle would exceed `cap` nodes.
 fn case_up_to(cap: usize, name: String, task: Task, unit: Option<Q>) -> Case {
     let world = World::new(task);
     let truth = match unit {
@@ -145,7 +142,6 @@ fn batteries_that_are_charged() {
     run(100, case).finish();
 }
 
-/// Returns the kinds and the texts of the failures of a task.
 fn kinds(task: &Task, unit: Option<Q>) -> (Vec<&'static str>, String) {
     // The oracle panics if its own plan is invalid, which is a failure to be shrunk as well.
     let case = std::panic::catch_unwind(|| case_of("smaller".into(), task.clone(), unit));

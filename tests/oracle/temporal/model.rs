@@ -9,8 +9,8 @@ use num_rational::Ratio;
 
 use crate::judge::decimal;
 
-/// Rational number for values and times. After each operation, numerator and denominator are checked to be
-/// below 2^30, so no operation overflows.
+/// Rational number for values and times. The oracles keep numerator and denominator below 2^30, so
+/// that no operation overflows.
 pub type Q = Ratio<i64>;
 
 pub fn q(number: i64) -> Q {
@@ -68,9 +68,7 @@ pub enum Condition {
     All(Vec<Condition>),
     Any(Vec<Condition>),
     Imply(Box<Condition>, Box<Condition>),
-    /// Holds for each object of a type.
     Forall(usize, Box<Condition>),
-    /// Holds for some object of a type.
     Exists(usize, Box<Condition>),
 }
 
@@ -89,11 +87,9 @@ pub enum Effect {
     Delete(Atom),
     Change(Operation, Fluent, Expression),
     When(Condition, Vec<Effect>),
-    /// Effects for each object of a type.
     Forall(usize, Vec<Effect>),
 }
 
-/// Conditions and effects of one end of an action.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Part {
     pub condition: Condition,
@@ -113,7 +109,7 @@ pub struct Action {
     pub body: Body,
 }
 
-/// An axiom of a derived predicate. The first variables of the condition are the arguments of the predicate.
+/// The first variables of the condition are the arguments of the predicate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axiom {
     pub predicate: usize,
@@ -134,7 +130,7 @@ pub enum Measure {
 pub struct Task {
     pub types: usize,
     pub objects: Vec<usize>,
-    /// Name and arity of each predicate, including derived predicates.
+    /// Names and arities, including derived predicates.
     pub predicates: Vec<(String, usize)>,
     pub functions: Vec<(String, usize)>,
     /// Axioms in the order of their strata.
@@ -149,7 +145,6 @@ pub struct Task {
     pub measure: Measure,
 }
 
-/// Formats a number in PDDL syntax.
 pub fn number(value: Q) -> String {
     if value < q(0) { format!("(- {})", decimal(&big(-value))) } else { decimal(&big(value)) }
 }
@@ -196,7 +191,7 @@ impl Task {
         }
     }
 
-    /// Formats a condition in which `depth` variables are bound.
+    /// `depth` is the number of bound variables.
     fn condition(&self, condition: &Condition, depth: usize) -> String {
         let list = |word: &str, parts: &[Condition]| {
             let parts: String =
@@ -230,7 +225,7 @@ impl Task {
         }
     }
 
-    /// Formats an effect with a time specifier, which is empty for instantaneous actions.
+    /// The time specifier is empty for instantaneous actions.
     fn effect(&self, effect: &Effect, time: &str, depth: usize) -> String {
         let at = |text: String| if time.is_empty() { text } else { format!("({time} {text})") };
         let list = |parts: &[Effect], depth: usize| {

@@ -26,8 +26,6 @@ use crate::judge::Truth;
 
 const INTERFERES: Obstacle = Obstacle::Blocked("happenings that interfere are too close");
 
-/// Returns the condition over all of a durative instance, and its arguments. `None` for an instantaneous
-/// action.
 fn over_all(world: &World, instance: usize) -> Option<(&Condition, &[usize])> {
     let (action, objects) = &world.instances[instance];
     match &world.task.actions[*action].body {
@@ -224,7 +222,6 @@ impl Search<'_> {
         happening.changes.iter().any(|(at, change)| relative(change) && self.reduction.keeps(*at))
     }
 
-    /// Returns `true` if the end of an instance may increase or scale a relevant number.
     fn has_cumulative_end(&self, instance: usize) -> bool {
         fn collect_relative(effects: &[Effect], functions: &mut Vec<usize>) {
             for effect in effects {
@@ -284,7 +281,6 @@ impl Search<'_> {
         }
     }
 
-    /// Completes the tick once all starts are chosen: applies its happenings and adds edges to the graph.
     fn finish(&mut self, from: usize, state: &State, tick: &Tick) -> Result<(), Obstacle> {
         let mut after = state.clone();
         // The events have been applied already. Applying them again is harmless, because nothing at this tick

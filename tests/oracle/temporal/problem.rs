@@ -49,7 +49,6 @@ impl Maker {
         self.task.values.push((Fluent { function: COST, terms: Vec::new() }, q(0)));
     }
 
-    /// Returns the distinct positive durations of the ground actions in the initial state, sorted.
     fn durations(&self) -> Vec<Q> {
         let world = World::new(self.task.clone());
         let duration = |(action, objects): &(usize, Vec<usize>)| match &self.task.actions[*action].body {
@@ -111,7 +110,6 @@ impl Maker {
         self.task.events.sort_by_key(|(time, _)| *time);
     }
 
-    /// Chooses the goal: usually literals that hold in a reachable state.
     pub(super) fn goal(&mut self) {
         if self.chance(20) {
             self.task.goal = self.conjunction(&[], &[1, 1, 2]);
@@ -183,8 +181,7 @@ impl Maker {
         self.task.actions.push(Action { name: "dear".into(), parameters: Vec::new(), body });
     }
 
-    /// Chooses the measure. A task has no metric only if it is clear whether plans are then measured by their
-    /// time.
+    /// A task has no metric only if it is clear whether plans are then measured by their time.
     pub(super) fn measure(&mut self) {
         let is_durative = |action: &&Action| matches!(action.body, Body::Durative { .. });
         let durative = self.task.actions.iter().filter(is_durative).count();

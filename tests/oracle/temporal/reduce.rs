@@ -1,10 +1,9 @@
-//! Relevance analysis of numbers: numbers that nothing reads and that only increase or decrease become action
-//! costs.
+//! Relevance analysis of numbers: numbers of the metric that nothing reads and that only increase
+//! or decrease become action costs.
 
 use super::happening::{Obstacle, State, World, fit};
 use super::model::{Body, Condition, Effect, Expression, Measure, Operation, Q, q};
 
-/// Role of a number in the search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     Kept,
@@ -15,11 +14,9 @@ pub enum Role {
     Unread,
 }
 
-/// Reduction of states to relevant numbers, and the parts of the metric.
 #[derive(Debug)]
 pub struct Reduction {
     roles: Vec<Role>,
-    /// Weight of the total time in the metric.
     pub time: Q,
     /// Cost of each action: 1 if plans are measured by their number of steps, otherwise 0.
     pub step: Q,

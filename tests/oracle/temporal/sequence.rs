@@ -36,7 +36,6 @@ type Clock = (Q, bool);
 /// irrelevant and set to 0.
 type Node = (State, usize, Clock);
 
-/// An action or a wait, which leads from one node to another.
 #[derive(Debug, Clone)]
 pub struct Edge {
     pub from: usize,
@@ -62,7 +61,7 @@ pub struct Search<'w> {
 }
 
 impl<'w> Search<'w> {
-    /// Builds the graph with at most `cap` nodes.
+    /// Builds the graph. Stops expanding nodes when there are more than `cap` nodes.
     pub fn new(world: &'w World, cap: usize) -> Self {
         let reduction = Reduction::new(world);
         let mut search = Self {

@@ -2,7 +2,6 @@
 
 use super::model::{Body, Condition, Effect, Expression, Measure, Part, Task, q};
 
-/// Returns tasks in which one part is removed or simplified.
 pub fn smaller(task: &Task) -> Vec<Task> {
     let mut tasks = Vec::new();
     let mut add_changed = |change: &dyn Fn(&mut Task)| {
@@ -72,7 +71,6 @@ pub fn smaller(task: &Task) -> Vec<Task> {
     tasks
 }
 
-/// Returns conditions in which one part is removed or simplified.
 fn conditions(condition: &Condition) -> Vec<Condition> {
     let always_true = Condition::All(Vec::new());
     match condition {

@@ -11,7 +11,6 @@ use test_resources::{Resource, python_with};
 use super::{decisions, input, run};
 use crate::common::root;
 
-/// Returns the Python executable with the packages, if available.
 fn python() -> Option<String> {
     python_with(Resource::Mcap, "METAPLAN_PYTHON", "mcap.reader, mcap_ros2.decoder")
 }

@@ -4,9 +4,8 @@ use fastrand::Rng;
 
 use super::{Action, Amount, Constraint, Effect, Formula, Moment, State, Task};
 
-/// Index of the number that the metric contains (`total-cost`).
+/// Index of `total-cost` in [`State::numbers`].
 pub(super) const PAID: usize = 2;
-/// Latest start time of an enumerated action.
 const LAST_START: i64 = 3;
 /// Number of random plans with three actions. Shorter plans are enumerated exhaustively.
 const LONG_PLANS: usize = 200;
@@ -56,7 +55,6 @@ struct Happening {
 }
 
 impl Happening {
-    /// Returns the start or the end of an action with a given duration. `None` if its effects conflict.
     fn new(action: &Action, moment: Moment, duration: i64) -> Option<Self> {
         let mut happening = Self::default();
         for (_, condition) in action.conditions.iter().filter(|(at, _)| *at == moment) {

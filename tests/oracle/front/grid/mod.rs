@@ -78,7 +78,6 @@ struct Task {
     initial: State,
     goal: Vec<Formula>,
     constraints: Vec<Constraint>,
-    /// A preference in the goal, with its weight in the metric.
     wish: Option<(Formula, i64)>,
     /// Weight in the metric of each violated soft constraint.
     weight: i64,
@@ -235,7 +234,6 @@ fn set(rng: &mut Rng) -> Effect {
     Effect::Set(rng.usize(0..3), rng.u32(0..3) > 0)
 }
 
-/// Returns a random task with constraints and preferences of PDDL 3 and fixed durations.
 pub fn trajectories(seed: u64) -> Sample {
     let mut rng = Rng::with_seed(seed);
     let rng = &mut rng;
@@ -288,7 +286,6 @@ pub fn trajectories(seed: u64) -> Sample {
     task.sample(rng)
 }
 
-/// Returns a random task with numbers and chosen durations.
 pub fn durations(seed: u64) -> Sample {
     let mut rng = Rng::with_seed(seed);
     let rng = &mut rng;

@@ -4,7 +4,6 @@ use std::fmt::Write as _;
 
 use super::{CHARGING, Design, FULL, Form, Robot, Situation};
 
-/// Actions of the explicit form that choose and replace designs.
 const CHANGES: &str = "(:derived (unset ?f - function) (not (exists (?d - functiondesign) (at_work ?d ?f))))
    (:action set :parameters (?f - function ?d - functiondesign)
       :precondition (and (unset ?f) (fd_solve_f ?d ?f) (fd_available ?d)) :effect (at_work ?d ?f))
@@ -13,8 +12,7 @@ const CHANGES: &str = "(:derived (unset ?f - function) (not (exists (?d - functi
       :effect (and (not (at_work ?old ?f)) (at_work ?new ?f) (increase (total-cost) (change ?new))))\n";
 
 impl Robot {
-    /// Returns the knowledge base as Turtle. In the renamed form, functions and designs get the prefix `k`,
-    /// which the name map removes.
+    /// In the renamed form, functions and designs get the prefix `k`, which the name map removes.
     pub(super) fn document(
         form: Form,
         functions: usize,

@@ -57,11 +57,10 @@ struct Design {
     safety: Option<i64>,
     change: i64,
     component: Option<usize>,
-    /// Minimum visibility with which the design can be used, if any.
+    /// Minimum visibility, if any.
     visibility: Option<i64>,
 }
 
-/// A robot: the content of its knowledge base.
 #[derive(Debug)]
 pub struct Robot {
     form: Form,
@@ -126,7 +125,6 @@ impl Robot {
         Self { form, functions, designs, safety, quiet, quick, reconfiguration, is_timed, knowledge }
     }
 
-    /// Returns the robot's mission in a random situation, with the result of brute force.
     pub fn sample(&self, seed: u64) -> Sample {
         // The random numbers of the situation must differ from those of the robot, so the seed is changed.
         let mut rng = Rng::with_seed(seed ^ 0x0b07);
