@@ -35,8 +35,8 @@ fn fraction(name: &str) -> f64 {
 }
 
 fn written(value: f64) -> String {
-    let integer_digits = (value.log10().floor() as i64 + 1).max(0) as usize;
-    format!("{value:.digits$}", digits = DIGITS - integer_digits.min(DIGITS))
+    let integer_digits = value.log10().floor() as i64 + 1;
+    format!("{value:.digits$}", digits = (DIGITS as i64 - integer_digits).max(0) as usize)
 }
 
 fn magnified(function: &str, arguments: &[&str], value: f64) -> String {

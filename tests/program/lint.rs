@@ -213,11 +213,6 @@ fn errors_of_all_files_are_reported_together() {
         &[
             ("mission.toml", "fail = [\"c_suction_cup\"]", "fail = [\"c_suction\"]"),
             ("mission.toml", "air_dust = \"0.8\"", "air_dust = \"much\""),
-            (
-                "mission.toml",
-                "fail = [\"c_lidar\"]\n\n[scenarios.suction",
-                "fail = [\"c_lidar\"]\n\n[scenarios.suction",
-            ),
             ("mission.toml", "step = 1 ", "step = 0 "),
             ("places.csv", "far_rack,16,0", "far_rack,sixteen,0"),
         ],

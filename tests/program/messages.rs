@@ -54,7 +54,7 @@ fn faults(outcome: &Outcome) -> Vec<String> {
             faults.push(line.to_owned());
         }
     }
-    if ![0, 1, 2, 3, 10, 20, 30].contains(&outcome.status) {
+    if ![0, 1, 2, 3, 10, 12, 20, 30].contains(&outcome.status) {
         faults.push(format!("status {}", outcome.status));
     }
     faults

@@ -99,7 +99,7 @@ fn close(task: &mut Task, observed: &[Vec<Number>], rng: &mut Rng) {
 }
 
 /// Returns a comparison of an expression with a value or a neighbouring value, in one of several
-/// forms. The forms are equivalent, except that a negated form of `=` is `>`.
+/// equivalent forms.
 fn compare(rng: &mut Rng, relation: Relation, expression: Expr, value: &Number) -> Condition {
     let value = near(rng, value);
     let reversed = match relation {
@@ -122,7 +122,7 @@ fn compare(rng: &mut Rng, relation: Relation, expression: Expr, value: &Number) 
             let product = Expr::Product(vec![Expr::Number(factor.clone()), expression]);
             Condition::Compare(relation, product, Expr::Number(value * factor))
         }
-        3 => Condition::Not(Box::new(Condition::Compare(
+        3 if !matches!(relation, Relation::Equal) => Condition::Not(Box::new(Condition::Compare(
             match relation {
                 Relation::Less => Relation::AtLeast,
                 Relation::AtMost => Relation::Greater,
