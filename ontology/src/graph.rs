@@ -72,8 +72,7 @@ impl Graph {
             .map(|(_, triple)| &triple.object)
     }
 
-    /// Returns the object of the only triple with this subject and predicate. The error message
-    /// distinguishes a missing triple from several triples.
+    /// Returns the object of the only triple with this subject and predicate.
     pub(crate) fn object<'a>(
         &'a self,
         subject: &NamedOrBlankNode,

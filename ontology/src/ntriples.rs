@@ -48,8 +48,7 @@ impl<'a> Terms<'a> {
         Self { symbols, texts: vec![format!("<{}> ", rdf::TYPE)], numbers: FxHashMap::default() }
     }
 
-    /// Converts a fact to the term numbers of subject, predicate and object. Returns `None` for a fact
-    /// to omit.
+    /// Returns the term numbers of subject, predicate and object; `None` for a fact to omit.
     fn triple(&mut self, fact: &Fact) -> Option<[u32; 3]> {
         let name = |symbol| self.symbols.value(symbol).as_name();
         let predicate = name(fact.predicate).filter(|name| !name.starts_with(INTERNAL))?;

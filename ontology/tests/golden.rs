@@ -88,7 +88,6 @@ fn one_question_ontologies_infer_what_the_reference_infers() {
     });
 }
 
-/// Runs a comparison on every case of a directory and reports the failures.
 fn check_all(directory: &str, compare: impl Fn(&Value) -> Result<(), String>) {
     let cases = recorded(directory);
     let mut failures = Vec::new();

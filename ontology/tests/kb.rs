@@ -23,7 +23,6 @@ fn engine(text: &str, name: &str) -> Engine {
     engine
 }
 
-/// Describes each design in one line: name, functions, components, estimations, availability.
 fn designs(engine: &Engine) -> Vec<String> {
     let line = |design: ontology::tomasys::FunctionDesign| {
         let names = |individuals: &[ontology::tomasys::Individual]| {

@@ -52,7 +52,8 @@ fn seeds() -> Vec<Vec<u8>> {
     seeds
 }
 
-/// Returns a copy with a few changes, from single bytes to passages, some of them from another text.
+/// Returns a copy with one or two changes, from single bytes to passages. A passage can come from the other
+/// text.
 fn damaged(seed: &[u8], other: &[u8], numbers: &mut Numbers) -> Vec<u8> {
     const BYTES: &[u8] = b"<>\"'&;:#@^_.,()[]{}/\\=! \n\0\xff0aZ";
     let mut text = seed.to_vec();

@@ -409,7 +409,6 @@ fn owl_xml_literals_may_contain_comments_and_cdata_sections() {
     assert_eq!(shown(&ontology), ["DataPropertyAssertion(<d> <i> \"a & </b> ]> & 'c d\")"]);
 }
 
-/// The fast path for N-Triples rejects everything that the grammar does not allow.
 #[test]
 fn the_fast_path_for_ntriples_checks_the_grammar() {
     let read = |subject: &str, object: &str| {

@@ -121,7 +121,6 @@ fn status(runtime: &Runtime) -> (Vec<String>, bool) {
     (objective.statuses.clone(), objective.updatable)
 }
 
-/// Checks the statuses after a failure, after the repair, and after a new grounding.
 fn check_failure(mode: Mode, after_repair: &[&str], updatable: bool) {
     let mut runtime = robot(mode);
     pursue(&mut runtime, "o", "f_move");

@@ -74,7 +74,6 @@ impl Engine {
         }
     }
 
-    /// Returns the state bits of a row; `None` if the row is not in the store.
     pub(crate) fn row_state(&self, row: &Fact) -> Option<u8> {
         let relation = self.store.get(self.store.find(row.predicate, row.arguments.len())?);
         Some(relation.state(relation.find(&row.arguments)?))

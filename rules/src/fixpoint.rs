@@ -53,8 +53,7 @@ pub(crate) enum Start {
 /// deferred.
 const BLOCK_MATCHES: usize = 1 << 16;
 
-/// Maximum number of partial matches in a small block. A small block passes several steps of its plan at once,
-/// instead of one step per application of the crepe rule.
+/// Maximum number of partial matches in a small block, which passes several steps of its plan at once.
 const SMALL_MATCHES: usize = 64;
 
 /// Complete matches of a plan: `bindings` contains the values of all variables, one match after the
@@ -110,7 +109,6 @@ impl Buffers {
 }
 
 mod program {
-    //! The crepe program.
 
     use crate::fixpoint::{BlockId, Handle, PlanId};
     use crepe::crepe;

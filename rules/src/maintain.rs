@@ -22,7 +22,7 @@ use crate::plan::HIDDEN;
 use crate::store::{Record, RelationId, Row, state};
 use crate::symbol::{Symbol, Symbols};
 
-/// Upper limit on the number of starts (pairs of a plan and a start row) per run of the crepe (Datalog) program;
+/// Upper limit on the number of starts (pairs of a plan and a start row) per run of the crepe program. It
 /// bounds the memory of partial matches.
 const CHUNK: usize = 2048;
 
@@ -372,7 +372,6 @@ impl<'a> Maintenance<'a> {
         Ok(())
     }
 
-    /// Runs seeds and processes the complete matches. Returns the deferred partial matches as seeds.
     fn run_once(&mut self, seeds: &[Seed], rows: &[Row], retracting: bool) -> Result<Vec<Seed>, Error> {
         let round = Round {
             store: &self.engine.store,

@@ -262,7 +262,7 @@ impl Relation {
         row
     }
 
-    /// Removes a row. Its number may be reused.
+    /// The number of the row may be reused.
     pub fn remove(&mut self, row: Row) {
         let (values, arity) = (&self.arguments, self.arity);
         let row_of = |row: Row| &values[row as usize * arity..(row as usize + 1) * arity];

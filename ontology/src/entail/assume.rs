@@ -13,9 +13,9 @@ use crate::vocab::owl;
 const MAX_CASES: usize = 64;
 
 impl Prover {
-    /// Assumes that an individual is in a class: adds the facts to copies of the engine. Returns one engine
-    /// for each case, because a disjunction gives several cases. `next` is the number of the last fresh name.
-    /// Parts of the class that rules cannot express are not assumed, so that a proof remains sound.
+    /// Assumes that an individual is in a class, in copies of the engine: one for each case of a disjunction.
+    /// `next` is the number of the last fresh name. Parts of the class that rules cannot express are not
+    /// assumed, so that a proof remains sound.
     pub(super) fn assume(
         engine: &Engine,
         class: &ClassExpression,
@@ -223,7 +223,7 @@ pub(super) fn pairwise_different(engine: &mut Engine, names: &[Iri]) -> Vec<Fact
     pairs.map(|pair| Fact::new(different, pair)).collect()
 }
 
-/// Lowers the assertion that `individual` is in `class`, and adds the resulting rules and facts to an engine.
+/// Assumes that `individual` is in `class` by the rules and facts of this assertion.
 fn by_rules(mut engine: Engine, class: &ClassExpression, individual: &Iri) -> Result<Engine, Error> {
     let axiom = Axiom::ClassAssertion(class.clone(), individual.clone());
     let axioms = vec![AnnotatedAxiom { axiom, annotations: Vec::new() }];

@@ -65,8 +65,7 @@ impl Prover {
         Ok(None)
     }
 
-    /// Returns the individuals that a statement may admit as values of the anonymous individual `name`; the
-    /// statement is not proved for them.
+    /// Returns individuals to try as the value of the anonymous individual `name`.
     fn candidates(&self, assignment: &Assignment, axiom: &Axiom, name: &Iri) -> Vec<Iri> {
         let engine = &self.base;
         let symbol = |iri: &str| engine.symbols().find_name(iri);
@@ -125,7 +124,6 @@ impl Prover {
                 explain(&copy, &goal)
             }
             Axiom::SameIndividual(individuals) => {
-                // Every neighbouring pair must be proved.
                 let mut explanations = Vec::new();
                 for pair in individuals.windows(2) {
                     let goal = same(&mut copy, &name(&pair[0]), &name(&pair[1]));

@@ -418,8 +418,6 @@ impl Builder {
         })
     }
 
-    /// Returns one warning for each triple, list, class expression or annotation that horned-owl
-    /// assigned to no axiom or rule.
     fn leftovers(&mut self, incomplete: &IncompleteParse<RcStr>) -> Vec<Warning> {
         let triple = |[subject, predicate, object]: &[Term<RcStr>; 3]| {
             format!("{} {} {}", term(subject), term(predicate), term(object))

@@ -232,8 +232,6 @@ impl AxiomLowering<'_, '_> {
         }
     }
 
-    /// Lowers an equivalence as a cycle of subclass axioms. A subclass axiom that no rule can express is recorded as
-    /// a gap.
     fn equivalent_classes(&mut self, classes: &[ClassExpression]) {
         for (sub, sup) in classes.iter().zip(classes.iter().cycle().skip(1)) {
             self.sub_class(sub, sup);
@@ -357,7 +355,7 @@ impl AxiomLowering<'_, '_> {
         }
     }
 
-    /// Lowers the domain axiom of a property (if `subject`), or its range axiom.
+    /// Lowers the domain axiom of a property if `subject` is `true`, otherwise its range axiom.
     fn domain_or_range(&mut self, property: &Property, class: &ClassExpression, subject: bool) {
         let mut variables = Variables::default();
         let (x, y) = (variables.fresh("x"), variables.fresh("y"));

@@ -13,8 +13,8 @@ use crate::vocab::{local_name, owl};
 /// Prefix of the IRIs of auxiliary relations, which are not part of the knowledge base.
 pub const INTERNAL: &str = "urn:metaplan:";
 
-/// Source in the identity of a rule that is lowered from an axiom. The label of such a rule is the axiom in
-/// functional-style syntax.
+/// Source in the identity of a rule that is lowered from an axiom or from OWL's own vocabulary. The label of
+/// such a rule is the axiom in functional-style syntax, or a short name of the rule.
 pub const AXIOM_SOURCE: &str = "http://www.w3.org/2002/07/owl";
 
 /// Semantics of the names of individuals.
@@ -29,8 +29,7 @@ pub enum Equality {
 
 pub(crate) type Conjunction = Vec<Atom>;
 
-/// Returns the Cartesian product of two lists: each conjunction of the first list joined with each
-/// conjunction of the second.
+/// Returns each conjunction of `left` joined with each conjunction of `right`.
 pub(crate) fn cross(left: &[Conjunction], right: &[Conjunction]) -> Vec<Conjunction> {
     left.iter().flat_map(|l| right.iter().map(move |r| l.iter().chain(r).cloned().collect())).collect()
 }
@@ -41,7 +40,7 @@ pub(crate) struct Context<'a> {
     pub facts: Vec<Fact>,
     pub warnings: Vec<Warning>,
     pub equality: Equality,
-    /// Maps each datatype with a definition to its data range.
+    /// Data ranges of the datatypes that are defined.
     pub definitions: HashMap<Iri, DataRange>,
     entities: HashSet<(EntityKind, Iri)>,
     /// Identity of the axiom or rule that is being lowered.
@@ -136,8 +135,7 @@ impl<'a> Context<'a> {
         T::default()
     }
 
-    /// Returns an error with the first recorded gap, if any, and clears the gaps. A gap is the reason why a
-    /// part of the current axiom or rule has no rule form.
+    /// Clears the gaps. Returns an error with the first gap, if there was one.
     pub(crate) fn take_gaps(&mut self) -> Result<(), &'static str> {
         let first = self.gaps.first().copied();
         self.gaps.clear();
@@ -148,8 +146,8 @@ impl<'a> Context<'a> {
         self.symbols.name(iri)
     }
 
-    /// Returns the symbol of an IRI of the ontology. An IRI that occurred before is found by its
-    /// address, without reading its text.
+    /// Returns the symbol of an IRI of the ontology. An IRI that occurred before is found by its address,
+    /// without reading its text.
     pub(crate) fn iri(&mut self, iri: &Iri) -> Symbol {
         let symbols = &mut *self.symbols;
         *self.shared.entry(iri.as_ptr()).or_insert_with(|| symbols.name(iri))
@@ -169,7 +167,6 @@ impl<'a> Context<'a> {
         Atom::relation(self.symbols.name(name), arguments)
     }
 
-    /// Builds the atom `property(first, second)`; an inverse property exchanges the arguments.
     pub(crate) fn property(
         &mut self,
         property: &ObjectPropertyExpression,
@@ -207,9 +204,8 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// Returns the auxiliary relation that contains the members of a data range. Its name contains the
-    /// range, so two ontologies that are lowered with the same symbols share the relation only if they
-    /// have equal ranges.
+    /// Returns the auxiliary relation that contains the members of a data range. Its name contains the range,
+    /// so that ontologies lowered with the same symbols share it only for equal ranges.
     pub(crate) fn members_of(&mut self, range: &DataRange) -> Symbol {
         self.symbols.name(&format!("{INTERNAL}range:{range}"))
     }
@@ -229,7 +225,6 @@ impl<'a> Context<'a> {
         self.rules.push(Rule { identity: identity.clone(), head, body, variables });
     }
 
-    /// Adds a warning that an axiom is omitted, or used in part if `partly`, with the reason.
     pub(crate) fn outside(&mut self, axiom: &Axiom, partly: bool, reason: &str) {
         let (axiom, reason) = (axiom.to_string(), reason.to_owned());
         self.warnings.push(Warning::OutsideProfile { axiom, partly, reason });

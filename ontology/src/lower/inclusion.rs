@@ -60,8 +60,7 @@ impl Inclusions {
         restriction(class, true).filter(|restriction| self.concluded.contains_key(restriction))
     }
 
-    /// Returns the pairs of different restrictions `[sub, sup]` with `sub ⊑ sup`, of which an axiom concludes
-    /// `sub`, and an axiom or rule has `sup` as a condition.
+    /// Returns the inclusions `[sub, sup]` between two different restrictions.
     pub(crate) fn pairs(&self) -> Vec<[ClassExpression; 2]> {
         let pairs =
             self.concluded.iter().flat_map(|(sub, including)| including.iter().map(move |sup| (sub, sup)));
@@ -185,7 +184,7 @@ impl Uses {
 /// concluded.
 const MAX_DEPTH: usize = 3;
 
-/// Memo tables; keys are a class or restriction and the depth to which nested restrictions are compared.
+/// Keys are a class or restriction and the depth to which nested restrictions are compared.
 #[derive(Default)]
 struct Memo {
     supers: HashMap<(ClassExpression, usize), BTreeSet<ClassExpression>>,
@@ -252,7 +251,7 @@ impl InclusionGraph {
         self.members(sup);
     }
 
-    /// Adds the inclusion of each member in the union, if the class is a union.
+    /// Adds the inclusion of each member if the class is a union.
     fn members(&mut self, class: &ClassExpression) {
         if let ClassExpression::UnionOf(members) = class {
             for member in members {

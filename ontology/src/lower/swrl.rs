@@ -166,7 +166,6 @@ fn term(context: &mut Context, argument: &Argument, variables: &mut Variables) -
     }
 }
 
-/// Lowers an atom of a body to alternative conjunctions.
 fn condition(
     context: &mut Context,
     atom: &Atom,

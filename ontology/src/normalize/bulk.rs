@@ -80,11 +80,10 @@ impl Usage {
         }
     }
 
-    /// Returns `true` if no other normalisation pass has to process the triple.
     pub(super) fn is_bulk(&self, triple: &Compact) -> bool {
         let uses = |number: u32| self.uses[number as usize];
         let subject = uses(triple.subject);
-        // A triple with this property may be part of an axiom, or of a statement about a property.
+        // Such a triple may be part of an axiom, or a statement about a property.
         if subject.special || subject.reserved || triple.subject == triple.predicate {
             return false;
         }

@@ -32,8 +32,7 @@ struct Use {
     entity: bool,
 }
 
-/// Adds a declaration and a warning for each undeclared class or property. `classes` contains undeclared
-/// classes that occur in triples outside of `graph`.
+/// `classes` contains undeclared classes that occur in triples outside of `graph`.
 pub(crate) fn declare(graph: &mut Graph, mut classes: BTreeSet<String>, warnings: &mut Vec<Warning>) {
     let (declared, mut properties) = (Declared::of(graph), BTreeMap::new());
     for (_, triple) in graph.iter() {
@@ -60,8 +59,7 @@ pub(crate) fn declare(graph: &mut Graph, mut classes: BTreeSet<String>, warnings
     state(graph, ORIGIN, owl::ANNOTATION_PROPERTY);
 }
 
-/// Adds declarations of the `known` entities, except individuals, that the documents mention but do not
-/// declare.
+/// Declares the `known` entities, except individuals, that the documents mention but do not declare.
 pub(crate) fn declare_known(graph: &mut Graph, known: &[(EntityKind, Iri)], names: &Names) {
     if known.is_empty() {
         return;

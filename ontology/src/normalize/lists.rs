@@ -9,8 +9,7 @@ use crate::graph::{Graph, iri_of, subject_of};
 use crate::owl::{AnnotatedAxiom, Axiom, ClassExpression, Iri};
 use crate::vocab::{owl, rdf};
 
-/// Rewrites the axioms with lists in the graph. Returns the axioms with many members, which horned-owl
-/// does not have to read.
+/// Returns the axioms with many members, which horned-owl does not have to read.
 pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) -> Vec<AnnotatedAxiom> {
     let groups = groups(graph);
     pairs(graph, owl::ALL_DISJOINT_CLASSES, owl::DISJOINT_WITH, warnings);
@@ -20,9 +19,7 @@ pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) -> Vec<Ann
     groups
 }
 
-/// Maximum number of members of the axioms that [`groups`] does not read. Axioms about disjoint named classes
-/// with at most this number of members are expanded to pairs, and axioms about different named individuals
-/// are read by horned-owl.
+/// Maximum number of members of a set that [`groups`] leaves in the graph.
 const MAX_PAIRED_MEMBERS: usize = 16;
 
 /// Removes and returns axioms about more than [`MAX_PAIRED_MEMBERS`] disjoint named classes or different

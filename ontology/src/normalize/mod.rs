@@ -88,8 +88,7 @@ pub(crate) fn merge(documents: Vec<Document>, names: &Names, is_bulk: impl Fn(&C
     Merged { graph, bulk, parts }
 }
 
-/// Merges and rewrites documents; see the module documentation. Entities of `known_entities` need no
-/// declaration.
+/// Merges and rewrites documents. Entities of `known_entities` need no declaration.
 ///
 /// # Errors
 /// Returns O112 if class expressions are nested too deeply.

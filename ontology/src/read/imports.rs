@@ -28,7 +28,7 @@ use crate::triples::Document;
 
 const CATALOG: &str = "catalog-v001.xml";
 
-/// Maximum depth of the subdirectories of the given directories that are searched for imports.
+/// Maximum depth of the subdirectories that are searched for imports.
 const MAX_DEPTH: usize = 4;
 
 /// Number of ancestor directories in which directories named like the first segments of the URL's path are
@@ -135,7 +135,6 @@ fn is_published_tomasys(import: &str) -> bool {
     })
 }
 
-/// Searches for the imported file in a repository that is checked out next to the importer's repository.
 fn checked_out(import: &str, importer: &Path) -> Option<PathBuf> {
     let plain = |segment: &&str| {
         !segment.starts_with('.') && segment.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c))

@@ -4,8 +4,8 @@
 use super::text::Text;
 use crate::error::{Error, Position, Warning};
 
-/// Number of warnings, counted from the first, for which a position is searched. The number is limited because each
-/// search visits all documents.
+/// Limit on the number of warnings for which a position is searched, because each search can visit all
+/// documents.
 const MAX_SEARCHES: usize = 100;
 
 /// Sets the position of each warning about an undeclared name to the first occurrence of the name in the
@@ -42,8 +42,8 @@ pub(super) fn placed(error: Error, texts: &[(String, Text)]) -> Error {
     }
 }
 
-/// Returns a position in the documents of the first IRI that `message` contains in angle brackets. `None` if
-/// `message` contains none, or if no document contains this IRI.
+/// Returns the first position, in the documents, of the first IRI in angle brackets in `message`. Returns
+/// `None` if `message` contains no such IRI, or if no document contains it.
 pub(super) fn place(message: &str, texts: &[(String, Text)]) -> Option<Position> {
     let iri = message.split_once('<')?.1.split_once('>')?.0;
     texts.iter().find_map(|(name, text)| {

@@ -76,7 +76,7 @@ impl Structural<'_> {
 const NESTING_MARGIN: usize = 8;
 
 /// Iterates over the words of functional-style syntax with their offsets: parentheses, equality signs and
-/// names. Strings, IRIs and comments are skipped.
+/// names. Skips strings, IRIs and comments.
 #[derive(Clone)]
 struct Words<'a> {
     text: &'a [u8],

@@ -149,8 +149,7 @@ pub fn unmeasured(engine: &mut Engine, attribute: &str) -> Result<Delta, Error> 
     Ok(Delta { insert: Vec::new(), delete })
 }
 
-/// Builds the facts that make `holder` an individual that holds measurements of the attribute type
-/// `kind`.
+/// Returns the facts that make `holder` hold measurements of the attribute type `kind`.
 fn observation(symbols: &mut Symbols, holder: Symbol, kind: Symbol, class: &str) -> Vec<Fact> {
     let mut facts = vec![
         Fact::new(symbols.name(term_for(terms::QA_VALUE, class)), [holder]),

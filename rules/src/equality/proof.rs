@@ -97,8 +97,7 @@ impl Equality {
         self.is_pair(fact, &engine.symbols) && fact.arguments[0] != fact.arguments[1]
     }
 
-    /// Returns the equality edges that the steps use, and transitively the edges that the derivations of
-    /// these edges use.
+    /// Returns the edges that the steps use, directly or through the derivations of other edges.
     fn edges_in(&self, engine: &Engine, steps: &[Step]) -> BTreeMap<EdgeId, &Edge> {
         let mut used_edges: BTreeMap<EdgeId, &Edge> = BTreeMap::new();
         let mut stack: Vec<EdgeId> = Vec::new();

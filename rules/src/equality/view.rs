@@ -96,8 +96,7 @@ impl Equality {
         pairs.map(|pair| pair.arguments.clone()).filter(move |pair| fits(pair[0]))
     }
 
-    /// Returns the arguments of the facts of a predicate that match a pattern. `None` in the pattern matches
-    /// every name.
+    /// `None` in the pattern matches every name.
     pub fn matching(&self, engine: &Engine, predicate: Symbol, pattern: &[Option<Symbol>]) -> Vec<Arguments> {
         let normal: SmallVec<[Option<Symbol>; 4]> =
             pattern.iter().map(|wanted| wanted.map(|name| self.classes.find(name))).collect();

@@ -37,7 +37,6 @@ pub(super) struct Matcher<'m> {
     /// Facts in which the first name of each individual replaces its other names.
     pub facts: &'m Facts,
     pub names: &'m Names,
-    /// Whether the program has equality, so that different names may denote one individual.
     pub equality: bool,
     /// Whether a rule required two names to differ although names may be equal. The given facts alone
     /// then do not determine the result.

@@ -25,7 +25,6 @@ impl ForeignAtom {
         is_foreign.then(|| Self { name: name.to_owned(), count: arguments.len(), place })
     }
 
-    /// Converts the atom to error R104: a relation that is neither a class, a property, nor derived.
     pub fn error(self, file: &str) -> Error {
         let Self { name, count, place: (line, column) } = self;
         Error::UnknownRelation { file: file.to_owned(), line, column, name, count }
