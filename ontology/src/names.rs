@@ -67,8 +67,7 @@ impl Names {
         self.texts.len()
     }
 
-    /// Returns the rank of each name in alphabetical order. The keys are the addresses of the shared
-    /// texts.
+    /// The keys are the addresses of the shared texts, the values are ranks in alphabetical order.
     pub(crate) fn ranks(&self) -> FxHashMap<*const u8, u32> {
         let mut sorted: Vec<&Iri> = self.texts.iter().collect();
         // Interned texts are distinct, so an unstable sort is deterministic.

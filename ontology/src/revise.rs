@@ -433,7 +433,6 @@ fn canonical(axiom: &Axiom) -> Axiom {
     }
 }
 
-/// Sorts the members of intersections, unions and enumerations at every depth.
 fn sorted(class: &ClassExpression) -> ClassExpression {
     use ClassExpression as C;
     let sorted_set =

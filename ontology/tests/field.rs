@@ -121,7 +121,6 @@ const EXPENSIVE_FILES: [(&str, Verdict); 3] = [
     ("hostile/42-swrl-runaway.ttl", Endless),
 ];
 
-/// Returns the text of the rule file with the name of the document, or with its number.
 fn rules_of(path: &Path) -> Option<String> {
     let name = path.file_stem()?.to_str()?;
     let number = name.split('-').next()?;

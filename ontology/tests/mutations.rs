@@ -23,7 +23,6 @@ const SYNTAXES: [OutputSyntax; 5] = [
 /// Time limit for one document; an undamaged one takes milliseconds.
 const TIME_LIMIT: Duration = Duration::from_secs(20);
 
-/// A pseudorandom number generator (xorshift) with the same numbers on every machine.
 struct Numbers(u64);
 
 impl Numbers {
@@ -35,7 +34,6 @@ impl Numbers {
     }
 }
 
-/// Embedded knowledge bases in every syntax, and real ones if the test data exist.
 fn seeds() -> Vec<Vec<u8>> {
     let ours = ["tomasys.ttl", "ugv.ttl"].map(|file| Path::new(OURS).join(file));
     let real = ["suave/suave.owl", "mros_ontology/mros.owl", "navigation_planta/navigation_with_imports.owl"];
@@ -89,7 +87,6 @@ fn damaged(seed: &[u8], other: &[u8], numbers: &mut Numbers) -> Vec<u8> {
     text
 }
 
-/// Reads and lowers a text. Returns `true` if it is accepted, and the elapsed time.
 fn survives(text: &[u8]) -> (bool, Duration) {
     let start = Instant::now();
     let options = ReadOptions { allow_missing_imports: true, ..ReadOptions::default() };

@@ -414,7 +414,6 @@ fn anonymous_individuals_of_two_documents_are_different() {
     assert_eq!(answers(&revised.engine).0.len(), 2);
 }
 
-/// Inclusions between restrictions depend on several axioms, each of which is asserted and retracted.
 #[test]
 fn inclusions_of_restrictions_follow_each_change() {
     let axioms = [

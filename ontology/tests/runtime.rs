@@ -115,7 +115,6 @@ fn pursue(runtime: &mut Runtime, name: &str, function: &str) {
     runtime.add_objective(&objective).expect("new");
 }
 
-/// Returns the statuses of the only objective, and `true` if it is updatable.
 fn status(runtime: &Runtime) -> (Vec<String>, bool) {
     let [objective] = &runtime.objectives()[..] else { panic!("one objective") };
     (objective.statuses.clone(), objective.updatable)

@@ -110,8 +110,6 @@ impl Engine {
         relations.filter_map(|relation| Some((relation.predicate?, relation.arity())))
     }
 
-    /// Returns the rows of the store that have all these state bits, except rows of constraints and
-    /// aggregates.
     pub(crate) fn rows_with(&self, bits: u8) -> impl Iterator<Item = Fact> {
         self.rows_where(move |state| state & bits == bits)
     }

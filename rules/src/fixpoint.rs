@@ -84,7 +84,6 @@ pub(crate) struct Round<'a> {
 
 type BlockId = u32;
 
-/// Buffers of processed blocks, which further blocks use again.
 #[derive(Debug, Default)]
 pub(crate) struct Buffers(RefCell<Vec<Vec<Symbol>>>);
 
@@ -446,8 +445,7 @@ impl Round<'_> {
     }
 }
 
-/// Returns the symbol of a computed value. A shared interner is cloned only if the value has no symbol
-/// yet.
+/// Clones a shared interner only if the value has no symbol yet.
 pub(crate) fn intern(symbols: &mut Arc<Symbols>, value: Literal) -> Symbol {
     symbols.find_literal(&value).unwrap_or_else(|| Arc::make_mut(symbols).literal(value))
 }
@@ -469,7 +467,6 @@ struct Lookup<'a> {
     is_link: bool,
 }
 
-/// Appends to the block the partial match `bound`, extended by a row, if the row fits the pattern.
 fn extend_match(block: &mut Vec<Symbol>, bound: &[Symbol], row: &[Symbol], pattern: &Pattern) {
     // A variable may occur twice in the row, so the columns are checked only after all variables are bound.
     let start = block.len();

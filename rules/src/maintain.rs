@@ -109,7 +109,6 @@ impl<'a> Maintenance<'a> {
         Self { engine, network, added, doomed, pending, touched, joined, budget, buffers }
     }
 
-    /// Derives all facts from the stated facts of an engine without derived facts.
     pub fn derive_all(mut self) -> Result<(), Error> {
         let network = Arc::clone(&self.network);
         for stratum in &network.strata {
@@ -264,7 +263,6 @@ impl<'a> Maintenance<'a> {
         self.run(&changed, |relation| stratum.aggregated.get(&relation).map(Vec::as_slice), retracting)
     }
 
-    /// Runs the rules backwards from the doomed (over-deleted) rows, to find other derivations of these rows.
     fn rederive(&mut self, stratum: &Stratum) -> Result<(), Error> {
         let doomed = self.still_doomed();
         self.run(&doomed, |relation| stratum.rederive.get(&relation).map(Vec::as_slice), false)

@@ -65,7 +65,6 @@ pub(crate) enum Step {
         built_in: BuiltIn,
         arguments: Vec<Source>,
     },
-    /// Computes the first argument of a built-in from the others.
     Compute {
         built_in: BuiltIn,
         result: u16,
@@ -166,8 +165,6 @@ pub(crate) enum Condition {
 }
 
 impl Condition {
-    /// Returns the relation on whose changes the condition depends; `None` for built-ins and
-    /// comparisons.
     pub fn relation(&self) -> Option<RelationId> {
         match self {
             Self::Relation(relation, _) | Self::Not(relation, _) => Some(*relation),

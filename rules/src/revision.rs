@@ -84,7 +84,6 @@ impl Engine {
         Ok(net([deletions, changed, insertions]))
     }
 
-    /// Changes facts and rules of an engine under equality, or switches equality on first.
     fn change_equally(&mut self, mut delta: Delta, mut program: Program) -> Result<Delta, Errors> {
         program.equality = true;
         if self.equality.is_none() && self.derives_pairs() {

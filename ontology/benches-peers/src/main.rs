@@ -16,7 +16,6 @@ use std::process::Command;
 use metaplan_rules::{Engine, Symbols};
 use ontology::{ReadOptions, lower, ntriples, read_files};
 
-/// Pseudorandom numbers (xorshift), the same in each run.
 pub struct Random(pub u64);
 
 impl Random {

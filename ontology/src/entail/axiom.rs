@@ -111,7 +111,6 @@ impl Prover {
         with_facts(&copy, facts)
     }
 
-    /// Proves that the edges of `body` imply that the fresh individuals `left` and `right` are the same.
     fn merges(&self, body: &[(&Property, usize, usize)], left: usize, right: usize) -> ProofResult {
         let mut copy = self.assumed(body)?;
         let goal = same(&mut copy, &Self::fresh(left), &Self::fresh(right));

@@ -45,8 +45,7 @@ impl Prover {
         Ok(Self { base })
     }
 
-    /// Returns the name of a fresh individual, which occurs nowhere else. `number` distinguishes the
-    /// fresh individuals of one proof.
+    /// `number` distinguishes the fresh individuals of one proof. They occur nowhere else.
     pub(super) fn fresh(number: usize) -> Iri {
         format!("urn:metaplan:any:{number}").into()
     }

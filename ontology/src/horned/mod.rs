@@ -178,8 +178,7 @@ impl Builder {
         self.rules.extend(indices.map(|index| (index, rule.clone())));
     }
 
-    /// Converts a rule atom. Returns `None` for the marker atom that normalisation adds to an empty body
-    /// or head.
+    /// Returns `None` for the marker atom that normalisation adds to an empty body or head.
     fn atom(&mut self, atom: &ho::Atom<RcStr>) -> Option<Atom> {
         Some(match atom {
             ho::Atom::BuiltInAtom { pred, args } => {

@@ -16,8 +16,7 @@ use crate::vocab::owl;
 /// Result of lowering an axiom. The error is the reason why the axiom, or a part of it, has no rule form.
 type LoweringResult = Result<(), &'static str>;
 
-/// Adds the rules of all axioms that are not plain assertions to `context`. Adds a warning for each axiom
-/// without a complete rule form and, if there are any, one summary warning.
+/// Adds a warning for each axiom without a complete rule form and, if there are any, one summary warning.
 pub(crate) fn lower_rules(axioms: &[AnnotatedAxiom], context: &mut Context) {
     let mut outside = 0;
     for (position, annotated) in axioms.iter().enumerate() {
@@ -47,8 +46,6 @@ pub(crate) fn lower_assertions(axioms: &[AnnotatedAxiom], context: &mut Context)
     }
 }
 
-/// Returns `true` if the axiom has no rules: it is an assertion of a named class or property, or a datatype
-/// definition.
 fn is_assertion(axiom: &Axiom) -> bool {
     matches!(
         axiom,

@@ -143,8 +143,8 @@ fn range_condition(context: &mut Context, range: &DataRange, value: Term) -> Vec
     range::condition(context, range, value).unwrap_or_else(|reason| context.gap(reason))
 }
 
-/// Lowers a class as a conclusion: returns the consequences of `x` being in `class`. Consequences that
-/// rules cannot express are recorded as gaps.
+/// Returns the consequences of `x` being in `class`. Consequences that rules cannot express are recorded as
+/// gaps.
 pub(crate) fn conclusions(
     context: &mut Context,
     class: &ClassExpression,
@@ -277,7 +277,6 @@ fn only_included(
     included(context, class, x)
 }
 
-/// Adds a rule for each inclusion between two different restrictions with auxiliary relations.
 pub(crate) fn lower_inclusions(context: &mut Context, position: usize) {
     for [sub, sup] in context.inclusions.pairs() {
         let mut variables = Variables::default();
@@ -294,8 +293,7 @@ fn relation_of(restriction: &ClassExpression) -> String {
 
 const EXISTS: &str = "an existential restriction as a conclusion";
 
-/// Returns the contradiction that follows if `x` has more than `limit` (0 or 1) values of `property` in
-/// `range`.
+/// Returns the contradiction of more than `limit` values; `limit` is 0 or 1.
 fn at_most(
     context: &mut Context,
     limit: u32,

@@ -29,7 +29,6 @@ pub enum Equality {
 
 pub(crate) type Conjunction = Vec<Atom>;
 
-/// Returns each conjunction of `left` joined with each conjunction of `right`.
 pub(crate) fn cross(left: &[Conjunction], right: &[Conjunction]) -> Vec<Conjunction> {
     left.iter().flat_map(|l| right.iter().map(move |r| l.iter().chain(r).cloned().collect())).collect()
 }
@@ -40,12 +39,9 @@ pub(crate) struct Context<'a> {
     pub facts: Vec<Fact>,
     pub warnings: Vec<Warning>,
     pub equality: Equality,
-    /// Data ranges of the datatypes that are defined.
     pub definitions: HashMap<Iri, DataRange>,
     entities: HashSet<(EntityKind, Iri)>,
-    /// Identity of the axiom or rule that is being lowered.
     pub identity: RuleIdentity,
-    /// Reasons why parts of the current axiom or rule have no rule form.
     gaps: Vec<&'static str>,
     pub inclusions: Inclusions,
     /// Names of the auxiliary relations whose rules have already been added.

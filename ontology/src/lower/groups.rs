@@ -33,14 +33,12 @@ fn differently_numbered(member: Symbol, [x, y]: [Term; 2], [i, j]: [Term; 2]) ->
     vec![Atom::relation(member, [x, i]), Atom::relation(member, [y, j]), Atom::Different(i, j)]
 }
 
-/// Adds the constraint that no individual has two numbers in the relation `member`.
 pub(crate) fn forbid(context: &mut Context, identity: &RuleIdentity, member: Symbol) {
     let mut variables = Variables::default();
     let [x, i, j] = ["x", "i", "j"].map(|name| variables.fresh(name));
     context.rule(identity, Vec::new(), differently_numbered(member, [x, x], [i, j]), &variables);
 }
 
-/// Adds the rule that individuals with different numbers in the relation `member` differ.
 pub(crate) fn differ(context: &mut Context, identity: &RuleIdentity, member: Symbol) {
     let mut variables = Variables::default();
     let [x, y, i, j] = ["x", "y", "i", "j"].map(|name| variables.fresh(name));

@@ -60,7 +60,6 @@ impl Inclusions {
         restriction(class, true).filter(|restriction| self.concluded.contains_key(restriction))
     }
 
-    /// Returns the inclusions `[sub, sup]` between two different restrictions.
     pub(crate) fn pairs(&self) -> Vec<[ClassExpression; 2]> {
         let pairs =
             self.concluded.iter().flat_map(|(sub, including)| including.iter().map(move |sup| (sub, sup)));
@@ -251,7 +250,6 @@ impl InclusionGraph {
         self.members(sup);
     }
 
-    /// Adds the inclusion of each member if the class is a union.
     fn members(&mut self, class: &ClassExpression) {
         if let ClassExpression::UnionOf(members) = class {
             for member in members {
@@ -268,8 +266,7 @@ impl InclusionGraph {
         }
     }
 
-    /// Returns the conditions that include a restriction. Nested restrictions are compared up to `depth`
-    /// levels.
+    /// Compares nested restrictions up to `depth` levels.
     fn including(
         &self,
         restriction: &ClassExpression,
@@ -308,8 +305,7 @@ impl InclusionGraph {
         including
     }
 
-    /// Returns the classes that include a class, and the class itself. Nested restrictions are compared
-    /// up to `depth` levels.
+    /// The result contains `class` itself. Nested restrictions are compared up to `depth` levels.
     fn supers(&self, class: &ClassExpression, depth: usize, memo: &mut Memo) -> BTreeSet<ClassExpression> {
         let key = (class.clone(), depth);
         if let Some(supers) = memo.supers.get(&key) {

@@ -88,8 +88,7 @@ struct Kinds<'a> {
 }
 
 impl Kinds<'_> {
-    /// Returns the OWL class of the property's kind, such as `owl:ObjectProperty`, from its declaration
-    /// or its uses; `None` for an unknown property.
+    /// Returns the OWL class for the kind of a property, from its declaration or its uses.
     fn of(&self, property: &str) -> Option<&'static str> {
         if self.declared.object_properties.contains(property) {
             Some(owl::OBJECT_PROPERTY)

@@ -55,8 +55,7 @@ fn groups(graph: &mut Graph) -> Vec<AnnotatedAxiom> {
     axioms
 }
 
-/// Replaces each axiom of type `class` by `predicate` between all pairs of its members. Removes a malformed
-/// axiom, with a warning.
+/// Removes a malformed axiom, with a warning.
 fn pairs(graph: &mut Graph, class: &str, predicate: &str, warnings: &mut Vec<Warning>) {
     for (_, node) in graph.instances(class) {
         let members = graph.object(&node, owl::MEMBERS).and_then(|head| graph.list(head));

@@ -30,11 +30,6 @@ pub(crate) fn decoded<'a>(bytes: &'a [u8], name: &str) -> Result<Cow<'a, [u8]>, 
     })
 }
 
-/// Rejects a document that is recognised as unsupported, such as Manchester syntax, a compressed file or an empty
-/// document.
-///
-/// # Errors
-/// Returns O113, which describes the document.
 pub(crate) fn require_syntax(text: &[u8], name: &str) -> Result<(), Errors> {
     match foreign::recognized(text) {
         Some(what) => {

@@ -29,8 +29,6 @@ pub(super) fn locate(warnings: &mut [Warning], texts: &[(String, Text)]) {
     }
 }
 
-/// Adds a position to an error about too deep nesting (O112) that has none, if its document contains the IRI that the
-/// expression describes.
 pub(super) fn placed(error: Error, texts: &[(String, Text)]) -> Error {
     match error {
         Error::TooDeep { file, about: Some(iri), position: None, deepest } => {

@@ -119,8 +119,7 @@ fn string_length(text: &[u8]) -> usize {
     text.len()
 }
 
-/// Returns the offset and the prefix of the first name with an undeclared prefix. Standard prefixes such as `owl:`
-/// and `xsd:` need no declaration.
+/// Standard prefixes such as `owl:` and `xsd:` need no declaration.
 fn undeclared_prefix(words: Words) -> Option<(usize, String)> {
     let mut declared: Vec<&[u8]> =
         vec![b"owl:", b"rdf:", b"rdfs:", b"xsd:", b"xml:", b"_:", b"swrl:", b"swrlb:"];

@@ -164,8 +164,6 @@ impl Runtime {
         self.report(component, delta)
     }
 
-    /// Applies a component's report. In latch mode, removes the realisability of all designs if the component
-    /// had failed or recovered.
     fn report(&mut self, component: &str, mut delta: Delta) -> Result<Delta, Error> {
         let facts = self.facts();
         let (component, _) = self.all_facts().find("component", terms::COMPONENT, component)?;

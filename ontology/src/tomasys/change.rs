@@ -32,7 +32,6 @@ fn spellings(status: Status) -> Vec<Literal> {
     vec![Literal::string(mros), Literal::string(planta), Literal::Boolean(truth)]
 }
 
-/// Returns `true` if a status, in any spelling, denotes a failure.
 pub(crate) fn is_failed(status: &str) -> bool {
     spells(Status::Failed, status)
 }
@@ -149,7 +148,6 @@ pub fn unmeasured(engine: &mut Engine, attribute: &str) -> Result<Delta, Error> 
     Ok(Delta { insert: Vec::new(), delete })
 }
 
-/// Returns the facts that make `holder` hold measurements of the attribute type `kind`.
 fn observation(symbols: &mut Symbols, holder: Symbol, kind: Symbol, class: &str) -> Vec<Fact> {
     let mut facts = vec![
         Fact::new(symbols.name(term_for(terms::QA_VALUE, class)), [holder]),

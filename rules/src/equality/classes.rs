@@ -57,7 +57,6 @@ impl Classes {
         self.members.get(&representative)
     }
 
-    /// Replaces all names of a fact by their representatives.
     pub fn normal(&self, fact: &Fact) -> Fact {
         Fact::new(fact.predicate, fact.arguments.iter().map(|&name| self.find(name)))
     }
@@ -125,7 +124,7 @@ impl Classes {
         }
     }
 
-    /// Merges the classes of two names. The representative of the larger class remains.
+    /// The representative of the larger class remains.
     pub fn join(&mut self, left: Symbol, right: Symbol) {
         let (left, right) = (self.find(left), self.find(right));
         if left == right {

@@ -98,7 +98,6 @@ impl Equality {
         Self { same_as, classes, originals, pairs, program: Arc::clone(program), constants }
     }
 
-    /// Returns a copy without equalities and without stated facts, for the rules of `program`.
     pub fn without_facts(&self, program: &Arc<Program>) -> Self {
         Self::new(self.same_as, program)
     }

@@ -88,8 +88,6 @@ impl Equality {
         facts
     }
 
-    /// Returns the arguments of the stated `owl:sameAs` pairs of a name with itself: of `name`, or of
-    /// all names if it is `None`.
     fn reflexive_pairs(&self, name: Option<Symbol>) -> impl Iterator<Item = Arguments> {
         let fits = move |at: Symbol| name.is_none_or(|name| name == at);
         let pairs = self.pairs.values().flatten().filter(|pair| pair.arguments[0] == pair.arguments[1]);
@@ -119,7 +117,6 @@ impl Equality {
         results
     }
 
-    /// Returns the `owl:sameAs` rows that relate a literal to a different symbol.
     pub fn clashes(&self, engine: &Engine) -> Vec<Fact> {
         let rows = engine.matching_rows(self.same_as, &[None, None]);
         let clashes = rows.filter(|row| engine.symbols.differ(row[0], row[1]));

@@ -47,8 +47,6 @@ pub struct Duration {
 }
 
 impl Moment {
-    /// Parses the lexical form of `dateTime`, `dateTimeStamp`, `date` or `time`; `local` is the name of
-    /// the datatype. Returns `None` if the form is invalid.
     pub(super) fn parse(lexical: &str, local: &str) -> Option<Self> {
         let (body, zone) = split_zone(lexical)?;
         let (kind, days, time) = match local {
@@ -140,7 +138,6 @@ impl Moment {
         Some(Duration { months: if negative { -months } else { months }, seconds: Decimal::from(0) })
     }
 
-    /// Returns year, month and day, and hours, minutes and seconds, in local time.
     pub(crate) fn calendar(&self) -> ([i64; 3], (i64, i64, Decimal)) {
         let (day, clock) = split_day(&self.local());
         let (year, month, date) = civil_from_days(day);
@@ -158,7 +155,6 @@ impl Moment {
         Self { kind: MomentKind::DateTime, ..self.clone() }
     }
 
-    /// Returns the time zone as text, for example `+02:00`; empty without a time zone.
     pub(crate) fn zone_text(&self) -> String {
         self.zone.map(zone_text).unwrap_or_default()
     }
@@ -379,7 +375,6 @@ pub(super) fn split_zone(lexical: &str) -> Option<(&str, Option<i64>)> {
     (seconds <= ZONE_LIMIT).then_some((body, Some(sign * seconds)))
 }
 
-/// Returns `true` for digits, optionally with a point and more digits.
 fn is_plain_decimal(text: &str) -> bool {
     let (whole, fraction) = text.split_once('.').unwrap_or((text, "0"));
     let is_number = |part: &str| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit());

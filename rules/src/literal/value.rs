@@ -145,7 +145,6 @@ impl Literal {
         }
     }
 
-    /// Returns approximately the number of bytes that a value needs in addition to its fixed size.
     pub(crate) fn size(&self) -> u64 {
         let size = match self {
             Self::String(text) | Self::Uri(text) | Self::Language { text, .. } | Self::Recurring(text, _) => {

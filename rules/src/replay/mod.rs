@@ -173,8 +173,7 @@ impl Replayer<'_> {
         Ok(())
     }
 
-    /// Checks that a rule derives the step at `position` from earlier steps. The error is the reason why
-    /// not.
+    /// Checks that a rule derives the step at `position` from earlier steps.
     fn follows(
         &mut self,
         rule: &Rule,

@@ -31,7 +31,6 @@ impl ForeignAtom {
     }
 }
 
-/// Returns an error for each of the foreign atoms whose relation is used in a rule body and derived by no rule.
 pub(super) fn unknown(atoms: Vec<(&str, ForeignAtom)>, program: &Program, symbols: &Symbols) -> Vec<Error> {
     let (queried, derived) = (program.queried(symbols), program.concluded(symbols));
     let is_unknown = |(_, atom): &(&str, ForeignAtom)| {
