@@ -237,10 +237,10 @@ impl Stated {
         removed
     }
 
-    /// Returns `true` if the change can be computed without a translation of the whole ontology: `axioms` are
-    /// only assertions about individuals by named classes and properties, and no rule of `program` derives
-    /// members of `owl:Thing`. The names must not belong to OWL's own vocabulary, and no individual may also
-    /// be declared as something else.
+    /// Returns `true` if the change can be computed without a translation of the whole ontology. Then
+    /// `axioms` are only assertions about individuals by named classes and properties, and no rule of
+    /// `program` derives members of `owl:Thing`. The names must not belong to OWL's own vocabulary, and no
+    /// individual may also be declared as something else.
     fn is_plain(&self, axioms: &[AnnotatedAxiom], program: &Program, symbols: &Symbols) -> bool {
         // The rules and facts of `owl:Thing` depend on all names that are stated.
         let thing = symbols.find_name(owl::THING);

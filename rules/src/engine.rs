@@ -103,8 +103,8 @@ impl Engine {
         }
     }
 
-    /// Returns the predicates of all facts that hold, each with its number of arguments, in no
-    /// particular order. The result may contain predicates whose facts no longer hold.
+    /// Returns the predicates of all facts that hold, each with its number of arguments, in no particular
+    /// order. The result may also contain predicates without facts.
     pub fn predicates(&self) -> impl Iterator<Item = (Symbol, usize)> {
         let relations = self.store.relations.iter();
         relations.filter_map(|relation| Some((relation.predicate?, relation.arity())))

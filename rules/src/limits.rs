@@ -32,7 +32,7 @@ pub struct Limits {
     /// digits or text.
     pub steps: u64,
     /// Function that can stop an update. It is called after about every 16,000 visited rows and charged
-    /// steps, i.e. every few microseconds to a millisecond.
+    /// steps.
     pub interrupt: Option<Interrupt>,
 }
 

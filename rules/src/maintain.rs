@@ -227,9 +227,9 @@ impl<'a> Maintenance<'a> {
         touch(&mut self.touched, &self.network, relation);
     }
 
-    /// Over-deletes rows, i.e. marks them as doomed: all rows whose recorded derivation depends on a doomed
-    /// row, on the absence of a new row, or on a changed group of an aggregate. Stated rows only lose their
-    /// recorded derivation.
+    /// Over-deletes rows by marking them as doomed. These are the rows whose recorded derivation depends on a
+    /// doomed row, on the absence of a new row, or on a changed group of an aggregate. Stated rows only lose
+    /// their recorded derivation.
     fn over_delete(&mut self, stratum: &Stratum) -> Result<(), Error> {
         // A new row invalidates derivations that depend on its absence.
         let appeared = self.added.clone();

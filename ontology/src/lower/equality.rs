@@ -40,9 +40,10 @@ pub(crate) fn lower(axioms: &[AnnotatedAxiom], context: &mut Context) -> bool {
     merges
 }
 
-/// Adds rule eq-rep of OWL 2 RL for classes and properties that are individuals, too: names that become equal have
-/// the same members. (For names that are stated to be equal, the lowering of `SameIndividual` also adds rules without
-/// a condition.) If a kind has more than [`MAX_PUNNED_NAMES`] such names, adds a warning instead.
+/// Adds rule eq-rep of OWL 2 RL for classes and properties that are individuals, too: names that become equal
+/// have the same members. For names that are stated to be equal, the lowering of `SameIndividual` also adds
+/// rules without a condition. If a kind has more than [`MAX_PUNNED_NAMES`] such names, adds a warning
+/// instead.
 fn entities(context: &mut Context) {
     let identity = RuleIdentity { source: AXIOM_SOURCE.into(), label: Some("eq-rep".into()), position: 0 };
     let mut variables = Variables::default();

@@ -109,9 +109,9 @@ impl Context<'_> {
         }
     }
 
-    /// Removes the rules that the engine rejects, for example because of unsafe variables, each with a warning, since
-    /// one such rule would make the engine reject the whole program. A rule lowered from an axiom is not tested if
-    /// its body has a relation atom, or an equality with a constant, because lowering then binds all variables.
+    /// Removes the rules that the engine rejects, each with a warning. One such rule would make the engine
+    /// reject the whole program. Omits the test for a rule lowered from an axiom if its body has a relation
+    /// atom, or an equality with a constant: lowering then binds all variables.
     fn drop_unusable(&mut self) {
         let binds = |atom: &Atom| match atom {
             Atom::Relation { .. } => true,

@@ -1,7 +1,7 @@
 //! Detects statements that no other pass has to process: assertions about named individuals with classes and
-//! declared properties, if no other statement makes the individuals part of an axiom, a list or a rule. Most
-//! triples of a large knowledge base are of this kind. They remain triples of numbers until they become axioms,
-//! which saves time and memory.
+//! declared properties. No other statement may make these individuals part of an axiom, a list or a rule.
+//! Most triples of a large knowledge base are of this kind. They remain triples of numbers until they become
+//! axioms, which saves time and memory.
 
 use std::collections::BTreeSet;
 

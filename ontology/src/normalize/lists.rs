@@ -1,5 +1,5 @@
-//! Rewrites axioms with lists: `AllDisjointClasses` and `AllDisjointProperties` become pairs, large sets of
-//! disjoint classes or different individuals become axioms without horned-owl, a list that several axioms
+//! Rewrites axioms with lists. `AllDisjointClasses` and `AllDisjointProperties` become pairs. Large sets of
+//! disjoint classes or different individuals become axioms without horned-owl. A list that several axioms
 //! share is copied, and malformed property chains are removed.
 
 use oxrdf::{NamedNode, NamedOrBlankNode, Term};

@@ -7,7 +7,7 @@
 //!
 //! | pass | rewrites |
 //! |---|---|
-//! | this file | headers of imported ontologies (removed) |
+//! | this file | imports, and headers of all documents but the first (removed) |
 //! | `bulk` | nothing: detects statements that the other passes can skip |
 //! | `swrl` | every rule to one canonical form |
 //! | `forms` | OWL 1 class definitions, expressions without a type, axiom nodes that are IRIs (to blank nodes) |

@@ -10,8 +10,8 @@ use crate::symbol::Symbol;
 
 type Relation = (Symbol, usize);
 
-/// Head relations and body relations of a rule. The number of a body relation states by how many levels the heads
-/// must at least exceed it: by 1 if the atom is negated or aggregated, otherwise by 0.
+/// Head relations and body relations of a rule. The number of a body relation is the difference in levels by
+/// which the heads must at least exceed it: 1 if the atom is negated or aggregated, otherwise 0.
 struct Uses {
     heads: Vec<Relation>,
     body: Vec<(Relation, usize)>,
