@@ -385,7 +385,7 @@ fn with_arguments(atom: &Atom, map: &mut impl FnMut(&Argument) -> Argument) -> A
     }
 }
 
-/// Returns the axiom in a canonical form: the members of sets are sorted, and an assertion of an inverse
+/// Returns the axiom in a canonical form. The members of sets are sorted, and an assertion of an inverse
 /// property becomes an assertion of the property with swapped individuals.
 fn canonical(axiom: &Axiom) -> Axiom {
     fn ordered<T: Ord + Clone>(items: &[T]) -> Vec<T> {

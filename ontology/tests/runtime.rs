@@ -10,7 +10,6 @@ use ontology::{INTERNAL, ReadOptions, kb, lower, read_files, read_text, vocab};
 use rules::{Delta, Engine, Fact, Literal, Symbols};
 use test_resources::data;
 
-/// Two designs of one function. `slow` depends on light and air; `fast` requires a motor.
 const ROBOT: &str = r#"
 @prefix t: <http://metacontrol.org/tomasys#> .
 @prefix m: <http://ros/mros#> .

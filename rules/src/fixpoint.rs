@@ -136,7 +136,7 @@ mod program {
 pub(crate) struct Handle<'a>(&'a dyn Evaluate);
 
 /// Operations of a round that the crepe program calls. `extend` returns the next step and the number of the
-/// extended block, or `None` if no match remains, the plan is complete, or the budget is exhausted.
+/// extended block. It returns `None` if no match remains, the plan is complete, or the budget is exhausted.
 trait Evaluate {
     fn extend(&self, plan: PlanId, step: u32, block: BlockId) -> Option<(u32, BlockId)>;
     fn is_complete(&self, plan: PlanId, step: u32) -> bool;
@@ -331,8 +331,8 @@ impl Round<'_> {
         })
     }
 
-    /// Returns the state bits of the rows that a step skips: normally `skip`; while retracting only unused
-    /// rows, because all rows that held before the update are visible then.
+    /// Returns the state bits of the rows that a step skips: normally `skip`. While retracting, only unused
+    /// rows are skipped, because all rows that held before the update are visible then.
     fn visibility(&self, skip: u8) -> u8 {
         if self.retracting { state::FREE } else { skip }
     }

@@ -314,7 +314,6 @@ impl<'a> Maintenance<'a> {
         }
     }
 
-    /// Marks rows as fresh (the delta of a semi-naive round), or removes the mark.
     fn mark(&mut self, rows: &Rows, fresh: bool) {
         for &(relation, row) in rows {
             let relation = self.engine.store.get_mut(relation);

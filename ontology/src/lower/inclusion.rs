@@ -1,11 +1,14 @@
-//! Inclusions between restrictions: rules scm-svf1, scm-svf2, scm-avf1 and scm-avf2 of OWL 2 RL ([1], table 9).
+//! Inclusions between restrictions: rules scm-svf1, scm-svf2, scm-avf1 and scm-avf2 of OWL 2 RL ([1], table
+//! 9).
 //!
-//! In this text, p and q are properties, C and D are classes. An individual of `∃p.C` has a value that rules cannot
-//! name, but the individual is in `∃q.D` if `p ⊑ q` and `C ⊑ D`. If one axiom concludes the first restriction and
-//! another axiom has the second restriction as a condition, both restrictions get an auxiliary relation, and a rule
-//! derives the second relation from the first. Universal restrictions are analogous, with `q ⊑ p`. The inclusions of
-//! classes and properties are the transitive closure of the stated ones, of `C ⊓ D ⊑ C` and `C ⊑ C ⊔ D`, and of the
-//! inclusions between restrictions that this module finds.
+//! In this text, p and q are properties, C and D are classes. An individual of `∃p.C` has a value that rules
+//! cannot name, but the individual is in `∃q.D` if `p ⊑ q` and `C ⊑ D`. Suppose that one axiom concludes the
+//! first restriction, and another axiom has the second restriction as a condition. Then both restrictions get
+//! an auxiliary relation, and a rule derives the second relation from the first. Universal restrictions are
+//! analogous, with `q ⊑ p`.
+//!
+//! The inclusions of classes and properties are a transitive closure. It consists of the stated inclusions,
+//! `C ⊓ D ⊑ C`, `C ⊑ C ⊔ D`, and the inclusions between restrictions that this module finds.
 //!
 //! [1] OWL 2 Web Ontology Language Profiles, W3C 2012, section 4.3.
 

@@ -1,9 +1,10 @@
-//! Adds declarations of undeclared classes and properties, because horned-owl drops assertions of properties whose kind
-//! is unknown.
+//! Adds declarations of undeclared classes and properties, because horned-owl drops assertions of properties
+//! whose kind is unknown.
 //!
-//! A class or property that the imports closure does not declare gets a kind from its use, with a warning. In general,
-//! a property with literals as values is a data property, a property between individuals an object property, and a
-//! property that describes only classes, properties or ontologies an annotation property.
+//! A class or property that the imports closure does not declare gets a kind from its use, with a warning. In
+//! general, a property with literals as values is a data property, and a property between individuals is an
+//! object property. A property that describes only classes, properties or ontologies is an annotation
+//! property.
 
 use std::collections::{BTreeMap, BTreeSet};
 

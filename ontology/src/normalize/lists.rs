@@ -55,6 +55,7 @@ fn groups(graph: &mut Graph) -> Vec<AnnotatedAxiom> {
     axioms
 }
 
+/// Replaces each n-ary axiom of the type `class` by one triple with `predicate` for each pair of members.
 /// Removes a malformed axiom, with a warning.
 fn pairs(graph: &mut Graph, class: &str, predicate: &str, warnings: &mut Vec<Warning>) {
     for (_, node) in graph.instances(class) {

@@ -1,10 +1,10 @@
-//! Rewrites every SWRL rule in the RDF graph to one canonical form: a blank node with typed lists of
-//! atoms, and for each atom a blank node that has only its arguments.
+//! Rewrites every SWRL rule in the RDF graph to one canonical form. A rule is a blank node with typed lists
+//! of atoms. An atom is a blank node that has only its arguments.
 //!
-//! Special IRIs encode information that this form cannot express; `crate::horned` decodes them.
-//! Variables and individuals have separate namespaces (in real files one IRI can be both). An individual
-//! as the first argument of a data atom becomes a variable with the individual's name. An empty body or
-//! head becomes one atom that always holds.
+//! Special IRIs encode information that this form cannot express; `crate::horned` decodes them. Variables and
+//! individuals have separate namespaces (in real files one IRI can be both). An individual as the first
+//! argument of a data atom becomes a variable with the individual's name. An empty body or head becomes one
+//! atom that always holds.
 
 use std::collections::HashSet;
 

@@ -51,8 +51,8 @@ pub(super) fn place(message: &str, texts: &[(String, Text)]) -> Option<Position>
     })
 }
 
-/// Returns the byte offset of the first occurrence of an IRI in a text: the whole IRI in brackets or quotes,
-/// or its local name after `:` or `#`.
+/// Returns the byte offset of the first occurrence of an IRI in a text. The text may contain the whole IRI in
+/// brackets or quotes, or its local name after `:` or `#`.
 fn offset(iri: &str, text: &str) -> Option<usize> {
     let whole = spelled(text, iri, |c| matches!(c, '<' | '"' | '\''));
     let local = iri.rsplit(['#', '/', ':']).next().filter(|local| !local.is_empty());
@@ -60,8 +60,8 @@ fn offset(iri: &str, text: &str) -> Option<usize> {
     [whole, short].into_iter().flatten().min()
 }
 
-/// Returns the byte offset of the first occurrence of a word that follows a character accepted by `opens` and
-/// is not the prefix of a longer name.
+/// Returns the byte offset of the first occurrence of a word that is not the prefix of a longer name. Only
+/// occurrences after a character that `opens` accepts count.
 fn spelled(text: &str, word: &str, opens: impl Fn(char) -> bool) -> Option<usize> {
     let continues = |c: char| c.is_alphanumeric() || matches!(c, '_' | '-');
     memchr::memmem::find_iter(text.as_bytes(), word).find(|offset| {

@@ -139,8 +139,8 @@ fn undeclared_prefix(words: Words) -> Option<(usize, String)> {
     None
 }
 
-/// Replaces `_:_:` at the start of labels of blank nodes by `_:own-`: horned-owl's readers keep the prefix as part of
-/// the label, and the writer adds another prefix.
+/// Replaces `_:_:` at the start of labels of blank nodes by `_:own-`. The reason is that horned-owl's readers
+/// keep the prefix as part of the label, and the writer adds another prefix.
 fn relabelled(ntriples: Vec<u8>) -> Vec<u8> {
     const DOUBLE_PREFIX: &[u8] = b"_:_:";
     if !ntriples.windows(DOUBLE_PREFIX.len()).any(|window| window == DOUBLE_PREFIX) {

@@ -186,8 +186,8 @@ pub fn replace(engine: &Engine, property: Symbol, subject: Symbol, value: Option
     Delta { insert: new.into_iter().collect(), delete }
 }
 
-/// Returns `true` if no constraint of the program forbids the value because it is outside the range of the
-/// property: outside of an enumeration, or in another datatype.
+/// Returns `true` if no constraint of the program excludes the value from the range of the property.
+/// Considers enumerations and datatypes.
 fn allows(engine: &Engine, property: Symbol, value: Symbol) -> bool {
     let literal = |symbol| engine.symbols().value(symbol).as_literal();
     let Some(value) = literal(value) else { return true };

@@ -1,5 +1,5 @@
-//! Incremental updates under equality (`owl:sameAs`): computes from a change of the stated facts which
-//! facts start or cease to hold, while equality classes merge and split. The store has one row for all
+//! Incremental updates under equality (`owl:sameAs`): computes the facts that start or cease to hold after a
+//! change of the stated facts. A change can merge and split equality classes. The store has one row for all
 //! facts that differ only in equal names; the row contains the representatives of the classes.
 
 use std::collections::{BTreeMap, BTreeSet};

@@ -1,10 +1,10 @@
 //! `xsd:dateTime`, `xsd:date`, `xsd:time` and `xsd:duration` as numbers of seconds and months, partially
 //! ordered.
 //!
-//! A moment is a number of seconds since 1970-01-01T00:00:00 in the proleptic Gregorian calendar,
-//! converted to UTC if it has a time zone. A moment without a time zone is comparable with a moment that
-//! has a time zone only if every possible time zone gives the same order. The order treats one instant
-//! in two time zones as equal, but `==` distinguishes the two.
+//! A moment is a number of seconds since 1970-01-01T00:00:00 in the proleptic Gregorian calendar, converted
+//! to UTC if it has a time zone. Moments with and without a time zone are comparable only if every possible
+//! time zone gives the same order. The order treats one instant in two time zones as equal, but `==`
+//! distinguishes the two.
 
 use std::cmp::Ordering;
 use std::fmt;
