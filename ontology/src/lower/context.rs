@@ -131,7 +131,6 @@ impl<'a> Context<'a> {
         T::default()
     }
 
-    /// Clears the gaps. Returns an error with the first gap, if there was one.
     pub(crate) fn take_gaps(&mut self) -> Result<(), &'static str> {
         let first = self.gaps.first().copied();
         self.gaps.clear();
@@ -191,8 +190,6 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// Builds the atom for the condition that two individuals differ. In OWL, the difference is stated
-    /// or derived; under the unique name assumption, different names suffice.
     pub(crate) fn different(&mut self, first: Term, second: Term) -> Atom {
         match self.equality {
             Equality::Owl => self.relation(owl::DIFFERENT_FROM, [first, second]),

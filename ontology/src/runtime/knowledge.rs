@@ -190,8 +190,6 @@ impl Runtime {
         self.apply(delta)
     }
 
-    /// Returns the facts that count for queries: assertions in latch mode, otherwise all facts that
-    /// hold.
     pub(super) fn facts(&self) -> Facts<'_> {
         Facts::stated(&self.engine, self.mode == Mode::Latch)
     }
