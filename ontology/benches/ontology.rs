@@ -29,8 +29,6 @@ fn engine(ontology: &Ontology) -> Engine {
     Engine::new(symbols, lowered.program, lowered.facts).expect("safe rules")
 }
 
-/// Creates a robot with an objective that is grounded in the first available design by IRI, which has the
-/// highest requirements.
 fn mission(ontology: &Ontology) -> Runtime {
     let mut runtime = Runtime::new(engine(ontology), Mode::Retract);
     let (name, function) = ("search", "f_generate_search_path");

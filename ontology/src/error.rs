@@ -99,7 +99,7 @@ pub enum Error {
     NotAnOntology {
         /// First of the merged documents.
         file: String,
-        /// Position of the faulty statement in its document, if found.
+        /// Position of an IRI that `reason` mentions, if found.
         position: Option<Position>,
         /// Description of the fault.
         reason: String,

@@ -9,7 +9,6 @@ use crate::owl::{
 };
 use crate::vocab::{local_name, xsd};
 
-/// Writes a constructor in functional-style syntax: `Name(argument argument …)`.
 fn call(f: &mut Formatter<'_>, name: &str, arguments: &[&dyn Display]) -> Result {
     write!(f, "{name}(")?;
     for (index, argument) in arguments.iter().enumerate() {

@@ -72,8 +72,6 @@ impl Graph {
             .map(|(_, triple)| &triple.object)
     }
 
-    /// Returns the object of the only triple with this subject and predicate. The error message
-    /// distinguishes a missing triple from several triples.
     pub(crate) fn object<'a>(
         &'a self,
         subject: &NamedOrBlankNode,
@@ -87,7 +85,6 @@ impl Graph {
         }
     }
 
-    /// Returns the subjects of type `class` with the indices of their type triples, in order.
     pub(crate) fn instances(&self, class: &str) -> Vec<(usize, NamedOrBlankNode)> {
         let typed = self.iter().filter(|(_, triple)| is_type(triple, class));
         typed.map(|(index, triple)| (index, triple.subject.clone())).collect()
@@ -111,8 +108,7 @@ impl Graph {
         }
     }
 
-    /// Adds an `rdf:List` and returns its head. `class` is the type of each list node, if the nodes have
-    /// one.
+    /// `class` is the type of each list node, if the nodes have one.
     pub(crate) fn add_list(&mut self, items: impl IntoIterator<Item = Term>, class: Option<&str>) -> Term {
         let nodes: Vec<_> = items.into_iter().map(|item| (self.fresh(), item)).collect();
         let nil = Term::from(NamedNode::new_unchecked(rdf::NIL));

@@ -1,5 +1,5 @@
-//! Interns IRIs: each IRI is stored once and has a number. Triples of numbers take a tenth of the memory
-//! of triples of text.
+//! Interns IRIs: each IRI is stored once and has a number. Triples of numbers take much less memory than
+//! triples of text.
 
 use oxrdf::{BlankNode, NamedNode, NamedOrBlankNode, Term, Triple};
 use rustc_hash::FxHashMap;
@@ -54,7 +54,7 @@ impl Names {
         self.numbers.get(name).copied()
     }
 
-    /// Returns the text of the name with this number. The text of a blank node begins with `_:`.
+    /// The text of a blank node begins with `_:`.
     pub(crate) fn text(&self, number: u32) -> &Iri {
         &self.texts[number as usize]
     }
@@ -67,8 +67,7 @@ impl Names {
         self.texts.len()
     }
 
-    /// Returns the rank of each name in alphabetical order. The keys are the addresses of the shared
-    /// texts.
+    /// The keys are the addresses of the shared texts, the values are ranks in alphabetical order.
     pub(crate) fn ranks(&self) -> FxHashMap<*const u8, u32> {
         let mut sorted: Vec<&Iri> = self.texts.iter().collect();
         // Interned texts are distinct, so an unstable sort is deterministic.
@@ -76,7 +75,7 @@ impl Names {
         sorted.into_iter().zip(0..).map(|(iri, rank)| (iri.as_ptr(), rank)).collect()
     }
 
-    /// Converts a triple of text to a triple of numbers. `blank` returns the number of a blank node.
+    /// `blank` returns the number of a blank node.
     pub(crate) fn compact(
         &mut self,
         triple: Triple,

@@ -40,7 +40,6 @@ struct Terms<'a> {
     numbers: FxHashMap<Symbol, Option<u32>>,
 }
 
-/// Term number of `rdf:type`.
 const TYPE: u32 = 0;
 
 impl<'a> Terms<'a> {
@@ -48,8 +47,6 @@ impl<'a> Terms<'a> {
         Self { symbols, texts: vec![format!("<{}> ", rdf::TYPE)], numbers: FxHashMap::default() }
     }
 
-    /// Converts a fact to the term numbers of subject, predicate and object. Returns `None` for a fact
-    /// to omit.
     fn triple(&mut self, fact: &Fact) -> Option<[u32; 3]> {
         let name = |symbol| self.symbols.value(symbol).as_name();
         let predicate = name(fact.predicate).filter(|name| !name.starts_with(INTERNAL))?;

@@ -237,10 +237,10 @@ impl Stated {
         removed
     }
 
-    /// Returns `true` if the change can be computed without a translation of the whole ontology: `axioms` are
-    /// only assertions about individuals by named classes and properties, and no rule of `program` derives
-    /// members of `owl:Thing`, which depend on all names in the ontology. The names must not belong to OWL's
-    /// own vocabulary, and no individual may also be declared as something else.
+    /// Returns `true` if the change can be computed without a translation of the whole ontology. Then
+    /// `axioms` are only assertions about individuals by named classes and properties, and no rule of
+    /// `program` derives members of `owl:Thing`. The names must not belong to OWL's own vocabulary, and no
+    /// individual may also be declared as something else.
     fn is_plain(&self, axioms: &[AnnotatedAxiom], program: &Program, symbols: &Symbols) -> bool {
         // The rules and facts of `owl:Thing` depend on all names that are stated.
         let thing = symbols.find_name(owl::THING);
@@ -318,8 +318,7 @@ fn resembles(first: &Axiom, second: &Axiom) -> bool {
     individuals_of(second).into_iter().any(|individual| individuals_of(first).contains(&individual))
 }
 
-/// Returns an error for each retracted statement with an anonymous individual: a blank node of one
-/// document never denotes an individual of another document.
+/// A blank node of one document never denotes an individual of another document.
 fn reject_anonymous(retractions: &Ontology) -> Result<(), Errors> {
     let is_anonymous = |statement: &dyn Debug| format!("{statement:?}").contains(ANONYMOUS);
     let axioms =
@@ -330,14 +329,13 @@ fn reject_anonymous(retractions: &Ontology) -> Result<(), Errors> {
 }
 
 /// Returns `program` with the rules of `before` replaced by the rules of `after`, or `None` if nothing
-/// changes. The comparison ignores the positions of axioms, so that the rules of remaining axioms keep
-/// their derivations.
+/// changes.
 fn revised_program(program: &Program, before: &Program, after: &Program) -> Option<Program> {
     let content = |rule: &EngineRule| {
         let mut copy = rule.clone();
         if *copy.identity.source == *AXIOM_SOURCE {
-            // The position of an axiom changes if another axiom is inserted before it, so the comparison
-            // ignores positions.
+            // The position of an axiom changes if another axiom is inserted before it. Its rules must keep
+            // their derivations.
             copy.identity.position = 0;
         }
         copy
@@ -387,7 +385,7 @@ fn with_arguments(atom: &Atom, map: &mut impl FnMut(&Argument) -> Argument) -> A
     }
 }
 
-/// Returns the axiom in a canonical form: the members of sets are sorted, and an assertion of an inverse
+/// Returns the axiom in a canonical form. The members of sets are sorted, and an assertion of an inverse
 /// property becomes an assertion of the property with swapped individuals.
 fn canonical(axiom: &Axiom) -> Axiom {
     fn ordered<T: Ord + Clone>(items: &[T]) -> Vec<T> {
@@ -435,8 +433,6 @@ fn canonical(axiom: &Axiom) -> Axiom {
     }
 }
 
-/// Returns the class expression with the members of its intersections, unions and enumerations sorted,
-/// at every depth.
 fn sorted(class: &ClassExpression) -> ClassExpression {
     use ClassExpression as C;
     let sorted_set =

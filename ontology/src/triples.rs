@@ -11,7 +11,6 @@ pub(crate) struct Document {
     /// Path of the document, or the name given for a text.
     pub name: String,
     pub syntax: Syntax,
-    /// The ontology IRI, if the document declares one.
     pub iri: Option<Arc<str>>,
     pub version: Option<Arc<str>>,
     /// Imported IRIs in order of appearance. The position is known if the text contains the IRI literally.

@@ -1,9 +1,11 @@
 //! IRIs of the vocabularies that this crate uses, as constants in one module per vocabulary.
 //!
-//! Each module has its namespace `NS` and a constant for each term in use. A constant is named after the local name of
-//! its IRI. The IRIs of OWL are those of the mapping to RDF graphs, for example `owl:someValuesFrom`. Knowledge bases
-//! in use spread TOMASys over several namespaces (for example with and without `www`), so the typed view in
-//! [`crate::tomasys`] uses a table of these constants instead of one namespace.
+//! Each module has its namespace `NS` and a constant for each term in use. A constant is named after the
+//! local name of its IRI. The IRIs of OWL are those of the mapping to RDF graphs, for example
+//! `owl:someValuesFrom`.
+//!
+//! Knowledge bases in use spread TOMASys over several namespaces, for example with and without `www`.
+//! Therefore the typed view in [`crate::tomasys`] uses a table of these constants instead of one namespace.
 
 macro_rules! vocabulary {
     ($(#[$doc:meta])* $module:ident = $ns:literal { $($name:ident = $local:literal),* $(,)? }) => {

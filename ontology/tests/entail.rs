@@ -23,7 +23,6 @@ fn engine(text: &str) -> Engine {
     Engine::new(symbols, lowered.program, lowered.facts).expect("safe")
 }
 
-/// Returns `true` if the first text entails all statements of the second one.
 fn follows(premise: &str, conclusion: &str) -> bool {
     let conclusion = read(conclusion);
     let mut results = entailments(&engine(premise), &conclusion).expect("it ends");

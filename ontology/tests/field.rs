@@ -25,8 +25,8 @@ enum Verdict {
 
 use Verdict::{Endless, Follows, Inconsistent, Nothing, Refused};
 
-/// The files of `field/ontology`, grouped by the specification that requires the verdict: OWL 2 (Direct
-/// Semantics if it applies, otherwise the rules of OWL 2 RL), XSD 1.1, and the grammars of the syntaxes.
+/// The files of `field/ontology` with their verdicts. The verdicts follow from OWL 2 (Direct Semantics if it
+/// applies, otherwise the rules of OWL 2 RL), XSD 1.1, and the grammars of the syntaxes.
 const FILES: [(&str, Verdict); 62] = [
     ("alldifferent-iri.ttl", Inconsistent),
     ("anonymous-header.ttl", Nothing),
@@ -95,7 +95,7 @@ const FILES: [(&str, Verdict); 62] = [
     ("user-datatype2.ttl", Inconsistent),
 ];
 
-/// Two files with the verdicts above, and files that stop other readers and reasoners.
+/// Two more files with verdicts, and files that stop other readers and reasoners.
 const HOSTILE_FILES: [(&str, Verdict); 16] = [
     ("userdt-functional.ttl", Nothing),
     ("zeros.ttl", Inconsistent),
@@ -121,7 +121,6 @@ const EXPENSIVE_FILES: [(&str, Verdict); 3] = [
     ("hostile/42-swrl-runaway.ttl", Endless),
 ];
 
-/// Returns the text of the rule file with the name of the document, or with its number.
 fn rules_of(path: &Path) -> Option<String> {
     let name = path.file_stem()?.to_str()?;
     let number = name.split('-').next()?;

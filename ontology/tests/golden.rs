@@ -88,7 +88,6 @@ fn one_question_ontologies_infer_what_the_reference_infers() {
     });
 }
 
-/// Runs a comparison on every case of a directory and reports the failures.
 fn check_all(directory: &str, compare: impl Fn(&Value) -> Result<(), String>) {
     let cases = recorded(directory);
     let mut failures = Vec::new();
@@ -134,7 +133,6 @@ fn compare(engine: &Engine, consistent: &Value, expected: &Value) -> Result<(), 
     }
 }
 
-/// Returns the knowledge base of a case with the added triples, and the triples to remove.
 fn knowledge_base(case: &Value) -> (Ontology, Vec<Triple>) {
     let added = tempfile::Builder::new().suffix(".nt").tempfile().expect("temporary file");
     let text: String = triples(&case["added"]).iter().map(ntriple).collect();
@@ -160,7 +158,6 @@ fn evaluate(ontology: &Ontology, removed: &[Triple], equality: Equality) -> Engi
     Engine::new(symbols, lowered.program, facts).expect("the rules are safe")
 }
 
-/// Returns the derived types and property values of named individuals, without equalities and differences.
 fn inferred(engine: &Engine) -> BTreeSet<String> {
     let symbols = engine.symbols();
     let shown = |fact: &Fact| {

@@ -25,7 +25,6 @@ use test_resources::data_path;
 
 use crate::w3c::premises;
 
-/// Maximum number of conclusions from one document that HermiT has to prove.
 const MAX_CONCLUSIONS: usize = 60;
 
 /// Documents that are inconsistent according to the W3C and consistent according to HermiT, with the reason.
@@ -40,7 +39,6 @@ const DIFFERENT: [(&str, &str); 2] = [
     ),
 ];
 
-/// Returns the class path of HermiT in the Python package `owlready2`.
 fn class_path() -> String {
     let python = std::env::var("METAPLAN_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let script = "import owlready2.reasoning as r; print(r._HERMIT_CLASSPATH)";
@@ -70,7 +68,6 @@ struct Conclusions {
     declared: Option<String>,
 }
 
-/// Computes the conclusions from a document; `None` if it is rejected.
 fn conclusions(document: &Path) -> Option<Conclusions> {
     let options = ReadOptions { allow_missing_imports: true, ..ReadOptions::default() };
     let ontology = read_files(&[document], &options).ok()?;

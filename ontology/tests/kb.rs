@@ -23,7 +23,6 @@ fn engine(text: &str, name: &str) -> Engine {
     engine
 }
 
-/// Describes each design in one line: name, functions, components, estimations, availability.
 fn designs(engine: &Engine) -> Vec<String> {
     let line = |design: ontology::tomasys::FunctionDesign| {
         let names = |individuals: &[ontology::tomasys::Individual]| {
@@ -158,10 +157,9 @@ fn rule_texts_can_be_added() {
     }
 }
 
-/// The restrictions of OWL 2 DL that concern these knowledge bases: everything is declared (horned-owl reads
-/// them without a warning), no IRI is a property of two kinds or both class and datatype, and composite
-/// properties (transitive, or defined by a chain) are not used in cardinality restrictions and not functional,
-/// irreflexive, asymmetric or disjoint.
+/// The restrictions of OWL 2 DL that concern these knowledge bases. Everything is declared: horned-owl reads
+/// them without a warning. No IRI is a property of two kinds or both class and datatype. Composite properties
+/// (transitive, or defined by a chain) are not functional, irreflexive, asymmetric or disjoint.
 #[test]
 fn our_knowledge_bases_are_owl_2_dl() {
     for (text, name) in [(kb::TOMASYS, "tomasys.ttl"), (kb::UGV, "ugv.ttl"), (kb::UUV, "uuv.ttl")] {

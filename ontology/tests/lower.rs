@@ -29,7 +29,6 @@ fn engine(text: &str) -> (Engine, Vec<String>) {
     (Engine::new(symbols, lowered.program, lowered.facts).expect("safe"), warnings)
 }
 
-/// The derived facts in short form.
 fn derived(engine: &Engine) -> BTreeSet<String> {
     let facts: Vec<Fact> = engine.facts().filter(|fact| !engine.is_asserted(fact)).collect();
     let text = ntriples(engine.symbols(), &facts);
@@ -39,8 +38,6 @@ fn derived(engine: &Engine) -> BTreeSet<String> {
     short.lines().map(|line| line.trim_end_matches(" .").replace(['<', '>'], "")).collect()
 }
 
-/// The derived facts of each text are exactly the expected ones. The text is consistent and causes no
-/// warnings.
 #[test]
 fn axioms_have_their_conclusions() {
     for (text, expected) in [

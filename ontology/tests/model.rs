@@ -19,7 +19,6 @@ fn warnings(ontology: &Ontology) -> Vec<String> {
     tomasys::check(ontology, &engine).iter().map(ToString::to_string).collect()
 }
 
-/// Checks the number of a model's warnings and their beginnings.
 fn check(model: &str, expected: &[&str]) {
     let text = format!("{HEAD}{model}");
     let reported = warnings(&read_text(&text, "model.ttl", &ReadOptions::default()).expect("well-formed"));

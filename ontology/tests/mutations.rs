@@ -23,7 +23,6 @@ const SYNTAXES: [OutputSyntax; 5] = [
 /// Time limit for one document; an undamaged one takes milliseconds.
 const TIME_LIMIT: Duration = Duration::from_secs(20);
 
-/// A pseudorandom number generator (xorshift) with the same numbers on every machine.
 struct Numbers(u64);
 
 impl Numbers {
@@ -35,7 +34,6 @@ impl Numbers {
     }
 }
 
-/// Embedded knowledge bases in every syntax, and real ones if the test data exist.
 fn seeds() -> Vec<Vec<u8>> {
     let ours = ["tomasys.ttl", "ugv.ttl"].map(|file| Path::new(OURS).join(file));
     let real = ["suave/suave.owl", "mros_ontology/mros.owl", "navigation_planta/navigation_with_imports.owl"];
@@ -52,7 +50,8 @@ fn seeds() -> Vec<Vec<u8>> {
     seeds
 }
 
-/// Returns a copy with a few changes, from single bytes to passages, some of them from another text.
+/// Returns a copy with one or two changes, from single bytes to passages. A passage can come from the other
+/// text.
 fn damaged(seed: &[u8], other: &[u8], numbers: &mut Numbers) -> Vec<u8> {
     const BYTES: &[u8] = b"<>\"'&;:#@^_.,()[]{}/\\=! \n\0\xff0aZ";
     let mut text = seed.to_vec();
@@ -88,7 +87,6 @@ fn damaged(seed: &[u8], other: &[u8], numbers: &mut Numbers) -> Vec<u8> {
     text
 }
 
-/// Reads and lowers a text. Returns `true` if it is accepted, and the elapsed time.
 fn survives(text: &[u8]) -> (bool, Duration) {
     let start = Instant::now();
     let options = ReadOptions { allow_missing_imports: true, ..ReadOptions::default() };

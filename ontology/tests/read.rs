@@ -19,7 +19,6 @@ fn turtle(body: &str) -> Ontology {
     read_text(&format!("{PREFIXES}{body}"), "test.ttl", &ReadOptions::default()).expect("well-formed")
 }
 
-/// Rules and logical axioms as text, without `http://e/#`.
 fn shown(ontology: &Ontology) -> Vec<String> {
     let rules = ontology.rules().iter().map(ToString::to_string);
     let axioms = ontology.axioms.iter().map(|annotated| annotated.axiom.to_string());
@@ -397,7 +396,6 @@ fn one_ontology_iri_twice_is_reported() {
     assert!(warning.contains("both declare the ontology <http://e/a>; both are read"), "{warning}");
 }
 
-/// Comments and CDATA sections are markup; tags inside of them are ignored.
 #[test]
 fn owl_xml_literals_may_contain_comments_and_cdata_sections() {
     let text = "<Ontology xmlns=\"http://www.w3.org/2002/07/owl#\" ontologyIRI=\"http://e/\">\n\
@@ -409,7 +407,6 @@ fn owl_xml_literals_may_contain_comments_and_cdata_sections() {
     assert_eq!(shown(&ontology), ["DataPropertyAssertion(<d> <i> \"a & </b> ]> & 'c d\")"]);
 }
 
-/// The fast path for N-Triples rejects everything that the grammar does not allow.
 #[test]
 fn the_fast_path_for_ntriples_checks_the_grammar() {
     let read = |subject: &str, object: &str| {
@@ -442,8 +439,6 @@ fn the_fast_path_for_ntriples_checks_the_grammar() {
     }
 }
 
-/// An axiom that uses an annotation property as another kind of property causes a warning, and the document is
-/// read.
 #[test]
 fn annotation_properties_have_no_logical_axioms() {
     let head = "@prefix : <http://e.org/#> . @prefix owl: <http://www.w3.org/2002/07/owl#> . \

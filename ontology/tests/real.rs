@@ -60,7 +60,6 @@ fn with_imports(file: &Path) -> Ontology {
     read_files(&[file], &options).unwrap_or_else(|errors| panic!("{}: {errors:?}", file.display()))
 }
 
-/// Number of entities of a kind that the document itself declares.
 fn declared(ontology: &Ontology, kind: ontology::EntityKind) -> usize {
     let undeclared = |iri: &str| {
         let mut warnings = ontology.warnings.iter();

@@ -73,8 +73,8 @@ fn a_measurement_reaches_what_holds_it() {
     }
 }
 
-/// The grounded design of SUAVE's search requires a visibility of 3.25. Below it the grounding and its
-/// objective are in error; above it they are not.
+/// The grounded design of SUAVE's search requires a visibility of 3.25. Below this value, the grounding and
+/// its objective are in error.
 #[test]
 fn a_measurement_puts_an_objective_in_error_and_out_of_it() {
     let Some(ontology) = read("suave/suave.owl") else { return };

@@ -122,7 +122,6 @@ impl Random {
         ])
     }
 
-    /// Generates a class expression that can be a condition.
     fn condition(&mut self, depth: usize) -> String {
         match self.below(if depth == 0 { 3 } else { 9 }) {
             3 => format!("ObjectIntersectionOf({} {})", self.condition(depth - 1), self.condition(depth - 1)),
@@ -139,7 +138,6 @@ impl Random {
         }
     }
 
-    /// Generates a class expression that has consequences.
     fn conclusion(&mut self, depth: usize) -> String {
         match self.below(if depth == 0 { 3 } else { 10 }) {
             3 => {
@@ -387,7 +385,7 @@ fn impossible_retractions_are_reported() {
     assert!(matches!(&error[0], Error::Nameless { .. }), "{error}");
 }
 
-/// A literal is retracted by value, and remains while another document states it.
+/// A literal is retracted by value. The fact remains while another axiom states it.
 #[test]
 fn values_are_retracted_by_value() {
     let integer = "DataPropertyAssertion(:n :a \"1\"^^xsd:integer)".to_owned();
@@ -416,7 +414,6 @@ fn anonymous_individuals_of_two_documents_are_different() {
     assert_eq!(answers(&revised.engine).0.len(), 2);
 }
 
-/// Inclusions between restrictions depend on several axioms, each of which is asserted and retracted.
 #[test]
 fn inclusions_of_restrictions_follow_each_change() {
     let axioms = [

@@ -88,7 +88,6 @@ fn cyclic_symbolic_links_terminate() {
     }
 }
 
-/// Each message has a position, if its syntax has positions.
 #[test]
 fn malformed_documents_are_rejected_with_their_place() {
     let owl_xml = "<Ontology xmlns=\"http://www.w3.org/2002/07/owl#\" ontologyIRI=\"http://x\">\n";

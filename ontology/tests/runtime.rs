@@ -10,7 +10,6 @@ use ontology::{INTERNAL, ReadOptions, kb, lower, read_files, read_text, vocab};
 use rules::{Delta, Engine, Fact, Literal, Symbols};
 use test_resources::data;
 
-/// Two designs of one function. `slow` depends on light and air; `fast` requires a motor.
 const ROBOT: &str = r#"
 @prefix t: <http://metacontrol.org/tomasys#> .
 @prefix m: <http://ros/mros#> .
@@ -115,13 +114,11 @@ fn pursue(runtime: &mut Runtime, name: &str, function: &str) {
     runtime.add_objective(&objective).expect("new");
 }
 
-/// Returns the statuses of the only objective, and `true` if it is updatable.
 fn status(runtime: &Runtime) -> (Vec<String>, bool) {
     let [objective] = &runtime.objectives()[..] else { panic!("one objective") };
     (objective.statuses.clone(), objective.updatable)
 }
 
-/// Checks the statuses after a failure, after the repair, and after a new grounding.
 fn check_failure(mode: Mode, after_repair: &[&str], updatable: bool) {
     let mut runtime = robot(mode);
     pursue(&mut runtime, "o", "f_move");

@@ -133,7 +133,6 @@ impl Replay {
         same("accepted", &json!(accepted), &json!(theirs))
     }
 
-    /// Replays one cycle of MROS: analyze, plan, execute.
     fn cycle(&mut self, step: &Value) -> Result<(), String> {
         let reasoned = !self.runtime.objectives().is_empty();
         same("reasoned", &json!(reasoned), &step["reasoned"])?;
@@ -217,7 +216,6 @@ impl Replay {
         })
     }
 
-    /// Returns the asserted failures: maps each design to the objectives for which it failed.
     fn error_log(&self) -> BTreeMap<String, Vec<String>> {
         let engine = self.runtime.engine();
         let mut log = BTreeMap::<String, Vec<String>>::new();

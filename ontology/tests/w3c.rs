@@ -92,7 +92,6 @@ fn engine(ontology: &Ontology) -> Result<Engine, String> {
     Engine::new(symbols, lowered.program, lowered.facts).map_err(|errors| errors[0].to_string())
 }
 
-/// Returns the premises of all cases, with their identifiers; empty if the suite does not exist.
 pub fn premises() -> Vec<(String, String)> {
     let Some(path) = data("real/owl_w3c/semantics-direct.rdf") else { return Vec::new() };
     let text = std::fs::read_to_string(path).expect("readable");

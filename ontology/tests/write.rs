@@ -36,8 +36,6 @@ fn rules(ontology: &Ontology) -> BTreeSet<String> {
     ontology.rules.iter().map(ToString::to_string).collect()
 }
 
-/// Writes a file with its imports in each syntax, and reads the result without imports. Compares the rules
-/// and the conclusions with those of the original.
 fn check(file: &Path) {
     let options = ReadOptions { directories: vec![real_directory(), OURS.into()], ..ReadOptions::default() };
     let original = read_files(&[file], &options).expect("readable");

@@ -11,7 +11,6 @@ use metaplan_rules::{
 
 const TOMASYS: &str = "http://metacontrol.org/tomasys#";
 
-/// A linear congruential generator with a fixed seed, so that every run has the same input.
 struct Random(u64);
 
 impl Random {

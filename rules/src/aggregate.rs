@@ -1,7 +1,7 @@
 //! Evaluation of aggregates over a group of matches.
 //!
-//! The result depends only on the values and not on their order: numbers are compared by their exact
-//! values, and floating-point sums are computed in ascending order.
+//! The result does not depend on the order of the values. Numbers are compared by their exact values, and
+//! floating-point sums are computed in ascending order.
 
 use std::cmp::Ordering;
 
@@ -96,7 +96,6 @@ fn extreme(values: &[&Literal], direction: Ordering) -> Option<Literal> {
     values.iter().all(is_extreme).then(|| best.clone())
 }
 
-/// Sort key for equal values: exact numbers first.
 fn spelling(value: &Literal) -> (bool, &str, String) {
     (as_decimal(value).is_none(), value.datatype(), value.lexical())
 }

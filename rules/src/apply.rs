@@ -133,8 +133,7 @@ impl Engine {
         })
     }
 
-    /// Applies a change of the stated facts without equality. An error comes with the delta that
-    /// restores the stated facts.
+    /// An error comes with the delta that restores the stated facts.
     pub(crate) fn apply_plainly(&mut self, delta: Delta) -> Result<Delta, (Error, Delta)> {
         self.replan().map_err(|error| (error, Delta::default()))?;
         let stated = state_change(self, delta);
@@ -164,7 +163,6 @@ impl Engine {
         network.plan(&mut self.store, true, (&self.program, &self.limits))
     }
 
-    /// Restores the stated facts with `undo` after an aborted update, and derives all facts again.
     pub(crate) fn restore(&mut self, undo: &Delta) {
         let (stated, undone) = (self.stated(), FxHashSet::from_iter(&undo.delete));
         let previous = stated.into_iter().filter(|fact| !undone.contains(fact));

@@ -41,7 +41,6 @@ impl Costs {
         self.relations[relation.0 as usize].0
     }
 
-    /// Returns the expected number of rows that agree with given values in the columns `bound_columns`.
     pub fn matches(&self, relation: RelationId, bound_columns: impl Iterator<Item = usize>) -> f64 {
         let (rows, distinct) = &self.relations[relation.0 as usize];
         let keys: f64 = bound_columns.map(|column| distinct[column]).product();

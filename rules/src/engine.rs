@@ -74,7 +74,6 @@ impl Engine {
         }
     }
 
-    /// Returns the state bits of a row; `None` if the row is not in the store.
     pub(crate) fn row_state(&self, row: &Fact) -> Option<u8> {
         let relation = self.store.get(self.store.find(row.predicate, row.arguments.len())?);
         Some(relation.state(relation.find(&row.arguments)?))
@@ -104,15 +103,13 @@ impl Engine {
         }
     }
 
-    /// Returns the predicates of all facts that hold, each with its number of arguments, in no
-    /// particular order. The result may contain predicates whose facts no longer hold.
+    /// Returns the predicates of all facts that hold, each with its number of arguments, in no particular
+    /// order. The result may also contain predicates without facts.
     pub fn predicates(&self) -> impl Iterator<Item = (Symbol, usize)> {
         let relations = self.store.relations.iter();
         relations.filter_map(|relation| Some((relation.predicate?, relation.arity())))
     }
 
-    /// Returns the rows of the store that have all these state bits, except rows of constraints and
-    /// aggregates.
     pub(crate) fn rows_with(&self, bits: u8) -> impl Iterator<Item = Fact> {
         self.rows_where(move |state| state & bits == bits)
     }

@@ -139,7 +139,6 @@ impl Engine {
         })
     }
 
-    /// Returns the rows of a relation whose first columns equal `key`, with their numbers.
     pub(crate) fn group(
         &self,
         relation: RelationId,

@@ -53,8 +53,7 @@ pub(crate) enum Start {
 /// deferred.
 const BLOCK_MATCHES: usize = 1 << 16;
 
-/// Maximum number of partial matches in a small block. A small block passes several steps of its plan at once,
-/// instead of one step per application of the crepe rule.
+/// Maximum number of partial matches in a small block, which passes several steps of its plan at once.
 const SMALL_MATCHES: usize = 64;
 
 /// Complete matches of a plan: `bindings` contains the values of all variables, one match after the
@@ -85,7 +84,6 @@ pub(crate) struct Round<'a> {
 
 type BlockId = u32;
 
-/// Buffers of processed blocks, which further blocks use again.
 #[derive(Debug, Default)]
 pub(crate) struct Buffers(RefCell<Vec<Vec<Symbol>>>);
 
@@ -110,7 +108,6 @@ impl Buffers {
 }
 
 mod program {
-    //! The crepe program.
 
     use crate::fixpoint::{BlockId, Handle, PlanId};
     use crepe::crepe;
@@ -139,7 +136,7 @@ mod program {
 pub(crate) struct Handle<'a>(&'a dyn Evaluate);
 
 /// Operations of a round that the crepe program calls. `extend` returns the next step and the number of the
-/// extended block, or `None` if no match remains, the plan is complete, or the budget is exhausted.
+/// extended block. It returns `None` if no match remains, the plan is complete, or the budget is exhausted.
 trait Evaluate {
     fn extend(&self, plan: PlanId, step: u32, block: BlockId) -> Option<(u32, BlockId)>;
     fn is_complete(&self, plan: PlanId, step: u32) -> bool;
@@ -334,8 +331,8 @@ impl Round<'_> {
         })
     }
 
-    /// Returns the state bits of the rows that a step skips: normally `skip`; while retracting only unused
-    /// rows, because all rows that held before the update are visible then.
+    /// Returns the state bits of the rows that a step skips: normally `skip`. While retracting, only unused
+    /// rows are skipped, because all rows that held before the update are visible then.
     fn visibility(&self, skip: u8) -> u8 {
         if self.retracting { state::FREE } else { skip }
     }
@@ -448,8 +445,7 @@ impl Round<'_> {
     }
 }
 
-/// Returns the symbol of a computed value. A shared interner is cloned only if the value has no symbol
-/// yet.
+/// Clones a shared interner only if the value has no symbol yet.
 pub(crate) fn intern(symbols: &mut Arc<Symbols>, value: Literal) -> Symbol {
     symbols.find_literal(&value).unwrap_or_else(|| Arc::make_mut(symbols).literal(value))
 }
@@ -471,7 +467,6 @@ struct Lookup<'a> {
     is_link: bool,
 }
 
-/// Appends to the block the partial match `bound`, extended by a row, if the row fits the pattern.
 fn extend_match(block: &mut Vec<Symbol>, bound: &[Symbol], row: &[Symbol], pattern: &Pattern) {
     // A variable may occur twice in the row, so the columns are checked only after all variables are bound.
     let start = block.len();

@@ -32,7 +32,7 @@ pub struct Limits {
     /// digits or text.
     pub steps: u64,
     /// Function that can stop an update. It is called after about every 16,000 visited rows and charged
-    /// steps, i.e. every few microseconds to a millisecond.
+    /// steps.
     pub interrupt: Option<Interrupt>,
 }
 
@@ -74,7 +74,6 @@ pub(crate) struct Budget {
     /// Whether semi-naive rounds are running, in which rules may use their own conclusions.
     pub recursive: Cell<bool>,
     stopped: Cell<Option<(Stop, u32)>>,
-    /// Last value that a recursive rule computed before the budget was exhausted.
     value: RefCell<Option<Box<str>>>,
 }
 
@@ -137,8 +136,6 @@ impl Budget {
         }
     }
 
-    /// Returns an error if evaluation has stopped. `identity` maps the number of a compiled rule to the
-    /// identity of the rule.
     pub fn error(&self, identity: impl Fn(u32) -> RuleIdentity) -> Option<Error> {
         self.stopped.get().map(|(stop, rule)| match stop {
             Stop::Exhausted => Error::BudgetExhausted {

@@ -51,7 +51,6 @@ impl<'a> Lowering<'a> {
         }
     }
 
-    /// Lowers the rule at a position of the program, after the rules of its aggregates.
     pub fn rule(&mut self, position: usize, rule: &Rule) {
         let width = rule.variable_count().max(1);
         let mut body: Vec<Option<Condition>> = rule.body.iter().map(|atom| self.condition(atom)).collect();
@@ -109,8 +108,7 @@ impl<'a> Lowering<'a> {
         Some(Template { relation: self.relation(predicate, &terms), arguments: sources(&terms) })
     }
 
-    /// Adds the rule that derives the matches of an aggregate, and returns the condition of the
-    /// aggregate. `outer_conditions` contains the conditions already lowered.
+    /// `outer_conditions` contains the conditions already lowered.
     fn aggregate(
         &mut self,
         position: usize,

@@ -22,7 +22,7 @@ use crate::plan::HIDDEN;
 use crate::store::{Record, RelationId, Row, state};
 use crate::symbol::{Symbol, Symbols};
 
-/// Upper limit on the number of starts (pairs of a plan and a start row) per run of the crepe (Datalog) program;
+/// Upper limit on the number of starts (pairs of a plan and a start row) per run of the crepe program. It
 /// bounds the memory of partial matches.
 const CHUNK: usize = 2048;
 
@@ -109,7 +109,6 @@ impl<'a> Maintenance<'a> {
         Self { engine, network, added, doomed, pending, touched, joined, budget, buffers }
     }
 
-    /// Derives all facts from the stated facts of an engine without derived facts.
     pub fn derive_all(mut self) -> Result<(), Error> {
         let network = Arc::clone(&self.network);
         for stratum in &network.strata {
@@ -228,9 +227,9 @@ impl<'a> Maintenance<'a> {
         touch(&mut self.touched, &self.network, relation);
     }
 
-    /// Over-deletes rows, i.e. marks them as doomed: all rows whose recorded derivation depends on a doomed
-    /// row, on the absence of a new row, or on a changed group of an aggregate. Stated rows only lose their
-    /// recorded derivation.
+    /// Over-deletes rows by marking them as doomed. These are the rows whose recorded derivation depends on a
+    /// doomed row, on the absence of a new row, or on a changed group of an aggregate. Stated rows only lose
+    /// their recorded derivation.
     fn over_delete(&mut self, stratum: &Stratum) -> Result<(), Error> {
         // A new row invalidates derivations that depend on its absence.
         let appeared = self.added.clone();
@@ -264,7 +263,6 @@ impl<'a> Maintenance<'a> {
         self.run(&changed, |relation| stratum.aggregated.get(&relation).map(Vec::as_slice), retracting)
     }
 
-    /// Runs the rules backwards from the doomed (over-deleted) rows, to find other derivations of these rows.
     fn rederive(&mut self, stratum: &Stratum) -> Result<(), Error> {
         let doomed = self.still_doomed();
         self.run(&doomed, |relation| stratum.rederive.get(&relation).map(Vec::as_slice), false)
@@ -316,7 +314,6 @@ impl<'a> Maintenance<'a> {
         }
     }
 
-    /// Marks rows as fresh (the delta of a semi-naive round), or removes the mark.
     fn mark(&mut self, rows: &Rows, fresh: bool) {
         for &(relation, row) in rows {
             let relation = self.engine.store.get_mut(relation);
@@ -372,7 +369,6 @@ impl<'a> Maintenance<'a> {
         Ok(())
     }
 
-    /// Runs seeds and processes the complete matches. Returns the deferred partial matches as seeds.
     fn run_once(&mut self, seeds: &[Seed], rows: &[Row], retracting: bool) -> Result<Vec<Seed>, Error> {
         let round = Round {
             store: &self.engine.store,

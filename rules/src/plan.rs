@@ -1,9 +1,9 @@
-//! Compiles a rule into join plans: one plan for each body atom whose relation may change, one for each
-//! head atom to be rederived, and one for the first evaluation. A plan is a list of steps.
+//! Compiles a rule into join plans: one plan for each body atom whose relation may change, one for each head
+//! atom, for rederivation, and one for the first evaluation. A plan is a list of steps.
 //!
-//! A plan starts from a row of one atom (its seed) and extends partial matches by one atom at a time in a
-//! greedy order: tests as soon as their variables are bound, then the atom with the smallest expected
-//! number of matches, given the bound columns and the size of its relation.
+//! A plan starts from a row of one atom (its seed) and extends partial matches by one atom at a time. The
+//! order is greedy. Tests come as soon as their variables are bound, then the atom with the smallest expected
+//! number of matches.
 
 use crate::aggregate::Function;
 use crate::builtin::BuiltIn;
@@ -65,7 +65,6 @@ pub(crate) enum Step {
         built_in: BuiltIn,
         arguments: Vec<Source>,
     },
-    /// Computes the first argument of a built-in from the others.
     Compute {
         built_in: BuiltIn,
         result: u16,
@@ -166,8 +165,6 @@ pub(crate) enum Condition {
 }
 
 impl Condition {
-    /// Returns the relation on whose changes the condition depends; `None` for built-ins and
-    /// comparisons.
     pub fn relation(&self) -> Option<RelationId> {
         match self {
             Self::Relation(relation, _) | Self::Not(relation, _) => Some(*relation),

@@ -57,7 +57,6 @@ impl Records {
         }
     }
 
-    /// Returns the bindings of a record; empty for [`Record::NONE`].
     pub fn get(&self, record: Record) -> &[Symbol] {
         // `Record::NONE` has a rule number beyond the table.
         self.rules.get(record.rule as usize).map_or(&[], |slots| {

@@ -84,7 +84,6 @@ impl Engine {
         Ok(net([deletions, changed, insertions]))
     }
 
-    /// Changes facts and rules of an engine under equality, or switches equality on first.
     fn change_equally(&mut self, mut delta: Delta, mut program: Program) -> Result<Delta, Errors> {
         program.equality = true;
         if self.equality.is_none() && self.derives_pairs() {
@@ -145,12 +144,12 @@ impl Engine {
         self.set_program(program)
     }
 
-    /// Changes the stated rows and replaces the rules `old` by `new`, in which representatives replace
-    /// names. Returns the net change of rows. After an error, the engine is in an undefined state.
+    /// Changes the stated rows and replaces the rules `old` by `new`, in which representatives replace names.
+    /// Returns the net change of rows. After an error, the engine is in an undefined state.
     ///
-    /// All unsupported conclusions are deleted before any rule derives new ones. The reason is that only
-    /// a spanning tree of the pairs of an equality class is stored: no pair of the tree may be deleted
-    /// after the other pairs have been derived and dropped.
+    /// All unsupported conclusions are deleted before any rule derives new ones. The reason is that only a
+    /// spanning tree of the pairs of an equality class is stored. No pair of the tree may be deleted after
+    /// the other pairs have been derived and dropped.
     pub(crate) fn replace_rules(
         &mut self,
         delta: Delta,

@@ -7,8 +7,7 @@ use crate::source::Source;
 use crate::symbol::Symbol;
 
 impl Round<'_> {
-    /// Extends each match of a block by all values that a built-in admits for its unbound arguments. Returns
-    /// no match if the budget is exhausted.
+    /// Returns no match if the budget is exhausted.
     pub fn solve(
         &self,
         block: &[Symbol],

@@ -59,7 +59,7 @@ impl Store {
         self.by_predicate.get(&(predicate, arity as u32)).copied()
     }
 
-    /// Returns the relation of a predicate with the given arity, and creates it on first use.
+    /// Creates the relation on first use.
     pub fn relation(&mut self, predicate: Symbol, arity: usize) -> RelationId {
         if let Some(id) = self.find(predicate, arity) {
             return id;
@@ -69,7 +69,6 @@ impl Store {
         id
     }
 
-    /// Inserts facts as stated rows, unless the rows exist.
     pub fn insert_stated(&mut self, facts: Vec<Fact>) {
         for fact in facts {
             let relation = self.relation(fact.predicate, fact.arguments.len());
@@ -190,12 +189,10 @@ impl Relation {
         &self.arguments[start..start + self.arity]
     }
 
-    /// Returns the row as a fact; `None` for the matches of a constraint or an aggregate.
     pub fn fact(&self, row: Row) -> Option<Fact> {
         Some(Fact { predicate: self.predicate?, arguments: Arguments::from_slice(self.row(row)) })
     }
 
-    /// Removes all rows and keeps the indexes.
     pub fn clear_all(&mut self) {
         let indexes = std::mem::take(&mut self.indexes);
         *self = Self::new(self.predicate, self.arity);
@@ -238,7 +235,7 @@ impl Relation {
         self.rows.find(hash(arguments.iter().copied()), |&row| self.row(row) == arguments).copied()
     }
 
-    /// Inserts a row that does not exist yet, and returns its number.
+    /// The row must not exist yet.
     pub fn insert(&mut self, arguments: &[Symbol], state: u8, record: Record) -> Row {
         let row = if let Some(row) = self.free.pop() {
             let start = row as usize * self.arity;
@@ -262,7 +259,7 @@ impl Relation {
         row
     }
 
-    /// Removes a row. Its number may be reused.
+    /// The number of the row may be reused.
     pub fn remove(&mut self, row: Row) {
         let (values, arity) = (&self.arguments, self.arity);
         let row_of = |row: Row| &values[row as usize * arity..(row as usize + 1) * arity];
@@ -282,7 +279,7 @@ impl Relation {
         self.indexes.iter().any(|index| index.columns == columns && index.excluded_rule.is_none())
     }
 
-    /// Returns the number of the index on the columns of a bit mask. Builds the index on first use.
+    /// `columns` is a bit mask. Builds the index on first use.
     pub fn index(&mut self, columns: u32) -> usize {
         self.index_without(columns, None)
     }

@@ -229,8 +229,8 @@ impl Search<'_> {
         self.best.is_some() && self.visited > SEARCH_LIMIT
     }
 
-    /// Returns the position in `open_conditions` of the next condition to visit: a test with bound
-    /// arguments, then the relation with the most bound columns, then any other condition.
+    /// Returns the position in `open_conditions` of the next condition to visit. The order of preference is:
+    /// a test with bound arguments, the relation with the most bound columns, any other condition.
     fn next(&self, state: &State) -> Option<usize> {
         let score = |position: usize| {
             let bound_count =

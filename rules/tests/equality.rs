@@ -134,7 +134,6 @@ fn violations_list_stated_facts() {
     assert_eq!(engine.violations(), []);
 }
 
-/// Constraints about several names of one individual are reported separately, in every order of changes.
 #[test]
 fn constraints_about_equal_names_remain_separate() {
     let (rules, all) = ("p(b) -> . p(a) -> .", "sameAs(b, a), p(b)");

@@ -95,7 +95,7 @@ fn steps_that_do_not_follow_are_rejected() {
         }),
         Err("<after>(<a>, <d>): a support that does not come before"),
     );
-    // Another rule with the same conclusion.
+    // The position of another rule with the same conclusion, but the label of this one.
     check(
         edit("<broken>(<b>)", |reason| {
             if let Reason::Rule { identity, .. } = reason {

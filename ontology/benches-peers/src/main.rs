@@ -16,7 +16,6 @@ use std::process::Command;
 use metaplan_rules::{Engine, Symbols};
 use ontology::{ReadOptions, lower, ntriples, read_files};
 
-/// Pseudorandom numbers (xorshift), the same in each run.
 pub struct Random(pub u64);
 
 impl Random {
@@ -74,7 +73,7 @@ fn parse(files: &[PathBuf]) -> usize {
     files.iter().map(parse).sum()
 }
 
-/// Processor time in seconds and peak memory in MB of this process.
+/// Returns the processor time in seconds and the peak memory in MB of this process.
 fn usage() -> (f64, u64) {
     let time = cpu_time::ProcessTime::now().as_duration().as_secs_f64();
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -87,8 +86,7 @@ fn usage() -> (f64, u64) {
 /// machine only makes runs slower.
 const RUNS: usize = 3;
 
-/// Runs a program in a separate process. Returns processor time in seconds, peak memory in MB and the number of
-/// conclusions.
+/// Returns processor time in seconds, peak memory in MB and the number of conclusions of a separate process.
 fn measure(peer: &str, files: &[PathBuf]) -> Option<(f64, u64, usize)> {
     let program = std::env::current_exe().expect("a program");
     let run = || {

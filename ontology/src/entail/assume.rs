@@ -9,13 +9,12 @@ use crate::lower::lower;
 use crate::owl::{AnnotatedAxiom, Axiom, Bound, ClassExpression, Iri, ObjectPropertyExpression, Ontology};
 use crate::vocab::owl;
 
-/// Maximum number of members of a union or enumeration that is assumed case by case.
 const MAX_CASES: usize = 64;
 
 impl Prover {
-    /// Assumes that an individual is in a class: adds the facts to copies of the engine. Returns one engine
-    /// for each case, because a disjunction gives several cases. `next` is the number of the last fresh name.
-    /// Parts of the class that rules cannot express are not assumed, so that a proof remains sound.
+    /// Assumes that an individual is in a class, in copies of the engine: one for each case of a disjunction.
+    /// `next` is the number of the last fresh name. Parts of the class that rules cannot express are not
+    /// assumed, so that a proof remains sound.
     pub(super) fn assume(
         engine: &Engine,
         class: &ClassExpression,
@@ -106,8 +105,7 @@ impl Prover {
         Ok(cases)
     }
 
-    /// Proves that an individual is in a class. Returns the explanation, or `None` if the proof fails.
-    /// Contradictory assumptions prove everything.
+    /// Proves that an individual is in a class. Contradictory assumptions prove everything.
     pub(super) fn is_in(
         engine: &Engine,
         class: &ClassExpression,
@@ -206,7 +204,6 @@ pub(super) fn first_proof<T>(attempts: &[T], mut prove: impl FnMut(&T) -> ProofR
     Ok(None)
 }
 
-/// Explains why all cases are contradictory. Returns `None` if a case is consistent.
 pub(super) fn refuted(cases: &[Engine]) -> Option<String> {
     let reasons: Option<Vec<String>> = cases.iter().map(contradiction).collect();
     Some(format!("the opposite is impossible: {}\n", reasons?.join("; and ")))
@@ -223,7 +220,6 @@ pub(super) fn pairwise_different(engine: &mut Engine, names: &[Iri]) -> Vec<Fact
     pairs.map(|pair| Fact::new(different, pair)).collect()
 }
 
-/// Lowers the assertion that `individual` is in `class`, and adds the resulting rules and facts to an engine.
 fn by_rules(mut engine: Engine, class: &ClassExpression, individual: &Iri) -> Result<Engine, Error> {
     let axiom = Axiom::ClassAssertion(class.clone(), individual.clone());
     let axioms = vec![AnnotatedAxiom { axiom, annotations: Vec::new() }];

@@ -9,8 +9,6 @@ use crate::owl::{Axiom, Characteristic, ClassExpression, Iri, ObjectPropertyExpr
 use crate::vocab::owl;
 
 impl Prover {
-    /// Decides if the rules prove an axiom. The answer contains an explanation of the proof, or the reason why the
-    /// axiom was not proved.
     pub(super) fn axiom(&self, axiom: &Axiom) -> Result<Answer, Error> {
         if let Axiom::DatatypeDefinition(..) = axiom {
             return Ok(Answer::Open("definitions of datatypes are not decided"));
@@ -113,7 +111,6 @@ impl Prover {
         with_facts(&copy, facts)
     }
 
-    /// Proves that the edges of `body` imply that the fresh individuals `left` and `right` are the same.
     fn merges(&self, body: &[(&Property, usize, usize)], left: usize, right: usize) -> ProofResult {
         let mut copy = self.assumed(body)?;
         let goal = same(&mut copy, &Self::fresh(left), &Self::fresh(right));
@@ -246,13 +243,10 @@ impl Prover {
     }
 }
 
-/// Explains a goal by its derivation, or by a contradiction of the assumptions. Returns `None` without
-/// either.
 fn explain_or_refute(engine: &Engine, goal: &Fact) -> Option<String> {
     explain(engine, goal).or_else(|| refuted(std::slice::from_ref(engine)))
 }
 
-/// Proves all goals. Returns the concatenated explanations, or `None` if a goal is not proved.
 fn prove_all<T>(goals: impl Iterator<Item = T>, mut prove: impl FnMut(T) -> ProofResult) -> ProofResult {
     let mut reasons = String::new();
     for goal in goals {

@@ -1,6 +1,6 @@
-//! Decides if statements are entailed by the facts and rules of an engine. Assertions are looked up. Axioms
-//! about classes and properties are proved with *fresh individuals*, about which only the axiom's condition is
-//! assumed, or by *refutation*: the negation is assumed and contradicts the knowledge.
+//! Decides if statements are entailed by the facts and rules of an engine. Assertions of named classes and
+//! properties are looked up. Most other axioms are proved with *fresh individuals*, about which only the
+//! axiom's condition is assumed, or by *refutation*: the negation is assumed and contradicts the knowledge.
 //!
 //! The procedure is sound, because the rules are sound for the assumed individuals. It is incomplete, because
 //! the rules are those of OWL 2 RL.

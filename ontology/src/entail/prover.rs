@@ -14,7 +14,6 @@ pub enum Answer {
     Open(&'static str),
 }
 
-/// Explains the first violation if the knowledge is inconsistent; otherwise returns `None`.
 pub(super) fn contradiction(engine: &Engine) -> Option<String> {
     let violation = engine.violations().into_iter().next()?;
     let facts: Vec<_> =
@@ -30,7 +29,7 @@ pub(super) fn contradiction(engine: &Engine) -> Option<String> {
 }
 
 pub(super) struct Prover {
-    /// Engine with the facts and rules of the knowledge base, in which `owl:sameAs` is equality.
+    /// In this engine, `owl:sameAs` is equality.
     pub(super) base: Engine,
 }
 
@@ -46,8 +45,7 @@ impl Prover {
         Ok(Self { base })
     }
 
-    /// Returns the name of a fresh individual, which occurs nowhere else. `number` distinguishes the
-    /// fresh individuals of one proof.
+    /// `number` distinguishes the fresh individuals of one proof. They occur nowhere else.
     pub(super) fn fresh(number: usize) -> Iri {
         format!("urn:metaplan:any:{number}").into()
     }
@@ -58,7 +56,6 @@ pub(super) fn member(engine: &mut Engine, class: &str, individual: &str) -> Fact
     Fact::new(symbols.name(class), [symbols.name(individual)])
 }
 
-/// Returns the fact that a property, or its inverse, relates two individuals.
 pub(super) fn edge(engine: &mut Engine, property: &ObjectPropertyExpression, from: &str, to: &str) -> Fact {
     let symbols = engine.symbols_mut();
     let (from, to) = (symbols.name(from), symbols.name(to));

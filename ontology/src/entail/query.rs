@@ -13,8 +13,8 @@ const MAX_PARTIAL_ANSWERS: usize = 100_000;
 type Assignment = BTreeMap<Iri, Iri>;
 
 impl Prover {
-    /// Searches for an answer of the conjunctive query `statements`, whose variables are the anonymous individuals.
-    /// The query is open if there is no answer, or if the budget of partial answers is exhausted.
+    /// The anonymous individuals are the variables of the query. The query is open if there is no answer, or
+    /// if the budget of partial answers is exhausted.
     pub(super) fn conjunctive_query(&self, statements: &[&Axiom]) -> Result<Answer, Error> {
         let mut budget = MAX_PARTIAL_ANSWERS;
         let explanation = self.extend(&Assignment::new(), statements.to_vec(), &mut budget)?;
@@ -25,9 +25,8 @@ impl Prover {
         })
     }
 
-    /// Extends an assignment to all statements by backtracking; the statement with the fewest unassigned
-    /// individuals comes first. Returns the explanation of the first answer; `None` if there is no answer or
-    /// the budget is exhausted.
+    /// Extends an assignment to all statements by backtracking. The statement with the fewest unassigned
+    /// individuals comes first. Returns the explanation of the first answer.
     fn extend(
         &self,
         assignment: &Assignment,
@@ -65,8 +64,6 @@ impl Prover {
         Ok(None)
     }
 
-    /// Returns the individuals that a statement may admit as values of the anonymous individual `name`; the
-    /// statement is not proved for them.
     fn candidates(&self, assignment: &Assignment, axiom: &Axiom, name: &Iri) -> Vec<Iri> {
         let engine = &self.base;
         let symbol = |iri: &str| engine.symbols().find_name(iri);
@@ -125,7 +122,6 @@ impl Prover {
                 explain(&copy, &goal)
             }
             Axiom::SameIndividual(individuals) => {
-                // Every neighbouring pair must be proved.
                 let mut explanations = Vec::new();
                 for pair in individuals.windows(2) {
                     let goal = same(&mut copy, &name(&pair[0]), &name(&pair[1]));

@@ -1,5 +1,5 @@
-//! Proves data property ranges: a fresh value of the property is assumed, and the intersection of the
-//! datatypes that constraints require of this value must be contained in the range.
+//! Proves data property ranges. A fresh value of the property is assumed. The intersection of the datatypes
+//! that constraints require of this value must be contained in the range.
 
 use rules::{Atom, BuiltIn, Literal, Rule, Symbol, Term, is_subsumed};
 

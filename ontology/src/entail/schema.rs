@@ -19,7 +19,7 @@ pub struct SchemaEntity {
     /// Members of `above` that contain the entity directly: no other member lies strictly between;
     /// sorted.
     pub direct: Vec<String>,
-    /// Explanation if the entity is unsatisfiable, i.e. has no instance in any model.
+    /// Explanation if the rules prove the entity unsatisfiable: it has no instance in any model.
     pub empty: Option<String>,
 }
 

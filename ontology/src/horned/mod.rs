@@ -178,8 +178,7 @@ impl Builder {
         self.rules.extend(indices.map(|index| (index, rule.clone())));
     }
 
-    /// Converts a rule atom. Returns `None` for the marker atom that normalisation adds to an empty body
-    /// or head.
+    /// Returns `None` for the marker atom that normalisation adds to an empty body or head.
     fn atom(&mut self, atom: &ho::Atom<RcStr>) -> Option<Atom> {
         Some(match atom {
             ho::Atom::BuiltInAtom { pred, args } => {
@@ -418,8 +417,6 @@ impl Builder {
         })
     }
 
-    /// Returns one warning for each triple, list, class expression or annotation that horned-owl
-    /// assigned to no axiom or rule.
     fn leftovers(&mut self, incomplete: &IncompleteParse<RcStr>) -> Vec<Warning> {
         let triple = |[subject, predicate, object]: &[Term<RcStr>; 3]| {
             format!("{} {} {}", term(subject), term(predicate), term(object))

@@ -4,8 +4,6 @@
 /// Stack size in bytes. Only address space is reserved; pages are committed on use.
 const STACK_BYTES: usize = 1 << 29;
 
-/// Runs a reader or writer of horned-owl on a thread with the large stack. Returns an error if the
-/// reader or writer panics, or if the thread cannot be started.
 pub(super) fn with_stack<T: Send>(run: impl FnOnce() -> T + Send) -> Result<T, String> {
     std::thread::scope(|scope| {
         let thread = std::thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, run);

@@ -16,8 +16,7 @@ use crate::vocab::owl;
 /// Result of lowering an axiom. The error is the reason why the axiom, or a part of it, has no rule form.
 type LoweringResult = Result<(), &'static str>;
 
-/// Adds the rules of all axioms that are not plain assertions to `context`. Adds a warning for each axiom
-/// without a complete rule form and, if there are any, one summary warning.
+/// Adds a warning for each axiom without a complete rule form and, if there are any, one summary warning.
 pub(crate) fn lower_rules(axioms: &[AnnotatedAxiom], context: &mut Context) {
     let mut outside = 0;
     for (position, annotated) in axioms.iter().enumerate() {
@@ -47,8 +46,6 @@ pub(crate) fn lower_assertions(axioms: &[AnnotatedAxiom], context: &mut Context)
     }
 }
 
-/// Returns `true` if the axiom has no rules: it is an assertion of a named class or property, or a datatype
-/// definition.
 fn is_assertion(axiom: &Axiom) -> bool {
     matches!(
         axiom,
@@ -232,8 +229,6 @@ impl AxiomLowering<'_, '_> {
         }
     }
 
-    /// Lowers an equivalence as a cycle of subclass axioms. A subclass axiom that no rule can express is recorded as
-    /// a gap.
     fn equivalent_classes(&mut self, classes: &[ClassExpression]) {
         for (sub, sup) in classes.iter().zip(classes.iter().cycle().skip(1)) {
             self.sub_class(sub, sup);
@@ -357,7 +352,7 @@ impl AxiomLowering<'_, '_> {
         }
     }
 
-    /// Lowers the domain axiom of a property (if `subject`), or its range axiom.
+    /// Lowers the domain axiom of a property if `subject` is `true`, otherwise its range axiom.
     fn domain_or_range(&mut self, property: &Property, class: &ClassExpression, subject: bool) {
         let mut variables = Variables::default();
         let (x, y) = (variables.fresh("x"), variables.fresh("y"));

@@ -94,8 +94,6 @@ pub(crate) fn condition(
     }
 }
 
-/// Returns alternative conjunctions for the condition that `x` has a value of `property` in the class
-/// `filler`.
 fn some_value(
     context: &mut Context,
     property: &ObjectPropertyExpression,
@@ -141,14 +139,12 @@ pub(crate) fn abbreviated(
     vec![vec![context.relation(&name, [x])]]
 }
 
-/// Returns the alternative conjunctions of [`range::condition`]. A data range without a rule form is
-/// recorded as a gap.
 fn range_condition(context: &mut Context, range: &DataRange, value: Term) -> Vec<Conjunction> {
     range::condition(context, range, value).unwrap_or_else(|reason| context.gap(reason))
 }
 
-/// Lowers a class as a conclusion: returns the consequences of `x` being in `class`. Consequences that
-/// rules cannot express are recorded as gaps.
+/// Returns the consequences of `x` being in `class`. Consequences that rules cannot express are recorded as
+/// gaps.
 pub(crate) fn conclusions(
     context: &mut Context,
     class: &ClassExpression,
@@ -250,8 +246,6 @@ pub(crate) fn conclusions(
     }
 }
 
-/// Returns the consequences of a universal restriction: all values of `property` for `x` are in the
-/// class `filler`.
 fn all_values(
     context: &mut Context,
     property: &ObjectPropertyExpression,
@@ -265,16 +259,14 @@ fn all_values(
     inner.into_iter().map(|(body, head)| (with_atom(edge.clone(), body), head)).collect()
 }
 
-/// Returns the conclusion that `x` is in the auxiliary relation of the restriction that follows from `class`. Empty
-/// if no condition of an axiom or rule includes this restriction.
+/// Returns the conclusion that `x` is in the auxiliary relation of a restriction that `class` implies.
+/// Returns no conclusion if no condition needs such a restriction.
 fn included(context: &mut Context, class: &ClassExpression, x: Term) -> Conclusions {
     let restriction = context.inclusions.conclusion(class);
     let atom = restriction.map(|restriction| context.relation(&relation_of(&restriction), [x]));
     atom.map(|atom| (Vec::new(), vec![atom])).into_iter().collect()
 }
 
-/// Records a gap for a class without a rule form as a conclusion, and returns the consequences of
-/// [`included`].
 fn only_included(
     context: &mut Context,
     class: &ClassExpression,
@@ -285,7 +277,6 @@ fn only_included(
     included(context, class, x)
 }
 
-/// Adds a rule for each inclusion between two different restrictions with auxiliary relations.
 pub(crate) fn lower_inclusions(context: &mut Context, position: usize) {
     for [sub, sup] in context.inclusions.pairs() {
         let mut variables = Variables::default();
@@ -302,8 +293,7 @@ fn relation_of(restriction: &ClassExpression) -> String {
 
 const EXISTS: &str = "an existential restriction as a conclusion";
 
-/// Returns the contradiction that follows if `x` has more than `limit` (0 or 1) values of `property` in
-/// `range`.
+/// Returns the contradiction of more than `limit` values; `limit` is 0 or 1.
 fn at_most(
     context: &mut Context,
     limit: u32,

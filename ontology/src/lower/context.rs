@@ -13,8 +13,8 @@ use crate::vocab::{local_name, owl};
 /// Prefix of the IRIs of auxiliary relations, which are not part of the knowledge base.
 pub const INTERNAL: &str = "urn:metaplan:";
 
-/// Source in the identity of a rule that is lowered from an axiom. The label of such a rule is the axiom in
-/// functional-style syntax.
+/// Source in the identity of a rule that is lowered from an axiom or from OWL's own vocabulary. The label of
+/// such a rule is the axiom in functional-style syntax, or a short name of the rule.
 pub const AXIOM_SOURCE: &str = "http://www.w3.org/2002/07/owl";
 
 /// Semantics of the names of individuals.
@@ -29,8 +29,6 @@ pub enum Equality {
 
 pub(crate) type Conjunction = Vec<Atom>;
 
-/// Returns the Cartesian product of two lists: each conjunction of the first list joined with each
-/// conjunction of the second.
 pub(crate) fn cross(left: &[Conjunction], right: &[Conjunction]) -> Vec<Conjunction> {
     left.iter().flat_map(|l| right.iter().map(move |r| l.iter().chain(r).cloned().collect())).collect()
 }
@@ -41,12 +39,9 @@ pub(crate) struct Context<'a> {
     pub facts: Vec<Fact>,
     pub warnings: Vec<Warning>,
     pub equality: Equality,
-    /// Maps each datatype with a definition to its data range.
     pub definitions: HashMap<Iri, DataRange>,
     entities: HashSet<(EntityKind, Iri)>,
-    /// Identity of the axiom or rule that is being lowered.
     pub identity: RuleIdentity,
-    /// Reasons why parts of the current axiom or rule have no rule form.
     gaps: Vec<&'static str>,
     pub inclusions: Inclusions,
     /// Names of the auxiliary relations whose rules have already been added.
@@ -136,8 +131,6 @@ impl<'a> Context<'a> {
         T::default()
     }
 
-    /// Returns an error with the first recorded gap, if any, and clears the gaps. A gap is the reason why a
-    /// part of the current axiom or rule has no rule form.
     pub(crate) fn take_gaps(&mut self) -> Result<(), &'static str> {
         let first = self.gaps.first().copied();
         self.gaps.clear();
@@ -148,8 +141,8 @@ impl<'a> Context<'a> {
         self.symbols.name(iri)
     }
 
-    /// Returns the symbol of an IRI of the ontology. An IRI that occurred before is found by its
-    /// address, without reading its text.
+    /// Returns the symbol of an IRI of the ontology. An IRI that occurred before is found by its address,
+    /// without reading its text.
     pub(crate) fn iri(&mut self, iri: &Iri) -> Symbol {
         let symbols = &mut *self.symbols;
         *self.shared.entry(iri.as_ptr()).or_insert_with(|| symbols.name(iri))
@@ -169,7 +162,6 @@ impl<'a> Context<'a> {
         Atom::relation(self.symbols.name(name), arguments)
     }
 
-    /// Builds the atom `property(first, second)`; an inverse property exchanges the arguments.
     pub(crate) fn property(
         &mut self,
         property: &ObjectPropertyExpression,
@@ -198,8 +190,6 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// Builds the atom for the condition that two individuals differ. In OWL, the difference is stated
-    /// or derived; under the unique name assumption, different names suffice.
     pub(crate) fn different(&mut self, first: Term, second: Term) -> Atom {
         match self.equality {
             Equality::Owl => self.relation(owl::DIFFERENT_FROM, [first, second]),
@@ -207,9 +197,8 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// Returns the auxiliary relation that contains the members of a data range. Its name contains the
-    /// range, so two ontologies that are lowered with the same symbols share the relation only if they
-    /// have equal ranges.
+    /// Returns the auxiliary relation that contains the members of a data range. Its name contains the range,
+    /// so that ontologies lowered with the same symbols share it only for equal ranges.
     pub(crate) fn members_of(&mut self, range: &DataRange) -> Symbol {
         self.symbols.name(&format!("{INTERNAL}range:{range}"))
     }
@@ -229,7 +218,6 @@ impl<'a> Context<'a> {
         self.rules.push(Rule { identity: identity.clone(), head, body, variables });
     }
 
-    /// Adds a warning that an axiom is omitted, or used in part if `partly`, with the reason.
     pub(crate) fn outside(&mut self, axiom: &Axiom, partly: bool, reason: &str) {
         let (axiom, reason) = (axiom.to_string(), reason.to_owned());
         self.warnings.push(Warning::OutsideProfile { axiom, partly, reason });

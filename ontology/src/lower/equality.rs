@@ -18,8 +18,8 @@ use crate::error::Warning;
 use crate::owl::{AnnotatedAxiom, Axiom, Characteristic, ClassExpression, EntityKind};
 use crate::vocab::owl;
 
-/// Adds the rules of difference if a rule depends on `differentFrom`. Returns `true` if a rule or fact can make two
-/// names equal; in this case also adds rule eq-rep for classes and properties that are individuals, too.
+/// Adds the rules of difference if a rule depends on `differentFrom`. Returns `true` if a rule or fact can
+/// make two names equal. In this case it also calls [`entities`].
 pub(crate) fn lower(axioms: &[AnnotatedAxiom], context: &mut Context) -> bool {
     let (same_as, different) = (context.name(owl::SAME_AS), context.name(owl::DIFFERENT_FROM));
     let merges_names = |rule: &Rule| rule.head.iter().any(|atom| matches!(atom, Atom::Same(..)));
@@ -40,9 +40,10 @@ pub(crate) fn lower(axioms: &[AnnotatedAxiom], context: &mut Context) -> bool {
     merges
 }
 
-/// Adds rule eq-rep of OWL 2 RL for classes and properties that are individuals, too: names that become equal have
-/// the same members. (For names that are stated to be equal, the lowering of `SameIndividual` also adds rules without
-/// a condition.) If a kind has more than [`MAX_PUNNED_NAMES`] such names, adds a warning instead.
+/// Adds rule eq-rep of OWL 2 RL for classes and properties that are individuals, too: names that become equal
+/// have the same members. For names that are stated to be equal, the lowering of `SameIndividual` also adds
+/// rules without a condition. If a kind has more than [`MAX_PUNNED_NAMES`] such names, adds a warning
+/// instead.
 fn entities(context: &mut Context) {
     let identity = RuleIdentity { source: AXIOM_SOURCE.into(), label: Some("eq-rep".into()), position: 0 };
     let mut variables = Variables::default();

@@ -14,10 +14,10 @@ use crate::vocab::owl;
 /// read.
 pub(crate) const MAX_PAIRED_MEMBERS: usize = 16;
 
-/// Returns the auxiliary relation that assigns numbers to individuals, for an axiom on pairwise different
-/// individuals (each has its own number) or disjoint classes (each individual has the numbers of its classes). The
-/// relation's name is a hash of the axiom's text, so that two ontologies that are lowered with the same symbols
-/// share the relation only for equal axioms.
+/// Returns the auxiliary relation that assigns numbers to individuals. For pairwise different individuals,
+/// each individual has its own number; for disjoint classes, it has the numbers of its classes. The
+/// relation's name is a hash of the axiom's text, so that ontologies lowered with the same symbols share the
+/// relation only for equal axioms.
 pub(crate) fn relation(context: &mut Context, axiom: &str) -> Symbol {
     // FNV-1a gives equal names on every machine.
     let step = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
@@ -33,14 +33,12 @@ fn differently_numbered(member: Symbol, [x, y]: [Term; 2], [i, j]: [Term; 2]) ->
     vec![Atom::relation(member, [x, i]), Atom::relation(member, [y, j]), Atom::Different(i, j)]
 }
 
-/// Adds the constraint that no individual has two numbers in the relation `member`.
 pub(crate) fn forbid(context: &mut Context, identity: &RuleIdentity, member: Symbol) {
     let mut variables = Variables::default();
     let [x, i, j] = ["x", "i", "j"].map(|name| variables.fresh(name));
     context.rule(identity, Vec::new(), differently_numbered(member, [x, x], [i, j]), &variables);
 }
 
-/// Adds the rule that individuals with different numbers in the relation `member` differ.
 pub(crate) fn differ(context: &mut Context, identity: &RuleIdentity, member: Symbol) {
     let mut variables = Variables::default();
     let [x, y, i, j] = ["x", "y", "i", "j"].map(|name| variables.fresh(name));

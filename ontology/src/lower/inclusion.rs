@@ -1,11 +1,14 @@
-//! Inclusions between restrictions: rules scm-svf1, scm-svf2, scm-avf1 and scm-avf2 of OWL 2 RL ([1], table 9).
+//! Inclusions between restrictions: rules scm-svf1, scm-svf2, scm-avf1 and scm-avf2 of OWL 2 RL ([1], table
+//! 9).
 //!
-//! In this text, p and q are properties, C and D are classes. An individual of `∃p.C` has a value that rules cannot
-//! name, but the individual is in `∃q.D` if `p ⊑ q` and `C ⊑ D`. If one axiom concludes the first restriction and
-//! another axiom has the second restriction as a condition, both restrictions get an auxiliary relation, and a rule
-//! derives the second relation from the first. Universal restrictions are analogous, with `q ⊑ p`. The inclusions of
-//! classes and properties are the transitive closure of the stated ones, of `C ⊓ D ⊑ C` and `C ⊑ C ⊔ D`, and of the
-//! inclusions between restrictions that this module finds.
+//! In this text, p and q are properties, C and D are classes. An individual of `∃p.C` has a value that rules
+//! cannot name, but the individual is in `∃q.D` if `p ⊑ q` and `C ⊑ D`. Suppose that one axiom concludes the
+//! first restriction, and another axiom has the second restriction as a condition. Then both restrictions get
+//! an auxiliary relation, and a rule derives the second relation from the first. Universal restrictions are
+//! analogous, with `q ⊑ p`.
+//!
+//! The inclusions of classes and properties are a transitive closure. It consists of the stated inclusions,
+//! `C ⊓ D ⊑ C`, `C ⊑ C ⊔ D`, and the inclusions between restrictions that this module finds.
 //!
 //! [1] OWL 2 Web Ontology Language Profiles, W3C 2012, section 4.3.
 
@@ -60,8 +63,6 @@ impl Inclusions {
         restriction(class, true).filter(|restriction| self.concluded.contains_key(restriction))
     }
 
-    /// Returns the pairs of different restrictions `[sub, sup]` with `sub ⊑ sup`, of which an axiom concludes
-    /// `sub`, and an axiom or rule has `sup` as a condition.
     pub(crate) fn pairs(&self) -> Vec<[ClassExpression; 2]> {
         let pairs =
             self.concluded.iter().flat_map(|(sub, including)| including.iter().map(move |sup| (sub, sup)));
@@ -185,7 +186,7 @@ impl Uses {
 /// concluded.
 const MAX_DEPTH: usize = 3;
 
-/// Memo tables; keys are a class or restriction and the depth to which nested restrictions are compared.
+/// Keys are a class or restriction and the depth to which nested restrictions are compared.
 #[derive(Default)]
 struct Memo {
     supers: HashMap<(ClassExpression, usize), BTreeSet<ClassExpression>>,
@@ -252,7 +253,6 @@ impl InclusionGraph {
         self.members(sup);
     }
 
-    /// Adds the inclusion of each member in the union, if the class is a union.
     fn members(&mut self, class: &ClassExpression) {
         if let ClassExpression::UnionOf(members) = class {
             for member in members {
@@ -269,8 +269,7 @@ impl InclusionGraph {
         }
     }
 
-    /// Returns the conditions that include a restriction. Nested restrictions are compared up to `depth`
-    /// levels.
+    /// Compares nested restrictions up to `depth` levels.
     fn including(
         &self,
         restriction: &ClassExpression,
@@ -309,8 +308,7 @@ impl InclusionGraph {
         including
     }
 
-    /// Returns the classes that include a class, and the class itself. Nested restrictions are compared
-    /// up to `depth` levels.
+    /// The result contains `class` itself. Nested restrictions are compared up to `depth` levels.
     fn supers(&self, class: &ClassExpression, depth: usize, memo: &mut Memo) -> BTreeSet<ClassExpression> {
         let key = (class.clone(), depth);
         if let Some(supers) = memo.supers.get(&key) {

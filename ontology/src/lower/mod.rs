@@ -89,8 +89,8 @@ pub fn lower_together(
     Lowered { program: Program { rules, equality }, facts, duplicates, warnings }
 }
 
-/// Lowers the assertions about named classes and properties, `sameAs` and `differentFrom` to facts, in the
-/// order of the axioms. Ignores other axioms, and adds no rules.
+/// Lowers only assertions about named classes and properties, `sameAs` and `differentFrom`, in the order of
+/// the axioms.
 pub(crate) fn lower_assertions(axioms: &[AnnotatedAxiom], symbols: &mut Symbols) -> Vec<Fact> {
     let mut context = Context::new(symbols, Equality::Owl, &Ontology::default());
     axiom::lower_assertions(axioms, &mut context);
@@ -109,9 +109,9 @@ impl Context<'_> {
         }
     }
 
-    /// Removes the rules that the engine rejects, for example because of unsafe variables, each with a warning, since
-    /// one such rule would make the engine reject the whole program. A rule lowered from an axiom is not tested if
-    /// its body has a relation atom, or an equality with a constant, because lowering then binds all variables.
+    /// Removes the rules that the engine rejects, each with a warning. One such rule would make the engine
+    /// reject the whole program. Omits the test for a rule lowered from an axiom if its body has a relation
+    /// atom, or an equality with a constant: lowering then binds all variables.
     fn drop_unusable(&mut self) {
         let binds = |atom: &Atom| match atom {
             Atom::Relation { .. } => true,
@@ -137,7 +137,6 @@ impl Context<'_> {
     }
 }
 
-/// Returns the rule that an error refers to; `None` for errors that lowered rules cannot cause.
 fn rejected_rule(error: &Error) -> Option<&RuleIdentity> {
     match error {
         Error::UnsafeHead { rule, .. }

@@ -61,8 +61,7 @@ fn canonical(rule: &rules::Rule) -> (Vec<rules::Atom>, Vec<rules::Atom>) {
     (body, rule.head.iter().map(|atom| renamed(atom, &mut number)).collect())
 }
 
-/// Returns the atom with each variable replaced by the term that `name` returns. Aggregates are returned
-/// unchanged.
+/// Returns aggregates unchanged.
 fn renamed(atom: &rules::Atom, name: &mut dyn FnMut(Variable) -> Term) -> rules::Atom {
     use rules::Atom as A;
     let mut term = |term: Term| match term {
@@ -166,7 +165,6 @@ fn term(context: &mut Context, argument: &Argument, variables: &mut Variables) -
     }
 }
 
-/// Lowers an atom of a body to alternative conjunctions.
 fn condition(
     context: &mut Context,
     atom: &Atom,
@@ -210,8 +208,7 @@ fn condition(
     })
 }
 
-/// Returns the arguments of a built-in. In `swrlm:eval`, the names of the argument variables are
-/// prepended to the expression.
+/// Prepends the names of the argument variables to the expression of `swrlm:eval`.
 fn with_names(built_in: BuiltIn, mut arguments: Vec<Argument>) -> Vec<Argument> {
     if let [_, Argument::Literal(text), values @ ..] = arguments.as_mut_slice() {
         let name = |argument: &Argument| match argument {

@@ -17,8 +17,6 @@ fn identity(label: &str) -> RuleIdentity {
     RuleIdentity { source: AXIOM_SOURCE.into(), label: Some(label.into()), position: 0 }
 }
 
-/// Adds the constraints, and the rules and facts of `owl:Thing` and of the top object property if a rule or
-/// fact mentions them.
 pub(crate) fn lower(ontology: &Ontology, context: &mut Context) {
     let mut variables = Variables::default();
     let (x, y) = (variables.fresh("x"), variables.fresh("y"));

@@ -1,5 +1,6 @@
-//! Removes axioms that use an annotation property as another kind of property, each with a warning. OWL 2 DL
-//! forbids such axioms, and horned-owl rejects a document that contains one.
+//! Removes axioms that use an annotation property as another kind of property. OWL 2 DL forbids such axioms,
+//! and horned-owl rejects a document that contains one. Each removed axiom about a named entity causes a
+//! warning.
 //!
 //! Two forms, which occur in practice, are recognised: `owl:equivalentProperty` with an annotation property
 //! on at least one side, and restrictions on annotation properties. A property that is also declared as an

@@ -1,7 +1,8 @@
 //! Replaces blank nodes that are individuals by IRIs, which depend only on the documents.
 //!
-//! A blank node is an individual if it has a type or a property value, or is a property value, and is not part
-//! of an axiom, class expression, rule or list. A blank node that only has annotations is reported and removed.
+//! A blank node is an individual if it has a type or a property value, or is a property value. Parts of
+//! axioms, class expressions, rules and lists are no individuals. A blank node that only has annotations is
+//! reported and removed.
 
 use std::collections::BTreeMap;
 

@@ -1,7 +1,7 @@
 //! Detects statements that no other pass has to process: assertions about named individuals with classes and
-//! declared properties, if no other statement makes the individuals part of an axiom, a list or a rule. Most
-//! triples of a large knowledge base are of this kind. They remain triples of numbers until they become axioms,
-//! which saves time and memory.
+//! declared properties. No other statement may make these individuals part of an axiom, a list or a rule.
+//! Most triples of a large knowledge base are of this kind. They remain triples of numbers until they become
+//! axioms, which saves time and memory.
 
 use std::collections::BTreeSet;
 
@@ -80,11 +80,10 @@ impl Usage {
         }
     }
 
-    /// Returns `true` if no other normalisation pass has to process the triple.
     pub(super) fn is_bulk(&self, triple: &Compact) -> bool {
         let uses = |number: u32| self.uses[number as usize];
         let subject = uses(triple.subject);
-        // A triple with this property may be part of an axiom, or of a statement about a property.
+        // Such a triple may be part of an axiom, or a statement about a property.
         if subject.special || subject.reserved || triple.subject == triple.predicate {
             return false;
         }

@@ -25,9 +25,8 @@ const NESTING_PROPERTIES: [&str; 10] = [
     rdf::REST,
 ];
 
-/// Returns the index of the first triple by which an expression is nested deeper than [`MAX_NESTING`], and an IRI
-/// that a too deeply nested expression describes, if there is one. Returns `None` if no expression is nested too
-/// deeply.
+/// Returns the index of the first triple by which an expression is nested deeper than [`MAX_NESTING`], and
+/// the IRI of an entity that such an expression describes, if there is one.
 pub(crate) fn too_deep(graph: &Graph) -> Option<(usize, Option<String>)> {
     let mut depths: FxHashMap<NamedOrBlankNode, usize> = FxHashMap::default();
     for (index, triple) in graph.iter() {

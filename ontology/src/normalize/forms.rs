@@ -61,8 +61,6 @@ fn take_all(graph: &mut Graph, node: &NamedOrBlankNode) {
     }
 }
 
-/// Moves the triples of axioms and annotations that are nodes with an IRI (such as `AllDifferent` and
-/// negative assertions) to blank nodes.
 fn remove_axiom_iris(graph: &mut Graph) {
     let kinds = [owl::ALL_DIFFERENT, owl::NEGATIVE_PROPERTY_ASSERTION, owl::AXIOM, owl::ANNOTATION];
     let named: Vec<NamedOrBlankNode> = kinds
@@ -80,8 +78,6 @@ fn remove_axiom_iris(graph: &mut Graph) {
     }
 }
 
-/// Makes each named class or datatype that is the subject of an expression's triples equivalent to a
-/// blank node with these triples.
 fn definitions(graph: &mut Graph) {
     let datatypes: FxHashSet<NamedOrBlankNode> =
         graph.instances(rdfs::DATATYPE).into_iter().map(|(_, node)| node).collect();
@@ -125,8 +121,6 @@ fn state(graph: &mut Graph, subject: &NamedOrBlankNode, predicate: &str, object:
     graph.state(subject, predicate, NamedNode::new_unchecked(object));
 }
 
-/// Gives each anonymous expression the type that its properties require, and removes other types of
-/// expressions.
 fn correct_types(graph: &mut Graph) {
     let datatypes: FxHashSet<Term> =
         graph.instances(rdfs::DATATYPE).into_iter().map(|(_, node)| Term::from(node)).collect();
@@ -191,8 +185,8 @@ fn has_values(graph: &Graph, list: &Term, datatypes: &FxHashSet<Term>) -> bool {
     }
 }
 
-/// Names anonymous inverses in qualified cardinality restrictions, where horned-owl requires a name. Removes
-/// the types of all anonymous inverses.
+/// Names anonymous inverses in qualified cardinality restrictions. Removes the types of all anonymous
+/// inverses.
 fn name_inverses(graph: &mut Graph) {
     let mut inverses: FxHashMap<Term, String> = FxHashMap::default();
     let mut typed = Vec::new();

@@ -1,9 +1,10 @@
-//! Adds declarations of undeclared classes and properties, because horned-owl drops assertions of properties whose kind
-//! is unknown.
+//! Adds declarations of undeclared classes and properties, because horned-owl drops assertions of properties
+//! whose kind is unknown.
 //!
-//! A class or property that the imports closure does not declare gets a kind from its use, with a warning. In general,
-//! a property with literals as values is a data property, a property between individuals an object property, and a
-//! property that describes only classes, properties or ontologies an annotation property.
+//! A class or property that the imports closure does not declare gets a kind from its use, with a warning. In
+//! general, a property with literals as values is a data property, and a property between individuals is an
+//! object property. A property that describes only classes, properties or ontologies is an annotation
+//! property.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -32,8 +33,7 @@ struct Use {
     entity: bool,
 }
 
-/// Adds a declaration and a warning for each undeclared class or property. `classes` contains undeclared
-/// classes that occur in triples outside of `graph`.
+/// `classes` contains undeclared classes that occur in triples outside of `graph`.
 pub(crate) fn declare(graph: &mut Graph, mut classes: BTreeSet<String>, warnings: &mut Vec<Warning>) {
     let (declared, mut properties) = (Declared::of(graph), BTreeMap::new());
     for (_, triple) in graph.iter() {
@@ -60,8 +60,7 @@ pub(crate) fn declare(graph: &mut Graph, mut classes: BTreeSet<String>, warnings
     state(graph, ORIGIN, owl::ANNOTATION_PROPERTY);
 }
 
-/// Adds declarations of the `known` entities, except individuals, that the documents mention but do not
-/// declare.
+/// Declares the `known` entities, except individuals, that the documents mention but do not declare.
 pub(crate) fn declare_known(graph: &mut Graph, known: &[(EntityKind, Iri)], names: &Names) {
     if known.is_empty() {
         return;
@@ -90,8 +89,7 @@ struct Kinds<'a> {
 }
 
 impl Kinds<'_> {
-    /// Returns the OWL class of the property's kind, such as `owl:ObjectProperty`, from its declaration
-    /// or its uses; `None` for an unknown property.
+    /// Returns the OWL class for the kind of a property, from its declaration or its uses.
     fn of(&self, property: &str) -> Option<&'static str> {
         if self.declared.object_properties.contains(property) {
             Some(owl::OBJECT_PROPERTY)

@@ -1,5 +1,5 @@
-//! Rewrites axioms with lists: `AllDisjointClasses` and `AllDisjointProperties` become pairs, large sets of
-//! disjoint classes or different individuals become axioms without horned-owl, a list that several axioms
+//! Rewrites axioms with lists. `AllDisjointClasses` and `AllDisjointProperties` become pairs. Large sets of
+//! disjoint classes or different individuals become axioms without horned-owl. A list that several axioms
 //! share is copied, and malformed property chains are removed.
 
 use oxrdf::{NamedNode, NamedOrBlankNode, Term};
@@ -9,8 +9,7 @@ use crate::graph::{Graph, iri_of, subject_of};
 use crate::owl::{AnnotatedAxiom, Axiom, ClassExpression, Iri};
 use crate::vocab::{owl, rdf};
 
-/// Rewrites the axioms with lists in the graph. Returns the axioms with many members, which horned-owl
-/// does not have to read.
+/// Returns the axioms with many members, which horned-owl does not have to read.
 pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) -> Vec<AnnotatedAxiom> {
     let groups = groups(graph);
     pairs(graph, owl::ALL_DISJOINT_CLASSES, owl::DISJOINT_WITH, warnings);
@@ -20,9 +19,7 @@ pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) -> Vec<Ann
     groups
 }
 
-/// Maximum number of members of the axioms that [`groups`] does not read. Axioms about disjoint named classes
-/// with at most this number of members are expanded to pairs, and axioms about different named individuals
-/// are read by horned-owl.
+/// Maximum number of members of a set that [`groups`] leaves in the graph.
 const MAX_PAIRED_MEMBERS: usize = 16;
 
 /// Removes and returns axioms about more than [`MAX_PAIRED_MEMBERS`] disjoint named classes or different
@@ -58,8 +55,8 @@ fn groups(graph: &mut Graph) -> Vec<AnnotatedAxiom> {
     axioms
 }
 
-/// Replaces each axiom of type `class` by `predicate` between all pairs of its members. Removes a malformed
-/// axiom, with a warning.
+/// Replaces each n-ary axiom of the type `class` by one triple with `predicate` for each pair of members.
+/// Removes a malformed axiom, with a warning.
 fn pairs(graph: &mut Graph, class: &str, predicate: &str, warnings: &mut Vec<Warning>) {
     for (_, node) in graph.instances(class) {
         let members = graph.object(&node, owl::MEMBERS).and_then(|head| graph.list(head));

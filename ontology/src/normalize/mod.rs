@@ -7,7 +7,7 @@
 //!
 //! | pass | rewrites |
 //! |---|---|
-//! | this file | headers of imported ontologies (removed) |
+//! | this file | imports, and headers of all documents but the first (removed) |
 //! | `bulk` | nothing: detects statements that the other passes can skip |
 //! | `swrl` | every rule to one canonical form |
 //! | `forms` | OWL 1 class definitions, expressions without a type, axiom nodes that are IRIs (to blank nodes) |
@@ -41,7 +41,6 @@ use crate::vocab::{owl, rdf};
 
 #[derive(Debug)]
 pub(crate) struct Normal {
-    /// The N-Triples document for horned-owl.
     pub ntriples: Vec<u8>,
     /// Axioms and annotations that horned-owl does not have to read.
     pub plain: Parts,
@@ -61,8 +60,7 @@ pub(crate) struct Merged {
     pub parts: Vec<(usize, Iri)>,
 }
 
-/// Merges documents. Triples for which `is_bulk` returns `true` are not added to the graph. Imports, and the
-/// headers of all documents but the first, are dropped.
+/// Drops imports, and the headers of all documents but the first.
 pub(crate) fn merge(documents: Vec<Document>, names: &Names, is_bulk: impl Fn(&Compact) -> bool) -> Merged {
     let (mut graph, mut bulk, mut parts) = (Graph::default(), Vec::new(), Vec::new());
     let [rdf_type, ontology, imports, version] =
@@ -88,8 +86,7 @@ pub(crate) fn merge(documents: Vec<Document>, names: &Names, is_bulk: impl Fn(&C
     Merged { graph, bulk, parts }
 }
 
-/// Merges and rewrites documents; see the module documentation. Entities of `known_entities` need no
-/// declaration.
+/// Merges and rewrites documents. Entities of `known_entities` need no declaration.
 ///
 /// # Errors
 /// Returns O112 if class expressions are nested too deeply.

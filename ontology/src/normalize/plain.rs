@@ -102,7 +102,6 @@ impl KindsByNumber {
         Self { kinds, rdf_type: names.find(rdf::TYPE) }
     }
 
-    /// Returns `true` if a triple is an axiom by itself under the declared kinds.
     fn contains(&self, triple: &Compact) -> bool {
         let property = || self.kinds.get(&triple.predicate).and_then(|kinds| kinds.property);
         match &triple.object {

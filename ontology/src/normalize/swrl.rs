@@ -1,10 +1,10 @@
-//! Rewrites every SWRL rule in the RDF graph to one canonical form: a blank node with typed lists of
-//! atoms, and for each atom a blank node that has only its arguments.
+//! Rewrites every SWRL rule in the RDF graph to one canonical form. A rule is a blank node with typed lists
+//! of atoms. An atom is a blank node that has only its arguments.
 //!
-//! Special IRIs encode information that this form cannot express; `crate::horned` decodes them.
-//! Variables and individuals have separate namespaces (in real files one IRI can be both). An individual
-//! as the first argument of a data atom becomes a variable with the individual's name. An empty body or
-//! head becomes one atom that always holds.
+//! Special IRIs encode information that this form cannot express; `crate::horned` decodes them. Variables and
+//! individuals have separate namespaces (in real files one IRI can be both). An individual as the first
+//! argument of a data atom becomes a variable with the individual's name. An empty body or head becomes one
+//! atom that always holds.
 
 use std::collections::HashSet;
 
@@ -34,9 +34,8 @@ pub(crate) const TRUE: &str = "urn:metaplan:true";
 /// Annotation property whose value is the index of a rule in the list of [`Origin`]s.
 pub(crate) const ORIGIN: &str = "urn:metaplan:origin";
 
-/// Rewrites the SWRL rules of `graph` and returns the origin of each rewritten rule. Each element of `parts`
-/// is a document: the index of its first triple, and its ontology IRI. Unreadable rules are removed with a
-/// warning.
+/// Returns the origin of each rewritten rule. Each element of `parts` is a document: the index of its first
+/// triple, and its ontology IRI. Unreadable rules are removed with a warning.
 pub(crate) fn rewrite(graph: &mut Graph, parts: &[(usize, Iri)], warnings: &mut Vec<Warning>) -> Vec<Origin> {
     let mut pass = Pass::new(graph);
     let (mut origins, mut positions) = (Vec::new(), vec![0; parts.len()]);
@@ -84,14 +83,13 @@ struct RdfAtom {
 
 struct Pass {
     variables: HashSet<Term>,
-    /// Terms that occur outside of rules.
+    /// Terms that occur outside of rules, except as classes.
     described: HashSet<Term>,
     /// Properties that are declared as data properties, but not as object properties.
     data_properties: HashSet<Term>,
     /// Indices of the triples that are removed at the end of the pass.
     replaced: HashSet<usize>,
     rule: usize,
-    /// Variables in the canonical forms of all rules.
     canonical_variables: Vec<NamedNode>,
     /// Arguments of the current rule that are neither variables nor described individuals.
     unknown: Vec<String>,
@@ -274,7 +272,6 @@ impl Pass {
         node.into()
     }
 
-    /// Adds the canonical form of a rule, with the annotations of the original rule.
     fn write(&mut self, graph: &mut Graph, original: &NamedOrBlankNode, body: &[RdfAtom], head: &[RdfAtom]) {
         let rule = NamedOrBlankNode::from(graph.fresh());
         graph.state(&rule, rdf::TYPE, NamedNode::new_unchecked(swrl::IMP));

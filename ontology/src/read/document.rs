@@ -30,11 +30,6 @@ pub(crate) fn decoded<'a>(bytes: &'a [u8], name: &str) -> Result<Cow<'a, [u8]>, 
     })
 }
 
-/// Rejects a document that is recognised as unsupported, such as Manchester syntax, a compressed file or an empty
-/// document.
-///
-/// # Errors
-/// Returns O113, which describes the document.
 pub(crate) fn require_syntax(text: &[u8], name: &str) -> Result<(), Errors> {
     match foreign::recognized(text) {
         Some(what) => {
@@ -93,9 +88,8 @@ pub(crate) fn parse(
     Ok(Document { name: name.to_owned(), syntax, iri: header, version, imports, triples })
 }
 
-/// Collects the triples of a document. Blank nodes are numbered in order of appearance, because parsers
-/// give random names to anonymous blank nodes, and two documents may use the same label for different
-/// nodes.
+/// Collects the triples of a document. Blank nodes are numbered in order of appearance: parsers give random
+/// names to anonymous blank nodes, and two documents may use one label for different nodes.
 struct Sink<'a> {
     names: &'a mut Names,
     prefix: &'a str,
@@ -150,9 +144,9 @@ fn between(text: &[u8], start: &str, end: char) -> Option<String> {
     tail.find(end).map(|length| tail[..length].to_owned())
 }
 
-/// Parses a document in N-Triples, a subset of Turtle without relative IRIs and prefixes. Returns `false` and no
-/// triples if the document is not N-Triples, or if it contains `/.`, because the Turtle parser may then change an IRI
-/// by removing dot segments.
+/// Parses a document in N-Triples, a subset of Turtle without relative IRIs and prefixes. Returns `false` and
+/// no triples if the document is not N-Triples. A document with `/.` is also rejected, because the Turtle
+/// parser may change an IRI by removing dot segments.
 fn parse_ntriples(text: &[u8], sink: &mut Sink) -> bool {
     let start = text.iter().find(|byte| !byte.is_ascii_whitespace());
     if !matches!(start, Some(b'<' | b'_' | b'#')) || memchr::memmem::find(text, b"/.").is_some() {

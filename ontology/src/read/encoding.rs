@@ -2,7 +2,6 @@
 
 use std::borrow::Cow;
 
-/// Returns the document in UTF-8 without a byte order mark. The error names an unknown encoding.
 pub(super) fn decoded(bytes: &[u8]) -> Result<Cow<'_, [u8]>, String> {
     let marked = encoding_rs::Encoding::for_bom(bytes);
     let unmarked = match bytes {

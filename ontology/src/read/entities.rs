@@ -93,7 +93,7 @@ fn reference(text: &[u8]) -> Option<(&[u8], usize)> {
 struct Expansion<'a> {
     entities: &'a HashMap<&'a [u8], &'a [u8]>,
     cache: HashMap<&'a [u8], Vec<u8>>,
-    /// Number of bytes that the expansions may still add to the document.
+    /// Number of bytes that expansions, including nested ones, may still produce.
     budget: usize,
 }
 

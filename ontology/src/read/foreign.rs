@@ -25,7 +25,6 @@ pub(super) fn recognized(text: &[u8]) -> Option<&'static str> {
     }
 }
 
-/// Returns `true` if the first line that is not a comment starts with a keyword of Manchester syntax.
 fn is_manchester(head: &[u8]) -> bool {
     let mut lines = head.split(|&byte| byte == b'\n').map(<[u8]>::trim_ascii);
     let first = lines.find(|line| !line.is_empty() && !line.starts_with(b"#")).unwrap_or_default();

@@ -28,7 +28,7 @@ use crate::triples::Document;
 
 const CATALOG: &str = "catalog-v001.xml";
 
-/// Maximum depth of the subdirectories of the given directories that are searched for imports.
+/// Maximum depth of the subdirectories that are searched for imports.
 const MAX_DEPTH: usize = 4;
 
 /// Number of ancestor directories in which directories named like the first segments of the URL's path are
@@ -72,8 +72,8 @@ impl Resolver {
         Ok(Self { catalogs, files: OnceCell::new(), directories: options.directories.clone() })
     }
 
-    /// Resolves an import of the document at `importer` (`None` if the document has no path). Returns `None` if the
-    /// import is not found, and an error if the catalog next to the importing document cannot be used.
+    /// `importer` is `None` if the importing document has no path. Returns an error if the catalog next to
+    /// that document cannot be used.
     pub(crate) fn resolve(
         &self,
         import: &str,
@@ -135,7 +135,6 @@ fn is_published_tomasys(import: &str) -> bool {
     })
 }
 
-/// Searches for the imported file in a repository that is checked out next to the importer's repository.
 fn checked_out(import: &str, importer: &Path) -> Option<PathBuf> {
     let plain = |segment: &&str| {
         !segment.starts_with('.') && segment.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c))
@@ -215,8 +214,6 @@ fn declared_iri(path: &Path) -> Option<String> {
     document::ontology_iri(&head)
 }
 
-/// Returns the file that best matches an import: by ontology IRI, otherwise by file name. Among several
-/// matches, the path with the most segments of the import IRI wins.
 fn best_match(import: &str, files: &[OntologyFile]) -> Option<PathBuf> {
     let by_iri: Vec<_> =
         files.iter().filter(|file| file.iri.as_deref().is_some_and(|iri| same_iri(iri, import))).collect();

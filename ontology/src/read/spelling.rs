@@ -4,8 +4,8 @@
 use super::text::Text;
 use crate::error::{Error, Position, Warning};
 
-/// Number of warnings, counted from the first, for which a position is searched. The number is limited because each
-/// search visits all documents.
+/// Limit on the number of warnings for which a position is searched, because each search can visit all
+/// documents.
 const MAX_SEARCHES: usize = 100;
 
 /// Sets the position of each warning about an undeclared name to the first occurrence of the name in the
@@ -29,8 +29,6 @@ pub(super) fn locate(warnings: &mut [Warning], texts: &[(String, Text)]) {
     }
 }
 
-/// Adds a position to an error about too deep nesting (O112) that has none, if its document contains the IRI that the
-/// expression describes.
 pub(super) fn placed(error: Error, texts: &[(String, Text)]) -> Error {
     match error {
         Error::TooDeep { file, about: Some(iri), position: None, deepest } => {
@@ -42,8 +40,8 @@ pub(super) fn placed(error: Error, texts: &[(String, Text)]) -> Error {
     }
 }
 
-/// Returns a position in the documents of the first IRI that `message` contains in angle brackets. `None` if
-/// `message` contains none, or if no document contains this IRI.
+/// Returns the first position, in the documents, of the first IRI in angle brackets in `message`. Returns
+/// `None` if `message` contains no such IRI, or if no document contains it.
 pub(super) fn place(message: &str, texts: &[(String, Text)]) -> Option<Position> {
     let iri = message.split_once('<')?.1.split_once('>')?.0;
     texts.iter().find_map(|(name, text)| {
@@ -53,8 +51,8 @@ pub(super) fn place(message: &str, texts: &[(String, Text)]) -> Option<Position>
     })
 }
 
-/// Returns the byte offset of the first occurrence of an IRI in a text: the whole IRI in brackets or quotes,
-/// or its local name after `:` or `#`.
+/// Returns the byte offset of the first occurrence of an IRI in a text. The text may contain the whole IRI in
+/// brackets or quotes, or its local name after `:` or `#`.
 fn offset(iri: &str, text: &str) -> Option<usize> {
     let whole = spelled(text, iri, |c| matches!(c, '<' | '"' | '\''));
     let local = iri.rsplit(['#', '/', ':']).next().filter(|local| !local.is_empty());
@@ -62,8 +60,8 @@ fn offset(iri: &str, text: &str) -> Option<usize> {
     [whole, short].into_iter().flatten().min()
 }
 
-/// Returns the byte offset of the first occurrence of a word that follows a character accepted by `opens` and
-/// is not the prefix of a longer name.
+/// Returns the byte offset of the first occurrence of a word that is not the prefix of a longer name. Only
+/// occurrences after a character that `opens` accepts count.
 fn spelled(text: &str, word: &str, opens: impl Fn(char) -> bool) -> Option<usize> {
     let continues = |c: char| c.is_alphanumeric() || matches!(c, '_' | '-');
     memchr::memmem::find_iter(text.as_bytes(), word).find(|offset| {

@@ -76,7 +76,7 @@ impl Structural<'_> {
 const NESTING_MARGIN: usize = 8;
 
 /// Iterates over the words of functional-style syntax with their offsets: parentheses, equality signs and
-/// names. Strings, IRIs and comments are skipped.
+/// names. Skips strings, IRIs and comments.
 #[derive(Clone)]
 struct Words<'a> {
     text: &'a [u8],
@@ -119,8 +119,7 @@ fn string_length(text: &[u8]) -> usize {
     text.len()
 }
 
-/// Returns the offset and the prefix of the first name with an undeclared prefix. Standard prefixes such as `owl:`
-/// and `xsd:` need no declaration.
+/// Standard prefixes such as `owl:` and `xsd:` need no declaration.
 fn undeclared_prefix(words: Words) -> Option<(usize, String)> {
     let mut declared: Vec<&[u8]> =
         vec![b"owl:", b"rdf:", b"rdfs:", b"xsd:", b"xml:", b"_:", b"swrl:", b"swrlb:"];
@@ -140,8 +139,8 @@ fn undeclared_prefix(words: Words) -> Option<(usize, String)> {
     None
 }
 
-/// Replaces `_:_:` at the start of labels of blank nodes by `_:own-`: horned-owl's readers keep the prefix as part of
-/// the label, and the writer adds another prefix.
+/// Replaces `_:_:` at the start of labels of blank nodes by `_:own-`. The reason is that horned-owl's readers
+/// keep the prefix as part of the label, and the writer adds another prefix.
 fn relabelled(ntriples: Vec<u8>) -> Vec<u8> {
     const DOUBLE_PREFIX: &[u8] = b"_:_:";
     if !ntriples.windows(DOUBLE_PREFIX.len()).any(|window| window == DOUBLE_PREFIX) {

@@ -75,8 +75,7 @@ fn is_iri_reference(text: &[u8]) -> bool {
             || inside.is_empty())
 }
 
-/// Returns the name of the root element of an XML document, and the text after the name. Skips XML
-/// declaration, comments and document type.
+/// Skips XML declaration, comments and document type. The second result is the text after the name.
 fn xml_root(mut text: &[u8]) -> Option<(&[u8], &[u8])> {
     loop {
         text = &text[text.iter().position(|&byte| byte == b'<')? + 1..];
@@ -116,8 +115,8 @@ pub(super) fn unclosed_root(text: &[u8]) -> Option<String> {
     Some(String::from_utf8_lossy(root).into_owned())
 }
 
-/// Returns the offset of the first closing tag that does not match the open element or of markup that is
-/// not closed, or the end of the text if an element is not closed; `None` if all tags match. The error
+/// Returns the offset of the first closing tag that does not match the open element, or of markup that is not
+/// closed. Returns the end of the text if an element is not closed, and `None` if all tags match. The error
 /// is the offset at which the nesting exceeds `max_depth`.
 pub(super) fn mismatched_tag(text: &[u8], max_depth: usize) -> Result<Option<usize>, usize> {
     let (mut open, mut cursor) = (Vec::new(), 0);

@@ -1,19 +1,21 @@
-//! Lists the designs for an objective, with the reasons that exclude them and their utility, both as in MROS. Also
-//! lists the requirements that each design misses, which MROS does not use for its choice.
+//! Lists the designs for an objective, with the reasons that exclude them and their utility, both as in MROS.
+//! Also lists the requirements that each design misses, which MROS does not use for its choice.
 //!
 //! A design is excluded if it is unavailable, if the error log contains its failure for the objective, or if
 //! a measurement excludes one of its estimations. The last condition compares both values by the attribute's
 //! `qa_comparison_operator` (`<` excludes the design if the measured value is below the estimation). An
 //! attribute without a measurement excludes no design. MROS raises an exception in this case, and for a
-//! design that violates two attributes. Unless the caller names an attribute, the utility is PLANTA's
-//! `fd_utility` if the knowledge base concludes it, otherwise the estimation of the attribute type
-//! `performance` if there is exactly one, otherwise 0.001.
+//! design that violates two attributes.
+//!
+//! The utility is PLANTA's `fd_utility` if the knowledge base concludes it. Otherwise it is the estimation of
+//! the attribute type `performance` if there is exactly one, or else 0.001. If the caller names an attribute,
+//! its estimation is the utility instead.
 //!
 //! Each design also has the requirements of the objective that its estimations do not meet, without those on
 //! attributes with a comparison operator. Only the rules of the knowledge base define on which side of a
-//! bound a value has to be (MROS's `QAenergy`: a value above the bound is an error). Therefore the rules are
-//! evaluated on a copy of the engine: the objective is grounded with the design, and the estimation is
-//! asserted as the measured value. The requirement is missed if the objective is then in error.
+//! bound a value has to be: for MROS's `QAenergy`, a value above the bound is an error. Therefore the rules
+//! are evaluated on a copy of the engine, in which the objective is grounded with the design. The estimation
+//! is asserted as the measured value. The requirement is missed if the objective is then in error.
 
 use std::collections::BTreeMap;
 

@@ -18,10 +18,11 @@ pub enum Mode {
     /// The conclusion is retracted.
     #[default]
     Retract,
-    /// The conclusion remains, as in the MROS reasoner. Each [`Runtime::conclude`] turns conclusions into assertions,
-    /// and only assertions count for queries. The realisability of all designs is removed when a component that had
-    /// failed or recovered reports again. The status of a grounding is removed with the grounding, and the status of
-    /// an objective when the objective is grounded. A design's error log is never removed.
+    /// The conclusion remains, as in the MROS reasoner. Each [`Runtime::conclude`] turns conclusions into
+    /// assertions, and only assertions count for queries. The realisability of all designs is removed when a
+    /// component that had failed or recovered reports again. The status of a grounding is removed with the
+    /// grounding, and the status of an objective when the objective is grounded. A failure in a design's
+    /// error log is removed only with the objective.
     Latch,
 }
 
@@ -163,8 +164,6 @@ impl Runtime {
         self.report(component, delta)
     }
 
-    /// Applies a component's report. In latch mode, removes the realisability of all designs if the component
-    /// had failed or recovered.
     fn report(&mut self, component: &str, mut delta: Delta) -> Result<Delta, Error> {
         let facts = self.facts();
         let (component, _) = self.all_facts().find("component", terms::COMPONENT, component)?;
@@ -191,8 +190,6 @@ impl Runtime {
         self.apply(delta)
     }
 
-    /// Returns the facts that count for queries: assertions in latch mode, otherwise all facts that
-    /// hold.
     pub(super) fn facts(&self) -> Facts<'_> {
         Facts::stated(&self.engine, self.mode == Mode::Latch)
     }

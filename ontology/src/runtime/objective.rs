@@ -197,8 +197,6 @@ impl Runtime {
         components.flat_map(|component| self.statements(component, terms::STATUS)).collect()
     }
 
-    /// Returns the facts to delete before a new grounding: the groundings of the objective, its status, and
-    /// the statement that it is updatable.
     fn release(&self, objective: Symbol) -> Vec<Fact> {
         let groundings = self.facts().subjects(objective, terms::SOLVES_O).into_iter();
         let mut delete: Vec<Fact> = groundings.flat_map(|grounding| self.mentions(grounding)).collect();
@@ -207,8 +205,7 @@ impl Runtime {
         delete
     }
 
-    /// Returns the individuals that hold measurements of the attributes in a design's estimations; empty in
-    /// latch mode.
+    /// Returns no individuals in latch mode.
     fn measurements(&self, design: Symbol) -> Vec<Symbol> {
         if self.mode == Mode::Latch {
             return Vec::new();
@@ -237,8 +234,6 @@ impl Runtime {
     }
 }
 
-/// Converts the name of a new individual to an IRI. Returns O107 if the name has a character that IRIs
-/// do not allow.
 fn iri_of(name: &str) -> Result<String, Error> {
     let forbidden = |c: &char| c.is_whitespace() || c.is_control() || "<>\"{}|\\^`".contains(*c);
     match name.chars().find(forbidden) {

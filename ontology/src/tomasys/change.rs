@@ -32,7 +32,6 @@ fn spellings(status: Status) -> Vec<Literal> {
     vec![Literal::string(mros), Literal::string(planta), Literal::Boolean(truth)]
 }
 
-/// Returns `true` if a status, in any spelling, denotes a failure.
 pub(crate) fn is_failed(status: &str) -> bool {
     spells(Status::Failed, status)
 }
@@ -149,8 +148,6 @@ pub fn unmeasured(engine: &mut Engine, attribute: &str) -> Result<Delta, Error> 
     Ok(Delta { insert: Vec::new(), delete })
 }
 
-/// Builds the facts that make `holder` an individual that holds measurements of the attribute type
-/// `kind`.
 fn observation(symbols: &mut Symbols, holder: Symbol, kind: Symbol, class: &str) -> Vec<Fact> {
     let mut facts = vec![
         Fact::new(symbols.name(term_for(terms::QA_VALUE, class)), [holder]),
@@ -189,8 +186,8 @@ pub fn replace(engine: &Engine, property: Symbol, subject: Symbol, value: Option
     Delta { insert: new.into_iter().collect(), delete }
 }
 
-/// Returns `true` if no constraint of the program forbids the value because it is outside the range of the
-/// property: outside of an enumeration, or in another datatype.
+/// Returns `true` if no constraint of the program excludes the value from the range of the property.
+/// Considers enumerations and datatypes.
 fn allows(engine: &Engine, property: Symbol, value: Symbol) -> bool {
     let literal = |symbol| engine.symbols().value(symbol).as_literal();
     let Some(value) = literal(value) else { return true };

@@ -84,7 +84,7 @@ fn measurements(facts: Facts) -> Vec<Warning> {
     unmeasured.map(|kind| Warning::NothingMeasured { attribute: iri(facts, kind) }).collect()
 }
 
-/// Reports individuals with several asserted values of a functional property. Literals are compared by value.
+/// Compares literals by value.
 fn several_values(ontology: &Ontology) -> Vec<Warning> {
     let functional: BTreeSet<&Iri> = ontology.axioms.iter().filter_map(functional).collect();
     // Axioms are sorted, so that the values of one property of one individual are adjacent.
@@ -109,7 +109,6 @@ fn several_values(ontology: &Ontology) -> Vec<Warning> {
     several.collect()
 }
 
-/// Returns `true` if two of the asserted values certainly differ.
 fn any_differ(axioms: &[AnnotatedAxiom]) -> bool {
     let values = axioms.iter().filter_map(|annotated| match &annotated.axiom {
         Axiom::DataPropertyAssertion(_, _, to) => Some(value(to)),

@@ -20,8 +20,6 @@ impl<'a> Facts<'a> {
         Self { engine, only_stated: false }
     }
 
-    /// Creates a view that answers queries from only the stated facts if `only_stated`, otherwise from all
-    /// facts that hold.
     pub(crate) fn stated(engine: &'a Engine, only_stated: bool) -> Self {
         Self { engine, only_stated }
     }

@@ -45,8 +45,8 @@ impl Individual {
 pub struct FunctionDesign {
     /// The design.
     pub individual: Individual,
-    /// The functions that the design solves: usually one, and several if the knowledge base states that these
-    /// functions are the same.
+    /// The functions that the design solves: usually one. There are several if, for example, the knowledge
+    /// base states that these functions are the same.
     pub solves: Vec<Individual>,
     /// The components that the design requires.
     pub components: Vec<Individual>,

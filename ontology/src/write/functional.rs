@@ -7,7 +7,6 @@ use crate::owl::{
 };
 use crate::vocab::{is_reserved, rdfs, xsd};
 
-/// Returns the document as text. The order of the statements depends only on the ontology.
 pub(super) fn document(ontology: &Ontology) -> String {
     let mut text = String::from("Prefix(xsd:=<http://www.w3.org/2001/XMLSchema#>)\n\n");
     let root = ontology.sources.first();

@@ -19,7 +19,6 @@ pub const PEERS: [(&str, Run); 5] = [
     ("datafrog", by_datafrog),
 ];
 
-/// Returns about 5,000 random edges between 1,000 nodes, without duplicates.
 pub fn edges() -> Vec<Edge> {
     let mut random = Random(1);
     let mut edges: Vec<Edge> = (0..5000).map(|_| (random.below(1000), random.below(1000))).collect();

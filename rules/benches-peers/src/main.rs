@@ -9,7 +9,6 @@ mod updates;
 
 use std::time::Duration;
 
-/// A linear congruential generator with a fixed seed, so that every run has the same input.
 pub struct Random(pub u64);
 
 impl Random {

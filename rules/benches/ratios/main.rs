@@ -17,7 +17,6 @@ use std::time::Duration;
 
 use metaplan_rules::{Engine, Fact, Prefixes, Program, Symbols, parse_rules};
 
-/// A linear congruential generator with a fixed seed, so that every run has the same input.
 pub(crate) struct Random(u64);
 
 impl Random {

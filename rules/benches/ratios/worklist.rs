@@ -148,7 +148,6 @@ struct Run {
     derived: usize,
 }
 
-/// Stores the facts, derives all consequences and returns their number.
 pub(crate) fn run(symbols: &Symbols, facts: &[Fact]) -> usize {
     let mut symbols = symbols.clone();
     let derived = ["fd_realisability", "b_status", "cc_availability", "cspec_availability", "fd_error_log"];

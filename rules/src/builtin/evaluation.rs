@@ -73,9 +73,9 @@ impl BuiltIn {
         }
     }
 
-    /// Returns the regular expression of the built-in and the reason why it cannot be used. `None` if it is valid or
-    /// not constant, and for built-ins without one. Constant flags are checked, too. `argument` returns the argument
-    /// at a position, or `None` if it is not constant.
+    /// Returns the regular expression of the built-in and the reason why it cannot be used. Returns `None` if
+    /// the expression is valid or not constant, and for built-ins without one. Constant flags are checked,
+    /// too. `argument` returns the argument at a position if it is constant.
     pub(crate) fn bad_pattern<'l>(
         self,
         argument: &impl Fn(usize) -> Option<&'l Literal>,

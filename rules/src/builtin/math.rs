@@ -9,8 +9,8 @@ use num_traits::{Signed, ToPrimitive, Zero};
 use super::signature::BuiltIn;
 use crate::literal::{Decimal, Literal, ten_to};
 
-/// Maximum absolute exponent of an exact power (a larger one has no result), and maximum number of digits for
-/// rounding decimals (larger numbers count as this one).
+/// Maximum absolute exponent of an exact power, and maximum number of digits for rounding decimals. A power
+/// with a larger exponent has no result. A larger number of digits counts as the maximum.
 const MAX_EXPONENT: u32 = 1000;
 
 enum Numbers {

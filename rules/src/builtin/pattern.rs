@@ -14,8 +14,6 @@ use crate::literal::Literal;
 
 const SIZE_LIMIT: usize = 1 << 20;
 
-/// Returns `true` if the first argument contains a match of the second, a regular expression. The third
-/// argument contains optional flags. Returns `false` for an invalid expression.
 pub(super) fn matches(arguments: &[&Literal]) -> bool {
     let texts: Option<Vec<&str>> = arguments.iter().map(|argument| as_text(argument)).collect();
     match texts.as_deref() {

@@ -94,8 +94,8 @@ fn durations(built_in: BuiltIn, left: &Duration, right: &Duration) -> Option<Lit
     Some(Literal::Duration(Duration::new(months, Decimal::from_rational(&sum))))
 }
 
-/// Returns the product or quotient of a duration and a number. Months are rounded, halves up. `None` for a division
-/// by 0, and if the built-in is for another kind of duration or does not scale.
+/// Rounds months, halves up. Returns `None` for a division by 0, and if the built-in is for another kind of
+/// duration or does not scale.
 fn scaled(built_in: BuiltIn, duration: &Duration, factor: &BigRational) -> Option<Literal> {
     use BuiltIn as B;
     let divides = matches!(built_in, B::DivideYearMonthDuration | B::DivideDayTimeDuration);
@@ -117,8 +117,6 @@ fn scaled(built_in: BuiltIn, duration: &Duration, factor: &BigRational) -> Optio
     Some(Literal::Duration(duration))
 }
 
-/// Returns a moment plus or minus a duration; `None` if the built-in is for another kind of moment or
-/// duration, or if [`Moment::later`] has no result.
 fn shifted(built_in: BuiltIn, moment: &Moment, duration: &Duration) -> Option<Literal> {
     use BuiltIn as B;
     let (kind, months, forward) = match built_in {
@@ -142,8 +140,6 @@ fn shifted(built_in: BuiltIn, moment: &Moment, duration: &Duration) -> Option<Li
     moment.later(&duration).map(Literal::Moment)
 }
 
-/// Returns the duration `left - right`; `None` if the built-in is for moments of another kind, or if the
-/// moments have no difference.
 fn difference(built_in: BuiltIn, left: &Moment, right: &Moment) -> Option<Literal> {
     use BuiltIn as B;
     let (kind, months) = match built_in {

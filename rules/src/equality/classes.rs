@@ -18,7 +18,7 @@ use crate::symbol::Symbol;
 /// derivation is recorded in its edge.
 pub(super) type Step = DerivationStep;
 
-/// Number of an edge (recorded equality of two names), in the order of creation.
+/// Numbers edges in the order of creation.
 pub(super) type EdgeId = u32;
 
 #[derive(Clone, Debug)]
@@ -27,7 +27,7 @@ pub(super) struct Edge {
     pub right: Symbol,
     /// Stated facts among the premises of this edge.
     pub facts: Vec<Fact>,
-    /// Earlier edges (recorded equalities) among the premises of this edge.
+    /// Earlier edges among the premises of this edge.
     pub edges: Vec<EdgeId>,
     /// Derivation of the pair when the edge was created, down to stated facts and other pairs; the first
     /// step is the pair itself. Empty if the pair is stated.
@@ -47,7 +47,7 @@ pub(super) struct Classes {
 }
 
 impl Classes {
-    /// Returns the representative of a name. A name without other equal names represents itself.
+    /// A name without other equal names represents itself.
     pub fn find(&self, name: Symbol) -> Symbol {
         self.representatives.get(&name).copied().unwrap_or(name)
     }
@@ -57,7 +57,6 @@ impl Classes {
         self.members.get(&representative)
     }
 
-    /// Replaces all names of a fact by their representatives.
     pub fn normal(&self, fact: &Fact) -> Fact {
         Fact::new(fact.predicate, fact.arguments.iter().map(|&name| self.find(name)))
     }
@@ -66,7 +65,7 @@ impl Classes {
         self.members(self.find(name)).map_or_else(|| Arc::from([name]), Arc::clone)
     }
 
-    /// Adds an edge (recorded equality of two names). The classes do not change; see [`Classes::join`].
+    /// Adds an edge without changing the classes; see [`Classes::join`].
     pub fn connect(&mut self, edge: Edge) {
         let id = self.next;
         self.next += 1;
@@ -82,8 +81,8 @@ impl Classes {
         self.edges.insert(id, edge);
     }
 
-    /// Returns the edges (recorded equalities) whose derivations depend on any of these facts or rules,
-    /// directly or through other edges.
+    /// Returns the edges whose derivations depend on any of these facts or rules, directly or through other
+    /// edges.
     pub fn depending_on<'f>(
         &self,
         facts: impl Iterator<Item = &'f Fact>,
@@ -104,7 +103,7 @@ impl Classes {
         dependent
     }
 
-    /// Removes edges (recorded equalities). The classes do not change; see [`Classes::split`].
+    /// Removes edges without changing the classes; see [`Classes::split`].
     pub fn disconnect(&mut self, edges: &BTreeSet<EdgeId>) {
         fn forget<K: std::hash::Hash + Eq>(index: &mut FxHashMap<K, Vec<EdgeId>>, key: &K, edge: EdgeId) {
             if let Some(edges) = index.get_mut(key) {
@@ -125,7 +124,7 @@ impl Classes {
         }
     }
 
-    /// Merges the classes of two names. The representative of the larger class remains.
+    /// The representative of the larger class remains.
     pub fn join(&mut self, left: Symbol, right: Symbol) {
         let (left, right) = (self.find(left), self.find(right));
         if left == right {
@@ -145,8 +144,7 @@ impl Classes {
         self.members.insert(representative, members.into());
     }
 
-    /// Splits the class of `representative` into the connected components of its remaining edges (recorded
-    /// equalities).
+    /// Splits the class of `representative` into the connected components of its remaining edges.
     pub fn split(&mut self, representative: Symbol) {
         let Some(members) = self.members.remove(&representative) else { return };
         for name in members.iter() {
@@ -161,8 +159,8 @@ impl Classes {
         }
     }
 
-    /// Returns a shortest path between two names, by breadth-first search over the edges (recorded equalities) with a
-    /// number below `before`. Empty if there is no path, or if both names are the same.
+    /// Returns a shortest path between two names by breadth-first search over the edges with a number below
+    /// `before`. Empty if there is no path, or if both names are the same.
     pub fn path(&self, from: Symbol, to: Symbol, before: EdgeId) -> Vec<EdgeId> {
         let mut predecessors: FxHashMap<Symbol, (EdgeId, Symbol)> = FxHashMap::default();
         let (mut visited, mut front) = (FxHashSet::from_iter([from]), vec![from]);

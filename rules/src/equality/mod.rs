@@ -98,7 +98,6 @@ impl Equality {
         Self { same_as, classes, originals, pairs, program: Arc::clone(program), constants }
     }
 
-    /// Returns a copy without equalities and without stated facts, for the rules of `program`.
     pub fn without_facts(&self, program: &Arc<Program>) -> Self {
         Self::new(self.same_as, program)
     }
@@ -129,7 +128,6 @@ impl Equality {
         self.classes.members(representative).map(|members| &**members)
     }
 
-    /// Returns the program with all constants replaced by their representatives.
     pub fn normal_program(&self, program: &Program) -> Program {
         let term = |term: Term| match term {
             Term::Constant(symbol) => Term::Constant(self.classes.find(symbol)),
@@ -153,7 +151,7 @@ fn constants(program: &Program) -> impl Iterator<Item = Symbol> {
 }
 
 impl Atom {
-    /// Replaces a comparison of names by the atom that `replacement` returns. Those inside an aggregate are replaced, too.
+    /// Replaces a comparison of names, also inside an aggregate, by the atom that `replacement` returns.
     pub fn replace_different(&mut self, replacement: &mut impl FnMut(Term, Term) -> Self) {
         match self {
             Self::Different(left, right) => *self = replacement(*left, *right),

@@ -43,7 +43,6 @@ struct Ground<'a> {
 }
 
 impl Equality {
-    /// Returns a derivation of a fact that holds.
     pub fn why(&self, engine: &Engine, fact: &Fact) -> Derivation {
         let derivation = Builder::new(engine, self).prove(fact);
         let edges = self.edges_in(engine, &derivation);
@@ -97,8 +96,7 @@ impl Equality {
         self.is_pair(fact, &engine.symbols) && fact.arguments[0] != fact.arguments[1]
     }
 
-    /// Returns the equality edges that the steps use, and transitively the edges that the derivations of
-    /// these edges use.
+    /// Returns the edges that the steps use, directly or through the derivations of other edges.
     fn edges_in(&self, engine: &Engine, steps: &[Step]) -> BTreeMap<EdgeId, &Edge> {
         let mut used_edges: BTreeMap<EdgeId, &Edge> = BTreeMap::new();
         let mut stack: Vec<EdgeId> = Vec::new();
@@ -152,7 +150,6 @@ impl Equality {
     }
 }
 
-/// Returns the reason with renumbered supports: `position` returns the new index of a fact.
 fn rebased(ground: &Ground, mut position: impl FnMut(&Fact) -> usize) -> Reason {
     let mut renumber =
         |supports: &[usize]| supports.iter().map(|&at| position(&ground.steps[at].fact)).collect::<Vec<_>>();
@@ -251,7 +248,6 @@ impl<'a> Builder<'a> {
         Reason::Equality { supports: pairs.iter().map(|pair| self.position(pair)).collect() }
     }
 
-    /// Explains a fact by the corresponding fact about other names and the equalities between the names.
     fn renamed(&mut self, fact: &Fact, other: &Fact) -> Reason {
         let mut supports = vec![self.position(other)];
         for (&name, &other) in fact.arguments.iter().zip(&other.arguments) {

@@ -1,5 +1,5 @@
-//! Incremental updates under equality (`owl:sameAs`): computes from a change of the stated facts which
-//! facts start or cease to hold, while equality classes merge and split. The store has one row for all
+//! Incremental updates under equality (`owl:sameAs`): computes the facts that start or cease to hold after a
+//! change of the stated facts. A change can merge and split equality classes. The store has one row for all
 //! facts that differ only in equal names; the row contains the representatives of the classes.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -34,7 +34,6 @@ struct Update<'e> {
     previous_facts: FxHashSet<Fact>,
     /// Whether the update reports no changes (during the first evaluation).
     silent: bool,
-    /// Derived `owl:sameAs` pairs; the classes of their names are still to be merged.
     pairs_to_join: Vec<Fact>,
     /// New rules, which the next [`Update::flush`] installs in the engine.
     program: Option<Program>,
@@ -284,8 +283,6 @@ impl<'e> Update<'e> {
         self.equality.facts_of(row, &names)
     }
 
-    /// Removes the stated facts from all rows that mention any of `names`, and returns the removed
-    /// facts.
     fn take_originals(&mut self, names: &BTreeSet<Symbol>) -> Vec<Fact> {
         let mut rows: Vec<Fact> = names.iter().flat_map(|&name| self.mentions(name)).collect();
         let pending_rows =
@@ -374,8 +371,6 @@ impl<'e> Update<'e> {
         }
     }
 
-    /// Merges the classes of derived `owl:sameAs` pairs and runs the rules again, until they derive no
-    /// further pair.
     fn join_concluded(&mut self) -> Result<(), Error> {
         loop {
             let mut connected = Forest::default();
@@ -457,8 +452,6 @@ impl<'e> Update<'e> {
         Ok(())
     }
 
-    /// Adds a change of rows to the net change of this update, and queues the new `owl:sameAs` pairs for
-    /// merging.
     fn record_change(&mut self, change: Delta) {
         for (rows, sign) in [(change.insert, 1), (change.delete, -1)] {
             for row in rows {
@@ -511,7 +504,6 @@ impl<'e> Update<'e> {
     }
 }
 
-/// Records a stated pair as an edge and merges the classes of its two names, unless they are already equal.
 fn connect_stated(classes: &mut Classes, pair: &Fact) {
     let (left, right) = (pair.arguments[0], pair.arguments[1]);
     if classes.find(left) != classes.find(right) {

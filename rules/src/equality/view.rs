@@ -88,16 +88,13 @@ impl Equality {
         facts
     }
 
-    /// Returns the arguments of the stated `owl:sameAs` pairs of a name with itself: of `name`, or of
-    /// all names if it is `None`.
     fn reflexive_pairs(&self, name: Option<Symbol>) -> impl Iterator<Item = Arguments> {
         let fits = move |at: Symbol| name.is_none_or(|name| name == at);
         let pairs = self.pairs.values().flatten().filter(|pair| pair.arguments[0] == pair.arguments[1]);
         pairs.map(|pair| pair.arguments.clone()).filter(move |pair| fits(pair[0]))
     }
 
-    /// Returns the arguments of the facts of a predicate that match a pattern. `None` in the pattern matches
-    /// every name.
+    /// `None` in the pattern matches every name.
     pub fn matching(&self, engine: &Engine, predicate: Symbol, pattern: &[Option<Symbol>]) -> Vec<Arguments> {
         let normal: SmallVec<[Option<Symbol>; 4]> =
             pattern.iter().map(|wanted| wanted.map(|name| self.classes.find(name))).collect();
@@ -120,7 +117,6 @@ impl Equality {
         results
     }
 
-    /// Returns the `owl:sameAs` rows that relate a literal to a different symbol.
     pub fn clashes(&self, engine: &Engine) -> Vec<Fact> {
         let rows = engine.matching_rows(self.same_as, &[None, None]);
         let clashes = rows.filter(|row| engine.symbols.differ(row[0], row[1]));

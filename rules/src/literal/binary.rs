@@ -19,7 +19,6 @@ pub(super) fn hexadecimal(bytes: &[u8]) -> String {
 
 const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
-/// Decodes groups of four base64 digits. White space is ignored. Returns `None` for invalid text.
 pub(super) fn parse_base64(text: &str) -> Option<Box<[u8]>> {
     let digits: Vec<u8> = text.bytes().filter(|byte| !byte.is_ascii_whitespace()).collect();
     let padding = digits.iter().rev().take_while(|&&byte| byte == b'=').count();

@@ -6,8 +6,6 @@ pub(super) const OWL_REAL: &str = "http://www.w3.org/2002/07/owl#real";
 pub(super) const OWL_RATIONAL: &str = "http://www.w3.org/2002/07/owl#rational";
 pub(super) const RDF: &str = "http://www.w3.org/1999/02/22-rdf-syntax-ns#";
 
-/// Returns `true` if an IRI is in the namespace of XSD, or denotes `rdfs:Literal`, `rdf:PlainLiteral`,
-/// `rdf:langString`, `owl:real` or `owl:rational`.
 pub(crate) fn is_datatype(iri: &str) -> bool {
     let rdf = |iri: &str| {
         iri.strip_prefix(RDF).is_some_and(|local| ["PlainLiteral", "langString"].contains(&local))

@@ -1,10 +1,10 @@
 //! `xsd:dateTime`, `xsd:date`, `xsd:time` and `xsd:duration` as numbers of seconds and months, partially
 //! ordered.
 //!
-//! A moment is a number of seconds since 1970-01-01T00:00:00 in the proleptic Gregorian calendar,
-//! converted to UTC if it has a time zone. A moment without a time zone is comparable with a moment that
-//! has a time zone only if every possible time zone gives the same order. The order treats one instant
-//! in two time zones as equal, but `==` distinguishes the two.
+//! A moment is a number of seconds since 1970-01-01T00:00:00 in the proleptic Gregorian calendar, converted
+//! to UTC if it has a time zone. Moments with and without a time zone are comparable only if every possible
+//! time zone gives the same order. The order treats one instant in two time zones as equal, but `==`
+//! distinguishes the two.
 
 use std::cmp::Ordering;
 use std::fmt;
@@ -47,8 +47,6 @@ pub struct Duration {
 }
 
 impl Moment {
-    /// Parses the lexical form of `dateTime`, `dateTimeStamp`, `date` or `time`; `local` is the name of
-    /// the datatype. Returns `None` if the form is invalid.
     pub(super) fn parse(lexical: &str, local: &str) -> Option<Self> {
         let (body, zone) = split_zone(lexical)?;
         let (kind, days, time) = match local {
@@ -140,7 +138,6 @@ impl Moment {
         Some(Duration { months: if negative { -months } else { months }, seconds: Decimal::from(0) })
     }
 
-    /// Returns year, month and day, and hours, minutes and seconds, in local time.
     pub(crate) fn calendar(&self) -> ([i64; 3], (i64, i64, Decimal)) {
         let (day, clock) = split_day(&self.local());
         let (year, month, date) = civil_from_days(day);
@@ -158,7 +155,6 @@ impl Moment {
         Self { kind: MomentKind::DateTime, ..self.clone() }
     }
 
-    /// Returns the time zone as text, for example `+02:00`; empty without a time zone.
     pub(crate) fn zone_text(&self) -> String {
         self.zone.map(zone_text).unwrap_or_default()
     }
@@ -379,7 +375,6 @@ pub(super) fn split_zone(lexical: &str) -> Option<(&str, Option<i64>)> {
     (seconds <= ZONE_LIMIT).then_some((body, Some(sign * seconds)))
 }
 
-/// Returns `true` for digits, optionally with a point and more digits.
 fn is_plain_decimal(text: &str) -> bool {
     let (whole, fraction) = text.split_once('.').unwrap_or((text, "0"));
     let is_number = |part: &str| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit());

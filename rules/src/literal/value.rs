@@ -145,7 +145,6 @@ impl Literal {
         }
     }
 
-    /// Returns approximately the number of bytes that a value needs in addition to its fixed size.
     pub(crate) fn size(&self) -> u64 {
         let size = match self {
             Self::String(text) | Self::Uri(text) | Self::Language { text, .. } | Self::Recurring(text, _) => {
@@ -159,10 +158,11 @@ impl Literal {
         size as u64
     }
 
-    /// Compares two values, with numeric promotion. Returns `None` if they are incomparable: values of
-    /// different kinds, NaN, ill-typed literals, different values of a kind without an order (such as binary
-    /// data or tagged strings), durations whose months and seconds are in opposite orders, or moments with
-    /// and without a time zone whose order depends on the time zone.
+    /// Compares two values, with numeric promotion. Returns `None` if they are incomparable:
+    /// - values of different kinds, NaN and ill-typed literals;
+    /// - different values of a kind without an order, such as binary data or tagged strings;
+    /// - durations whose months and seconds are in opposite orders;
+    /// - moments with and without a time zone whose order depends on the time zone.
     pub fn compare(&self, other: &Self) -> Option<Ordering> {
         match (self, other) {
             (Self::Decimal(a), Self::Decimal(b)) => Some(a.cmp(b)),

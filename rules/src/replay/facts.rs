@@ -40,8 +40,6 @@ impl Facts {
         self.members.contains(fact)
     }
 
-    /// Returns the facts of a relation that have a given symbol at a given argument position; without `place`, all
-    /// facts of the relation.
     pub fn rows(&self, relation: Relation, place: Option<(usize, Symbol)>) -> Vec<&Fact> {
         let Some(rows) = self.by_relation.get(&relation) else { return Vec::new() };
         match place {

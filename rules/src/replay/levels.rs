@@ -1,6 +1,6 @@
-//! Stratification check: relations have levels such that the heads of a rule are not below its positive
-//! atoms, and are above its negated and aggregated atoms. Levels are raised to a fixpoint. If a level
-//! exceeds the number of relations, the rules are not stratified.
+//! Stratification check: relations have levels. The heads of a rule are not below its positive atoms, and are
+//! above its negated and aggregated atoms. Levels are raised to a fixpoint. If a level exceeds the number of
+//! relations, the rules are not stratified.
 
 use rustc_hash::FxHashMap;
 
@@ -10,8 +10,8 @@ use crate::symbol::Symbol;
 
 type Relation = (Symbol, usize);
 
-/// Head relations and body relations of a rule. The number of a body relation states by how many levels the heads
-/// must at least exceed it: by 1 if the atom is negated or aggregated, otherwise by 0.
+/// Head relations and body relations of a rule. The number of a body relation is the least difference between
+/// its level and the level of the heads: 1 if the atom is negated or aggregated, otherwise 0.
 struct Uses {
     heads: Vec<Relation>,
     body: Vec<(Relation, usize)>,

@@ -14,7 +14,6 @@ use crate::rule::{Aggregate, Atom, Rule, Term, Variable};
 use crate::source::Source;
 use crate::symbol::{Symbol, Symbols};
 
-/// Maximum number of matches that are enumerated for one body.
 const MATCH_LIMIT: usize = 1 << 21;
 
 /// Values of the variables of a rule; `None` for an unbound variable.
@@ -37,12 +36,10 @@ pub(super) struct Matcher<'m> {
     /// Facts in which the first name of each individual replaces its other names.
     pub facts: &'m Facts,
     pub names: &'m Names,
-    /// Whether the program has equality, so that different names may denote one individual.
     pub equality: bool,
     /// Whether a rule required two names to differ although names may be equal. The given facts alone
     /// then do not determine the result.
     pub compares_names: bool,
-    /// Whether an enumeration was stopped at [`MATCH_LIMIT`] matches.
     pub too_many: bool,
 }
 
@@ -119,8 +116,6 @@ impl Matcher<'_> {
         (Some(position), rows.into_iter().filter_map(|row| self.agree(arguments, row, &values)).collect())
     }
 
-    /// Unifies the terms of a relation atom with a row. Returns the extended values, or `None` if a
-    /// bound term differs from the row.
     fn agree(&self, terms: &[Term], row: &Fact, values: &Values) -> Option<Values> {
         let mut extended = values.clone();
         for (term, symbol) in terms.iter().zip(&row.arguments) {
@@ -133,8 +128,6 @@ impl Matcher<'_> {
         Some(extended)
     }
 
-    /// Returns the extensions of `values` by all values that a built-in admits for its unbound
-    /// arguments.
     fn solve(&mut self, built_in: BuiltIn, arguments: &[Term], values: &Values) -> Vec<Values> {
         let literal = |term: &Term| match value(*term, values) {
             Some(symbol) => self.symbols.value(symbol).as_literal().map(Some),
@@ -251,7 +244,6 @@ fn column(aggregate: Aggregate) -> Aggregate {
     aggregate.map(&|_| Term::Variable(Variable(0)))
 }
 
-/// Returns `true` if an atom that is not a relation atom can be evaluated.
 fn is_ready(body: &[Atom], position: usize, values: &Values) -> bool {
     let is_bound = |term: &Term| value(*term, values).is_some();
     match &body[position] {

@@ -1,18 +1,19 @@
 //! Independent checker of derivations: checks each step by itself, and completeness by plain joins, without
 //! the engine.
 //!
-//! The facts that hold are the perfect model of a stratified program \[1\]. It is the only set of facts that
-//! is *founded* (each fact is stated, or derived by a rule from earlier facts while the negated atoms of the
-//! rule are not in the set) and *closed* (it contains all stated facts, and all facts that rules derive from
-//! the set), because a stratified program has exactly one stable model \[2\]. Therefore [`replay`] checks
-//! three properties: the rules are stratified, every step is founded, and no fact is missing. The last check
-//! is essential, since a rule may negate a missing fact. Contradictory facts are rejected, too.
+//! The facts that hold are the perfect model of a stratified program \[1\]. This model is the only set of
+//! facts that is *founded* and *closed*, because a stratified program has exactly one stable model \[2\]. A
+//! set is founded if each fact is stated, or derived by a rule from earlier facts while the negated atoms of
+//! the rule are not in the set. It is closed if it contains all stated facts, and all facts that rules derive
+//! from it. Therefore [`replay`] checks three properties: the rules are stratified, every step is founded,
+//! and no fact is missing. The last check is essential, since a rule may negate a missing fact. Contradictory
+//! facts are rejected, too.
 //!
 //! With equality, facts are compared by the first name of each class of equal names. A step may use only
 //! equalities of earlier steps.
 //!
-//! The checker uses nothing of the engine's store, plans, strata or records. It uses only the rules as
-//! data, and the evaluation of single built-ins and aggregates.
+//! The checker uses nothing of the engine's store, plans, strata or records. It uses only the rules as data,
+//! and the evaluation of single built-ins and aggregates.
 //!
 //! \[1\] Przymusinski, "On the declarative semantics of deductive databases and logic programs", 1988.
 //! \[2\] Gelfond, Lifschitz, "The stable model semantics for logic programming", ICLP 1988.
@@ -173,8 +174,7 @@ impl Replayer<'_> {
         Ok(())
     }
 
-    /// Checks that a rule derives the step at `position` from earlier steps. The error is the reason why
-    /// not.
+    /// Checks that a rule derives the step at `position` from earlier steps.
     fn follows(
         &mut self,
         rule: &Rule,

@@ -18,7 +18,6 @@ impl Names {
         name
     }
 
-    /// Merges the classes of two names. Returns `false` if the names were already in one class.
     pub fn join(&mut self, left: Symbol, right: Symbol) -> bool {
         let (left, right) = (self.find(left), self.find(right));
         if left != right {

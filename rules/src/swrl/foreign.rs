@@ -25,14 +25,12 @@ impl ForeignAtom {
         is_foreign.then(|| Self { name: name.to_owned(), count: arguments.len(), place })
     }
 
-    /// Converts the atom to error R104: a relation that is neither a class, a property, nor derived.
     pub fn error(self, file: &str) -> Error {
         let Self { name, count, place: (line, column) } = self;
         Error::UnknownRelation { file: file.to_owned(), line, column, name, count }
     }
 }
 
-/// Returns an error for each of the foreign atoms whose relation is used in a rule body and derived by no rule.
 pub(super) fn unknown(atoms: Vec<(&str, ForeignAtom)>, program: &Program, symbols: &Symbols) -> Vec<Error> {
     let (queried, derived) = (program.queried(symbols), program.concluded(symbols));
     let is_unknown = |(_, atom): &(&str, ForeignAtom)| {

@@ -298,7 +298,6 @@ impl Parser<'_> {
         })
     }
 
-    /// Inserts the names of the variables into the expression of `swrlm:eval`, which is the second argument.
     fn name_expression(&mut self, built_in: BuiltIn, arguments: &mut [Term]) {
         let [_, Term::Constant(text), values @ ..] = arguments else { return };
         let Some(Literal::String(expression)) = self.symbols.value(*text).as_literal() else { return };

@@ -62,7 +62,6 @@ fn is_pair(fact: &Fact, same_as: Symbol, symbols: &Symbols) -> bool {
     fact.predicate == same_as && fact.arguments.iter().all(is_name)
 }
 
-/// Maps each name with equal names to the first name of its class.
 pub fn representatives(symbols: &Symbols, facts: &BTreeSet<Fact>) -> BTreeMap<Symbol, Symbol> {
     let classes = classes(symbols, facts);
     let first = |class: &BTreeSet<Symbol>| *class.first().expect("a name");

@@ -25,8 +25,8 @@ const DIFFERENCE: u8 = 4;
 const DIFFERENT_FROM: &str = "http://www.w3.org/2002/07/owl#differentFrom";
 const VARIABLES: u8 = 4;
 const CONSTANTS: u8 = 4;
-/// Numbers of the predicates that changes use ([`CONCLUDED`]: that heads use); frequent ones occur several
-/// times. There are only few predicates, so that different conclusions interact.
+/// Numbers of the predicates in changes. Frequent predicates occur several times. There are only few
+/// predicates, so that different conclusions interact. [`CONCLUDED`] contains the predicates in heads.
 const CHANGED: [u8; 16] = [0, 0, 0, 0, 1, 1, 1, 1, 0, 1, 2, 3, 3, 4, 6, 7];
 const CONCLUDED: [u8; 9] = [0, 1, 2, 3, 3, 4, 4, 6, 7];
 

@@ -8,8 +8,6 @@
 /// parser.
 const MAX_DEPTH: usize = 200;
 
-/// Returns the value of an expression under an assignment of its variables; `None` if the expression is
-/// invalid or nested too deeply.
 pub(super) fn value(text: &str, variables: &[(&str, f64)]) -> Option<f64> {
     let mut parser = Parser { rest: text, variables, depth: 0 };
     let value = parser.sum()?;

@@ -17,7 +17,6 @@ use num_traits::ToPrimitive;
 use crate::builtin::custom::Definition;
 use crate::literal::{Decimal, Duration, Literal, Moment, MomentKind, XSD};
 
-/// Units of time, from coarse to fine.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Granularity {
     Years,
@@ -111,8 +110,7 @@ fn comparable(moments: &[Moment]) -> bool {
     moments.windows(2).all(|pair| pair[0].zone_text().is_empty() == pair[1].zone_text().is_empty())
 }
 
-/// Returns the absolute number of granules between two moments. The arguments are two moments and a
-/// granularity. Returns `None` for other arguments and for incomparable moments.
+/// `arguments` are two moments and a granularity. Returns `None` for incomparable moments.
 fn difference(arguments: &[&Literal]) -> Option<i64> {
     let [from, to, granularity] = arguments else { return None };
     let (granularity, moments) = (Granularity::from_literal(granularity)?, [moment(from)?, moment(to)?]);
