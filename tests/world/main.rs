@@ -45,13 +45,13 @@ use schedule::{Faults, Schedule};
 /// Designs in order of decreasing cost, each with the components that it requires.
 pub const DESIGNS: [(&str, &[&str]); 3] = [("fd_a", &["c_a"]), ("fd_b", &["c_b"]), ("fd_c", &["c_a", "c_b"])];
 
-pub const COMPONENTS: [&str; 2] = ["c_a", "c_b"];
+const COMPONENTS: [&str; 2] = ["c_a", "c_b"];
 
-pub const START: &str = "p0";
+const START: &str = "p0";
 
-pub const GOAL: &str = "p2";
+const GOAL: &str = "p2";
 
-pub const FUNCTION: &str = "f_drive";
+const FUNCTION: &str = "f_drive";
 
 const DOMAIN: &str = "(define (domain m) (:requirements :typing :fluents :durative-actions)
   (:types place)
