@@ -102,7 +102,7 @@ impl<N: TaskNumber> Search<N> {
         let has_landmarks = segment.is_none() && !context.status.is_empty();
         let estimates = if has_landmarks { 2 } else { 1 };
         let targets = match &segment {
-            None => vec![context.relaxation.goal],
+            None => context.relaxation.goals.clone(),
             Some(goal) => goal.facts.iter().map(|fact| context.relaxation.fact(*fact)).collect(),
         };
         let useful = prices.iter().filter(|price| **price < USELESS_OPERATOR_COST);
