@@ -22,6 +22,7 @@ impl Lists {
     }
 
     /// Returns the list at an index.
+    #[inline]
     pub fn of(&self, index: u32) -> &[u32] {
         let index = index as usize;
         let start = index.checked_sub(1).map_or(0, |before| self.ends[before]);

@@ -41,6 +41,9 @@ const NEAR_BOOST: i32 = 1;
 /// Numerator and denominator of a ratio. If the cost of a plan divided by the lower bound exceeds this ratio,
 /// a better plan is probably easier to find than a proof.
 const NEAR_OPTIMAL_RATIO: (Int, Int) = (3, 2);
+/// Number of rounds for which the lower bound is extrapolated, from the same number of rounds before. If the bound
+/// will not reach the cost of the plan, a better plan is probably easier to find than a proof.
+const FORECAST_ROUNDS: usize = 3;
 
 struct Portfolio<'r, 'a> {
     run: Run<'a>,
@@ -51,6 +54,11 @@ struct Portfolio<'r, 'a> {
     prover: Option<Prover>,
     best: Option<GroundPlan>,
     lower: Int,
+    /// Lowest positive operator cost. If the plan costs only this much more than the lower bound, few better plans can
+    /// exist, so that a proof is the likely next result.
+    least_cost: Int,
+    /// Lower bound at the beginning of each round.
+    bounds_by_round: Vec<Int>,
     reason: Proof,
     /// Number of times that the budget of formulas is halved, at most [`MAX_BACKOFF`].
     share: u32,
@@ -84,6 +92,8 @@ pub(super) fn solve(run: Run<'_>, bounds: &Bounds, lower: Int) -> Solution {
     let exact =
         space.map(|space| InterleavedSearch::new(space, &context.task.initial).continue_without_forecast());
     let is_sat = run.config.engine != Engine::Search;
+    let costs = context.task.operators.iter().map(|operator| operator.cost.minimum());
+    let least_cost = costs.filter(|cost| *cost > 0).min().unwrap_or(0);
     let mut portfolio = Portfolio {
         first: is_sat.then(|| HorizonSchedule::new(&run)),
         prover: is_sat.then(Prover::default),
@@ -93,6 +103,8 @@ pub(super) fn solve(run: Run<'_>, bounds: &Bounds, lower: Int) -> Solution {
         satisficer: None,
         best: None,
         lower,
+        least_cost,
+        bounds_by_round: Vec::new(),
         reason: Proof::Bound,
         share: MAX_BACKOFF,
         satisficer_share: 0,
@@ -118,6 +130,7 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
             // The work doubles in each round, up to a factor of 2^20.
             let work = unit.saturating_mul(1_usize.checked_shl(round.min(20)).unwrap_or(1));
             stored = stored.saturating_add(work);
+            self.bounds_by_round.push(self.lower);
             let turns: [fn(&mut Self, usize, usize) -> Turn; 4] = [
                 Self::satisfice,
                 Self::improve_best_plan,
@@ -220,6 +233,8 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
     fn is_near(&self) -> bool {
         self.best.as_ref().is_some_and(|plan| {
             plan.cost.saturating_mul(NEAR_OPTIMAL_RATIO.1) <= self.lower.saturating_mul(NEAR_OPTIMAL_RATIO.0)
+                && (plan.cost.saturating_sub(self.lower) <= self.least_cost
+                    || bound_reaches(&self.bounds_by_round, self.lower, plan.cost))
         })
     }
 
@@ -242,6 +257,10 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         let mut is_better = false;
         while let Ok(Some(better)) = satisficer.improve(&plan, &mut nodes) {
             (plan, is_better) = (better, true);
+            self.run.statistics.found_by = Some(PlannerPart::Satisficing);
+            let horizon = plan.steps.len();
+            let better = Best { plan: plan.clone(), lower: self.lower };
+            self.run.announce(&better, horizon);
         }
         satisficer.figures.add_to(before, &mut self.run.statistics);
         record(&span, &self.run.statistics);
@@ -250,7 +269,8 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
             return None;
         }
         self.improvement_share = most;
-        self.improve(plan, PlannerPart::Satisficing)
+        self.best = Some(plan);
+        self.meets()
     }
 
     fn sat_turn(&mut self, work: usize, _: usize) -> Turn {
@@ -359,6 +379,35 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
     }
 }
 
+/// Returns `true` if the lower bound `lower` will reach `cost` within [`FORECAST_ROUNDS`] rounds, provided that it
+/// rises as much as in the same number of rounds before. Also returns `true` if there were fewer rounds.
+/// `bounds_by_round` are the bounds at the beginnings of the rounds, including the current one.
+fn bound_reaches(bounds_by_round: &[Int], lower: Int, cost: Int) -> bool {
+    let earlier = bounds_by_round.iter().rev().nth(FORECAST_ROUNDS);
+    earlier.is_none_or(|earlier| lower.saturating_add(lower.saturating_sub(*earlier)) >= cost)
+}
+
 fn record(span: &Span, statistics: &Statistics) {
     span.record("expanded", statistics.expanded).record("generated", statistics.generated);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_proof_is_within_reach_if_the_bound_rises_enough() {
+        let check = |bounds: &[Int], lower, cost, expected| {
+            assert_eq!(bound_reaches(bounds, lower, cost), expected, "{bounds:?} {lower} {cost}");
+        };
+        // No forecast after fewer rounds.
+        check(&[], 1, 100, true);
+        check(&[1, 1, 1], 1, 100, true);
+        check(&[10, 12, 14, 16], 16, 22, true);
+        check(&[10, 12, 14, 16], 16, 23, false);
+        check(&[0, 10, 12, 14, 16], 18, 26, true);
+        check(&[0, 10, 12, 14, 16], 18, 27, false);
+        check(&[20, 20, 20, 20], 20, 21, false);
+        check(&[20, 20, 20, 20], 20, 20, true);
+    }
 }

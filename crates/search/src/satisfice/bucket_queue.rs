@@ -7,6 +7,8 @@ const BUCKET_COUNT: usize = 1 << 16;
 #[derive(Debug, Default)]
 pub struct Queue {
     buckets: Vec<Vec<u32>>,
+    /// Number of buckets that may contain items: all later buckets are empty.
+    end: usize,
     at: usize,
     /// Number of items of the cheapest bucket that [`Queue::pop_first`] has already returned.
     taken: usize,
@@ -16,9 +18,10 @@ pub struct Queue {
 
 impl Queue {
     pub fn clear(&mut self) {
-        for bucket in &mut self.buckets {
+        for bucket in self.buckets.iter_mut().take(self.end) {
             bucket.clear();
         }
+        self.end = 0;
         self.dear.clear();
         (self.at, self.taken, self.count) = (0, 0, 0);
     }
@@ -33,6 +36,7 @@ impl Queue {
             self.buckets.resize_with(place.saturating_add(1), Vec::new);
         }
         self.buckets[place].push(item);
+        self.end = self.end.max(place.saturating_add(1));
         self.count = self.count.saturating_add(1);
     }
 

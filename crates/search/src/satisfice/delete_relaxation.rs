@@ -1,7 +1,7 @@
 //! Delete relaxation of a ground task as an AND/OR graph: nodes with conditions and effects over
 //! propositions.
 //!
-//! Propositions are facts, disjunctions and numeric comparisons. A node is the goal, an operator, a
+//! Propositions are facts, disjunctions and numeric comparisons. A node is an operator, a
 //! conditional effect, a rule of a derived variable, or one disjunct of a disjunction. Conditions that
 //! require a derived variable to be false are assumed to hold. For each numeric comparison separately, the
 //! most favourable designs are assumed. The number of repetitions of an operator until a comparison holds is
@@ -20,7 +20,7 @@ use task::task::number::{TaskNumber, sum_of_products};
 use task::task::quantity::{Linear, NumericId, Quantity};
 use task::task::{Condition, Fact, Literal, Operator, OperatorId, State, Task, VariableId};
 
-/// Index of a proposition: a fact, a disjunction, a numeric comparison, or the artificial goal.
+/// Index of a proposition: a fact, a disjunction, or a numeric comparison.
 pub(super) type Proposition = u32;
 
 pub(super) const NO_OPERATOR: u32 = u32::MAX;
@@ -71,7 +71,6 @@ pub(super) struct Relaxation<N> {
     pub(super) waiting: Lists,
     /// `true` for the unconditional part of an operator.
     pub(super) is_base: Vec<bool>,
-    pub(super) goal: Proposition,
     pub(super) goals: Vec<Proposition>,
 }
 
@@ -99,8 +98,7 @@ impl<N: TaskNumber> Relaxation<N> {
 }
 
 impl<N: TaskNumber> Relaxation<N> {
-    /// Returns `false` for disjunctions and the artificial goal, and if the value of a comparison
-    /// overflows.
+    /// Returns `false` for disjunctions, and if the value of a comparison overflows.
     pub(super) fn holds(&self, proposition: Proposition, state: &State<N>) -> bool {
         if let Some(fact) = self.fact_of(proposition) {
             return fact.holds(&state.values);
@@ -172,8 +170,6 @@ impl<'a, N: TaskNumber> Builder<'a, N> {
             }
         }
         let goals = self.condition(&task.goal);
-        let goal = self.fresh();
-        self.node(NO_OPERATOR, false, &goals, &[goal]);
         for item in limits.watch(task.operators.iter().zip(OperatorId::all(task.operators.len()))) {
             let (operator, id) = item?;
             let conditions = self.condition(&operator.condition);
@@ -207,7 +203,6 @@ impl<'a, N: TaskNumber> Builder<'a, N> {
             supports,
             waiting,
             is_base: self.is_base,
-            goal,
             goals,
         })
     }

@@ -26,14 +26,23 @@ struct Supporter {
     times: u32,
 }
 
+/// Progress of a node of the delete relaxation during an evaluation.
+#[derive(Debug, Clone, Copy)]
+struct NodeProgress {
+    /// Number of unreached conditions.
+    left: u32,
+    /// Sum of the costs of the reached conditions.
+    sum: u32,
+}
+
 pub(super) struct FfHeuristic {
     costs: Vec<u32>,
     supporters: Vec<Supporter>,
-    /// For each node: the number of its unreached conditions.
-    left: Vec<u32>,
-    /// For each node: the sum of the costs of its reached conditions.
-    sums: Vec<u32>,
-    initially_left: Vec<u32>,
+    progress: Vec<NodeProgress>,
+    /// Values of `progress` before any condition is reached.
+    initial_progress: Vec<NodeProgress>,
+    /// Nodes without conditions.
+    unconditional: Vec<u32>,
     queue: Queue,
     values: Vec<f64>,
     numbers: Vec<f64>,
@@ -50,14 +59,17 @@ pub(super) struct FfHeuristic {
 
 impl FfHeuristic {
     pub(super) fn new<N: TaskNumber>(relaxation: &Relaxation<N>, operators: usize) -> Self {
-        let nodes = relaxation.operators.len();
         let lengths = relaxation.conditions.iter().map(<[Proposition]>::len);
+        let initial_progress: Vec<NodeProgress> =
+            lengths.map(|length| NodeProgress { left: task::number::dense(length), sum: 0 }).collect();
+        let nodes = (0..).zip(&initial_progress);
+        let unconditional = nodes.filter(|(_, progress)| progress.left == 0).map(|(node, _)| node).collect();
         Self {
             costs: vec![UNREACHED; relaxation.propositions],
             supporters: vec![Supporter { node: NO_OPERATOR, times: 0 }; relaxation.propositions],
-            left: vec![0; nodes],
-            sums: vec![0; nodes],
-            initially_left: lengths.map(task::number::dense).collect(),
+            progress: initial_progress.clone(),
+            initial_progress,
+            unconditional,
             queue: Queue::default(),
             values: vec![0.0; relaxation.directions.len()],
             numbers: Vec::new(),
@@ -97,8 +109,7 @@ impl FfHeuristic {
         targets: &[Proposition],
     ) {
         self.costs.fill(UNREACHED);
-        self.sums.fill(0);
-        self.left.copy_from_slice(&self.initially_left);
+        self.progress.copy_from_slice(&self.initial_progress);
         self.queue.clear();
         self.applicable.clear();
         let no_supporter = Supporter { node: NO_OPERATOR, times: 0 };
@@ -121,10 +132,8 @@ impl FfHeuristic {
             let index: usize = index;
             self.values[index] = value.map_or(0.0, |value| value.approximate());
         }
-        for node in 0..task::number::dense(self.left.len()) {
-            if self.left[node as usize] == 0 {
-                self.reached(relaxation, prices, node);
-            }
+        for position in 0..self.unconditional.len() {
+            self.reached(relaxation, prices, self.unconditional[position], 0);
         }
         let mut missing = targets;
         while let Some((cost, proposition)) = self.queue.pop() {
@@ -144,12 +153,12 @@ impl FfHeuristic {
                 }
             }
             for node in relaxation.waiting.of(proposition) {
-                let unreached = &mut self.left[*node as usize];
-                *unreached = unreached.saturating_sub(1);
-                let sum = &mut self.sums[*node as usize];
+                let NodeProgress { left, sum } = &mut self.progress[*node as usize];
+                *left = left.saturating_sub(1);
                 *sum = sum.saturating_add(cost).min(MAX_COST);
-                if *unreached == 0 {
-                    self.reached(relaxation, prices, *node);
+                if *left == 0 {
+                    let sum = *sum;
+                    self.reached(relaxation, prices, *node, sum);
                 }
             }
         }
@@ -165,10 +174,10 @@ impl FfHeuristic {
     }
 
     /// Processes a node when its last condition is reached: lowers the costs of its effects and of the
-    /// numeric comparisons that it can achieve. If the node is the unconditional part of an operator and all
-    /// conditions cost 0, the operator is added to `applicable`.
-    fn reached<N: TaskNumber>(&mut self, relaxation: &Relaxation<N>, prices: &[u32], node: u32) {
-        let sum = self.sums[node as usize];
+    /// numeric comparisons that it can achieve. `sum` is the sum of the costs of its conditions. If the node
+    /// is the unconditional part of an operator and all conditions cost 0, the operator is added to
+    /// `applicable`.
+    fn reached<N: TaskNumber>(&mut self, relaxation: &Relaxation<N>, prices: &[u32], node: u32, sum: u32) {
         let operator = relaxation.operators[node as usize];
         if sum == 0 && relaxation.is_base[node as usize] {
             self.applicable.push(operator);
@@ -177,6 +186,9 @@ impl FfHeuristic {
         let cost = sum.saturating_add(price).min(MAX_COST);
         for effect in relaxation.effects.of(node) {
             self.put(*effect, cost, Supporter { node, times: 1 });
+        }
+        if relaxation.directions.is_empty() {
+            return;
         }
         for support in &relaxation.supports[node as usize] {
             let direction = &relaxation.directions[support.direction as usize];
@@ -235,11 +247,11 @@ impl FfHeuristic {
                 if !self.in_plan[operator as usize] {
                     self.in_plan[operator as usize] = true;
                     self.planned.push(operator);
-                    if self.sums[node as usize] == 0 {
+                    if self.progress[node as usize].sum == 0 {
                         self.preferred.push(operator);
                     }
                 }
-                if times > 1 && self.sums[node as usize] == 0 {
+                if times > 1 && self.progress[node as usize].sum == 0 {
                     self.repeated.push((operator, times));
                 }
             }

@@ -3,7 +3,8 @@
 //!
 //! `delete_relaxation` builds the delete relaxation, `ff_heuristic` computes relaxed plans, `landmarks` finds
 //! landmarks, and `landmark_status` tracks which landmarks a path has reached. `search` implements the search
-//! with an `alternating_open_list` over the states in a `store`. `plan_improvement` makes a plan cheaper.
+//! with an `alternating_open_list` over the states in a `store`. `novelty` prefers states with new facts.
+//! `plan_improvement` makes a plan cheaper.
 //!
 //! The heuristic guides the search, but proves no plan optimal. Unsolvability is reported only if a search
 //! has visited all reachable states except those behind proved dead ends.
@@ -17,6 +18,7 @@ mod delete_relaxation;
 mod ff_heuristic;
 mod landmark_status;
 mod landmarks;
+mod novelty;
 mod plan_improvement;
 mod search;
 mod search_context;
