@@ -44,7 +44,8 @@ let memoized world =
       | None -> let result = f atom in Hashtbl.replace table atom result; result in
   { C.holds_in = once world.C.holds_in; C.value_in = once world.C.value_in }
 
-let search max_states (problem : R.problem) =
+(* With or without steps of duration 0, see [step] in Lifted.v. *)
+let search allow_zero max_states (problem : R.problem) =
   let pddl = problem.task in
   let steps = List.concat (List.mapi (fun i action ->
       List.map (fun env -> R.nat i, action, env) (C.instances pddl (fun _ -> false) action.C.parameters [])) pddl.C.actions) in
@@ -62,11 +63,11 @@ let search max_states (problem : R.problem) =
     else if Hashtbl.length visited > max_states then Too_large
     else
       let world, plan = Queue.pop queue in
-      if C.execute pddl true world R.zero [] <> None then Plan (List.rev plan)
+      if C.execute pddl allow_zero world R.zero [] <> None then Plan (List.rev plan)
       else begin
         let world = C.derived_world pddl world in
         List.iter (fun (i, action, env) ->
-          match C.step pddl true world action env with
+          match C.step pddl allow_zero world action env with
           | Some (next, _) -> add next ((i, env) :: plan)
           | None -> ()) steps;
         visit ()

@@ -134,7 +134,7 @@ let solvable_problems (problem : R.problem) =
       { pddl with C.initial_values = C.add_atom f (R.decimal "1000") pddl.C.initial_values }) (C.all_entries pddl.C.initial_values) in
   let easier_goals = List.map (fun (p, terms) -> { pddl with C.goal_formula = C.Atom (p, terms) }) goal_atoms in
   let candidates = { pddl with C.actions = pddl.C.actions @ [shortcut] } :: changed_actions @ more_atoms @ greater_numbers @ easier_goals in
-  List.filter (fun task -> match Exhaustive.search 2000 { problem with task } with
+  List.filter (fun task -> match Exhaustive.search true 2000 { problem with task } with
       | Exhaustive.Plan _ -> true
       | Exhaustive.No_plan | Exhaustive.Too_large -> false) candidates
 
