@@ -196,7 +196,40 @@ Definition covered (mono : bool) (bs : list key) (s : state) (p : Z) : bool :=
   existsb (potential_prunes s p) (potentials A) || existsb (need_prunes s) (needs A)
   || existsb (fun i => match M.find i (labels A) with Some l => label_covers mono bs s p l | None => false end) (oracle s).
 
-Definition check_label (mono : bool) (bs : list key) (ops : list (operator * list choice)) (l : label) : bool :=
+(* Operators with their choices, by the rarest fact of their conditions: of all operators, a state
+   needs only those without facts, and those whose fact it has. The second part maps variables to maps
+   from values. *)
+Definition front := (operator * list choice)%type.
+Definition fronts_by_fact := M.t (M.t (list front)).
+Definition slot (x : Z) : positive := Z.to_pos (x + 1).   (* equal slots of different values cost time only *)
+Definition row {X} (m : M.t (M.t X)) (v : key) : M.t X := match M.find v m with Some r => r | None => M.empty _ end.
+Definition with_fact (m : fronts_by_fact) (f : fact) : list front :=
+  match M.find (slot (snd f)) (row m (fst f)) with Some l => l | None => [] end.
+Definition add_front (f : fact) (p : front) (m : fronts_by_fact) : fronts_by_fact :=
+  M.add (fst f) (M.add (slot (snd f)) (p :: with_fact m f) (row m (fst f))) m.
+Definition frequency (m : M.t (M.t Z)) (f : fact) : Z := get (row m (fst f)) (slot (snd f)).
+Definition frequencies (fs : list fact) : M.t (M.t Z) :=
+  fold_left (fun m f => M.add (fst f) (M.add (slot (snd f)) (frequency m f + 1) (row m (fst f))) m) fs (M.empty _).
+Fixpoint rarest (m : M.t (M.t Z)) (fs : list fact) : option fact :=
+  match fs with
+  | [] => None
+  | f :: r => match rarest m r with
+              | Some g => if frequency m f <? frequency m g then Some f else Some g
+              | None => Some f end
+  end.
+Fixpoint index_fronts (m : M.t (M.t Z)) (ps : list front) : list front * fronts_by_fact :=
+  match ps with
+  | [] => ([], M.empty _)
+  | p :: r => let '(others, by_fact) := index_fronts m r in
+              match rarest m (facts (precondition (fst p))) with
+              | None => (p :: others, by_fact)
+              | Some f => (others, add_front f p by_fact)
+              end
+  end.
+Definition applicable (others : list front) (by_fact : list (key * M.t (list front))) (s : state) : list front :=
+  others ++ flat_map (fun vm => match M.find (slot (var_value s (fst vm))) (snd vm) with Some l => l | None => [] end) by_fact.
+
+Definition check_label (mono : bool) (bs : list key) (ops : state -> list front) (l : label) : bool :=
   let s := derive T (label_state l) in
   negb (holds (goal T) s [] [] && match claim with Some c => path_cost l <? c | None => true end) &&
   forallb (fun p => let o := fst p in
@@ -204,7 +237,7 @@ Definition check_label (mono : bool) (bs : list key) (ops : list (operator * lis
         forallb (fun ch => if holds (precondition o) s (slot_sizes o) ch
                            then covered mono bs (apply o s ch) (path_cost l + amount (cost o) (slot_sizes o) ch)
                            else true) (snd p)
-      else true) ops.
+      else true) (ops s).
 
 Definition in_range (v : key) (x : Z) : bool := (0 <=? x) && (x <? get (domain_size T) v).
 Definition is_well_formed (f : fact) : bool := is_basic (fst f) && in_range (fst f) (snd f).
@@ -243,6 +276,8 @@ Definition check : bool :=
       forallb (check_need ops) (needs A) &&
       covered mono bs (init T) 0 &&
       (let fronts := map (fun o => (o, undominated_choices mono o)) (operators T) in
-       forallb (fun il => check_label mono bs fronts (snd il)) (M.elements (labels A)))
+       let index := index_fronts (frequencies (flat_map (fun o => facts (precondition o)) (operators T))) fronts in
+       let by_fact := M.elements (snd index) in
+       forallb (fun il => check_label mono bs (applicable (fst index) by_fact) (snd il)) (M.elements (labels A)))
   end.
 End Checker.

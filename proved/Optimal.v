@@ -47,3 +47,30 @@ Proof.
     assert (H' : check T A None oracle = true) by (destruct (eval (initial P) None [] (metric P)); exact H).
     exact (sound T A None oracle H' ps c Pl).
 Qed.
+
+(* A plan without steps of duration 0 is also a plan where such steps are permitted. *)
+Lemma step_permissive P w a env r : step P false w a env = Some r -> step P true w a env = Some r.
+Proof.
+  unfold step. destruct (negb _); [auto|]. destruct (duration a); [|auto].
+  destruct (eval w None env e); [|auto]. destruct (less q 0); [auto|]. destruct (Qeq_bool q 0); [discriminate|auto].
+Qed.
+Lemma execute_permissive P plan : forall w spent r,
+  execute P false w spent plan = Some r -> execute P true w spent plan = Some r.
+Proof.
+  induction plan as [|[i env] plan IH]; intros w spent r; [auto|]. simpl.
+  destruct (nth_error (actions P) i) as [a|]; [|auto].
+  destruct (step P false (derived_world P w) a env) as [[w' d]|] eqn:S; [|discriminate].
+  rewrite (step_permissive _ _ _ _ _ S). apply IH.
+Qed.
+
+(* A certificate without a claimed metric: no list of steps can be executed to a goal state, whether
+   steps of duration 0 are permitted or not. *)
+Theorem unsolvable : forall P T N case goal_case A oracle plan,
+  check_certificate P T N case goal_case A oracle plan None = true ->
+  forall allow_zero steps, execute P allow_zero (initial P) 0 steps = None.
+Proof.
+  intros P T N case goal_case A oracle plan H allow_zero steps.
+  pose proof (optimal _ _ _ _ _ _ _ _ _ H steps) as E. destruct allow_zero; [exact E|].
+  destruct (execute P false (initial P) 0 steps) as [r|] eqn:X; [|reflexivity].
+  apply execute_permissive in X. congruence.
+Qed.

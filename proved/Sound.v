@@ -5,6 +5,50 @@ From Proved Require Import Task Check Proof.
 Import ListNotations.
 Open Scope Z_scope.
 
+(* No operator whose facts a state has is left out. *)
+Lemma with_fact_add : forall f p m g, with_fact (add_front f p m) g =
+  if Pos.eqb (fst f) (fst g) && Pos.eqb (slot (snd f)) (slot (snd g)) then p :: with_fact m f else with_fact m g.
+Proof.
+  intros f p m g. unfold with_fact at 1, add_front, row at 1. destruct (Pos.eqb_spec (fst f) (fst g)) as [->|D].
+  - rewrite M.gss. destruct (Pos.eqb_spec (slot (snd f)) (slot (snd g))) as [->|E]; cbn [andb].
+    + rewrite M.gss. reflexivity.
+    + rewrite M.gso by congruence. reflexivity.
+  - rewrite M.gso by congruence. reflexivity.
+Qed.
+Lemma rarest_In : forall m fs f, rarest m fs = Some f -> In f fs.
+Proof.
+  induction fs as [|g r IH]; intros f H; [discriminate|]. simpl in H. destruct (rarest m r) as [h|].
+  - destruct (_ <? _); injection H as <-; [left; reflexivity|right; apply IH; reflexivity].
+  - injection H as <-. left. reflexivity.
+Qed.
+Lemma index_complete : forall m ps p, In p ps ->
+  match rarest m (facts (precondition (fst p))) with
+  | None => In p (fst (index_fronts m ps))
+  | Some f => In p (with_fact (snd (index_fronts m ps)) f)
+  end.
+Proof.
+  induction ps as [|q r IH]; intros p I; [destruct I|]. simpl.
+  destruct (index_fronts m r) as [others by_fact]. cbn [fst snd] in IH. destruct I as [->|I].
+  - destruct (rarest m (facts (precondition (fst p)))) as [f|]; cbn [fst snd]; [|left; reflexivity].
+    rewrite with_fact_add, !Pos.eqb_refl. left. reflexivity.
+  - specialize (IH p I). destruct (rarest m (facts (precondition (fst p)))) as [f|],
+      (rarest m (facts (precondition (fst q)))) as [g|]; cbn [fst snd]; auto; [|right; exact IH].
+    rewrite with_fact_add. destruct (Pos.eqb_spec (fst g) (fst f)) as [E|]; [|exact IH].
+    destruct (Pos.eqb_spec (slot (snd g)) (slot (snd f))) as [E2|]; [|exact IH]. right.
+    unfold with_fact in *. rewrite E, E2. exact IH.
+Qed.
+Lemma applicable_complete : forall m ps s p, In p ps -> holds_facts (precondition (fst p)) s = true ->
+  In p (applicable (fst (index_fronts m ps)) (M.elements (snd (index_fronts m ps))) s).
+Proof.
+  intros m ps s p I H. pose proof (index_complete m ps p I) as C. unfold applicable. apply in_or_app.
+  destruct (rarest m (facts (precondition (fst p)))) as [f|] eqn:E; [|left; exact C]. right.
+  apply rarest_In in E. unfold holds_facts in H. apply andb_true_iff in H. destruct H as [H _].
+  rewrite forallb_forall in H. specialize (H f E). unfold is_fact in H. apply Z.eqb_eq in H.
+  apply in_flat_map. unfold with_fact, row in C. destruct (M.find (fst f) (snd (index_fronts m ps))) as [r|] eqn:F.
+  - exists (fst f, r). split; [apply M.elements_correct, F|]. cbn [fst snd]. rewrite H. exact C.
+  - rewrite M.gempty in C. destruct C.
+Qed.
+
 Section Main.
 Variables (T : task) (A : argument) (claim : option Z) (oracle : state -> list positive).
 Notation mono := (is_monotone T).
@@ -20,8 +64,10 @@ Proof. unfold check_task in task_ok. rewrite !andb_true_iff in task_ok. tauto. Q
 
 Hypothesis pots_ok : forallb (check_potential T (map prepare (operators T))) (potentials A) = true.
 Hypothesis needs_ok : forallb (check_need T (map prepare (operators T))) (needs A) = true.
+Variable frequency_of : M.t (M.t Z).
+Notation index := (index_fronts frequency_of (map (fun o => (o, undominated_choices mono o)) (operators T))).
 Hypothesis labels_ok : forallb (fun il => check_label T A claim oracle mono (basics T)
-    (map (fun o => (o, undominated_choices mono o)) (operators T)) (snd il)) (M.elements (labels A)) = true.
+    (applicable (fst index) (M.elements (snd index))) (snd il)) (M.elements (labels A)) = true.
 
 Definition Covered (s : state) (p : Z) : Prop :=
   (exists t, In t (potentials A) /\ potential_prunes T claim s p t = true) \/
@@ -102,16 +148,16 @@ Proof.
       rewrite !andb_true_iff in M. tauto. }
     rewrite Hl in G. simpl in G. unfold reached. destruct claim; [lia|discriminate].
   - destruct (front_ok mono o ch Ad) as [ch' [If Nd]].
-    rewrite forallb_forall in O.
-    specialize (O (o, undominated_choices mono o) (in_map (fun o => (o, undominated_choices mono o)) _ _ Io)).
-    cbn [fst snd] in O.
     assert (Hl : holds (precondition o) (derive T (label_state l)) (slot_sizes o) ch' = true).
     { eapply holds_mono2; [|exact Sa| |exact Ho].
       - intro M. apply (mono_op o Io M).
       - intros lin Il. apply Nd. apply in_or_app. left. exact Il. }
     assert (Hf : holds_facts (precondition o) (derive T (label_state l)) = true).
     { unfold holds in Hl. apply andb_true_iff in Hl. tauto. }
-    rewrite Hf in O. rewrite forallb_forall in O. specialize (O ch' If). rewrite Hl in O.
+    rewrite forallb_forall in O.
+    specialize (O _ (applicable_complete frequency_of _ _ (o, undominated_choices mono o)
+      (in_map (fun o => (o, undominated_choices mono o)) _ _ Io) Hf)).
+    cbn [fst snd] in O. rewrite Hf in O. rewrite forallb_forall in O. specialize (O ch' If). rewrite Hl in O.
     apply covered_Covered in O.
     replace (p + (amount (cost o) (slot_sizes o) ch + c)) with
       ((p + amount (cost o) (slot_sizes o) ch) + c) by lia.

@@ -36,7 +36,6 @@ rejected() {
   echo "$1: $answer"
 }
 accepted "$stored/designs" 'proved: the plan of 3 steps is optimal, metric 5'
-accepted "$stored/stuck" 'proved: there is no plan'
 mutated() {
   ocaml/mutants "$1" "$temporary/evidence.txt" "$mutants" "$seed" || fail "a false statement is accepted"
 }
@@ -90,6 +89,28 @@ changed problem.pddl 's/(:goal .*/(:goal (robot_at wp8))/'
 changed domain.pddl 's/(over all (corridor ?from ?to))//'
 changed domain.pddl 's/(at start (not (robot_at ?from)))//'
 changed plan.txt '1d'
+# There is no plan: no road leads to the goal, no charge suffices, or no order of the actions works.
+directory=$stored/stuck
+accepted "$directory" 'proved: there is no plan'
+mutated "$directory"
+changed domain.pddl 's/(and (a) (not (b)))/(a)/'
+directory=tests/flat
+accepted "$directory" 'proved: there is no plan'
+mutated "$directory"
+changed problem.pddl 's/(= (battery) 6.5)/(= (battery) 7)/'
+changed problem.pddl 's/(= (energy gate yard) 4)/(= (energy gate yard) 3.5)/'
+changed domain.pddl 's/(>= (battery) (energy ?p ?q))/(> (battery) 2)/'
+directory=tests/morning
+accepted "$directory" 'proved: there is no plan'
+mutated "$directory"
+changed problem.pddl 's/(not (slept hall))//'
+changed problem.pddl 's/(lamp hall)/(lamp hall) (lamp bedroom)/'
+changed domain.pddl 's/(not (open ?r ?s)))/(open ?s ?r))/; s/(when (dark ?r)/(when (not (dark ?r))/'
+directory=tests/far
+accepted "$directory" 'proved: there is no plan'
+mutated "$directory"
+changed problem.pddl 's/(= (battery_reserve) 88)/(= (battery_reserve) 80)/'
+changed problem.pddl 's/(= (pipeline_length pl1) 4)/(= (pipeline_length pl1) 1)/'
 # A list of objectives: one certificate for each objective, with limits for those before it.
 cp -r tests/errands "$temporary/errands"
 for i in 1 2; do ocaml/metaplan-proved-prepare "tests/errands/$i" >"$temporary/$i"; done

@@ -1646,9 +1646,82 @@ let covered t0 a claim oracle mono bs s p =
       | Some l -> label_covers t0 mono bs s p l
       | None -> false) (oracle s))
 
+type front = operator * choice list
+
+type fronts_by_fact = front list M.t M.t
+
+(** val slot : z -> positive **)
+
+let slot x =
+  Z.to_pos (Z.add x (Zpos XH))
+
+(** val row : 'a1 M.t M.t -> key0 -> 'a1 M.t **)
+
+let row m v =
+  match M.find v m with
+  | Some r -> r
+  | None -> M.empty
+
+(** val with_fact : fronts_by_fact -> fact -> front list **)
+
+let with_fact m f =
+  match M.find (slot (snd f)) (row m (fst f)) with
+  | Some l -> l
+  | None -> []
+
+(** val add_front : fact -> front -> fronts_by_fact -> fronts_by_fact **)
+
+let add_front f p m =
+  M.add (fst f) (M.add (slot (snd f)) (p :: (with_fact m f)) (row m (fst f)))
+    m
+
+(** val frequency : z M.t M.t -> fact -> z **)
+
+let frequency m f =
+  get (row m (fst f)) (slot (snd f))
+
+(** val frequencies : fact list -> z M.t M.t **)
+
+let frequencies fs =
+  fold_left (fun m f ->
+    M.add (fst f)
+      (M.add (slot (snd f)) (Z.add (frequency m f) (Zpos XH)) (row m (fst f)))
+      m) fs M.empty
+
+(** val rarest : z M.t M.t -> fact list -> fact option **)
+
+let rec rarest m = function
+| [] -> None
+| f :: r ->
+  (match rarest m r with
+   | Some g ->
+     if Z.ltb (frequency m f) (frequency m g) then Some f else Some g
+   | None -> Some f)
+
+(** val index_fronts :
+    z M.t M.t -> front list -> front list * fronts_by_fact **)
+
+let rec index_fronts m = function
+| [] -> ([], M.empty)
+| p :: r ->
+  let (others, by_fact) = index_fronts m r in
+  (match rarest m (fst p).precondition.facts with
+   | Some f -> (others, (add_front f p by_fact))
+   | None -> ((p :: others), by_fact))
+
+(** val applicable :
+    front list -> (key0 * front list M.t) list -> state -> front list **)
+
+let applicable others by_fact s =
+  app others
+    (flat_map (fun vm ->
+      match M.find (slot (var_value s (fst vm))) (snd vm) with
+      | Some l -> l
+      | None -> []) by_fact)
+
 (** val check_label :
     task -> argument -> z option -> (state -> positive list) -> bool -> key0
-    list -> (operator * choice list) list -> label -> bool **)
+    list -> (state -> front list) -> label -> bool **)
 
 let check_label t0 a claim oracle mono bs ops l =
   let s = derive t0 l.label_state in
@@ -1666,7 +1739,7 @@ let check_label t0 a claim oracle mono bs ops l =
              then covered t0 a claim oracle mono bs (apply o s ch)
                     (Z.add l.path_cost (amount o.cost o.slot_sizes ch))
              else true) (snd p)
-      else true) ops)
+      else true) (ops s))
 
 (** val in_range : task -> key0 -> z -> bool **)
 
@@ -1745,9 +1818,15 @@ let check t0 a claim oracle =
       (let fronts =
          map (fun o -> (o, (undominated_choices mono o))) t0.operators
        in
+       let index =
+         index_fronts
+           (frequencies
+             (flat_map (fun o -> o.precondition.facts) t0.operators)) fronts
+       in
+       let by_fact = M.elements (snd index) in
        forallb (fun il ->
-         check_label t0 a claim oracle mono bs fronts (snd il))
-         (M.elements a.labels))
+         check_label t0 a claim oracle mono bs
+           (applicable (fst index) by_fact) (snd il)) (M.elements a.labels))
   | None ->
     if existsb (fun c -> match c with
                          | [] -> true
@@ -1766,8 +1845,16 @@ let check t0 a claim oracle =
            (let fronts =
               map (fun o -> (o, (undominated_choices mono o))) t0.operators
             in
+            let index =
+              index_fronts
+                (frequencies
+                  (flat_map (fun o -> o.precondition.facts) t0.operators))
+                fronts
+            in
+            let by_fact = M.elements (snd index) in
             forallb (fun il ->
-              check_label t0 a claim oracle mono bs fronts (snd il))
+              check_label t0 a claim oracle mono bs
+                (applicable (fst index) by_fact) (snd il))
               (M.elements a.labels))
 
 type key1 = positive

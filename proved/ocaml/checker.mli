@@ -619,9 +619,32 @@ val covered :
   task -> argument -> z option -> (state -> positive list) -> bool -> key0
   list -> state -> z -> bool
 
+type front = operator * choice list
+
+type fronts_by_fact = front list M.t M.t
+
+val slot : z -> positive
+
+val row : 'a1 M.t M.t -> key0 -> 'a1 M.t
+
+val with_fact : fronts_by_fact -> fact -> front list
+
+val add_front : fact -> front -> fronts_by_fact -> fronts_by_fact
+
+val frequency : z M.t M.t -> fact -> z
+
+val frequencies : fact list -> z M.t M.t
+
+val rarest : z M.t M.t -> fact list -> fact option
+
+val index_fronts : z M.t M.t -> front list -> front list * fronts_by_fact
+
+val applicable :
+  front list -> (key0 * front list M.t) list -> state -> front list
+
 val check_label :
   task -> argument -> z option -> (state -> positive list) -> bool -> key0
-  list -> (operator * choice list) list -> label -> bool
+  list -> (state -> front list) -> label -> bool
 
 val in_range : task -> key0 -> z -> bool
 

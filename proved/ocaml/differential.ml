@@ -1,6 +1,7 @@
 (* Changes the files of a certificate at random, and compares what metaplan-verify and the proved
    checker answer. Keeps the certificates that only one of them accepts. The formula and the
-   knowledge base are left out: the proved checker does not read them. *)
+   knowledge base are left out: the proved checker does not read them. If the claim is that
+   there is no plan, an exhaustive search decides whether it is true. *)
 module R = Reader
 
 let usage = "usage: differential METAPLAN_VERIFY CERTIFICATE COUNT SEED KEPT_DIRECTORY"
@@ -76,15 +77,19 @@ let files = ["domain.pddl", mutate_pddl; "problem.pddl", mutate_pddl; "plan.txt"
 let run command = match Sys.command command with n -> n
 let quote = Filename.quote
 
+(* The claimed metric; none if the claim is that there is no plan. *)
 let claim certificate =
   let manifest = read_file (Filename.concat certificate "manifest.json") in
-  let marker = "\"metric\": \"" in
-  let rec find position =
-    if String.sub manifest position (String.length marker) = marker then position + String.length marker else find (position + 1) in
-  let start = find 0 in
-  String.sub manifest start (String.index_from manifest start '"' - start)
+  let rec find marker position =
+    if position + String.length marker > String.length manifest then None
+    else if String.sub manifest position (String.length marker) = marker then Some (position + String.length marker)
+    else find marker (position + 1) in
+  match find "\"metric\": \"" 0 with
+  | Some start -> Some (String.sub manifest start (String.index_from manifest start '"' - start))
+  | None when find "\"unsolvable\"" 0 <> None -> None
+  | None -> failwith "the manifest has no claim"
 
-let write_manifest directory metric =
+let write_manifest directory files metric =
   let entry (name, _) =
     let path = Filename.concat directory name in
     let digest_file = path ^ ".sha256" in
@@ -93,8 +98,21 @@ let write_manifest directory metric =
     Sys.remove digest_file;
     Printf.sprintf {|{"name": "%s", "bytes": %d, "sha256": "%s"}|} name (String.length (read_file path)) digest in
   write_file (Filename.concat directory "manifest.json")
-    (Printf.sprintf {|{"format": "metaplan-certificate/3", "claim": {"optimal": {"metric": "%s"}}, "refutation": {"none": "left out"},
-  "files": [%s]}|} metric (String.concat ",\n" (List.map entry files)))
+    (Printf.sprintf {|{"format": "metaplan-certificate/3", "claim": %s, "refutation": {"none": "left out"},
+  "files": [%s]}|} (match metric with Some metric -> Printf.sprintf {|{"optimal": {"metric": "%s"}}|} metric | None -> {|"unsolvable"|})
+       (String.concat ",\n" (List.map entry files)))
+
+(* The judge of the claim that there is no plan. *)
+let exhaustive_answer directory =
+  let read name = read_file (Filename.concat directory name) in
+  match R.problem (read "domain.pddl") (read "problem.pddl") with
+  | exception R.Rejected _ -> "not read"
+  | problem ->
+    match Exhaustive.search false 5000 problem, Exhaustive.search true 5000 problem with
+    | Exhaustive.Plan _, _ -> "plan"
+    | _, Exhaustive.No_plan -> "no plan"
+    | Exhaustive.No_plan, Exhaustive.Plan _ -> "unclear"     (* start and end of a step of duration 0 may interfere *)
+    | Exhaustive.Too_large, _ | _, Exhaustive.Too_large -> "too large"
 
 let () =
   match Sys.argv with
@@ -105,28 +123,49 @@ let () =
     Sys.remove work;
     ignore (run (Printf.sprintf "mkdir -p %s %s" (quote work) (quote kept)));
     let metric = claim certificate in
-    let counts = Hashtbl.create 10 in
-    for i = 1 to int_of_string count do
-      List.iter (fun (name, _) -> write_file (Filename.concat work name) (read_file (Filename.concat certificate name))) files;
-      let mutated = random_item files in
-      let path = Filename.concat work (fst mutated) in
-      write_file path (snd mutated (read_file path));
-      let metric = if Random.int 8 = 0 then mutate_tokens metric else metric in
-      write_manifest work metric;
+    let files = if metric = None then List.filter (fun (name, _) -> name <> "plan.txt") files else files in
+    let counts = Hashtbl.create 10 and judged = Hashtbl.create 4 in
+    let increment counts case = Hashtbl.replace counts case (1 + Option.value ~default:0 (Hashtbl.find_opt counts case)) in
+    let copy () = List.iter (fun (name, _) -> write_file (Filename.concat work name) (read_file (Filename.concat certificate name))) files in
+    (* What the two checkers accept. *)
+    let verdicts metric =
+      write_manifest work files metric;
       let outputs = Filename.concat work "answer" and evidence = Filename.concat work "evidence" in
       let rust = run (Printf.sprintf "%s %s > %s 2>&1" (quote verify) (quote work) (quote (outputs ^ "-verify"))) in
       let prepared = run (Printf.sprintf "%s/metaplan-proved-prepare %s > %s 2> %s" (quote programs) (quote work) (quote evidence) (quote (outputs ^ "-prepare"))) in
       let proved =
         if prepared <> 0 then 1
         else run (Printf.sprintf "timeout 100 %s/metaplan-proved-check %s %s > %s 2>&1" (quote programs) (quote work) (quote evidence) (quote (outputs ^ "-check"))) in
-      let case = (rust = 0, proved = 0) in
+      rust = 0, proved = 0 in
+    copy ();
+    if verdicts metric <> (true, true) then failwith "not both checkers accept the unchanged certificate";
+    for i = 1 to int_of_string count do
+      copy ();
+      let mutated = random_item files in
+      let path = Filename.concat work (fst mutated) in
+      write_file path (snd mutated (read_file path));
+      let case = verdicts (if Random.int 8 = 0 then Option.map mutate_tokens metric else metric) in
       if fst case <> snd case then
         ignore (run (Printf.sprintf "cp -r %s %s" (quote work)
-          (quote (Filename.concat kept (Printf.sprintf "%s-%s-%d-%s" (if rust = 0 then "verify" else "check") seed i (fst mutated))))));
-      Hashtbl.replace counts case (1 + Option.value ~default:0 (Hashtbl.find_opt counts case))
+          (quote (Filename.concat kept (Printf.sprintf "%s-%s-%d-%s" (if fst case then "verify" else "check") seed i (fst mutated))))));
+      increment counts case;
+      if metric = None then begin
+        let answer = exhaustive_answer work and accepted = case <> (false, false) in
+        increment judged (accepted, answer);
+        if accepted && answer = "plan" || snd case && answer = "unclear" then begin
+          Printf.printf "accepted although there is a plan: %s\n" work; exit 1
+        end
+      end
     done;
     ignore (run (Printf.sprintf "rm -r %s" (quote work)));
-    let count case = Option.value ~default:0 (Hashtbl.find_opt counts case) in
+    let of_case counts case = Option.value ~default:0 (Hashtbl.find_opt counts case) in
+    let count = of_case counts in
     Printf.printf "%s, seed %s: both accept %d, both reject %d, only metaplan-verify accepts %d, only the proved checker accepts %d\n"
-      certificate seed (count (true, true)) (count (false, false)) (count (true, false)) (count (false, true))
+      certificate seed (count (true, true)) (count (false, false)) (count (true, false)) (count (false, true));
+    if metric = None then
+      List.iter (fun accepted ->
+        let count answer = of_case judged (accepted, answer) in
+        Printf.printf "%s: there is a plan for %d, there is no plan for %d, unclear %d, too large %d, not read %d\n"
+          (if accepted then "accepted by a checker" else "rejected by both") (count "plan") (count "no plan") (count "unclear") (count "too large")
+          (count "not read")) [true; false]
   | _ -> prerr_endline usage; exit 2

@@ -1,6 +1,7 @@
 (* Reads the evidence that prepare.ml writes: claim, ground task, names, argument and case trees.
    Nothing in it is believed: the theorem holds for any evidence. Required of this file is only that
-   it returns immutable values and prints nothing. *)
+   it returns immutable values (or functions of tables that do not change any more) and prints
+   nothing. *)
 module C = Checker
 open Reader
 
@@ -107,7 +108,12 @@ let rec tree = function
   | _ -> reject "a case tree is expected"
 
 module Cases = Map.Make (struct type t = string * C.positive list let compare = compare end)
-module Values = Map.Make (struct type t = C.z list let compare = compare end)
+(* The hash depends on all values, since many states differ in a few variables only. *)
+module Values = Hashtbl.Make (struct
+  type t = C.z list
+  let equal = List.equal (fun a b -> a == b || a = b)
+  let hash = List.fold_left (fun hash value -> 31 * hash + Hashtbl.hash value) 0
+end)
 
 type t = {
   claim : string; ground_task : C.task; names : C.names; argument : C.argument;
@@ -121,9 +127,10 @@ let read action_names text =
   let ground_task = ground_task (section "task") and argument = argument (section "argument") in
   let basics = C.basics ground_task in
   let values state = List.map (C.var_value state) basics in
-  let labels = List.fold_left (fun map (i, label) ->
-      Values.update (values label.C.label_state) (fun others -> Some (i :: Option.value ~default:[] others)) map)
-      Values.empty (C.M.elements argument.C.labels) in
+  let labels = Values.create 1000 in
+  List.iter (fun (i, label) ->
+    let key = values label.C.label_state in
+    Values.replace labels key (i :: Option.value ~default:[] (Values.find_opt labels key))) (C.M.elements argument.C.labels);
   let cases = List.fold_left (fun map item ->
       let (name, arguments), tree = pair (function
         | List (name :: arguments) -> word name, List.map (fun item -> object_key (word item)) arguments
@@ -131,7 +138,7 @@ let read action_names text =
       Cases.add (name, arguments) tree map) Cases.empty (section "cases") in
   let rec nth names = function C.O -> List.hd names | C.S n -> nth (List.tl names) n in
   { claim = word (only "claim"); ground_task; names = names (section "names"); argument;
-    labels_at = (fun state -> Option.value ~default:[] (Values.find_opt (values state) labels));
+    labels_at = (fun state -> Option.value ~default:[] (Values.find_opt labels (values state)));
     case = (fun action arguments ->
       Option.value ~default:(C.Decided None) (Cases.find_opt (nth action_names action, arguments) cases));
     goal_case = tree (only "goal-case") }

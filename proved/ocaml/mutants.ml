@@ -103,6 +103,41 @@ let false_statements problem plan best =
     | _ -> [] in
   Option.to_list worse @ [{ name = "no plan"; problem; plan = []; claim = None }] @ shortcut
 
+(* Changed problems that have a plan, as the exhaustive search shows: that there is no plan is false for
+   them. One more action reaches the goal, an action has no condition or other effects, one more atom
+   holds initially, a number is 1000, or the goal is one atom. *)
+let solvable_problems (problem : R.problem) =
+  let pddl = problem.task in
+  let truth = C.Truth true in
+  let rec positive_atoms = function
+    | C.Atom (p, terms) -> [p, terms]
+    | C.And (f, g) -> positive_atoms f @ positive_atoms g
+    | _ -> [] in
+  let goal_atoms = positive_atoms pddl.C.goal_formula in
+  let reach_goal = List.fold_left (fun effect (p, terms) -> C.Both (effect, C.Put (true, p, terms))) C.Nothing goal_atoms in
+  let shortcut = { C.parameters = []; duration = None; at_start = truth; start_effect = reach_goal; over_all = truth; at_end = truth;
+                   end_effect = C.Nothing } in
+  let changed_action i action = { pddl with C.actions = List.mapi (fun j other -> if i = j then action else other) pddl.C.actions } in
+  let changed_actions = List.concat (List.mapi (fun i action ->
+      changed_action i { action with C.at_start = truth }
+      :: changed_action i { action with C.over_all = truth; at_end = truth }
+      :: List.filter_map (fun (other : C.action) ->
+          if List.length other.parameters > List.length action.C.parameters then None
+          else Some (changed_action i { action with C.start_effect = other.start_effect; end_effect = other.end_effect }))
+        pddl.C.actions) pddl.C.actions) in
+  let objects = List.map R.object_key problem.object_names in
+  let more_atoms = List.concat_map (fun (is_number, p, n) ->
+      if is_number then [] else List.map (fun arguments ->
+          { pddl with C.initial_atoms = C.add_atom (p, arguments) () pddl.C.initial_atoms }) (Exhaustive.tuples objects n))
+      (Exhaustive.changed_heads pddl) in
+  let greater_numbers = List.map (fun (f, _) ->
+      { pddl with C.initial_values = C.add_atom f (R.decimal "1000") pddl.C.initial_values }) (C.all_entries pddl.C.initial_values) in
+  let easier_goals = List.map (fun (p, terms) -> { pddl with C.goal_formula = C.Atom (p, terms) }) goal_atoms in
+  let candidates = { pddl with C.actions = pddl.C.actions @ [shortcut] } :: changed_actions @ more_atoms @ greater_numbers @ easier_goals in
+  List.filter (fun task -> match Exhaustive.search true 2000 { problem with task } with
+      | Exhaustive.Plan _ -> true
+      | Exhaustive.No_plan | Exhaustive.Too_large -> false) candidates
+
 let read_file path =
   let channel = open_in_bin path in
   Fun.protect ~finally:(fun () -> close_in channel) (fun () -> really_input_string channel (in_channel_length channel))
@@ -112,15 +147,17 @@ let () =
   Random.init seed;
   let read name = read_file (Filename.concat directory name) in
   let problem = R.problem (read "domain.pddl") (read "problem.pddl") in
-  let plan = R.plan problem (read "plan.txt") in
   let evidence_text = read_file Sys.argv.(2) in
   let names = problem.R.action_names @ ["shortcut"] in
   let original = Evidence.read names evidence_text in
   let claim = R.claim problem original.claim in
-  let best = match claim with Some value -> value | None -> failwith "the certificate has no plan" in
+  let plan = if claim = None then [] else R.plan problem (read "plan.txt") in
   let true_statement = { name = "the true statement"; problem = problem.R.task; plan; claim } in
   if not (holds true_statement original) then failwith "the certificate itself is not accepted";
-  let false_statements = false_statements problem.R.task plan best in
+  let false_statements = match claim with
+    | Some best -> false_statements problem.R.task plan best
+    | None -> List.map (fun problem -> { name = "no plan of a solvable problem"; problem; plan = []; claim = None }) (solvable_problems problem) in
+  if false_statements = [] then failwith "there is no false statement";
   let sections = R.expressions evidence_text in
   let unreadable = ref 0 and true_accepted = ref 0 and true_rejected = ref 0 in
   for _ = 1 to count do
@@ -135,4 +172,6 @@ let () =
         end) false_statements
   done;
   Printf.printf "seed %d: %d mutants, %d of them unreadable; %d accepted and %d not accepted for the true statement; none of them accepted for %s\n"
-    seed count !unreadable !true_accepted !true_rejected (String.concat ", " (List.map (fun s -> s.name) false_statements))
+    seed count !unreadable !true_accepted !true_rejected (match claim with
+      | Some _ -> String.concat ", " (List.map (fun s -> s.name) false_statements)
+      | None -> Printf.sprintf "%d solvable problems" (List.length false_statements))

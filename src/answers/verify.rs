@@ -9,9 +9,6 @@ use verify::{Verification, VerificationAnswer};
 use crate::certificate::Theorem;
 use crate::visible::visible;
 
-/// Name of the theorem in `proved/Optimal.v`.
-const OPTIMAL: &str = "optimal";
-
 /// The claim of a certificate, and the results of checking its parts.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct VerifyAnswer<'a> {
@@ -38,8 +35,8 @@ impl<'a> VerifyAnswer<'a> {
     /// Creates the answer for the result of a verification, and of the proved checker if it was run.
     pub fn new(report: &'a Verification, theorem: Option<&'a Theorem>) -> Self {
         let theorem = theorem.map(|theorem| match theorem {
-            Theorem::Holds { statement, parts } => {
-                TheoremPart { proved: true, name: Some(OPTIMAL), parts, message: statement }
+            Theorem::Holds { name, statement, parts } => {
+                TheoremPart { proved: true, name: Some(name), parts, message: statement }
             }
             Theorem::None(reason) => TheoremPart { proved: false, name: None, parts: &[], message: reason },
         });
@@ -51,8 +48,8 @@ impl<'a> VerifyAnswer<'a> {
 pub fn theorem_line(theorem: &Theorem) -> String {
     let mut line = String::new();
     let _ = match theorem {
-        Theorem::Holds { parts, .. } => {
-            writeln!(line, "proved: theorem `{OPTIMAL}` covers the parts {}", parts.join(", "))
+        Theorem::Holds { name, parts, .. } => {
+            writeln!(line, "proved: theorem `{name}` covers the parts {}", parts.join(", "))
         }
         Theorem::None(reason) => writeln!(line, "NOT proved by a theorem: {reason}"),
     };

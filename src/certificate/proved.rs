@@ -2,7 +2,7 @@
 //! `metaplan-verify`.
 //!
 //! Two programs are called. `metaplan-proved-prepare` writes evidence for the claim and need not be trusted.
-//! `metaplan-proved-check` checks the evidence with the function about which the theorem `optimal` is proved.
+//! `metaplan-proved-check` checks the evidence with the function about which the theorems `optimal` and `unsolvable` are proved.
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -38,8 +38,10 @@ pub struct ProvedChecker {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Theorem {
-    /// The claim follows from the theorem `optimal`.
+    /// The claim follows from a theorem.
     Holds {
+        /// Name of the theorem in `proved/Optimal.v`.
+        name: &'static str,
         /// The proved statement, as the program prints it.
         statement: String,
         /// Parts of the verification that the theorem covers.
@@ -113,7 +115,11 @@ impl ProvedChecker {
             Answer::Accepted(statement) if accepted => {
                 let parts = report.parts.iter().map(|part| part.part);
                 let parts = parts.filter(|part| COVERED_PARTS.contains(part)).collect();
-                return Ok(Theorem::Holds { statement, parts });
+                let name = match claim {
+                    Claim::Optimal { .. } => "optimal",
+                    Claim::Unsolvable => "unsolvable",
+                };
+                return Ok(Theorem::Holds { name, statement, parts });
             }
             Answer::Accepted(statement) => {
                 format!("the proved checker accepts this certificate ({statement})")

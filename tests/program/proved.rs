@@ -31,11 +31,15 @@ fn theorem_covers_the_parts_about_the_pddl_files() {
     let folder = tempfile::tempdir().expect("a folder");
     let ugv = certificate(folder.path(), &["plan", "missions/ugv.toml"]);
     let covers = "proved: theorem `optimal` covers the parts task, plan, argument\n";
+    let no_plan = "proved: theorem `unsolvable` covers the parts task, argument\n";
     for (certificate, status, line) in [
         (ugv.as_str(), 0, covers),
         ("proved/tests/battery", 0, covers),
         (&format!("{STORED}/designs"), 0, covers),
-        (&format!("{STORED}/stuck"), 0, "proved: theorem `optimal` covers the parts task, argument\n"),
+        (&format!("{STORED}/stuck"), 0, no_plan),
+        ("proved/tests/flat", 0, no_plan),
+        ("proved/tests/morning", 0, no_plan),
+        ("proved/tests/far", 0, no_plan),
         (&format!("{STORED}/oven"), 1, "NOT proved by a theorem: not covered: timed initial literals\n"),
     ] {
         let outcome = verify(&[certificate, "--proved"]);
@@ -49,6 +53,9 @@ fn theorem_covers_the_parts_about_the_pddl_files() {
     let message = "proved: the plan of 2 steps is optimal, metric 2";
     let theorem =
         json!({"proved": true, "name": "optimal", "parts": ["task", "plan", "argument"], "message": message});
+    assert_eq!(answer["theorem"], theorem, "{answer:#}");
+    let answer = verify(&["proved/tests/flat", "--proved", "--format", "json"]).json();
+    let theorem = json!({"proved": true, "name": "unsolvable", "parts": ["task", "argument"], "message": "proved: there is no plan"});
     assert_eq!(answer["theorem"], theorem, "{answer:#}");
     assert_eq!(verify(&[battery, "--format", "json"]).json().get("theorem"), None);
 }
