@@ -75,8 +75,8 @@ pub struct PlanningLine {
 }
 
 impl PlanningLine {
-    /// Creates the line. `seconds` is the duration of planning until now, `line` the number of the
-    /// last input line.
+    /// Creates the line. `seconds` is the duration of planning until now, `line` the number of the last
+    /// input line that the loop received.
     pub fn new(planning: &Planning, seconds: u64, line: u64) -> Self {
         Self {
             answer: "planning",
@@ -88,7 +88,7 @@ impl PlanningLine {
     }
 }
 
-/// Answer with the number of the last input line before it.
+/// An answer, with the number of the last input line that the loop received before it gave the answer.
 #[derive(Debug, Clone, Serialize)]
 pub struct NumberedAnswer<'a, A> {
     #[serde(flatten)]
@@ -97,7 +97,7 @@ pub struct NumberedAnswer<'a, A> {
 }
 
 impl<'a, A> NumberedAnswer<'a, A> {
-    /// Creates the answer; `line` is the number of the last input line.
+    /// Creates the answer; `line` is the number of the last input line that the loop received.
     pub fn new(answer: &'a A, line: u64) -> Self {
         Self { answer, line }
     }

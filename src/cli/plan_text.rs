@@ -38,7 +38,7 @@ pub(super) fn steps_text(plan: &Plan, columns: Option<u16>) -> String {
     output::table_within(columns, &["step", "start", "duration", "action", "configuration", "cost"], rows)
 }
 
-/// Returns the arguments of a step except for functions and their designs.
+/// Returns the arguments of a step without the functions and designs of its configuration.
 fn route(step: &Step) -> Vec<&str> {
     let configured =
         |argument: &String| step.configuration.iter().any(|(f, design)| f == argument || design == argument);

@@ -195,7 +195,8 @@ pub fn hindsight(mission: &Coadaptation, risk: Risk, penalty: f64, spent: Spent)
             break;
         }
     }
-    // With the remaining probability, the loss comes too late to matter.
+    // `left` is the probability that the loss has not happened yet. For these cases, the value without
+    // a loss is added.
     let expected = expected + left * never[start].min(penalty);
     Hindsight { least, expected: Some(expected).filter(|value| value.is_finite()) }
 }

@@ -186,7 +186,7 @@ fn keep_cut(name: &Path, sound: u64) -> io::Result<()> {
         let mut beside = name.as_os_str().to_owned();
         beside.push(format!(".cut{number}"));
         match open_private(Path::new(&beside), OpenOptions::new().create_new(true).write(true)) {
-            // Earlier crashes may have left such files.
+            // A file with this number may remain from an earlier crash.
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => number += 1,
             other => return other.and_then(|mut file| file.write_all(remaining)),
         }

@@ -188,8 +188,8 @@ fn next_deadline_after(running: &Running, settings: &Settings) -> Duration {
     allowed_silence(running, settings).saturating_mul(running.overdue.saturating_add(1))
 }
 
-/// Returns the time without reports after which an action is first overdue: a multiple of its expected duration, and at
-/// least the deadline of effects.
+/// Returns how long an action may be without reports before it is first overdue: `deadline_factor`
+/// times its expected duration, but at least `settings.deadline`.
 fn allowed_silence(running: &Running, settings: &Settings) -> Duration {
     let expected = number::to_f64(&running.step.duration) * settings.time_unit.seconds();
     let allowed_silence =

@@ -1,5 +1,6 @@
-//! Tests of the UUV mission: with a full and with a low battery, in murky water, and without designs that it
-//! needs. Brute force shows that the optimal plans are unique.
+//! Tests of the UUV mission: with a full and with a low battery, in murky water, and without designs
+//! that it needs. Brute force shows that the optimal plans with a full and with a low battery are
+//! unique.
 
 use crate::common::{metaplan, metaplan_in, root, steps};
 

@@ -1,4 +1,5 @@
-//! Property tests: printing is the inverse of parsing, and no text makes the parser or the checker panic.
+//! Property tests: printing what was parsed from printed text gives the same text again, and no text
+//! makes the parser or the checker panic.
 
 use proptest::prelude::*;
 

@@ -16,9 +16,9 @@ use crate::svg::Picture;
 const HEIGHT: f64 = 300.0;
 const TOP: f64 = 24.0;
 const ROW: f64 = 46.0;
-/// Distance on the axis below which dots are stacked.
+/// Width of the cells into which the axis is divided, in pixels. Dots in the same cell are stacked.
 const NEAR: f64 = 6.0;
-/// Maximum height of a stack of dots.
+/// Maximum height of a stack of dots, in pixels.
 const HIGHEST: f64 = 28.0;
 
 impl Sheet {
@@ -209,7 +209,7 @@ fn rows(own: &Rows, canvas: Canvas) -> Picture {
     Picture { width: canvas.width, height: bottom + 40.0, title: own.title.clone(), description, body }
 }
 
-/// Returns the height of each dot above the base line. Dots of nearby values are stacked.
+/// Returns the height of each dot above the base line. Dots in the same cell of the axis are stacked.
 fn heights(values: &[(f64, String)], across: &Scale) -> Vec<f64> {
     let mut counts: BTreeMap<i64, usize> = BTreeMap::new();
     let mut place = |(value, _): &(f64, String)| {

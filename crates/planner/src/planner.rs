@@ -78,7 +78,7 @@ impl<'a> Planner<'a> {
         self
     }
 
-    /// Sets the options of the optimizer, including its limits.
+    /// Sets the options of the optimizer. Their limits also become the limits of grounding.
     #[must_use]
     pub fn config(mut self, config: Config) -> Self {
         self.grounding.limits = config.limits.clone();

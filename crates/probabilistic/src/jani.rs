@@ -364,8 +364,9 @@ impl Writer<'_> {
     }
 }
 
-/// Converts a rational to JANI: a decimal as a number literal, another fraction as a division. A fraction whose
-/// parts do not fit into 64 bits is rounded.
+/// Converts a rational to JANI. A decimal with at most 30 decimal places becomes an exact number
+/// literal. Another fraction becomes a division, or a rounded double if its numerator or denominator
+/// does not fit into 64 bits.
 fn number(value: &num_rational::BigRational) -> Value {
     let (text, _) = crate::prism::decimal(value);
     text.parse::<serde_json::Number>().map_or_else(

@@ -27,10 +27,11 @@ use crate::sat::Lit;
 /// requires more than 50 times as many additions, the sum is encoded by binary addition.
 const AMOUNT_LIMIT: usize = 1_000;
 
-/// Cost limit of an encoding: only plans with a cost of at most `limit` are admitted. With `CostEncoding::Apart`,
-/// amounts are not summed, and clauses exclude only an amount that alone exceeds the gap between `limit` and the lower
-/// bound. Operator costs are reduced by the goal distances in the first projection of `bounds` (see the head of this
-/// file). Without a projection, neither costs nor the limit are encoded.
+/// Cost limit of an encoding. With `CostEncoding::Sum`, only plans with a cost of at most `limit` are
+/// admitted. With `CostEncoding::Apart`, clauses exclude only single amounts above the gap between
+/// `limit` and the lower bound. Operator costs are reduced by the goal distances in the first
+/// projection of `bounds` (see the head of this file). Without a projection, neither costs nor the
+/// limit are encoded.
 pub struct CostLimit<'a> {
     pub limit: Int,
     pub bounds: &'a Bounds,

@@ -134,7 +134,7 @@ struct Server {
     /// Trust the certificate authorities in this file in addition to those of the system.
     #[arg(long, value_name = "FILE")]
     tls_ca: Option<PathBuf>,
-    /// Authenticate with a client certificate and its key.
+    /// Authenticate with the client certificate in the first file and its key in the second file.
     #[arg(long, value_names = ["CERTIFICATE", "KEY"], num_args = 2)]
     tls_cert: Vec<PathBuf>,
     /// Set the name of the fleet. Its streams, buckets and subjects begin with this name, except for subjects of the fleet `fleet`.

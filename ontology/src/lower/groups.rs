@@ -10,8 +10,8 @@ use rules::{Atom, RuleIdentity, Symbol, Term};
 use super::context::{Context, INTERNAL, Variables};
 use crate::vocab::owl;
 
-/// Maximum number of members for which pairs are used, because explanations with pairs are easier to
-/// read.
+/// Maximum number of members of a set of different individuals or disjoint classes for which pairs are
+/// used. Explanations with pairs are easier to read.
 pub(crate) const MAX_PAIRED_MEMBERS: usize = 16;
 
 /// Returns the auxiliary relation that assigns numbers to individuals. For pairwise different individuals,

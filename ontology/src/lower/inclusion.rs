@@ -281,7 +281,7 @@ impl InclusionGraph {
         if let Some(including) = memo.including.get(&key) {
             return including.clone();
         }
-        // `∀p.C ⊑ ∀q.D` if `q ⊑ p`: universal restrictions are antitone in the property.
+        // `∀p.C ⊑ ∀q.D` if `q ⊑ p` and `C ⊑ D`: universal restrictions are antitone in the property.
         let is_universal = matches!(restriction, ClassExpression::AllValuesFrom(..));
         let related = if is_universal { &self.subproperties } else { &self.properties };
         let mut properties = reachable(property, related);

@@ -42,7 +42,7 @@ impl Usage {
         let uses: Vec<NameUse> = (0..names.len() as u32).map(reserved).collect();
         let [kind, individual] = [rdf::TYPE, owl::NAMED_INDIVIDUAL].map(|iri| names.find(iri));
         let mut usage = Self { uses, kind, individual };
-        // Annotations do not make a name part of an axiom.
+        // A name that occurs only in these annotations is not part of an axiom.
         let comments = [rdfs::LABEL, rdfs::COMMENT, rdfs::SEE_ALSO, rdfs::IS_DEFINED_BY];
         let comments = comments.map(|iri| names.find(iri));
         for triple in documents.iter().flat_map(|document| &document.triples) {

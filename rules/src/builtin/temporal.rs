@@ -56,8 +56,8 @@ fn construct(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Literal> {
     (!literal.is_ill_typed()).then_some(literal)
 }
 
-/// Returns the common sign of all parts of a duration (zero has either sign), and removes it from their
-/// texts. `None` if the signs differ or a part is not a number.
+/// Returns the common sign of all parts of a duration: `""` or `"-"` (zero has either sign). Removes
+/// the sign `-` from `texts`. `None` if the signs differ or a part is not a number.
 fn common_sign(arguments: &[&Literal], texts: &mut [String]) -> Option<&'static str> {
     let zero = BigRational::zero();
     let numbers = arguments.iter().map(|argument| argument.as_rational()).collect::<Option<Vec<_>>>()?;

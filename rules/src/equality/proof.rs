@@ -261,8 +261,8 @@ impl<'a> Builder<'a> {
         Reason::Equality { supports }
     }
 
-    /// Explains a fact by the rule that is recorded for its row (the fact with representatives); `None`
-    /// without a recorded rule.
+    /// Explains a fact by the rule recorded for `row`, i.e. for the fact with each name replaced by the
+    /// representative of its equality class. `None` if no rule is recorded.
     fn derived(&mut self, fact: &Fact, row: &Fact) -> Option<Reason> {
         let engine = self.engine;
         let relation = engine.store.get(engine.store.find(row.predicate, row.arguments.len())?);

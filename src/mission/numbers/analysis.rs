@@ -7,9 +7,9 @@
 //!
 //! - The function has only constants as arguments.
 //! - At least three quarters of the tuples have a value.
-//! - A static fact in the action's conditions holds and mentions all parameters of the function, as
-//!   `(lit_aisle a b)` does for `(distance a b)`. Also, at least two thirds of the tuples have a value, or
-//!   the only argument is a design.
+//! - All parameters of the function occur in a static fact that holds and is part of the action's
+//!   conditions, such as `(lit_aisle a b)` for `(distance a b)`. In addition, at least two thirds of the
+//!   tuples have a value, or the only argument is a design.
 //!
 //! Functions without any value have a separate warning. Durations are computed from values that no action
 //! changes.
@@ -356,7 +356,7 @@ impl<'m> Numbers<'m> {
     }
 
     /// Returns `true` if a static fact among the conjuncts or disjuncts of a condition holds and
-    /// mentions all these variables.
+    /// contains all these variables.
     fn is_linked(&self, condition: &Condition, variables: &[&Name], binding: &Binding<'_>) -> bool {
         match condition {
             Condition::And(parts) | Condition::Or(parts) => {

@@ -109,7 +109,7 @@ pub struct Action {
     pub body: Body,
 }
 
-/// The first variables of the condition are the arguments of the predicate.
+/// Rule of a derived predicate. The first variables of `condition` are the arguments of the predicate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axiom {
     pub predicate: usize,

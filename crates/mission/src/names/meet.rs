@@ -1,10 +1,11 @@
 //! Compares the names in the problem with those in the knowledge base: finds objects without an
 //! individual, and designs that the problem never names.
 //!
-//! The problems of Metaplan's own missions name no designs and receive all of them from the
-//! knowledge base. If a problem does name designs, names that occur only in the problem or only in
-//! the knowledge base suggest that the two files do not belong together. The availability of a
-//! design is stated by the problem if the knowledge base has neither the design nor its functions.
+//! A problem that names no designs receives all of them from the knowledge base; examples are the
+//! missions `ugv` and `uuv`. The problem of `camara_like` names its 18 designs. If a problem names
+//! designs, a name that is missing in the problem or in the knowledge base suggests that the two do not
+//! belong together. The availability of a design is stated by the problem if the knowledge base has
+//! neither the design nor its functions.
 //!
 //! A required function can be solved only by a design that occurs in both the problem and the knowledge base, or by a
 //! design whose availability is stated by the problem. If different names are the reason that a required function has

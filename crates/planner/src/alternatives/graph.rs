@@ -84,8 +84,8 @@ pub(super) fn cheapest(
     Some(graph)
 }
 
-/// Key of comparable labels (nodes): the values of the basic (not derived) variables, and the numbers that
-/// are not compared.
+/// Key under which labels (nodes) are grouped: the values of the basic (not derived) variables, and the
+/// numbers that are not compared. Only labels with equal keys are compared with each other.
 type Place = (Box<[u32]>, Box<[Int]>);
 
 /// States, each with the cost of the path by which it was reached.

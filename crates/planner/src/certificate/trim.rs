@@ -208,7 +208,8 @@ impl Trimmer {
         Ok(())
     }
 
-    /// Literals that the clause has implied permanently stay assigned.
+    /// Deletes one copy of a clause. Literals that are permanently assigned because of this clause stay
+    /// assigned.
     fn forget(&mut self, clause: &[Literal]) {
         let Some(positions) = self.positions.get_mut(clause) else { return };
         if let Some(position) = positions.pop() {

@@ -127,8 +127,9 @@ pub fn pareto(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement))
     }
 }
 
-/// Stops at the first objective under which optimality is not proved. Each budget is the index of
-/// an objective and the maximum cost under this objective.
+/// Optimises the objectives in the given order. The cost found for each becomes a budget (maximum cost)
+/// for the later ones. Stops at the first objective under which optimality is not proved. `budgets`
+/// gives initial budgets, each as the index of an objective and the maximum cost.
 fn in_order(
     task: &Task,
     order: &[usize],

@@ -62,9 +62,9 @@ pub struct Draw<'b> {
 
 #[derive(Debug, Clone, Copy)]
 struct Allowed {
-    /// Predicates that may be read anywhere.
+    /// Derived predicates that may be read everywhere, negated or not.
     free: &'static [usize],
-    /// Predicates that may be read only where they are not negated.
+    /// Derived predicates that may be read only where they are not negated.
     positive: &'static [usize],
     negated: bool,
     numeric: bool,

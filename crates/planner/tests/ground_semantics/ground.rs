@@ -15,8 +15,8 @@ const LIMIT: usize = 60;
 /// States with numbers above this limit are not expanded, because exact integers are limited.
 const LARGE: i128 = 100_000;
 
-/// Error codes with which grounding may reject a task: unsupported construct, product of fluents, too large
-/// numbers.
+/// Error codes with which grounding may reject a task: unsupported construct or missing value, product
+/// of fluents, too large numbers.
 const REFUSALS: [&str; 3] = ["E301", "E303", "E304"];
 
 fn rewards_time(task: &Task) -> bool {

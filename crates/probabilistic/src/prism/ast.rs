@@ -449,8 +449,8 @@ impl Expr {
         Self::new(ExprKind::Binary(op, Box::new(self), Box::new(other)))
     }
 
-    /// Appends the names of constants, formulas and variables in the expression, each with its position. Does not
-    /// descend into properties.
+    /// Appends the names of constants, formulas and variables in the expression, each with its
+    /// position. Does not descend into properties and path formulas.
     pub fn names<'a>(&'a self, occurrences: &mut Vec<(&'a str, Place)>) {
         match &self.kind {
             ExprKind::Name(name) => occurrences.push((name, self.place)),
@@ -474,8 +474,8 @@ impl Expr {
         }
     }
 
-    /// Returns the expression with each name replaced by `with(name)`. A name for which `with` returns `None` is
-    /// kept.
+    /// Returns the expression with each name outside of properties and path formulas replaced by
+    /// `with(name)`. A name for which `with` returns `None` is kept.
     #[must_use]
     pub fn replace(&self, with: &dyn Fn(&str) -> Option<Self>) -> Self {
         self.rewrite(&mut |part| match &part.kind {
@@ -484,8 +484,9 @@ impl Expr {
         })
     }
 
-    /// Returns the expression with subexpressions replaced by `with`, outermost first. If `with` returns `None` for a
-    /// subexpression, the operands of this subexpression are rewritten. Does not descend into properties.
+    /// Returns the expression with subexpressions replaced by `with`, outermost first. If `with`
+    /// returns `None` for a subexpression, the operands of this subexpression are rewritten. Does not
+    /// descend into properties and path formulas.
     #[must_use]
     pub fn rewrite(&self, with: &mut dyn FnMut(&Self) -> Option<Self>) -> Self {
         if let Some(replacement) = with(self) {

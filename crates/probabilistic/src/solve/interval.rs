@@ -76,7 +76,8 @@ struct Rows<'a, N> {
     rounding: f64,
 }
 
-/// A copy of the equations, sorted by the distance of their blocks from an exit of the component.
+/// A copy of the equations, sorted by the distance of their blocks from an exit of the component,
+/// nearest first. Blocks that reach no exit come last.
 struct Sorted<N> {
     order: Vec<u32>,
     blocks: Vec<u32>,

@@ -22,8 +22,8 @@ pub struct Work {
 /// Size in bits up to which a fraction usually has a numerator and denominator of one word each.
 const SHORT_BITS: u64 = 126;
 
-/// Total budget, in work units, for solving in rationals those components whose bounds in doubles are
-/// insufficient.
+/// Total budget, in work units, for solving components again in rationals if their bounds in doubles
+/// are insufficient.
 const SPARE_BUDGET: u64 = 1_000_000_000;
 
 impl Work {

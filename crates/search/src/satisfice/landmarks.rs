@@ -167,9 +167,9 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
         }
     }
 
-    /// Adds disjunctive landmarks: sets of 2 to `MAX_DISJUNCTION` facts of one predicate, none of them
-    /// initially true, such that each achiever requires a fact of the set. The conditions `shared` by all
-    /// achievers are not used.
+    /// Adds disjunctive landmarks that come before `landmark`: sets of 2 to `MAX_DISJUNCTION` facts of
+    /// one predicate, none of them initially true. Each of the `achievers` of `landmark` requires a
+    /// fact of each set. The conditions `shared` by all achievers are not used.
     fn disjunctive(&mut self, achievers: &[u32], shared: &[Proposition], landmark: u32) {
         if achievers.len() < 2 {
             return;

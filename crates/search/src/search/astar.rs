@@ -187,8 +187,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         search
     }
 
-    /// Returns `None` if more than `max_states` states are stored, or the memory limit is reached,
-    /// before the search has finished.
+    /// Searches until the search has finished. Returns `None` if before that more than `max_states`
+    /// states are stored or the memory limit is reached.
     pub(super) fn run_until_states(
         &mut self,
         max_states: usize,

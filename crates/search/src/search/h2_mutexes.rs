@@ -36,7 +36,8 @@ struct Rule {
     touched: Words,
 }
 
-/// For each fact: a bitset of the facts that are compatible with it, i.e. can hold in a common state.
+/// For each fact: a bitset of the facts that are compatible with it, i.e. for which the analysis does
+/// not exclude a common state.
 struct Table {
     words: usize,
     bits: Words,

@@ -32,8 +32,9 @@ pub(super) fn rewards_time(metrics: &[Metric]) -> Option<bool> {
     rewards.iter().all(|other| *other == rewarded).then_some(rewarded)
 }
 
-/// Returns the constant coefficient of `total-time` in an expression, or `None` if the coefficient is not
-/// recognised as constant.
+/// Returns the coefficient of `total-time` in an expression, or `None` if the coefficient is not
+/// recognised as constant. A quotient whose dividend has the coefficient 0 has the coefficient 0, even
+/// if its divisor contains `total-time`.
 pub fn time_factor(expression: &Expression) -> Option<Rational> {
     let number = |expression: &Expression| match expression {
         Expression::Number(number) => Some(number.clone()),

@@ -22,8 +22,8 @@ use crate::concurrent::split::{Half, Split};
 use crate::concurrent::time_number::TimeNumber;
 use crate::concurrent::unit::{StaticDurations, Unit};
 
-/// Ground operators of one action instance. There are several starts and ends if its numeric
-/// effects are conditional.
+/// The operators into which an action instance is split: starts, over-all condition and ends. There are
+/// several starts and ends if numeric effects are conditional.
 #[derive(Clone, Default)]
 struct Halves {
     starts: Vec<OperatorId>,

@@ -12,7 +12,8 @@ use crate::concurrent::time_number::TimeNumber;
 pub(super) struct DeadlineMissed;
 
 impl<T: TimeNumber> TemporalTask<T> {
-    /// One detecting operator for each preference that is violated in a final state.
+    /// Returns, for each preference that the final state `state` violates, the first applicable
+    /// operator that detects the violation.
     pub(super) fn violated(&self, state: &State) -> impl Iterator<Item = OperatorId> {
         let is_violated = |id: &&OperatorId| self.task.operators[id.index()].applicable(state, &[]);
         self.violations.iter().filter_map(move |ways| ways.iter().find(is_violated).copied())

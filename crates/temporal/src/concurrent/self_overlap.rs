@@ -307,7 +307,8 @@ impl<T: TimeNumber> Index<'_, T> {
         duration.quotient(apart)?.checked_add(1)
     }
 
-    /// Returns `true` if a run that starts during another run is certain to have the same duration.
+    /// Returns `true` if a run of `own` that starts during another run of `own` certainly has the same
+    /// duration as that run.
     fn lasts_as_long(&self, own: &Instance<T>, start: &Operator, invariant: &Invariant) -> bool {
         start.numeric_effects.iter().all(|effect| {
             let mut numbers =

@@ -55,7 +55,9 @@ impl ConcurrentTask {
 #[derive(Debug, Clone)]
 pub(super) enum Width {
     Narrow(Box<TemporalTask>),
-    /// Task whose common unit of all times needs more bits than the narrow type has.
+    /// Task with the wide number type for times. It is used if the narrow type is too small for the
+    /// common unit of all times, a constant time or the metric. The threshold `narrow_times` can also
+    /// demand it.
     Wide(Box<TemporalTask<Wide>>),
 }
 

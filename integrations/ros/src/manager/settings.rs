@@ -46,7 +46,7 @@ pub struct Settings {
     /// Performers of actions for PlanSys2's executor, by action names.
     #[serde(default)]
     pub offers: BTreeMap<String, Offered>,
-    /// The file, for errors that are found later.
+    /// Name and text of the settings file, so that errors found after parsing can show their position.
     #[serde(skip)]
     source: Source,
 }

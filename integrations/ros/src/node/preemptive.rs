@@ -309,7 +309,9 @@ fn preemptive_acknack(message: &[u8]) -> Option<(Match, Vec<u8>)> {
         if flags & LITTLE_ENDIAN == 0 {
             return None;
         }
-        // The length 0 means that the submessage extends to the end.
+        // The length 0 means that the submessage extends to the end. This is not true for PAD and
+        // INFO_TS (RTPS 9.4.5.1.3): with the length 0, they are empty. An ACKNACK after such an empty
+        // submessage is not recognised.
         let length = match u16::from_le_bytes(length) {
             0 => message.len() - start - 4,
             length => usize::from(length),

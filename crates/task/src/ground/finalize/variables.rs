@@ -19,7 +19,8 @@ pub(super) struct Atoms {
     facts: Vec<Option<Fact>>,
     /// For each variable, the value for "none of these atoms".
     pub(super) none: Vec<u32>,
-    /// Mutex groups that are larger than their variable, see [`exclusive`](crate::task::Task::exclusive).
+    /// Mutex groups of which some facts are values of other variables, so that no variable expresses
+    /// the whole group. See [`exclusive`](crate::task::Task::exclusive).
     pub(super) exclusive: Vec<Vec<Fact>>,
 }
 

@@ -22,7 +22,8 @@ const SILENT_RETRY_DELAY: Duration = Duration::from_secs(2);
 
 const REFUSED_RETRY_DELAY: Duration = Duration::from_secs(60);
 
-/// Time after a granted change of mode during which reports of another mode are ignored.
+/// Time after a granted change of mode during which reports of another mode are ignored. If a report
+/// was ignored, and no later report confirmed the mode, the mode is queried again after this time.
 ///
 /// `system_modes` answers `change_mode` before the node has changed, and `get_mode` returns the old mode until its
 /// observer has noticed the change. If this program adopted the old mode, it would request the new mode again, and
