@@ -116,7 +116,7 @@ fn rules_in_unusual_forms_are_read() {
         ),
         // A list that is the body of one rule and the head of another.
         (format!("{} _:l rdf:first {c} ; rdf:rest rdf:nil .", rule("_:l", "_:l")), "<C>(?x) -> <C>(?x)"),
-        // A blank node as individual and as variable.
+        // One blank node as individual, another one as variable.
         (
             format!(
                 "_:b a :C . _:v a swrl:Variable . {}",

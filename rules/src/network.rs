@@ -47,7 +47,8 @@ pub(crate) struct Stratum {
     /// Plans that start from a deleted or inserted row of a negated body atom, by the relation of the
     /// row.
     pub negative: FxHashMap<RelationId, Vec<PlanId>>,
-    /// Plans that compute the aggregate of the group of a changed row, by the relation of the row.
+    /// Plans for inserted or deleted rows over which an aggregate is computed, by the relation of
+    /// the row. A plan computes the aggregate of the row's group again.
     pub aggregated: FxHashMap<RelationId, Vec<PlanId>>,
     /// Plans that search for another derivation of a row that lost its support, by the relation of the
     /// row.

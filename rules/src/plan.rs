@@ -229,9 +229,11 @@ pub(crate) struct Planner<'a> {
 }
 
 impl Planner<'_> {
-    /// Creates a plan that starts from a row of the body condition at `position`. If `exactly_once`, the
-    /// conditions before `position` match no fresh rows, so that each match is found from exactly one of
-    /// its fresh rows. Returns `None` if the plan cannot be completed.
+    /// Creates a plan that starts from a row of the body condition at `position`. Returns `None` if the plan
+    /// cannot be completed.
+    ///
+    /// If `exactly_once`, the conditions before `position` match no fresh rows (rows in the delta of the
+    /// current round). A match with several fresh rows is then found only from the first of them.
     pub fn start_at_condition(&mut self, position: usize, exactly_once: bool) -> Option<Plan> {
         let fresh_from = if exactly_once { position } else { 0 };
         match &self.lowered.body[position] {

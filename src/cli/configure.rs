@@ -41,7 +41,8 @@ pub struct Arguments {
     wanted: Wanted,
 }
 
-/// Options for the required functions and the value of designs.
+/// Options that state which functions need a design, what restricts the choice (requirements, budgets, exclusive
+/// components), and which designs are preferred.
 #[derive(Debug, Clone, Default, Args)]
 pub(super) struct Wanted {
     /// A required function (repeatable). Default: the objectives of the knowledge base, or all its

@@ -14,8 +14,8 @@ use crate::comparison::planned::{NoResult, PlanTable};
 use crate::comparison::process::{Action, Process, Risk, Valuation};
 use crate::comparison::referee::Referee;
 
-/// Total times of a mission in which a component is lost after a given number of moves and no move fails, for four
-/// reactions to the loss.
+/// Total times of a mission for four reactions to the loss of a component. The component is lost after a given number
+/// of moves, and no move fails.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct LossAt {

@@ -51,8 +51,7 @@ fn magnified(function: &str, arguments: &[&str], value: f64) -> String {
     let fraction_of_name = fraction(&format!("{function} {}", sorted.join(" ")));
     written(match function {
         "dist" => value * (1.0 - fraction_of_name / 20.0).sqrt(),
-        // The same number is added to both functions, otherwise recharging would not fill the
-        // battery.
+        // Battery and capacity grow by the same number, so that recharging still fills the battery.
         "battery" | "capacity" => value + fraction("battery") / 4.0,
         "visibility" => value * (1.0 + fraction_of_name / 50.0),
         _ => value * (1.0 - fraction_of_name / 50.0),

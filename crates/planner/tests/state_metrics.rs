@@ -208,7 +208,8 @@ fn state_dependent_costs_within_a_horizon_are_as_low_as_by_brute_force() {
     );
 }
 
-/// With the SAT solver alone and with overlapping actions, no plan that costs more than the optimum is called optimal.
+/// Tested in two ways: with the SAT solver alone, and with overlapping actions. If costs depend on the state, no plan
+/// is called optimal; otherwise only plans with the least cost are.
 #[test]
 fn state_dependent_costs_that_are_not_minimised_are_not_called_optimal() {
     let mut planned = 0;

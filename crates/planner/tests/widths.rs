@@ -97,7 +97,8 @@ fn differences_of_a_tiny_fraction_decide() {
         let (domain, problem) = parse(domain, &problem);
         solve(&domain, &problem, &separation, &Limits::none()).status
     };
-    // `light` ends a separation after `work`, which starts a separation after `light`.
+    // `work` starts one separation after the start of `light`, and `light` ends one separation
+    // after the end of `work`.
     assert_eq!(status(&BigRational::from_integer(0.into())), Status::Optimal);
     assert_eq!(status(&tiny), Status::Optimal);
     assert_eq!(status(&-tiny), Status::Unsolvable);

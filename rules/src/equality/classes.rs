@@ -14,8 +14,8 @@ use crate::fact::{Arguments, Fact};
 use crate::rule::RuleIdentity;
 use crate::symbol::Symbol;
 
-/// A derivation step: a fact with its reason. A derived equality counts as a stated fact in a step, because its own
-/// derivation is recorded in its edge.
+/// A derivation step: a fact with its reason. A premise that is the pair of an edge has the reason `Asserted`; the
+/// derivation of the pair is in [`Edge::proof`].
 pub(super) type Step = DerivationStep;
 
 /// Numbers edges in the order of creation.

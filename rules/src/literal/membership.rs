@@ -1,5 +1,5 @@
-//! Three-valued tests (yes, no, undecided): whether two literals have different values, and whether a value
-//! lies in a datatype.
+//! Tests whether two literals certainly have different values, and whether a value lies in a datatype (yes,
+//! no or undecided).
 
 use super::datatype::{OWL_RATIONAL, OWL_REAL, RDF, RDFS_LITERAL, XSD};
 use super::lexical::{Parsed, parse_xsd};

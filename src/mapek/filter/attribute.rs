@@ -281,8 +281,8 @@ impl AttributeFilter {
         if self.is_same_cell(&target, believed) { Cow::Borrowed(believed) } else { Cow::Owned(target) }
     }
 
-    /// Returns a value that violates `bound`. It lies at most half a band from the bound, and not beyond the next
-    /// bound.
+    /// Returns a value that violates `bound`. Its distance from the bound is half the band of the bound, or half the
+    /// distance to the next bound in this direction if that is less.
     fn beyond(&self, bound: &Bound) -> BigRational {
         let two = BigRational::from_integer(2.into());
         let values = self.bounds.iter().map(|neighbour| &neighbour.value);

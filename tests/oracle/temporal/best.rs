@@ -29,8 +29,9 @@ pub fn best(world: &World, cap: usize) -> Truth {
 /// A plan: instances of actions, each with start and duration.
 pub type Schedule = Vec<(usize, Q, Q)>;
 
-/// Converts the optimal path in a graph of all non-empty plans to an answer. `empty` is the cost of
-/// the empty plan in this graph, if the plan is valid. `open` means that the graph is incomplete.
+/// Converts the optimum over all non-empty plans (paths of a graph) and the empty plan to an
+/// answer. `empty` is the cost of the empty plan, measured as in the graph; `None` if this plan is
+/// invalid. `open` means that the graph is incomplete.
 #[allow(clippy::type_complexity)]
 pub fn judged(
     world: &World,

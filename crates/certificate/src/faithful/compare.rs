@@ -51,8 +51,8 @@ struct Instance<'i> {
 }
 
 impl<'c> Comparison<'c> {
-    /// Indexes the operators of the task. `timed` states that plans are measured by time, or by length if it is
-    /// `false`; with a metric it has no effect. Times of events and durations are multiples of `unit`.
+    /// Indexes the operators of the task. Without a metric, plans are measured by time if `timed`, otherwise
+    /// by length. Times of events and durations are multiples of `unit`.
     pub(super) fn new(task: &'c Translation<'c>, timed: bool, unit: BigRational) -> Result<Self> {
         let model = task.model;
         let folded = |name: &String| name.to_ascii_lowercase();

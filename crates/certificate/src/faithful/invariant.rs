@@ -38,8 +38,8 @@ const WIDENING_THRESHOLD: u32 = 8;
 struct WitnessFile {
     format: String,
     atoms: Vec<String>,
-    /// The least and greatest value of each fluent that actions change; `null` means unbounded.
-    /// Fluents that are not listed are unbounded.
+    /// Lower and upper bound of each fluent that actions change; `null` means unbounded, as does a
+    /// missing entry. Static fluents are not listed: they keep their initial values.
     numbers: Vec<(String, Option<String>, Option<String>)>,
     /// Mutex groups (atoms of which at most one holds) in addition to the variables of the task.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

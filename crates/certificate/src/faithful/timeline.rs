@@ -6,10 +6,10 @@
 //! on the phases of its start and end, and on whether start or end coincides with an event. The plan may start
 //! the action at any time that the passage permits.
 //!
-//! The task has its own clock. All times of events and all durations are multiples of a *unit*. A clock value
-//! that is a multiple of the unit represents this time and all later times. Any other clock value is rounded
-//! down to a multiple of the unit, and represents all times after this multiple. Hence the clock may be ahead
-//! of the represented time, but by less than a unit, which no action can observe.
+//! The task has its own clock. All times of events and all durations are multiples of a *unit*. Let `k` be an
+//! integer. A clock value of `k` units represents all times from `k` units on. A clock value between `k` and
+//! `k + 1` units represents all times after `k` units. So the clock may be ahead of a represented time, but
+//! by less than a unit, which no action can observe.
 
 use std::collections::BTreeMap;
 

@@ -33,9 +33,11 @@ pub(crate) struct Meeting {
     pub(crate) never_named: NeverNamed,
 }
 
-/// Warning about designs of the knowledge base that the problem does not declare although it declares others: the
-/// IRI of the first one, and the text. `None` if another message already lists these designs, because the problem
-/// also declares unknown designs or a required function has no design.
+/// Warning that the problem declares some designs, but not all that the knowledge base has for the functions named in
+/// the problem. Contains the IRI of the first missing design, and the text.
+///
+/// `None` if no design is missing, or if another message already lists the missing designs. Such a message appears if
+/// the problem declares unknown designs, or if a required function has no design.
 pub(crate) type NeverNamed = Option<(String, String)>;
 
 pub(crate) fn meet(

@@ -394,8 +394,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Values of the numbers that must be equal for dominance, because neither less nor more of them is known to be
-    /// no worse.
+    /// Values of the numbers for which neither less nor more is known to be at least as good. Dominance requires these
+    /// values to be equal.
     fn key_numbers<'s>(&self, state: &'s State) -> impl Iterator<Item = Int> + use<'s, '_> {
         let numbers = state.numbers.iter().zip(&self.costs.preferences);
         numbers.filter(|(_, preference)| !preference.less && !preference.more).map(|(number, _)| *number)

@@ -7,8 +7,8 @@ use pddl::validate::Advance;
 use task::limits::Limits;
 use task::plan::Step;
 
-/// One of the alternative first steps of a query: the remaining part of a running action, with a configuration in which
-/// it can continue. Every plan begins with one of the alternatives. The step is not an operator of the task.
+/// The remaining part of a running action, with a configuration in which it can continue. A query lists such steps as
+/// alternatives, and every plan begins with one of them. They are not operators of the task.
 #[derive(Debug, Clone)]
 pub struct FirstStep {
     /// Functions of the action, with the designs selected for them.

@@ -1,8 +1,9 @@
 //! Usage of the symbols of a domain and problem: which symbols conditions read, which symbols effects change,
 //! and which parameters need available objects.
 //!
-//! The analysis is syntactic: if a symbol is read anywhere, all its atoms count as read. Only the goal is
-//! more precise: outside quantifiers, it reads just the atoms that it mentions.
+//! The analysis is syntactic: if a symbol is read anywhere but in the metric, it counts as read for all
+//! arguments. Only predicates in the goal are treated more precisely: outside quantifiers, just the atoms
+//! that the goal mentions count as read.
 
 use rustc_hash::FxHashSet;
 

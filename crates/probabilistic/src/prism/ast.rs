@@ -133,8 +133,8 @@ pub struct Steps {
     pub least: Option<StepBound>,
     /// The upper bound, if there is one.
     pub most: Option<StepBound>,
-    /// `None` if the number of steps is bounded. If a reward is bounded, the name of its reward structure; the
-    /// inner `None` selects the first structure.
+    /// Bounded quantity: the number of steps (`None`), or the reward of the structure with this name.
+    /// `Some(None)` selects the first structure.
     pub reward: Option<Option<String>>,
 }
 

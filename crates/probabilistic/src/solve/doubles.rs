@@ -15,8 +15,8 @@ use crate::solve::work::{TIGHT, Work};
 /// Limits for solving in rationals if the bounds in doubles are insufficient: work units, and
 /// number of blocks (merged end components).
 const RATIONAL_LIMITS: (u64, usize) = (1_000_000_000, 3000);
-/// Work limit for solving in rationals if the bounds in doubles are finite, and no bounds narrower than
-/// [`TIGHT`] were requested.
+/// Work limit for solving in rationals if the bounds in doubles are finite but too wide, and the requested
+/// width is [`TIGHT`] or more. In all other cases, the work limit is the first of [`RATIONAL_LIMITS`].
 const IMPROVEMENT_LIMIT: u64 = 100_000_000;
 
 /// Computes bounds on the values of all blocks (merged end components). Returns `None` if policy iteration

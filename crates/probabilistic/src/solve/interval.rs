@@ -254,9 +254,9 @@ impl<'a, N: Number> Rows<'a, N> {
         None
     }
 
-    /// Updates all values by their best rows, and stores these rows in `policy`. Results are
-    /// multiplied by `scale` to account for rounding. Returns the greatest relative growth of a
-    /// value.
+    /// Replaces each value by that of its best row times `scale` (which accounts for rounding), and
+    /// stores the row in `policy`. Returns the greatest relative increase of a value, or 0 if none
+    /// increased.
     fn sweep(&self, values: &mut [f64], policy: &mut [u32], scale: f64) -> f64 {
         let mut change = 0.0_f64;
         for (position, chosen) in policy.iter_mut().enumerate() {

@@ -344,8 +344,12 @@ impl Ties<'_> {
         self.bounds.projections.iter().zip(&self.prepared.steps_to_go).all(in_time)
     }
 
-    /// Returns `None` if the step is inapplicable or cannot lead to a plan within the cost and
-    /// number of steps of the known plan. `to_go` is the result of [`Self::cost_to_go_after`].
+    /// Returns the label after a step. The propositional condition of `operator` must hold, and
+    /// `to_go` is the result of [`Self::cost_to_go_after`].
+    ///
+    /// Returns `None` if a numeric condition does not hold or a new value overflows. Also returns
+    /// `None` if the step cannot lead to a plan within the cost and number of steps of the known
+    /// plan.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "costs are not negative and those of labels at most that of a known plan, so that sums with an operator and an estimate fit"

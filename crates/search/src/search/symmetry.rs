@@ -22,7 +22,7 @@ struct Move {
     values: Vec<u32>,
 }
 
-/// Symmetries of a task: exchanges of two interchangeable objects.
+/// Symmetries of a task, as a list of exchanges. Each one exchanges two interchangeable objects.
 pub struct Orbits {
     exchanges: Vec<Vec<Move>>,
 }

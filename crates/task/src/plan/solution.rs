@@ -62,8 +62,8 @@ pub struct Improvement {
 }
 
 impl Improvement {
-    /// Returns the relative gap between the metric of the plan and the lower bound; 0 if both are equal. The
-    /// result is infinite if only the metric is 0.
+    /// Returns the distance between the metric and the lower bound, divided by the absolute value of the
+    /// metric. The result is 0 if both are equal, and infinite if the metric is 0 but the bound is not.
     pub fn gap(&self) -> f64 {
         let (cost, bound) = (self.cost.to_f64(), self.lower_bound.to_f64());
         if self.cost == self.lower_bound { 0.0 } else { (cost - bound).abs() / cost.abs() }

@@ -9,9 +9,9 @@
 //! Given `m` resources, a plan with makespan `T` contains occupying actions of total duration at most `T` per
 //! resource, or `T + s` if each duration is increased by the separation `s`. The sum of the increased
 //! durations over all actions of the plan, once for each resource that an action occupies, is therefore at
-//! most `m (T + s)`. The LM-cut value `W` \[1\] is a lower bound on this sum if the start of each action has
-//! its increased durations as cost. So `T ≥ W / m - s`. If separations are not certain to be required, `s` is
-//! 0.
+//! most `m (T + s)`. The LM-cut value `W` \[1\] is a lower bound on this sum if the start of each action
+//! costs its increased duration, times the number of resources that it occupies. So `T ≥ W / m - s`. If
+//! separations are not certain to be required, `s` is 0.
 //!
 //! \[1\] M. Helmert, C. Domshlak: Landmarks, critical paths and abstractions: what's the difference anyway?,
 //! ICAPS 2009.

@@ -176,8 +176,8 @@ impl Preemptive {
         self.matches.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Sends the ACKNACK to the writer, or, if its count is unknown, the HEARTBEAT to our own
-    /// participant.
+    /// Sends the ACKNACK to the writer. If its count is still unknown, sends the HEARTBEAT to our
+    /// own participant instead, whose answer contains the count.
     async fn advance(&self, matched: Match) {
         let ready = self.matches().get(&matched).and_then(|pending| {
             pending.acknack.as_ref().map(|acknack| (pending.addresses.clone(), acknack.clone()))
