@@ -65,7 +65,7 @@ pub enum Refutation {
     None(String),
 }
 
-/// What is claimed.
+/// Claim of a certificate.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]

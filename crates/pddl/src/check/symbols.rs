@@ -11,7 +11,7 @@ pub(super) struct Object<'a> {
     pub(super) is_constant: bool,
 }
 
-/// Of several declarations of a predicate or a function, the first counts.
+/// Declared names. The first of several declarations of a predicate or a function counts.
 #[derive(Debug)]
 pub(super) struct Symbols<'a> {
     pub(super) types: TypeHierarchy,

@@ -42,7 +42,7 @@ pub(super) enum HeuristicWeight {
 pub(super) enum SearchGoal<N> {
     /// Guided also by landmarks.
     Task,
-    /// From a state of a plan to the goal of a segment (consecutive steps of the plan).
+    /// Goal of a segment (consecutive steps of a plan), for a search from a state of the plan.
     Segment(State<N>, SegmentGoal),
 }
 
