@@ -56,7 +56,7 @@ fn examples_print_the_expected_output() {
     let text = printed("anytime");
     assert!(
         text.contains("optimal, proved")
-            && (text.ends_with("(move b1 p r)\n") || text.ends_with("(move b1 q r)\n")),
+            && (text.ends_with("(move b1 p r)\n") || text.contains("(move b1 q r)")),
         "{text}"
     );
     let text = printed("argument");
