@@ -2,7 +2,8 @@
 //! `metaplan-verify`.
 //!
 //! Two programs are called. `metaplan-proved-prepare` writes evidence for the claim and need not be trusted.
-//! `metaplan-proved-check` checks the evidence with the function about which the theorems `optimal` and `unsolvable` are proved.
+//! `metaplan-proved-check` checks the evidence with the function about which the theorems `optimal` and
+//! `unsolvable` are proved.
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -15,7 +16,7 @@ use crate::message::Message;
 
 const PREPARE: &str = "metaplan-proved-prepare";
 const CHECK: &str = "metaplan-proved-check";
-/// Success of both programs. The next two constants are other exit statuses of
+/// Exit status of both programs on success. The next two constants are other exit statuses of
 /// `metaplan-proved-check`; `proved/ocaml/check.ml` defines them.
 const PROVED: i32 = 0;
 const REJECTED: i32 = 3;

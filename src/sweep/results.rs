@@ -14,9 +14,6 @@ use crate::message::{Errors, Message};
 
 pub(super) const FORMAT: &str = "metaplan-sweep/1";
 
-/// First characters of each result file.
-const HEADER_START: &str = "{\"format\":\"metaplan-sweep/1\"";
-
 const OTHER_STUDY: &str = "it belongs to another study, or the study or its files have changed";
 
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -161,6 +158,7 @@ pub fn read_lines(directory: &Path, study: &Study) -> Result<Vec<Line>, Errors> 
         }
     }
     files.sort();
+    let header_start = format!("{{\"format\":\"{FORMAT}\"");
     let (mut all, mut mistakes) = (BTreeMap::<usize, Line>::new(), Vec::new());
     for path in &files {
         let text = match std::fs::read_to_string(path) {
@@ -171,7 +169,7 @@ pub fn read_lines(directory: &Path, study: &Study) -> Result<Vec<Line>, Errors> 
             }
         };
         let whole = text.rfind('\n').map_or(0, |end| end + 1);
-        if whole == 0 && (text.starts_with(HEADER_START) || HEADER_START.starts_with(&text)) {
+        if whole == 0 && (text.starts_with(&header_start) || header_start.starts_with(&text)) {
             // The process was killed before it had written the header.
             continue;
         }

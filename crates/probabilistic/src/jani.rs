@@ -27,7 +27,7 @@ pub fn write(name: &str, model: &Model) -> Result<Value, Error> {
     if !recursive.is_empty() {
         return Err(Error::Model(recursive.into()));
     }
-    let writer = Writer { formulas: &model.formulas, has_initial_condition: model.initial.is_some() };
+    let writer = Writer { model };
     let mut problems = Vec::new();
     let actions = actions(model);
     let globals = model.modules.iter().flat_map(|module| &module.variables).chain(&model.globals);
@@ -176,8 +176,7 @@ fn parts(condition: &Expr) -> Vec<&Expr> {
 }
 
 struct Writer<'a> {
-    formulas: &'a [Named],
-    has_initial_condition: bool,
+    model: &'a Model,
 }
 
 impl Writer<'_> {
@@ -298,7 +297,7 @@ impl Writer<'_> {
     fn fixes<'a>(&self, part: &'a Expr) -> Option<(&'a str, i64)> {
         let ExprKind::Binary(BinaryOp::Equal, left, right) = &part.kind else { return None };
         let (ExprKind::Name(name), ExprKind::Int(value)) = (&left.kind, &right.kind) else { return None };
-        let is_formula = self.formulas.iter().any(|formula| formula.name == *name);
+        let is_formula = self.model.formulas.iter().any(|formula| formula.name == *name);
         (!is_formula).then_some((name.as_str(), *value))
     }
 
@@ -313,7 +312,7 @@ impl Writer<'_> {
         };
         let mut entry = json!({ "name": variable.name, "type": kind });
         // Without an initial value, all values that the condition on initial states admits are initial.
-        if !self.has_initial_condition {
+        if self.model.initial.is_none() {
             entry["initial-value"] = variable.initial.as_ref().map_or(least, |value| self.expression(value));
         }
         entry
@@ -325,7 +324,7 @@ impl Writer<'_> {
             ExprKind::Int(value) => json!(value),
             ExprKind::Number(value) => number(value),
             ExprKind::Label(name) => json!(name),
-            ExprKind::Name(name) => match self.formulas.iter().find(|formula| formula.name == *name) {
+            ExprKind::Name(name) => match self.model.formulas.iter().find(|formula| formula.name == *name) {
                 Some(formula) => self.expression(&formula.expression),
                 None => json!(name),
             },

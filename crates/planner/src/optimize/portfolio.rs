@@ -247,30 +247,24 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         } else {
             (MIN_BOOST, MAX_BOOST.cast_signed())
         };
-        let (satisficer, best) = (self.satisficer.as_mut()?, self.best.as_ref()?);
+        let before = self.satisficer.as_ref()?.figures;
         let span = info_span!("improve", expanded = Empty, generated = Empty).entered();
         let share = self.improvement_share.clamp(least, most);
         let nodes = work.saturating_mul(RELAXATION_WORK_PER_STATE) as u64;
         let mut nodes = (nodes << share.max(0) >> share.min(0).unsigned_abs()).max(1);
-        let before = satisficer.figures;
-        let mut plan = best.clone();
-        let mut is_better = false;
-        while let Ok(Some(better)) = satisficer.improve(&plan, &mut nodes) {
-            (plan, is_better) = (better, true);
-            self.run.statistics.found_by = Some(PlannerPart::Satisficing);
-            let horizon = plan.steps.len();
-            let better = Best { plan: plan.clone(), lower: self.lower };
-            self.run.announce(&better, horizon);
+        let (mut is_better, mut turn) = (false, None);
+        while let Ok(Some(plan)) = self.satisficer.as_mut()?.improve(self.best.as_ref()?, &mut nodes) {
+            is_better = true;
+            turn = self.improve(plan, PlannerPart::Satisficing);
         }
-        satisficer.figures.add_to(before, &mut self.run.statistics);
+        self.satisficer.as_ref()?.figures.add_to(before, &mut self.run.statistics);
         record(&span, &self.run.statistics);
         if !is_better {
             self.improvement_share = share.saturating_sub(1).max(least);
             return None;
         }
         self.improvement_share = most;
-        self.best = Some(plan);
-        self.meets()
+        turn
     }
 
     fn sat_turn(&mut self, work: usize, _: usize) -> Turn {
