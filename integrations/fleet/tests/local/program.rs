@@ -56,15 +56,24 @@ impl Program {
         fs::read_to_string(self.folder.path().join("log")).expect("it can be read")
     }
 
-    fn wait(&mut self, path: &str, status: u16) -> String {
+    /// Calls `look` until it returns a value, at most for a minute.
+    fn poll<T>(&mut self, look: impl Fn(&Self) -> Option<T>) -> T {
         for _ in 0..600 {
-            if let Some((_, body)) = self.get(path).filter(|page| page.0 == status) {
-                return body;
+            if let Some(value) = look(self) {
+                return value;
             }
             assert!(self.child.try_wait().expect("it is a child").is_none(), "it has ended: {}", self.log());
             std::thread::sleep(Duration::from_millis(100));
         }
-        panic!("{path} has not had status {status}: {:?}", self.get(path));
+        panic!("not seen within a minute; log: {}", self.log());
+    }
+
+    fn wait(&mut self, path: &str, status: u16) -> String {
+        self.poll(|program| program.get(path).filter(|page| page.0 == status).map(|(_, body)| body))
+    }
+
+    fn wait_for_line(&mut self, text: &str) -> String {
+        self.poll(|program| Some(program.log()).filter(|log| log.contains(text)))
     }
 }
 
@@ -76,8 +85,9 @@ fn a_worker_is_ready_when_it_has_reached_its_log() {
     assert!(program.wait("/metrics", 200).contains("metaplan_fleet_partitions"));
     assert_eq!(program.get("/health").map(|page| page.0), Some(200));
     assert_eq!(program.get("/secret").map(|page| page.0), Some(404));
-    let log = program.log();
-    assert!(log.contains("taken") && !log.contains('\u{1b}'), "{log:?}");
+    // A worker is ready as soon as it has reached its log, and takes its partitions afterwards.
+    let log = program.wait_for_line("taken");
+    assert!(!log.contains('\u{1b}'), "{log:?}");
 }
 
 #[test]
