@@ -203,7 +203,11 @@ fn one(
     let config = Config {
         risk,
         penalty: arguments.penalty,
-        priority: arguments.priority as usize,
+        priority: match arguments.priority {
+            Priority::Time => crate::comparison::Priority::Time,
+            Priority::Energy => crate::comparison::Priority::Energy,
+            Priority::Safety => crate::comparison::Priority::Safety,
+        },
         states: arguments.state_limit,
         memory: &memory_since,
     };

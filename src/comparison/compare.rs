@@ -12,7 +12,7 @@ use crate::comparison::nominal::time_of;
 use crate::comparison::planned::{Costs, NoResult, PlanFinder, PlanTable};
 use crate::comparison::play::Measures;
 use crate::comparison::process::{Process, REWARDS, Risk, Valuation};
-use crate::comparison::published::{published, shortest_routes};
+use crate::comparison::published::{Priority, published, shortest_routes};
 use crate::comparison::referee::Referee;
 use crate::comparison::route::best_on_route;
 
@@ -27,8 +27,8 @@ pub struct Config<'a> {
     /// Time added if a mission does not reach the goal. `None` for ten times the time that the first plan takes if
     /// nothing fails (at least 10; 10,000 if there is no plan).
     pub penalty: Option<f64>,
-    /// Priority of the published procedure: time (0), energy (1) or safety (2).
-    pub priority: usize,
+    /// Priority of the published procedure.
+    pub priority: Priority,
     /// Maximum number of states of the process.
     pub states: usize,
     /// Returns the peak memory in megabytes since its previous call, if the platform reports it.

@@ -31,6 +31,6 @@ pub use planned::{Costs, NoResult, PlanFinder, Planned, Stages};
 pub use play::Measures;
 pub use process::{Action, Process, REWARDS, Risk, State, Valuation};
 pub use program::program;
-pub use published::{Published, published, shortest_routes};
+pub use published::{Priority, Published, published, shortest_routes};
 pub use single_way::published_program;
 pub use task::Tasked;

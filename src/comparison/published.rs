@@ -21,6 +21,17 @@ pub(super) const ROUTES: usize = 5;
 const WEIGHTS: [f64; 2] = [0.6, 0.2];
 const MAX_PARTIAL_ROUTES: usize = 2_000_000;
 
+/// Property that the published procedure considers first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Priority {
+    /// The time until the goal.
+    Time,
+    /// The energy until the goal.
+    Energy,
+    /// The probability of no collision.
+    Safety,
+}
+
 /// Decision of the published procedure, with its predicted values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Published {
@@ -46,9 +57,10 @@ impl Published {
     }
 }
 
-/// Returns at most `wanted` simple routes from start to goal, in ascending length. The length of an arc is its least
-/// time over all configurations. The search stops after 2,000,000 partial routes with the routes found until then.
-pub fn shortest_routes(mission: &Coadaptation, wanted: usize) -> Vec<Vec<usize>> {
+/// Returns at most `max_routes` simple routes from start to goal, in ascending length. The length of an arc is its
+/// least time over all configurations. The search stops after 2,000,000 partial routes with the routes found until
+/// then.
+pub fn shortest_routes(mission: &Coadaptation, max_routes: usize) -> Vec<Vec<usize>> {
     let length = |arc: usize| {
         let by = mission.arcs[arc].by.iter().flatten().map(|traversal| traversal.time.to_f64());
         by.fold(f64::INFINITY, f64::min)
@@ -64,18 +76,17 @@ pub fn shortest_routes(mission: &Coadaptation, wanted: usize) -> Vec<Vec<usize>>
     for (number, arc) in mission.arcs.iter().enumerate() {
         leaving[arc.from].push(number);
     }
-    let (mut found, mut steps) = (Vec::new(), 0);
-    while let Some(Reverse((estimate, route))) = queue.pop() {
+    let (mut routes, mut steps) = (Vec::new(), 0);
+    while routes.len() < max_routes
+        && let Some(Reverse((estimate, route))) = queue.pop()
+    {
         steps += 1;
         if estimate == u64::MAX || steps > MAX_PARTIAL_ROUTES {
             break;
         }
         let at = route.last().map_or(mission.start, |arc| mission.arcs[*arc].to);
         if at == mission.goal {
-            found.push(route);
-            if found.len() == wanted {
-                break;
-            }
+            routes.push(route);
             continue;
         }
         let so_far: u64 = route.iter().map(|arc| scaled(*arc)).sum();
@@ -93,7 +104,7 @@ pub fn shortest_routes(mission: &Coadaptation, wanted: usize) -> Vec<Vec<usize>>
             }
         }
     }
-    found
+    routes
 }
 
 /// Returns the length of the shortest route from each place to the goal.
@@ -135,19 +146,19 @@ fn believed(mission: &Coadaptation, route: &[usize], configuration: usize) -> Op
     Some([time, energy, 1.0 - last_risky.unwrap_or(0.0)])
 }
 
-/// Runs the published procedure with the priority on time (0), energy (1) or safety (2). Returns `None` if no route
-/// can be traversed.
-///
-/// # Panics
-/// `priority` is greater than 2, and several configurations can traverse a route.
-pub fn published(mission: &Coadaptation, priority: usize) -> Option<Published> {
+/// Runs the published procedure. Returns `None` if no route can be traversed.
+pub fn published(mission: &Coadaptation, priority: Priority) -> Option<Published> {
     let available = |configuration: &usize| mission.configurations[*configuration].available;
     let mut candidates = Vec::new();
     for route in shortest_routes(mission, ROUTES) {
         let drivable = (0..mission.configurations.len()).filter(available);
         let believed = drivable.filter_map(|c| believed(mission, &route, c).map(|values| (c, values)));
         // Time and energy are minimised; the probability is maximised.
-        let key = |values: &[f64; 3]| if priority == 2 { -values[2] } else { values[priority] };
+        let key = |[time, energy, safety]: &[f64; 3]| match priority {
+            Priority::Time => *time,
+            Priority::Energy => *energy,
+            Priority::Safety => -safety,
+        };
         let best = believed.min_by(|(_, a), (_, b)| key(a).total_cmp(&key(b)));
         candidates.extend(best.map(|(configuration, values)| (route, configuration, values)));
     }
@@ -157,7 +168,7 @@ pub fn published(mission: &Coadaptation, priority: usize) -> Option<Published> {
         [greatest(0), mission.battery.map_or(greatest(1), |b| f64::from(b.initial) * f64::from(b.unit))];
     let utility = |values: &[f64; 3]| {
         let single = [1.0 - values[0] / scale[0], 1.0 - (values[1] / scale[1]).min(1.0), values[2]];
-        let weighted = single.iter().enumerate().map(|(of, u)| u * WEIGHTS[usize::from(of != priority)]);
+        let weighted = single.iter().enumerate().map(|(of, u)| u * WEIGHTS[usize::from(of != priority as usize)]);
         weighted.sum::<f64>()
     };
     let best = candidates.iter().max_by(|(.., a), (.., b)| utility(a).total_cmp(&utility(b)))?;

@@ -52,7 +52,7 @@ impl JsonSchema for PlannedStep {
                 "arguments": {
                     "type": "array",
                     "items": { "type": "string" },
-                    "description": "All arguments, including designs, in the order of the parameters."
+                    "description": "Arguments of the parameters that the domain file declares, in this order."
                 },
                 "configuration": {
                     "type": "object",

@@ -3,7 +3,7 @@
 #![allow(clippy::print_stdout)]
 
 use metaplan::comparison::{
-    Coadaptation, MapOptions, Process, Risk, import_map, program, published, shortest_routes,
+    Coadaptation, MapOptions, Priority, Process, Risk, import_map, program, published, shortest_routes,
 };
 use metaplan::mission::{Mission, Planning as _};
 use metaplan::setup::Setup;
@@ -402,19 +402,20 @@ fn exported_published_setting_matches_its_execution() {
     };
     let routes = shortest_routes(&mission, 5);
     assert_eq!(routes.len(), 5);
+    assert!(shortest_routes(&mission, 0).is_empty());
     let questions = [
-        "R{\"time\"}min=? [ F \"goal\" ]",
-        "R{\"energy\"}min=? [ F \"goal\" ]",
-        "Pmax=? [ F \"safe_goal\" ]",
+        (Priority::Time, "R{\"time\"}min=? [ F \"goal\" ]"),
+        (Priority::Energy, "R{\"energy\"}min=? [ F \"goal\" ]"),
+        (Priority::Safety, "Pmax=? [ F \"safe_goal\" ]"),
     ];
-    for (priority, question) in questions.into_iter().enumerate() {
+    for (priority, question) in questions {
         let published_plan = published(&mission, priority).expect("a route");
         let number =
             routes.iter().position(|route| *route == published_plan.route).expect("one of the five") + 1;
-        let believed = [published_plan.time, published_plan.energy, published_plan.not_collided][priority];
+        let believed = [published_plan.time, published_plan.energy, published_plan.not_collided][priority as usize];
         assert!((value(question, number) - believed).abs() < 1e-9, "{question}: {believed}");
         let values: Vec<f64> = (1..=5).map(|route| value(question, route)).collect();
-        let best = values.iter().copied().reduce(if priority == 2 { f64::max } else { f64::min });
+        let best = values.iter().copied().reduce(if priority == Priority::Safety { f64::max } else { f64::min });
         assert!((value(question, 0) - best.expect("five")).abs() < 1e-9, "{question}: {values:?}");
     }
     let arguments = ["export", "missions/camara_like.toml", "--to", "jani", "--setting", "published"];

@@ -308,7 +308,13 @@ impl Mission {
             };
             let compared = Compared { mission, roles: &roles, coadaptation: &own, tasked: tasked.as_ref() };
             let (risk, memory) = (Risk::all(&own), &|| None);
-            let config = comparison::Config { risk, penalty, priority: 0, states: state_limit, memory };
+            let config = comparison::Config {
+                risk,
+                penalty,
+                priority: comparison::Priority::Time,
+                states: state_limit,
+                memory,
+            };
             let comparison = compared.compare(&config, &mut |_, _| {})?;
             let answer = CompareAnswer::new(vec![ComparisonAnswer::new(None, &comparison)], &[], &[]);
             Ok(serde_json::to_string(&answer).unwrap_or_default())

@@ -78,7 +78,7 @@ pub enum Difference {
     },
     /// The witness does not contain the initial state, or an action instance leads out of the
     /// witness.
-    #[error("the witness does not cover all reachable values of {what}")]
+    #[error("the witness does not cover all values of {what} that it may reach")]
     Witness {
         /// The atom or number that is outside the witness.
         what: String,
