@@ -2,6 +2,7 @@
 //! `metaplan-verify` checks them. The documentation of the crate `verify` specifies the files.
 
 mod derivations;
+mod front;
 mod knowledge;
 mod proved;
 
@@ -16,7 +17,9 @@ use pddl::{print_domain, print_problem};
 use planner::{
     Certificate, ExactTask, Limits, RefutationOutputs, Solution, Status, Task, certify, certify_exact, refute,
 };
+use serde::Serialize;
 
+pub use front::write_front;
 pub use proved::{ProvedChecker, Theorem};
 
 pub use ::verify::{Claim, Verification, VerifiedPart, Verifier};
@@ -94,6 +97,16 @@ impl Contents<'_> {
 /// The solution has no certificate, or one that is too large or would be rejected (M120); the knowledge base
 /// cannot be read again; or the directory cannot be written (M109).
 pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Result<(), Message> {
+    write_with(directory, contents, knowledge::files(contents.mission)?.into_iter().flatten(), limits)
+}
+
+/// Writes the certificate of a solution with the given files of the knowledge base.
+fn write_with(
+    directory: &Path,
+    contents: &Contents<'_>,
+    origin: impl IntoIterator<Item = (&'static str, String)>,
+    limits: &Limits,
+) -> Result<(), Message> {
     let Contents { mission, problem, task, solution, plan } = *contents;
     let wrong = |error: &dyn std::fmt::Display| Message::error("M120", format!("no certificate: {error}"));
     let name = directory.display().to_string();
@@ -117,7 +130,7 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
         (WITNESS, witness),
         (ARGUMENT, certificate.argument),
     ];
-    files.extend(knowledge::files(mission)?.into_iter().flatten());
+    files.extend(origin);
     let claim = match &solution.plan {
         Some(found) => {
             files.push((PLAN, plan.to_owned()));
@@ -140,21 +153,30 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
     let refutation =
         refutation(whole.path(), (text(&files, TASK), text(&files, ARGUMENT)), metric.as_ref(), limits)
             .map_err(failed)?;
-    let mut listed: Vec<File> = Vec::new();
     for (name, text) in &files {
         fs::write(whole.path().join(name), text).map_err(failed)?;
     }
     // Without a refutation, its files do not exist.
-    let streamed = STREAMED.iter().filter(|_| matches!(refutation, Refutation::Steps(_)));
-    for name in files.iter().map(|(name, _)| name).chain(streamed) {
-        let (bytes, sha256) = digest_of(&whole.path().join(name)).map_err(failed)?;
-        listed.push(File { name: (*name).to_owned(), bytes, sha256 });
-    }
+    let streamed = STREAMED.into_iter().filter(|_| matches!(refutation, Refutation::Steps(_)));
+    let names = files.iter().map(|(name, _)| *name).chain(streamed);
+    let listed = listed(whole.path(), names).map_err(failed)?;
     let manifest = Manifest { format: FORMAT.to_owned(), claim, refutation, files: listed };
-    let mut text = serde_json::to_string_pretty(&manifest).map_err(|error| wrong(&error))?;
-    text.push('\n');
-    fs::write(whole.path().join("manifest.json"), text).map_err(failed)?;
+    write_manifest(whole.path(), &manifest).map_err(failed)?;
     whole.commit().map_err(failed)
+}
+
+/// Returns the sizes and digests of files.
+fn listed<'n>(directory: &Path, names: impl Iterator<Item = &'n str>) -> std::io::Result<Vec<File>> {
+    let list = |name: &str| {
+        let (bytes, sha256) = digest_of(&directory.join(name))?;
+        Ok(File { name: name.to_owned(), bytes, sha256 })
+    };
+    names.map(list).collect()
+}
+
+fn write_manifest(directory: &Path, manifest: &impl Serialize) -> std::io::Result<()> {
+    let text = serde_json::to_string_pretty(manifest)?;
+    fs::write(directory.join("manifest.json"), text + "\n")
 }
 
 /// Creates the witness (an over-approximation of the reachable states). Uses it to check that the ground task agrees

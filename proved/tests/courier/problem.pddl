@@ -1,0 +1,11 @@
+(define (problem morning)
+  (:domain courier)
+  (:objects home shop work - place)
+  (:init
+    (at home) (road home shop) (road shop home) (road shop work) (alley home shop) (alley shop work)
+    (= (length home shop) 6) (= (length shop home) 6) (= (length shop work) 5)
+    (= (shortcut home shop) 4) (= (shortcut shop work) 2.5)
+    (= (danger home shop) 3) (= (danger shop work) 3.5)
+    (= (cost) 0) (= (risk) 0))
+  (:goal (at work))
+  (:metric minimize (cost)))
