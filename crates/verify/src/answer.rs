@@ -79,7 +79,8 @@ fn text(report: &Verification) -> String {
         Some(Claim::Unsolvable) => "there is no plan".to_owned(),
         Some(Claim::Front(front)) => {
             let [first, second] = &front.objectives;
-            format!("the front of {first} and {second} has exactly {} points", front.points.len())
+            let (count, ending) = (front.points.len(), if front.points.len() == 1 { "" } else { "s" });
+            format!("the front of {first} and {second} has exactly {count} point{ending}")
         }
         None => "nothing is claimed".to_owned(),
     };

@@ -215,3 +215,28 @@ impl Members<'_> {
         Ok(text(&contents, PLAN).to_owned())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_usual_form_of_a_front_is_read() {
+        let text = "minimize (cost)\nminimize (+ (risk) 1)\n6.5 7\n8 1/3\n";
+        let front = Front::parse(text).expect("a front");
+        assert_eq!(front.objectives, ["(cost)", "(+ (risk) 1)"]);
+        assert_eq!(front.points, [["6.5", "7"], ["8", "1/3"]]);
+        assert_eq!(front.text(), text);
+        for wrong in [
+            "",
+            "minimize (cost)\n",
+            "minimize (cost)\nminimize (risk)\n",
+            "maximize (cost)\nminimize (risk)\n1 2\n",
+            "minimize (cost)\nminimize (risk)\n1\n",
+            "minimize (cost)\nminimize (risk)\n1 2",
+            "minimize (cost)\r\nminimize (risk)\n1 2\n",
+        ] {
+            assert!(Front::parse(wrong).is_err(), "{wrong:?}");
+        }
+    }
+}
