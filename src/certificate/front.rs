@@ -85,7 +85,8 @@ pub fn write_front(
     let problem = member_problem(problem, &objectives, false, None);
     write_member(&member(sorted.len()), (mission, &problem), (last, least), limits)?;
     let files = listed(whole.path(), files.iter().map(|(name, _)| *name)).map_err(failed)?;
-    write_manifest(whole.path(), &FrontManifest { format: FRONT_FORMAT.to_owned(), files }).map_err(failed)?;
+    write_manifest(whole.path(), &FrontManifest { format: FRONT_FORMAT.to_owned(), files })
+        .map_err(failed)?;
     whole.commit().map_err(failed)
 }
 

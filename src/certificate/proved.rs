@@ -139,12 +139,7 @@ impl ProvedChecker {
         Ok(Theorem::None(reason))
     }
 
-    fn answer(
-        &self,
-        directory: &Path,
-        claim: &Claim,
-        stop: &dyn Fn() -> bool,
-    ) -> Result<Answer, Message> {
+    fn answer(&self, directory: &Path, claim: &Claim, stop: &dyn Fn() -> bool) -> Result<Answer, Message> {
         let folder = tempfile::tempdir().map_err(|error| failed("a temporary directory", &error))?;
         let errors = folder.path().join("errors");
         let (certificates, checker, name) = match claim {

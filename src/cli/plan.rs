@@ -240,7 +240,9 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         let mut front = front.map_err(|messages| Failure::planning(messages, &limits))?;
         front.preparation.read = read;
         show_front(&front, &mission.name, &positions, (arguments, common))?;
-        return Ok(certified((arguments, common), exit(front.front.status), |directory| front.certify(directory)));
+        return Ok(certified((arguments, common), exit(front.front.status), |directory| {
+            front.certify(directory)
+        }));
     }
     let front = planner.plan();
     progress.finish();

@@ -105,7 +105,9 @@ pub fn check_front(
     let directory = parent.join("true");
     fs::create_dir_all(&parent).expect("a directory");
     let limits = Limits::none().with_time(4 * case.limit);
-    if let Err(message) = certificate::write_front(&directory, (mission, problem), objectives, points, &limits) {
+    if let Err(message) =
+        certificate::write_front(&directory, (mission, problem), objectives, points, &limits)
+    {
         return tally.count(format!("front: {}: {:.120}", message.code, without_names(&message.message)));
     }
     let verify = |directory: &Path| {
@@ -198,8 +200,7 @@ fn forge(original: &Path, target: &Path, front: &Front, members: &[usize]) {
     let mut document: FrontManifest =
         serde_json::from_str(&fs::read_to_string(&manifest).expect("a manifest")).expect("JSON");
     for file in document.files.iter_mut().filter(|file| file.name == FRONT) {
-        *file =
-            File { name: FRONT.to_owned(), bytes: text.len() as u64, sha256: digest(text.as_bytes()) };
+        *file = File { name: FRONT.to_owned(), bytes: text.len() as u64, sha256: digest(text.as_bytes()) };
     }
     fs::write(target.join(FRONT), text).expect("a file");
     fs::write(manifest, serde_json::to_string(&document).expect("JSON")).expect("a file");

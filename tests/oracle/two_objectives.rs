@@ -36,20 +36,22 @@ struct Courier {
 }
 
 fn courier(rng: &mut Rng) -> Courier {
-    let places = rng.usize(3..6);
+    let places = rng.usize(3..7);
     let is_timed = rng.u32(0..3) == 0;
     let mut edges: Vec<Edge> = Vec::new();
-    for _ in 0..rng.usize(places + 2..3 * places + 4) {
+    for _ in 0..rng.usize(2 * places..4 * places + 4) {
         let (from, to) = (rng.usize(0..places), rng.usize(0..places));
         let least = u32::from(is_timed);
-        let edge =
-            Edge { from, to, length: rng.u32(least..12), danger: rng.u32(0..8), has_gate: rng.u32(0..5) == 0 };
+        let length = rng.u32(least..12);
+        // Many short edges are dangerous, so that the objectives conflict.
+        let danger = if rng.u32(0..3) == 0 { rng.u32(0..8) } else { (13 - length) * rng.u32(0..3) };
+        let edge = Edge { from, to, length, danger, has_gate: rng.u32(0..4) == 0 };
         // Two edges between the same places differ in their gate.
         if from != to && edges.iter().all(|e| (e.from, e.to, e.has_gate) != (from, to, edge.has_gate)) {
             edges.push(edge);
         }
     }
-    let (key_place, fuel) = (rng.usize(0..places), rng.u32(2..7));
+    let (key_place, fuel) = (rng.usize(0..places), rng.u32(3..8));
     Courier { places, edges, key_place, fuel, is_timed, is_exchanged: rng.bool() }
 }
 
@@ -90,8 +92,10 @@ fn text(courier: &Courier) -> (String, String) {
         action("pass", "gate", "(has-key)")
     );
     let objects: String = (0..courier.places).map(|place| format!(" p{place}")).collect();
-    let mut facts =
-        format!("(at p0) (key-at p{}) (= (cost) 0) (= (risk) 0.5) (= (fuel) {})", courier.key_place, courier.fuel);
+    let mut facts = format!(
+        "(at p0) (key-at p{}) (= (cost) 0) (= (risk) 0.5) (= (fuel) {})",
+        courier.key_place, courier.fuel
+    );
     for Edge { from, to, length, danger, has_gate } in &courier.edges {
         let edge = if *has_gate { "gate" } else { "road" };
         let (length, danger) = (half(*length), half(*danger));
@@ -157,7 +161,8 @@ fn judge_seed(seed: u64, tally: &mut Tally) {
     tally.tasks += 1;
     let (mission, problem) = read(&case.domain, &case.problem).expect("a task");
     let first = if courier.is_timed { "total-time" } else { "(cost)" };
-    let mut objectives = [first, "(risk)"].map(|text| mission.objective(&problem, text).expect("an objective"));
+    let mut objectives =
+        [first, "(risk)"].map(|text| mission.objective(&problem, text).expect("an objective"));
     let mut expected = front(&courier);
     if courier.is_exchanged {
         objectives.reverse();

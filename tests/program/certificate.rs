@@ -65,12 +65,11 @@ fn fronts_have_certificates() {
     let directory = tempfile::tempdir().expect("a directory");
     let plan = |domain: &str, problem: &str, objectives: &str, name: &str| {
         let target = directory.path().join(name).display().to_string();
-        let outcome =
-            metaplan(&["plan", domain, problem, "--pareto", objectives, "--certificate", &target]);
+        let outcome = metaplan(&["plan", domain, problem, "--pareto", objectives, "--certificate", &target]);
         (outcome, target)
     };
-    let [domain, problem] = ["domain", "problem"]
-        .map(|name| format!("crates/verify/tests/certificates/front/{name}.pddl"));
+    let [domain, problem] =
+        ["domain", "problem"].map(|name| format!("crates/verify/tests/certificates/front/{name}.pddl"));
     let (planned, front) = plan(&domain, &problem, "cost,risk", "front");
     assert_eq!((planned.status, planned.stderr.as_str()), (0, ""), "{planned:#?}");
     let outcome = verify(&front);
@@ -82,7 +81,9 @@ fn fronts_have_certificates() {
     let claim = json!({ "front": { "objectives": ["(cost)", "(risk)"], "points": points } });
     assert_eq!(answer["claim"], claim);
     // A front without one of its points, and one with a point that does not exist.
-    for (old, new, part) in [("9 3\n", "", "point       failed: 3"), ("\n9 3", "\n9 2", "point       failed: 3")] {
+    for (old, new, part) in
+        [("9 3\n", "", "point       failed: 3"), ("\n9 3", "\n9 2", "point       failed: 3")]
+    {
         change(&front, "front.txt", &|text| text.replace(old, new));
         let outcome = verify(&front);
         assert_eq!(outcome.status, 30, "{outcome:#?}");
@@ -106,7 +107,10 @@ fn fronts_have_certificates() {
     assert_eq!(planned.status, 0, "{planned:#?}");
     let outcome = verify(&front);
     assert_eq!(outcome.status, 0, "{outcome:#?}");
-    assert!(outcome.stdout.contains("the front of (total-time) and (battery_used) has exactly"), "{outcome:#?}");
+    assert!(
+        outcome.stdout.contains("the front of (total-time) and (battery_used) has exactly"),
+        "{outcome:#?}"
+    );
     let (planned, front) = ugv("total-time,(+ 1 (* 2 total-time))", "twice");
     assert_eq!(planned.status, 3, "{planned:#?}");
     assert!(planned.stderr.contains("error[M120]: no certificate: both objectives depend on the total time"));
@@ -114,8 +118,11 @@ fn fronts_have_certificates() {
     // Without a plan, the certificate is an ordinary one.
     let unsolvable = directory.path().join("unsolvable.pddl").display().to_string();
     let text = std::fs::read_to_string(root().join(&problem)).expect("a problem");
-    std::fs::write(&unsolvable, text.replace("(road shop work) (alley", "(alley").replace("(alley shop work)", ""))
-        .expect("a file");
+    std::fs::write(
+        &unsolvable,
+        text.replace("(road shop work) (alley", "(alley").replace("(alley shop work)", ""),
+    )
+    .expect("a file");
     let (planned, certificate) = plan(&domain, &unsolvable, "cost,risk", "unsolvable");
     assert_eq!(planned.status, 10, "{planned:#?}");
     let outcome = verify(&certificate);

@@ -16,8 +16,8 @@ use crate::about::about;
 use crate::files::{is_front, read, read_front, text};
 use crate::front::{self, FRONT};
 use crate::manifest::{
-    ARGUMENT, Claim, DOMAIN, File, Front, Manifest, PLAN, PROBLEM, Refutation, STREAMED, Subject, TASK, Verification,
-    VerifiedPart, WITNESS,
+    ARGUMENT, Claim, DOMAIN, File, Front, Manifest, PLAN, PROBLEM, Refutation, STREAMED, Subject, TASK,
+    Verification, VerifiedPart, WITNESS,
 };
 use crate::plan::plan;
 use crate::task::{read_pddl, same_task};
@@ -150,7 +150,8 @@ impl fmt::Debug for Verifier<'_> {
 fn conditions(directory: &Path, stop: &dyn Fn() -> bool) -> Result<String, Message> {
     let wrong = |reason: String| Message::at("M121", &directory.display().to_string(), None, reason);
     if is_front(directory) {
-        let reason = "a front has no verification conditions, but the certificates in its subdirectories have";
+        let reason =
+            "a front has no verification conditions, but the certificates in its subdirectories have";
         return Err(wrong(reason.to_owned()));
     }
     let (Manifest { claim, .. }, contents) = read(directory).map_err(wrong)?;

@@ -81,8 +81,7 @@ pub fn member_problem(
     problem.metric = Some(if is_point { first.clone() } else { second.clone() });
     if let Some(limit) = previous.filter(|_| is_point) {
         let limit = Expression::Number(limit.clone(), Span::default());
-        let limited =
-            Condition::Compare(Comparison::Less, second.expression.clone(), limit, Span::default());
+        let limited = Condition::Compare(Comparison::Less, second.expression.clone(), limit, Span::default());
         problem.goal = Condition::And(vec![limited, problem.goal]);
     }
     problem
@@ -130,7 +129,8 @@ pub(crate) fn check(
         });
         let number = position + 1;
         let is_failed = point.is_err();
-        let result = point.map(|text| format!("{number}: {text}")).map_err(|text| format!("{number}: {text}"));
+        let result =
+            point.map(|text| format!("{number}: {text}")).map_err(|text| format!("{number}: {text}"));
         results.push(VerifiedPart { part: "point", result });
         if is_failed {
             return results;
@@ -207,7 +207,9 @@ impl Members<'_> {
             return Err(format!("{DOMAIN} is not that of the front"));
         }
         if text(&contents, PROBLEM) != print_problem(problem) {
-            return Err(format!("{PROBLEM} is not that of the front, with the metric and the limit of the point"));
+            return Err(format!(
+                "{PROBLEM} is not that of the front, with the metric and the limit of the point"
+            ));
         }
         for VerifiedPart { part, result } in parts(&directory, &manifest, &contents, self.stop) {
             result.map_err(|reason| format!("{part}: {reason}"))?;
