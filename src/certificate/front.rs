@@ -9,10 +9,11 @@ use pddl::ast::{Metric, Problem};
 use pddl::{print_domain, print_expression, print_problem};
 use planner::{Exact, Limits, Point, Status, Task};
 
-use ::verify::front::{FRONT, MAX_POINTS, can_be_limited, member_directory, member_problem};
-use ::verify::manifest::{DOMAIN, FRONT_FORMAT, Front, FrontManifest, PROBLEM};
+use ::verify::front::{MAX_POINTS, can_be_limited, member_directory, member_problem};
+use ::verify::manifest::{DOMAIN, FRONT, FRONT_FORMAT, Front, FrontManifest, PROBLEM};
 
-use super::{Contents, Ground, knowledge, listed, write_manifest, write_with};
+use super::knowledge;
+use super::write::{Contents, Ground, listed, write_manifest, write_with};
 use crate::file::create_directory;
 use crate::message::{Errors, Message};
 use crate::mission::{Mission, Planning as _};

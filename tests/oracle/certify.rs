@@ -9,8 +9,8 @@ use num_rational::BigRational;
 use pddl::ast::{InitialElement, Metric, Problem};
 use planner::{Exact, ExactTask, Limits, Point, Solution, Status, Task};
 use verify::digest::digest;
-use verify::front::{FRONT, member_directory};
-use verify::manifest::{File, Front, FrontManifest};
+use verify::front::member_directory;
+use verify::manifest::{FRONT, File, Front, FrontManifest};
 
 use crate::judge::{Case, Tally, Truth, compare, plan_lines, rational, steps_of};
 
@@ -90,7 +90,7 @@ pub fn check(
 }
 
 /// Writes and verifies a certificate of a front, which must be complete unless `is_wrong`. Then verifies false fronts
-/// that are made of the files of this certificate; none of them may be accepted. With the environment variable
+/// that are made of the files of this certificate. They must all be rejected. With the environment variable
 /// `ORACLE_FRONTS`, all certificates are saved in this directory, false ones in folders named `false`.
 pub fn check_front(
     case: &Case,
@@ -142,7 +142,7 @@ pub fn check_front(
 /// Returns false fronts, each with its kind, and the members of the true certificate that it contains.
 fn false_fronts(front: &Front) -> Vec<(&'static str, Front, Vec<usize>)> {
     let count = front.points.len();
-    let all: Vec<usize> = (0..=count).collect();
+    let whole: Vec<usize> = (0..=count).collect();
     let plus = |value: &str, difference: i64| {
         let value: Exact = value.parse().expect("a number");
         Exact::from(value.to_rational() + BigRational::from_integer(difference.into())).to_string()
@@ -152,29 +152,29 @@ fn false_fronts(front: &Front) -> Vec<(&'static str, Front, Vec<usize>)> {
         if count > 1 {
             let mut changed = front.clone();
             changed.points.remove(position);
-            let kept = all.iter().copied().filter(|member| *member != position).collect();
-            changes.push(("a point is missing", changed.clone(), kept));
+            let remaining = whole.iter().copied().filter(|member| *member != position).collect();
+            changes.push(("a point is missing", changed.clone(), remaining));
             // The next certificate takes the place of the last one.
-            changes.push(("a point is missing", changed, all.clone()));
+            changes.push(("a point is missing", changed, whole.clone()));
         }
         for (objective, difference) in [(0, 1), (0, -1), (1, 1), (1, -1)] {
             let mut changed = front.clone();
             let value = &mut changed.points[position][objective];
             *value = plus(value, difference);
-            changes.push(("a value is wrong", changed, all.clone()));
+            changes.push(("a value is wrong", changed, whole.clone()));
         }
         for (objective, place) in [(0, position + 1), (1, position)] {
             let mut changed = front.clone();
             let mut dominated = changed.points[position].clone();
             dominated[objective] = plus(&dominated[objective], 1);
             changed.points.insert(place, dominated);
-            let mut members = all.clone();
+            let mut members = whole.clone();
             members.insert(position, position);
             changes.push(("a point is dominated", changed, members));
         }
         let mut changed = front.clone();
         changed.points.insert(position, front.points[position].clone());
-        let mut members = all.clone();
+        let mut members = whole.clone();
         members.insert(position, position);
         changes.push(("a point is there twice", changed, members));
     }

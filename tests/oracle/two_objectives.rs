@@ -135,8 +135,8 @@ fn front(courier: &Courier) -> Vec<[u32; 2]> {
     }
     let goals = labels.iter().filter(|((place, ..), _)| *place == courier.places - 1);
     let mut points: Vec<[u32; 2]> = goals.flat_map(|(_, labels)| labels).copied().collect();
-    let all = points.clone();
-    points.retain(|point| all.iter().all(|other| other == point || !dominates(other, point)));
+    let candidates = points.clone();
+    points.retain(|point| candidates.iter().all(|other| other == point || !dominates(other, point)));
     points.sort_unstable();
     points.dedup();
     points

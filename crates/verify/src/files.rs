@@ -5,10 +5,9 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use crate::digest::{digest, digest_of};
-use crate::front::FRONT;
 use crate::manifest::{
-    ARGUMENT, Claim, DOMAIN, FORMAT, FRONT_FORMAT, File, FrontManifest, HINTS, Manifest, PLAN, PROBLEM,
-    PROOF, PROOF_LIMIT, Refutation, SIZE_LIMIT, STREAMED, TASK, TEXT_LIMIT, WITNESS,
+    ARGUMENT, Claim, DOMAIN, FORMAT, FRONT, FRONT_FORMAT, File, FrontManifest, HINTS, Manifest, PLAN,
+    PROBLEM, PROOF, PROOF_LIMIT, Refutation, SIZE_LIMIT, STREAMED, TASK, TEXT_LIMIT, WITNESS,
 };
 use crate::{derivations, knowledge};
 

@@ -17,13 +17,11 @@ use num_rational::BigRational;
 use pddl::ast::{Comparison, Condition, Direction, Domain, Expression, Metric, Problem, Span};
 use pddl::{Source, print_expression, print_problem, read_objective};
 
-use crate::check::parts;
 use crate::files::{read, text};
-use crate::manifest::{Claim, DOMAIN, Front, PLAN, PROBLEM, VerifiedPart};
+use crate::manifest::{Claim, DOMAIN, FRONT, Front, PLAN, PROBLEM, VerifiedPart};
+use crate::parts::parts;
 use crate::plan::plan;
 
-/// Name of the file with the two objectives and the values of the points.
-pub const FRONT: &str = "front.txt";
 /// Upper limit on the number of points of a front with a certificate.
 pub const MAX_POINTS: usize = 10_000;
 

@@ -35,6 +35,7 @@ pub mod knowledge;
 pub mod manifest;
 pub mod measure;
 pub mod memory;
+mod parts;
 pub mod plan;
 pub mod task;
 pub mod watch;

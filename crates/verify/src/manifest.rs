@@ -21,6 +21,8 @@ pub const DOMAIN: &str = "domain.pddl";
 pub const PROBLEM: &str = "problem.pddl";
 /// Name of the file with the plan; absent if the claim is that no plan exists.
 pub const PLAN: &str = "plan.txt";
+/// Name of the file with the two objectives of a front and the values of its points.
+pub const FRONT: &str = "front.txt";
 /// Name of the file with the ground task.
 pub const TASK: &str = "task.json";
 /// Name of the file with the witness, an over-approximation of the reachable states: possible atoms
