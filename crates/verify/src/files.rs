@@ -38,6 +38,9 @@ pub(crate) fn is_front(directory: &Path) -> bool {
 pub(crate) fn read(directory: &Path) -> Result<(Manifest, Contents), String> {
     let manifest: Manifest = read_manifest(directory)?;
     check_format(&manifest.format, FORMAT)?;
+    if matches!(manifest.claim, Claim::Front(_)) {
+        return Err(format!("{MANIFEST}: the certificate of a single plan cannot claim a front"));
+    }
     let mut expected = vec![ARGUMENT, DOMAIN, PROBLEM, TASK, WITNESS];
     if manifest.claim != Claim::Unsolvable {
         expected.push(PLAN);

@@ -83,14 +83,14 @@ pub enum Claim {
     Unsolvable,
     /// These are all points of the Pareto front. A certificate of a front claims it; the manifest of a single
     /// certificate cannot.
-    #[serde(skip_deserializing)]
     Front(Front),
 }
 
 /// A Pareto front: every plan has values that are at least those of one of the points in both objectives, each
 /// point has a plan with its values, and no point has values that are at least those of another point.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
 pub struct Front {
     /// The two expressions that are minimized, in PDDL.
     pub objectives: [String; 2],
