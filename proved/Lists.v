@@ -35,36 +35,39 @@ Definition is_list_optimal (P : problem) (objectives : list objective) (plan : l
 Record evidence := Evidence {
   list_task : task; list_names : names; list_case : nat -> list key -> case_tree; list_goal_case : case_tree;
   list_argument : argument; list_oracle : state -> list positive }.
-Definition limited (P : problem) (e : expression) (m : Q) : problem :=
+Definition accepts (P : problem) (e : evidence) (plan : list (nat * list key)) (claim : Q) : bool :=
+  check_certificate P (list_task e) (list_names e) (list_case e) (list_goal_case e) (list_argument e) (list_oracle e) plan
+    (Some claim).
+(* The goal also requires that the expression is at most [m], or less than [m] if [strict]. *)
+Definition limited (P : problem) (strict : bool) (e : expression) (m : Q) : problem :=
   Problem (objects P) (actions P) (strata P) (initial_atoms P) (initial_values P)
-          (And (Compare false (Constant m) e) (goal_formula P)) (metric P) (per_time P) (per_step P).
+          (And (Compare strict (Constant m) e) (goal_formula P)) (metric P) (per_time P) (per_step P).
 Definition is_untimed (o : objective) : bool := Qeq_bool (time_weight o) 0 && Qeq_bool (step_weight o) 0.
 Fixpoint check_list (P : problem) (objectives : list objective) (es : list evidence) (plan : list (nat * list key))
     (ms : list Q) : bool :=
   match objectives, es, ms with
   | [], [], [] => true
   | o :: rest, e :: es, m :: ms =>
-      check_certificate (with_objective P o) (list_task e) (list_names e) (list_case e) (list_goal_case e) (list_argument e)
-        (list_oracle e) plan (Some m) &&
+      accepts (with_objective P o) e plan m &&
       match rest with
       | [] => match es, ms with [], [] => true | _, _ => false end
-      | _ => is_untimed o && check_list (limited P (objective_metric o) m) rest es plan ms
+      | _ => is_untimed o && check_list (limited P false (objective_metric o) m) rest es plan ms
       end
   | _, _, _ => false
   end.
 
 Section Same.
-Variables (P : problem) (o : objective) (e : expression) (m : Q).
-Notation L := (limited P e m).
+Variables (P : problem) (o : objective) (strict : bool) (e : expression) (m : Q).
+Notation L := (limited P strict e m).
 (* A plan of a problem is a plan of the limited one if its value is within the limit. *)
 Lemma run_limited : forall allow plan w spent w' spent',
   execute (with_objective P o) allow w spent plan = Some (w', spent') ->
-  truth P (derived_world P w') None [] (Compare false (Constant m) e) = Some true ->
+  truth P (derived_world P w') None [] (Compare strict (Constant m) e) = Some true ->
   execute (with_objective L o) allow w spent plan = Some (w', spent').
 Proof.
   intros allow. induction plan as [|[i env] plan IH]; intros w spent w' spent' H T; cbn [execute] in *.
   - change (truth (with_objective L o) (derived_world (with_objective L o) w) None [] (goal_formula (with_objective L o)))
-      with (truth P (derived_world P w) None [] (And (Compare false (Constant m) e) (goal_formula P))).
+      with (truth P (derived_world P w) None [] (And (Compare strict (Constant m) e) (goal_formula P))).
     change (truth (with_objective P o) (derived_world (with_objective P o) w) None [] (goal_formula (with_objective P o)))
       with (truth P (derived_world P w) None [] (goal_formula P)) in H.
     destruct (truth P (derived_world P w) None [] (goal_formula P)) as [[]|] eqn:G; try discriminate.
@@ -82,7 +85,7 @@ Lemma run_unlimited : forall allow plan w spent w' spent',
 Proof.
   intros allow. induction plan as [|[i env] plan IH]; intros w spent w' spent' H; cbn [execute] in *.
   - change (truth (with_objective L o) (derived_world (with_objective L o) w) None [] (goal_formula (with_objective L o)))
-      with (truth P (derived_world P w) None [] (And (Compare false (Constant m) e) (goal_formula P))) in H.
+      with (truth P (derived_world P w) None [] (And (Compare strict (Constant m) e) (goal_formula P))) in H.
     change (truth (with_objective P o) (derived_world (with_objective P o) w) None [] (goal_formula (with_objective P o)))
       with (truth P (derived_world P w) None [] (goal_formula P)).
     cbn [truth] in H.
@@ -123,7 +126,7 @@ Proof.
 Qed.
 (* A plan whose value equals the limit has the same values of all objectives in both problems. *)
 Lemma within_limit : forall P o m, is_untimed o = true -> forall allow plan m', objective_value P allow o plan = Some m' ->
-  m' == m -> forall o', objective_value (limited P (objective_metric o) m) allow o' plan = objective_value P allow o' plan.
+  m' == m -> forall o', objective_value (limited P false (objective_metric o) m) allow o' plan = objective_value P allow o' plan.
 Proof.
   intros P o m U allow plan m' H E o'. unfold objective_value in H.
   destruct (execute (with_objective P o) allow (initial P) 0 plan) as [[w spent]|] eqn:X; [|discriminate].
@@ -134,8 +137,8 @@ Proof.
   assert (T : truth P (derived_world P w) None [] (Compare false (Constant m) (objective_metric o)) = Some true).
   { cbn [truth eval]. rewrite <- (Axioms.eval_same w (derived_world P w) (fun f => eq_refl)), V. f_equal.
     apply Qle_bool_iff. rewrite <- H in E. lra. }
-  unfold objective_value. change (initial (limited P (objective_metric o) m)) with (initial P).
-  rewrite (run_limited P o' (objective_metric o) m allow plan _ _ _ _ X' T), X'. reflexivity.
+  unfold objective_value. change (initial (limited P false (objective_metric o) m)) with (initial P).
+  rewrite (run_limited P o' false (objective_metric o) m allow plan _ _ _ _ X' T), X'. reflexivity.
 Qed.
 Lemma no_less_same : forall P R other, (forall o, objective_value P true o other = objective_value R true o other) ->
   forall objectives ms, no_less P objectives ms other -> no_less R objectives ms other.
@@ -165,13 +168,13 @@ Proof.
     + apply andb_true_iff in H. destruct H as [U H]. apply IH in H. destruct H as [Values Rest]. split.
       * constructor; [exists m0; auto|]. revert Values. clear -X. intro V. induction V as [|o' m' os ms A V IH]; constructor;
           [|exact IH]. destruct A as [x [A B]]. exists x. split; [|exact B]. unfold objective_value in *.
-        change (initial (limited P (objective_metric o) m)) with (initial P) in A.
-        destruct (execute (with_objective (limited P (objective_metric o) m) o') false (initial P) 0 plan)
+        change (initial (limited P false (objective_metric o) m)) with (initial P) in A.
+        destruct (execute (with_objective (limited P false (objective_metric o) m) o') false (initial P) 0 plan)
           as [[w' s']|] eqn:Y; [|discriminate]. apply run_unlimited in Y. rewrite Y. exact A.
       * intro other. change (match objective_value P true o other with Some m' => m < m' \/ m == m' /\
           no_less P (o2 :: rest) ms other | None => True end).
         destruct (objective_value P true o other) as [m'|] eqn:V; [|exact I].
         destruct (Bound _ _ V) as [L|L]; [left; exact L|right]. split; [exact L|].
-        apply (no_less_same (limited P (objective_metric o) m) P other); [|apply Rest].
+        apply (no_less_same (limited P false (objective_metric o) m) P other); [|apply Rest].
         apply (within_limit P o m U true other m' V). symmetry. exact L.
 Qed.

@@ -127,4 +127,45 @@ list 'not proved' "$temporary/1 $temporary/2"
 cp tests/errands/plan.txt "$temporary/errands"
 printf 'minimize (risk)\nminimize (cost)\n' >"$temporary/errands/objectives.txt"
 list 'not proved' "$temporary/1 $temporary/2"
+# A Pareto front: one certificate for each point, and one more. False fronts are not accepted for any order of the
+# evidence: a point is missing, dominated or there twice, or has a wrong value.
+front=$stored/front
+for i in 1 2 3 4 5; do ocaml/metaplan-proved-prepare "$front/$i" >"$temporary/$i"; done
+evidence() { for i in $1; do printf '%s ' "$temporary/$i"; done; }
+front() {
+  answer=$(ocaml/metaplan-proved-front "$1" $(evidence "$3")) || true
+  [ "$answer" = "$2" ] || fail "front: $answer, where the answer should be: $2"
+}
+front "$front" 'proved: the front has exactly these values: 6.5 6.5, 8.5 3.5, 9 3, 11 0' '1 2 3 4 5'
+for order in '1 2 3 4' '1 2 3 4 4' '2 1 3 4 5' '1 2 3 5 4' '1 2 3 4 5 5'; do front "$front" 'not proved' "$order"; done
+# The lines of the points of a false front, and the certificates that its plans and its evidence are from.
+false_front() {
+  rm -rf "$temporary/front"
+  mkdir "$temporary/front"
+  cp "$front/domain.pddl" "$front/problem.pddl" "$temporary/front"
+  { head -2 "$front/front.txt"; printf "$1"; } >"$temporary/front/front.txt"
+  number=0
+  for i in $2; do
+    number=$((number + 1))
+    mkdir "$temporary/front/$number"
+    cp "$front/$i/plan.txt" "$temporary/front/$number"
+  done
+  for order in "$2" '1 2 3 4 5' "$2 5" '1 3 4 5' '1 2 4 5' '1 2 3 5' '2 3 4 5' '5'; do
+    front "$temporary/front" 'not proved' "$order"
+  done
+}
+false_front '8.5 3.5\n9 3\n11 0\n' '2 3 4'
+false_front '6.5 6.5\n9 3\n11 0\n' '1 3 4'
+false_front '6.5 6.5\n8.5 3.5\n11 0\n' '1 2 4'
+false_front '6.5 6.5\n8.5 3.5\n9 3\n' '1 2 3'
+false_front '6.5 6.5\n' '1'
+false_front '11 0\n' '4'
+false_front '6.5 6.5\n8.5 3.5\n9 3\n10 0\n' '1 2 3 4'
+false_front '6.5 6.5\n8.5 3.5\n9 3\n12 0\n' '1 2 3 4'
+false_front '6.5 6.5\n8.5 3\n9 2\n11 0\n' '1 2 3 4'
+false_front '6.5 7\n8.5 3.5\n9 3\n11 0\n' '1 2 3 4'
+false_front '6.5 6.5\n8.5 3.5\n9 3.5\n9 3\n11 0\n' '1 2 2 3 4'
+false_front '6.5 6.5\n8.5 3.5\n8.5 3.5\n9 3\n11 0\n' '1 2 2 3 4'
+false_front '11 0\n9 3\n8.5 3.5\n6.5 6.5\n' '4 3 2 1'
+echo "$front: the front is accepted, and no false front"
 echo 'test.sh: all as expected'

@@ -4069,17 +4069,34 @@ let with_objective p o =
     goal_formula = p.goal_formula; metric = o.objective_metric; per_time =
     o.time_weight; per_step = o.step_weight }
 
+(** val objective_value :
+    problem -> bool -> objective -> (nat * key1 list) list -> q option **)
+
+let objective_value p allow_zero o plan =
+  match execute (with_objective p o) allow_zero (initial p) { qnum = Z0;
+          qden = XH } plan with
+  | Some p0 ->
+    let (w, spent) = p0 in final_metric (with_objective p o) w spent
+  | None -> None
+
 type evidence = { list_task : task; list_names : names;
                   list_case : (nat -> key1 list -> case_tree);
                   list_goal_case : case_tree; list_argument : argument;
                   list_oracle : (state -> positive list) }
 
-(** val limited : problem -> expression -> q -> problem **)
+(** val accepts :
+    problem -> evidence -> (nat * key1 list) list -> q -> bool **)
 
-let limited p e m =
+let accepts p e plan claim =
+  check_certificate p e.list_task e.list_names e.list_case e.list_goal_case
+    e.list_argument e.list_oracle plan (Some claim)
+
+(** val limited : problem -> bool -> expression -> q -> problem **)
+
+let limited p strict e m =
   { objects = p.objects; actions = p.actions; strata = p.strata;
     initial_atoms = p.initial_atoms; initial_values = p.initial_values;
-    goal_formula = (And ((Compare (false, (Constant m), e)),
+    goal_formula = (And ((Compare (strict, (Constant m), e)),
     p.goal_formula)); metric = p.metric; per_time = p.per_time; per_step =
     p.per_step }
 
@@ -4108,10 +4125,7 @@ let rec check_list p objectives es plan ms =
        (match ms with
         | [] -> false
         | m :: ms0 ->
-          (&&)
-            (check_certificate (with_objective p o) e.list_task e.list_names
-              e.list_case e.list_goal_case e.list_argument e.list_oracle plan
-              (Some m))
+          (&&) (accepts (with_objective p o) e plan m)
             (match rest with
              | [] ->
                (match es0 with
@@ -4121,5 +4135,59 @@ let rec check_list p objectives es plan ms =
                 | _ :: _ -> false)
              | _ :: _ ->
                (&&) (is_untimed o)
-                 (check_list (limited p o.objective_metric m) rest es0 plan
-                   ms0))))
+                 (check_list (limited p false o.objective_metric m) rest es0
+                   plan ms0))))
+
+type point = { point_plan : (nat * key1 list) list; first_value : q;
+               second_value : q }
+
+(** val within : problem -> objective -> q option -> problem **)
+
+let within p second = function
+| Some m -> limited p true second.objective_metric m
+| None -> p
+
+(** val has_value :
+    problem -> objective -> (nat * key1 list) list -> q -> bool **)
+
+let has_value p o plan m =
+  match objective_value p false o plan with
+  | Some x -> qeq_bool x m
+  | None -> false
+
+(** val check_points :
+    problem -> objective -> objective -> q option -> evidence list -> point
+    list -> bool **)
+
+let rec check_points p first second limit es = function
+| [] -> false
+| p0 :: rest ->
+  (match es with
+   | [] -> false
+   | e :: es0 ->
+     (&&)
+       ((&&)
+         (accepts (with_objective (within p second limit) first) e
+           p0.point_plan p0.first_value)
+         (has_value p second p0.point_plan p0.second_value))
+       (match rest with
+        | [] ->
+          (match es0 with
+           | [] -> false
+           | e0 :: l ->
+             (match l with
+              | [] ->
+                accepts (with_objective p second) e0 p0.point_plan
+                  p0.second_value
+              | _ :: _ -> false))
+        | q0 :: _ ->
+          (&&)
+            ((&&) (less p0.first_value q0.first_value)
+              (less q0.second_value p0.second_value))
+            (check_points p first second (Some p0.second_value) es0 rest)))
+
+(** val check_front :
+    problem -> objective -> objective -> evidence list -> point list -> bool **)
+
+let check_front p first second es points =
+  (&&) (is_untimed second) (check_points p first second None es points)

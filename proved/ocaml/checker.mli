@@ -1126,15 +1126,34 @@ type objective = { objective_metric : expression; time_weight : q;
 
 val with_objective : problem -> objective -> problem
 
+val objective_value :
+  problem -> bool -> objective -> (nat * key1 list) list -> q option
+
 type evidence = { list_task : task; list_names : names;
                   list_case : (nat -> key1 list -> case_tree);
                   list_goal_case : case_tree; list_argument : argument;
                   list_oracle : (state -> positive list) }
 
-val limited : problem -> expression -> q -> problem
+val accepts : problem -> evidence -> (nat * key1 list) list -> q -> bool
+
+val limited : problem -> bool -> expression -> q -> problem
 
 val is_untimed : objective -> bool
 
 val check_list :
   problem -> objective list -> evidence list -> (nat * key1 list) list -> q
   list -> bool
+
+type point = { point_plan : (nat * key1 list) list; first_value : q;
+               second_value : q }
+
+val within : problem -> objective -> q option -> problem
+
+val has_value : problem -> objective -> (nat * key1 list) list -> q -> bool
+
+val check_points :
+  problem -> objective -> objective -> q option -> evidence list -> point
+  list -> bool
+
+val check_front :
+  problem -> objective -> objective -> evidence list -> point list -> bool

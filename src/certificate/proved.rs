@@ -10,14 +10,16 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
+use ::verify::front::member_directory;
 use ::verify::{Claim, Verification, VerifiedPart};
 
 use crate::message::Message;
 
 const PREPARE: &str = "metaplan-proved-prepare";
 const CHECK: &str = "metaplan-proved-check";
-/// Exit status of both programs on success. The next two constants are other exit statuses of
-/// `metaplan-proved-check`; `proved/ocaml/check.ml` defines them.
+const FRONT: &str = "metaplan-proved-front";
+/// Exit status of the programs on success. The next two constants are other exit statuses of
+/// `metaplan-proved-check` and `metaplan-proved-front`; `proved/ocaml/check.ml` defines them.
 const PROVED: i32 = 0;
 const REJECTED: i32 = 3;
 const NOT_PROVED: i32 = 30;
@@ -27,12 +29,15 @@ const POLL_INTERVAL: Duration = Duration::from_millis(5);
 const MEMORY_LIMIT: u64 = 4 << 20;
 /// Parts of a verification that the theorem makes statements about.
 const COVERED_PARTS: [&str; 3] = ["task", "plan", "argument"];
+/// Parts of the verification of a front that the theorem makes statements about.
+const COVERED_FRONT_PARTS: [&str; 2] = ["point", "front"];
 
-/// Paths of the two programs of the proved checker.
+/// Paths of the programs of the proved checker.
 #[derive(Debug, Clone)]
 pub struct ProvedChecker {
     prepare: PathBuf,
     check: PathBuf,
+    front: PathBuf,
 }
 
 /// Answer of the proved checker to a certificate, after the comparison with `metaplan-verify`.
@@ -41,7 +46,7 @@ pub struct ProvedChecker {
 pub enum Theorem {
     /// The claim follows from a theorem.
     Holds {
-        /// Name of the theorem in `proved/Optimal.v`.
+        /// Name of the theorem in `proved/Optimal.v` or `proved/Fronts.v`.
         name: &'static str,
         /// The proved statement, as the program prints it.
         statement: String,
@@ -54,11 +59,11 @@ pub enum Theorem {
 }
 
 impl ProvedChecker {
-    /// Finds the two programs in `folder` if it is given. Otherwise finds them in the directory of the running
-    /// program or in a directory of `PATH`.
+    /// Finds the programs in `folder` if it is given. Otherwise finds them in the directory of the running program or in
+    /// a directory of `PATH`. The program for fronts is not needed for other certificates, and may be absent.
     ///
     /// # Errors
-    /// M145: no directory has both programs.
+    /// M145: no directory has both programs for certificates of a plan.
     pub fn find(folder: Option<&Path>) -> Result<Self, Message> {
         let candidates = if let Some(folder) = folder {
             vec![folder.to_owned()]
@@ -71,7 +76,7 @@ impl ProvedChecker {
         let program = |folder: &Path, name| folder.join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
         candidates
             .iter()
-            .map(|folder| Self { prepare: program(folder, PREPARE), check: program(folder, CHECK) })
+            .map(|folder| Self { prepare: program(folder, PREPARE), check: program(folder, CHECK), front: program(folder, FRONT) })
             .find(|checker| checker.prepare.is_file() && checker.check.is_file())
             .ok_or_else(|| {
                 let place = match folder {
@@ -100,11 +105,16 @@ impl ProvedChecker {
         let Some(claim) = &report.claim else {
             return Ok(Theorem::None("the files of the certificate cannot be read".to_owned()));
         };
-        let answer = self.answer(directory, stop)?;
-        let accepted = COVERED_PARTS.iter().all(|part| {
+        let (name, covered) = match claim {
+            Claim::Optimal { .. } => ("optimal", &COVERED_PARTS[..]),
+            Claim::Unsolvable => ("unsolvable", &COVERED_PARTS[..]),
+            Claim::Front(_) => ("front_optimal", &COVERED_FRONT_PARTS[..]),
+        };
+        let answer = self.answer(directory, claim, stop)?;
+        let accepted = covered.iter().all(|part| {
             let has_part = *part != "plan" || *claim != Claim::Unsolvable;
-            let is_verified = |verified: &VerifiedPart| verified.part == *part && verified.result.is_ok();
-            !has_part || report.parts.iter().any(is_verified)
+            let mut results = report.parts.iter().filter(|verified| verified.part == *part).peekable();
+            !has_part || (results.peek().is_some() && results.all(|verified| verified.result.is_ok()))
         });
         let disagreement = match answer {
             Answer::None(reason) => return Ok(Theorem::None(reason)),
@@ -115,11 +125,9 @@ impl ProvedChecker {
             }
             Answer::Accepted(statement) if accepted => {
                 let parts = report.parts.iter().map(|part| part.part);
-                let parts = parts.filter(|part| COVERED_PARTS.contains(part)).collect();
-                let name = match claim {
-                    Claim::Optimal { .. } => "optimal",
-                    Claim::Unsolvable => "unsolvable",
-                };
+                let mut parts: Vec<_> = parts.filter(|part| covered.contains(part)).collect();
+                // A front has a part for each of its points.
+                parts.dedup();
                 return Ok(Theorem::Holds { name, statement, parts });
             }
             Answer::Accepted(statement) => {
@@ -131,26 +139,37 @@ impl ProvedChecker {
         Ok(Theorem::None(reason))
     }
 
-    fn answer(&self, directory: &Path, stop: &dyn Fn() -> bool) -> Result<Answer, Message> {
+    fn answer(&self, directory: &Path, claim: &Claim, stop: &dyn Fn() -> bool) -> Result<Answer, Message> {
         let folder = tempfile::tempdir().map_err(|error| failed("a temporary directory", &error))?;
-        let evidence = folder.path().join("evidence");
-        let mut prepare = Command::new(&self.prepare);
-        prepare.arg(directory);
         let errors = folder.path().join("errors");
-        match run(prepare, &evidence, &errors, stop)? {
-            Ended::Status(PROVED) => {}
-            Ended::Status(_) => return Ok(Answer::None(reason(&errors)?)),
-            Ended::Other(reason) => return Ok(Answer::None(format!("`{PREPARE}` {reason}"))),
+        let (certificates, checker, name) = match claim {
+            Claim::Front(front) => {
+                let members = 0..=front.points.len();
+                let members = members.map(|position| member_directory(directory, position)).collect();
+                (members, &self.front, FRONT)
+            }
+            Claim::Optimal { .. } | Claim::Unsolvable => (vec![directory.to_owned()], &self.check, CHECK),
+        };
+        let mut check = Command::new(checker);
+        check.arg(directory);
+        for (certificate, position) in certificates.iter().zip(0_usize..) {
+            let evidence = folder.path().join(format!("evidence{position}"));
+            let mut prepare = Command::new(&self.prepare);
+            prepare.arg(certificate);
+            match run(prepare, &evidence, &errors, stop)? {
+                Ended::Status(PROVED) => {}
+                Ended::Status(_) => return Ok(Answer::None(reason(&errors)?)),
+                Ended::Other(reason) => return Ok(Answer::None(format!("`{PREPARE}` {reason}"))),
+            }
+            check.arg(&evidence);
         }
-        let mut check = Command::new(&self.check);
-        check.arg(directory).arg(&evidence);
         let output = folder.path().join("output");
         Ok(match run(check, &output, &errors, stop)? {
             Ended::Status(PROVED) => Answer::Accepted(read(&output)?),
             Ended::Status(NOT_PROVED) => Answer::Rejected,
             Ended::Status(REJECTED) => Answer::None(reason(&output)?),
-            Ended::Status(status) => Answer::None(format!("`{CHECK}` ended with status {status}")),
-            Ended::Other(reason) => Answer::None(format!("`{CHECK}` {reason}")),
+            Ended::Status(status) => Answer::None(format!("`{name}` ended with status {status}")),
+            Ended::Other(reason) => Answer::None(format!("`{name}` {reason}")),
         })
     }
 }
@@ -173,6 +192,10 @@ enum Ended {
 fn states(statement: &str, claim: &Claim) -> bool {
     match claim {
         Claim::Unsolvable => statement == "proved: there is no plan",
+        Claim::Front(front) => {
+            let values: Vec<_> = front.points.iter().map(|values| values.join(" ")).collect();
+            statement == format!("proved: the front has exactly these values: {}", values.join(", "))
+        }
         Claim::Optimal { metric } => statement
             .strip_prefix("proved: the plan of ")
             .and_then(|text| text.strip_suffix(&format!(" steps is optimal, metric {metric}")))

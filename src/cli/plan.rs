@@ -67,8 +67,9 @@ pub struct Arguments {
     /// Return the Pareto front of two objectives.
     #[arg(long, value_name = "EXPRESSION,EXPRESSION", conflicts_with_all = ["minimize", "plan_format", "concurrent"])]
     pareto: Option<String>,
-    /// Write a certificate of optimality, or of the absence of plans, to a new directory. `metaplan verify` checks it.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["pareto", "concurrent"])]
+    /// Write a certificate of optimality, of the absence of plans, or of a complete Pareto front to a new directory.
+    /// `metaplan verify` checks it.
+    #[arg(long, value_name = "DIR", conflicts_with = "concurrent")]
     certificate: Option<PathBuf>,
     /// Return up to this many additional optimal plans, and the choices that all optimal plans share.
     #[arg(long, value_name = "N", conflicts_with_all = ["minimize", "pareto", "plan_format", "concurrent"])]
@@ -238,7 +239,10 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         progress.finish();
         let mut front = front.map_err(|messages| Failure::planning(messages, &limits))?;
         front.preparation.read = read;
-        return show_front(&front, &mission.name, &positions, (arguments, common));
+        show_front(&front, &mission.name, &positions, (arguments, common))?;
+        return Ok(certified((arguments, common), exit(front.front.status), |directory| {
+            front.certify(directory)
+        }));
     }
     let front = planner.plan();
     progress.finish();
@@ -264,14 +268,23 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     }
     finish(&planned, &mission, (arguments, common))?;
     // The plan is shown before the certificate is written, which may take long.
-    Ok(match arguments.certificate.as_deref().map_or(Ok(()), |directory| planned.certify(directory)) {
-        Ok(()) => exit(planned.solution.status),
-        // The plan is written, but the requested certificate is not.
+    Ok(certified((arguments, common), exit(planned.solution.status), |directory| planned.certify(directory)))
+}
+
+/// Writes the certificate if one is requested. Returns `exit` if it is written, or if none is requested.
+fn certified(
+    (arguments, common): (&Arguments, &Common),
+    exit: Exit,
+    certify: impl FnOnce(&Path) -> Result<(), Message>,
+) -> Exit {
+    match arguments.certificate.as_deref().map_or(Ok(()), certify) {
+        Ok(()) => exit,
+        // The answer is written, but the requested certificate is not.
         Err(message) => {
             output::warnings(common, [&message]);
             Exit::BadInput
         }
-    })
+    }
 }
 
 fn two(pair: &str) -> Result<[&str; 2], Failure> {
@@ -386,7 +399,7 @@ fn show_front(
     name: &str,
     positions: &Positions,
     (arguments, common): (&Arguments, &Common),
-) -> Result<Exit, Failure> {
+) -> Result<(), Failure> {
     if arguments.report.is_some() || arguments.drawing.is_file_wanted() {
         let sheet = front.sheet(positions);
         arguments.drawing.draw_front(&sheet)?;
@@ -402,7 +415,7 @@ fn show_front(
         Some(file) => output::write_file(file, &text)?,
         None => output::answer(&text),
     }
-    Ok(exit(front.front.status))
+    Ok(())
 }
 
 pub(super) fn exit(status: Status) -> Exit {

@@ -205,8 +205,9 @@ impl<'m, 'r> Planner<'m, 'r> {
             // A plan that the validator does not accept must not be returned.
             objectives.confirm(self.mission, &self.problem, point, &reading, &config.limits)?;
         }
-        let Self { mission, problem, .. } = self;
-        Ok(PlannedFront { front, preparation, mission, problem, objectives: objectives.texts })
+        let Self { mission, problem, config, .. } = self;
+        let limits = config.limits;
+        Ok(PlannedFront { front, preparation, mission, problem, objectives, task, limits })
     }
 
     fn overlapping(

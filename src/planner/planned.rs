@@ -71,7 +71,9 @@ pub struct PlannedFront<'m> {
     pub preparation: Preparation,
     pub(super) mission: &'m Mission,
     pub(super) problem: Problem,
-    pub(super) objectives: Vec<String>,
+    pub(super) objectives: Objectives,
+    pub(super) task: Task,
+    pub(super) limits: Limits,
 }
 
 impl Planned<'_> {
@@ -173,7 +175,41 @@ impl Planned<'_> {
 impl PlannedFront<'_> {
     /// Returns the objectives as the caller wrote them.
     pub fn objectives(&self) -> &[String] {
-        &self.objectives
+        &self.objectives.texts
+    }
+
+    /// Writes a certificate that the front is complete, or that there is no plan, to a new directory. `metaplan
+    /// verify` checks it.
+    ///
+    /// # Errors
+    /// The front is not complete; both objectives depend on the total time; one of the certificates that the front
+    /// needs cannot be written; or the directory cannot be written.
+    pub fn certify(&self, directory: &Path) -> Result<(), Message> {
+        let wrong = |reason: &str| Message::error("M120", format!("no certificate: {reason}"));
+        let (mission, problem, limits) = (self.mission, &self.problem, &self.limits);
+        let [first, second] = &self.objectives.metrics[..] else {
+            return Err(wrong("a front has two objectives"));
+        };
+        match (self.front.status, &self.front.points[..]) {
+            (Status::Unsolvable, [point]) => {
+                let problem = Problem { metric: Some(first.clone()), ..problem.clone() };
+                let mut task = self.task.clone();
+                // A certificate is about a task with one objective.
+                task.others.clear();
+                for operator in &mut task.operators {
+                    operator.others.clear();
+                }
+                let task = certificate::Ground::Integers(&task);
+                let contents =
+                    Contents { mission, problem: &problem, task, solution: &point.solution, plan: "" };
+                certificate::write(directory, &contents, limits)
+            }
+            (Status::Optimal, points) => {
+                let objectives = [first.clone(), second.clone()];
+                certificate::write_front(directory, (mission, problem), &objectives, points, limits)
+            }
+            _ => Err(wrong("it is not proved that the front is complete")),
+        }
     }
 
     /// Returns the front with the arguments of each step as in the domain's file, i.e. without the
@@ -188,12 +224,12 @@ impl PlannedFront<'_> {
 
     /// Returns the answer in the JSON format of `metaplan plan --pareto`.
     pub fn answer(&self) -> ParetoAnswer {
-        ParetoAnswer::new(&self.mission.name, &self.objectives, &self.written(), &self.preparation)
+        ParetoAnswer::new(&self.mission.name, &self.objectives.texts, &self.written(), &self.preparation)
     }
 
     /// Returns the data of a page about the front, with its plans.
     pub fn sheet(&self, positions: &Positions) -> picture::Sheet {
         let context = Seen { mission: self.mission, problem: &self.problem, positions };
-        front_sheet(context, &self.objectives, &self.front)
+        front_sheet(context, &self.objectives.texts, &self.front)
     }
 }

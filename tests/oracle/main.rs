@@ -6,7 +6,7 @@
 //! structure, which is printed as PDDL.
 //!
 //! Environment variables: `ORACLE_FROM` is the first seed, `ORACLE_TASKS` the number of tasks, `ORACLE_SAVE` a directory for the files
-//! of failing tasks. If `ORACLE_STOP` is set, a run ends at the first failure. `mutants.toml` lists faults of the planner that the
+//! of failing tasks, `ORACLE_FRONTS` one for the certificates of fronts. If `ORACLE_STOP` is set, a run ends at the first failure. `mutants.toml` lists faults of the planner that the
 //! oracles must detect.
 
 // Readability of the oracles matters more than their speed.
@@ -21,3 +21,4 @@ mod judge;
 mod magnify;
 mod numbers;
 mod temporal;
+mod two_objectives;

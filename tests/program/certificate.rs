@@ -61,6 +61,72 @@ fn unsolvability_has_a_certificate() {
 }
 
 #[test]
+fn fronts_have_certificates() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let plan = |domain: &str, problem: &str, objectives: &str, name: &str| {
+        let target = directory.path().join(name).display().to_string();
+        let outcome = metaplan(&["plan", domain, problem, "--pareto", objectives, "--certificate", &target]);
+        (outcome, target)
+    };
+    let [domain, problem] =
+        ["domain", "problem"].map(|name| format!("crates/verify/tests/certificates/front/{name}.pddl"));
+    let (planned, front) = plan(&domain, &problem, "cost,risk", "front");
+    assert_eq!((planned.status, planned.stderr.as_str()), (0, ""), "{planned:#?}");
+    let outcome = verify(&front);
+    assert_eq!(outcome.status, 0, "{outcome:#?}");
+    let last = "verified: the front of (cost) and (risk) has exactly 4 points, for these PDDL files only";
+    assert!(outcome.stdout.contains(last), "{outcome:#?}");
+    let answer = verify_in(&root(), &[&front, "--format", "json"]).json();
+    let points = json!([["6.5", "6.5"], ["8.5", "3.5"], ["9", "3"], ["11", "0"]]);
+    let claim = json!({ "front": { "objectives": ["(cost)", "(risk)"], "points": points } });
+    assert_eq!(answer["claim"], claim);
+    // A front without one of its points, and one with a point that does not exist.
+    for (old, new, part) in
+        [("9 3\n", "", "point       failed: 3"), ("\n9 3", "\n9 2", "point       failed: 3")]
+    {
+        change(&front, "front.txt", &|text| text.replace(old, new));
+        let outcome = verify(&front);
+        assert_eq!(outcome.status, 30, "{outcome:#?}");
+        assert!(outcome.stdout.contains(part) && outcome.stdout.contains("\nNOT verified: "), "{outcome:#?}");
+        change(&front, "front.txt", &|_| {
+            "minimize (cost)\nminimize (risk)\n6.5 6.5\n8.5 3.5\n9 3\n11 0\n".to_owned()
+        });
+    }
+    assert_eq!(verify(&front).status, 0);
+    // The certificate of another problem does not become that of this front.
+    let member = Path::new(&front).join("3").display().to_string();
+    change(&member, "problem.pddl", &|text| text.replace("(< (risk) 3.5)", "(< (risk) 3)"));
+    let outcome = verify(&front);
+    assert!(outcome.stdout.contains("point       failed: 3: problem.pddl is not that of"), "{outcome:#?}");
+    // A goal cannot limit the total time, so the objectives are exchanged, or there is no certificate.
+    let ugv = |objectives: &str, name: &str| {
+        let target = directory.path().join(name).display().to_string();
+        (metaplan(&["plan", "missions/ugv.toml", "--pareto", objectives, "--certificate", &target]), target)
+    };
+    let (planned, front) = ugv("battery_used,total-time", "exchanged");
+    assert_eq!(planned.status, 0, "{planned:#?}");
+    let outcome = verify(&front);
+    assert_eq!(outcome.status, 0, "{outcome:#?}");
+    assert!(
+        outcome.stdout.contains("the front of (total-time) and (battery_used) has exactly"),
+        "{outcome:#?}"
+    );
+    let (planned, front) = ugv("total-time,(+ 1 (* 2 total-time))", "twice");
+    assert_eq!(planned.status, 3, "{planned:#?}");
+    assert!(planned.stderr.contains("error[M120]: no certificate: both objectives depend on the total time"));
+    assert!(!Path::new(&front).exists());
+    // Without a plan, the certificate is an ordinary one.
+    let unsolvable = directory.path().join("unsolvable.pddl").display().to_string();
+    let text = std::fs::read_to_string(root().join(&problem)).expect("a problem");
+    let text = text.replace("(road shop work)", "").replace("(alley shop work)", "");
+    std::fs::write(&unsolvable, text).expect("a file");
+    let (planned, certificate) = plan(&domain, &unsolvable, "cost,risk", "unsolvable");
+    assert_eq!(planned.status, 10, "{planned:#?}");
+    let outcome = verify(&certificate);
+    assert!(outcome.stdout.contains("\nverified: there is no plan"), "{outcome:#?}");
+}
+
+#[test]
 fn verification_json_has_the_documented_fields() {
     let directory = tempfile::tempdir().expect("a directory");
     let target = certificate(directory.path(), &["plan", "missions/ugv.toml"]);

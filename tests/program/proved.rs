@@ -40,6 +40,7 @@ fn theorem_covers_the_parts_about_the_pddl_files() {
         ("proved/tests/flat", 0, no_plan),
         ("proved/tests/morning", 0, no_plan),
         ("proved/tests/far", 0, no_plan),
+        (&format!("{STORED}/front"), 0, "proved: theorem `front_optimal` covers the parts point, front\n"),
         (&format!("{STORED}/oven"), 1, "NOT proved by a theorem: not covered: timed initial literals\n"),
     ] {
         let outcome = verify(&[certificate, "--proved"]);

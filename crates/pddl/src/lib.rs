@@ -40,7 +40,7 @@ pub use mentioned::Mentioned;
 pub use number::to_decimal;
 pub use parse::{parse_domain, parse_problem, parse_problem_of};
 pub use portable::portable;
-pub use print::{print_domain, print_problem};
+pub use print::{print_domain, print_expression, print_problem};
 pub use source::{Position, Source};
 pub use types::TypeHierarchy;
 pub use validator::Validator;

@@ -18,6 +18,7 @@ fn main() -> ExitCode {
         let claim = match &verification.claim {
             Some(Claim::Optimal { metric }) => format!("optimal with metric {metric}"),
             Some(Claim::Unsolvable) => "no plan".to_owned(),
+            Some(Claim::Front(front)) => format!("a front of {} points", front.points.len()),
             None => "nothing".to_owned(),
         };
         println!("{}: claims {claim}", directory.display());

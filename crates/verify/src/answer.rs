@@ -18,7 +18,8 @@ pub struct VerificationAnswer<'a> {
     format: &'static str,
     /// Whether every part is verified.
     verified: bool,
-    /// Claim of the certificate: `{"optimal": {"metric": "408"}}`, `"unsolvable"`, or null.
+    /// Claim of the certificate: `{"optimal": {"metric": "408"}}`, `"unsolvable"`, `{"front": {"objectives": ["(time)",
+    /// "(energy)"], "points": [["2", "8"], ["6", "5"]]}}`, or null.
     claim: Option<&'a Claim>,
     /// Files or mission for which the claim was checked; null if the files cannot be read or the
     /// verification was aborted at a limit.
@@ -31,7 +32,7 @@ pub struct VerificationAnswer<'a> {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 struct PartAnswer<'a> {
     /// `files`, `derivations`, `knowledge`, `task`, `plan`, `argument`, `formula`, `proof`, `steps`,
-    /// `mission`; or `limits` if a time or memory limit was reached; or `theorem` if the proved
+    /// `point`, `front`, `mission`; or `limits` if a time or memory limit was reached; or `theorem` if the proved
     /// checker disagrees.
     part: &'static str,
     /// Whether the part is verified.
@@ -76,6 +77,11 @@ fn text(report: &Verification) -> String {
     let claim = match &report.claim {
         Some(Claim::Optimal { metric }) => format!("the plan is optimal, metric {metric}"),
         Some(Claim::Unsolvable) => "there is no plan".to_owned(),
+        Some(Claim::Front(front)) => {
+            let [first, second] = &front.objectives;
+            let (count, ending) = (front.points.len(), if front.points.len() == 1 { "" } else { "s" });
+            format!("the front of {first} and {second} has exactly {count} point{ending}")
+        }
         None => "nothing is claimed".to_owned(),
     };
     let _ = match (&report.subject, report.verified()) {

@@ -1,25 +1,23 @@
 //! Verifies a certificate part by part.
 
 use std::fmt;
-use std::fs;
-use std::io::BufReader;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use certificate::{Checked, Inputs, check, check_refutation, verification_conditions};
+use certificate::verification_conditions;
 use mission::Mission;
 use mission::message::{Errors, Message};
-use num_rational::BigRational;
 
 use crate::about::about;
-use crate::files::{read, text};
+use crate::files::{is_front, read, read_front, text};
+use crate::front;
 use crate::manifest::{
-    ARGUMENT, Claim, DOMAIN, Manifest, PLAN, PROBLEM, Refutation, STREAMED, Subject, TASK, Verification,
+    ARGUMENT, Claim, DOMAIN, FRONT, File, Front, Manifest, PLAN, PROBLEM, Subject, TASK, Verification,
     VerifiedPart, WITNESS,
 };
+use crate::parts::{MISPLACED, origin_parts, parts, written};
 use crate::plan::plan;
 use crate::task::{read_pddl, same_task};
-use crate::{derivations, knowledge};
 
 /// Checks the certificate in a directory. The program that wrote the certificate is not trusted.
 ///
@@ -69,27 +67,55 @@ impl<'a> Verifier<'a> {
     /// Verifies the parts of the certificate. A defect is reported as a failed part, not as an
     /// error. Parts that cannot be checked because of an earlier defect are omitted.
     pub fn verify(&self) -> Verification {
-        let mut report = Verification { claim: None, subject: None, parts: Vec::new() };
+        if is_front(self.directory) {
+            return self.verify_front();
+        }
         match read(self.directory) {
             Ok((manifest, contents)) => {
-                report.claim = Some(manifest.claim.clone());
-                let mission = self.mission.map(|mission| mission.name.as_str());
-                report.subject = Some(Subject::new(&manifest.files, mission));
-                let bytes: u64 = manifest.files.iter().map(|file| file.bytes).sum();
-                let files =
-                    format!("{} files, {bytes} bytes, as the manifest has them", manifest.files.len());
-                report.parts.push(VerifiedPart { part: "files", result: Ok(files) });
+                let mut report = self.report(manifest.claim.clone(), &manifest.files);
                 report.parts.extend(parts(self.directory, &manifest, &contents, &|| self.is_over()));
-                if let Some(mission) = self.mission {
-                    let written = written(&contents);
-                    let domain = text(&contents, DOMAIN);
-                    let result = about(written.as_ref(), (domain, text(&contents, PROBLEM)), mission);
-                    report.parts.push(VerifiedPart { part: "mission", result });
-                }
+                report.parts.extend(self.about_mission(&contents));
+                report
             }
-            Err(reason) => report.parts.push(VerifiedPart { part: "files", result: Err(reason) }),
+            Err(reason) => unreadable(reason),
         }
+    }
+
+    fn verify_front(&self) -> Verification {
+        let read = read_front(self.directory).and_then(|(manifest, contents)| {
+            let front = Front::parse(text(&contents, FRONT))?;
+            let (domain, problem) = read_pddl(text(&contents, DOMAIN), text(&contents, PROBLEM))?;
+            Ok((manifest, contents, front, domain, problem))
+        });
+        let (manifest, contents, front, domain, problem) = match read {
+            Ok(read) => read,
+            Err(reason) => return unreadable(reason),
+        };
+        let mut report = self.report(Claim::Front(front.clone()), &manifest.files);
+        report.parts.extend(origin_parts(&contents, &domain, &problem));
+        let texts = (text(&contents, DOMAIN), &domain, &problem);
+        report.parts.extend(front::check(self.directory, &front, texts, &|| self.is_over()));
+        report.parts.extend(self.about_mission(&contents));
         report
+    }
+
+    /// Returns the report of a certificate whose files are as its manifest states.
+    fn report(&self, claim: Claim, files: &[File]) -> Verification {
+        let mission = self.mission.map(|mission| mission.name.as_str());
+        let bytes: u64 = files.iter().map(|file| file.bytes).sum();
+        let summary = format!("{} files, {bytes} bytes, as the manifest has them", files.len());
+        Verification {
+            claim: Some(claim),
+            subject: Some(Subject::new(files, mission)),
+            parts: vec![VerifiedPart { part: "files", result: Ok(summary) }],
+        }
+    }
+
+    /// Compares the certificate with the mission, if there is one.
+    fn about_mission(&self, contents: &[(String, String)]) -> Option<VerifiedPart> {
+        let texts = (text(contents, DOMAIN), text(contents, PROBLEM));
+        let result = about(written(contents).as_ref(), texts, self.mission?);
+        Some(VerifiedPart { part: "mission", result })
     }
 
     /// Returns the optimality proof (argument) of the certificate as verification conditions in
@@ -117,10 +143,16 @@ impl fmt::Debug for Verifier<'_> {
 
 fn conditions(directory: &Path, stop: &dyn Fn() -> bool) -> Result<String, Message> {
     let wrong = |reason: String| Message::at("M121", &directory.display().to_string(), None, reason);
+    if is_front(directory) {
+        let reason =
+            "a front has no verification conditions, but the certificates in its subdirectories have";
+        return Err(wrong(reason.to_owned()));
+    }
     let (Manifest { claim, .. }, contents) = read(directory).map_err(wrong)?;
     let text = |name: &str| text(&contents, name);
     let metric = match &claim {
         Claim::Unsolvable => None,
+        Claim::Front(_) => return Err(wrong(MISPLACED.to_owned())),
         Claim::Optimal { metric } => {
             let (domain, problem) = read_pddl(text(DOMAIN), text(PROBLEM)).map_err(wrong)?;
             let (_, timed) =
@@ -133,83 +165,7 @@ fn conditions(directory: &Path, stop: &dyn Fn() -> bool) -> Result<String, Messa
         .ok_or_else(|| wrong("a task with derived predicates has no verification conditions".to_owned()))
 }
 
-fn parts(
-    directory: &Path,
-    manifest: &Manifest,
-    contents: &[(String, String)],
-    stop: &dyn Fn() -> bool,
-) -> Vec<VerifiedPart> {
-    let Manifest { claim, refutation, .. } = manifest;
-    let text = |name: &str| text(contents, name);
-    let (domain, problem) = match read_pddl(text(DOMAIN), text(PROBLEM)) {
-        Ok(read) => read,
-        Err(reason) => return vec![VerifiedPart { part: "files", result: Err(reason) }],
-    };
-    let mut parts = Vec::new();
-    if let Some(written) = written(contents) {
-        let [derivations, filled] = knowledge::check(&written, &domain, &problem);
-        parts.push(VerifiedPart { part: "derivations", result: derivations });
-        parts.push(VerifiedPart { part: "knowledge", result: filled });
-    }
-    let (task_result, timed) = match same_task(&domain, &problem, (text(TASK), text(WITNESS)), stop) {
-        Ok((summary, timed)) => (Ok(summary), timed),
-        // If the task is rejected, it is unknown whether plans are measured by time. The plan is then checked
-        // as if they were not; the certificate is rejected in any case.
-        Err(reason) => (Err(reason), false),
-    };
-    parts.push(VerifiedPart { part: "task", result: task_result });
-    let metric = match claim {
-        Claim::Unsolvable => None,
-        Claim::Optimal { metric } => {
-            let checked = plan(&domain, &problem, timed, text(PLAN), metric, stop);
-            let (result, value) = match checked {
-                Ok((summary, value)) => (Ok(summary), Some(value)),
-                Err(reason) => (Err(reason), None),
-            };
-            parts.push(VerifiedPart { part: "plan", result });
-            // Without the metric value, the remaining parts cannot be checked.
-            let Some(value) = value else { return parts };
-            Some(value)
-        }
-    };
-    let checked = check(text(TASK), text(ARGUMENT), metric.as_ref());
-    let result = checked.map_err(|fault| fault.to_string()).map(|Checked { labels, potentials, needs }| {
-        format!("no plan is better: induction over {labels} labels, with {potentials} potentials and {needs} needs")
-    });
-    parts.push(VerifiedPart { part: "argument", result });
-    let documents = (text(TASK), text(ARGUMENT));
-    parts.extend(match refutation {
-        Refutation::Steps(steps) => refuted(directory, documents, metric.as_ref(), *steps),
-        Refutation::None(reason) => {
-            vec![VerifiedPart {
-                part: "formula",
-                result: Ok(format!("none, the claim rests on the argument: {reason}")),
-            }]
-        }
-    });
-    parts
-}
-
-fn written(contents: &[(String, String)]) -> Option<knowledge::KnowledgeFiles<'_>> {
-    contents.iter().any(|(name, _)| name == knowledge::ORIGIN).then(|| knowledge::KnowledgeFiles {
-        document: text(contents, knowledge::DOCUMENT),
-        origin: text(contents, knowledge::ORIGIN),
-        derivations: text(contents, derivations::DERIVATIONS),
-    })
-}
-
-fn refuted(
-    directory: &Path,
-    documents: (&str, &str),
-    metric: Option<&BigRational>,
-    steps: usize,
-) -> Vec<VerifiedPart> {
-    let open = |name: &str| fs::File::open(directory.join(name)).map(BufReader::new);
-    let opened = STREAMED.map(open);
-    let [Ok(mut formula), Ok(mut legend), Ok(mut proof), Ok(mut hints)] = opened else {
-        return vec![VerifiedPart { part: "formula", result: Err("it cannot be read".to_owned()) }];
-    };
-    let inputs = Inputs { formula: &mut formula, legend: &mut legend, proof: &mut proof, hints: &mut hints };
-    let checked = check_refutation(documents, metric, steps, inputs).into_iter();
-    checked.map(|(part, result)| VerifiedPart { part, result }).collect()
+fn unreadable(reason: String) -> Verification {
+    let parts = vec![VerifiedPart { part: "files", result: Err(reason) }];
+    Verification { claim: None, subject: None, parts }
 }

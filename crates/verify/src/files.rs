@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use crate::digest::{digest, digest_of};
 use crate::manifest::{
-    ARGUMENT, Claim, DOMAIN, FORMAT, File, HINTS, Manifest, PLAN, PROBLEM, PROOF, PROOF_LIMIT, Refutation,
-    SIZE_LIMIT, STREAMED, TASK, TEXT_LIMIT, WITNESS,
+    ARGUMENT, Claim, DOMAIN, FORMAT, FRONT, FRONT_FORMAT, File, FrontManifest, HINTS, Manifest, PLAN,
+    PROBLEM, PROOF, PROOF_LIMIT, Refutation, SIZE_LIMIT, STREAMED, TASK, TEXT_LIMIT, WITNESS,
 };
 use crate::{derivations, knowledge};
 
@@ -16,47 +16,91 @@ pub fn text<'t, N: AsRef<str>>(files: &'t [(N, String)], name: &str) -> &'t str 
     files.iter().find(|(file_name, _)| file_name.as_ref() == name).map_or("", |(_, text)| text.as_str())
 }
 
+const MANIFEST: &str = "manifest.json";
+const MANIFEST_LIMIT: u64 = 1 << 20;
+
+/// Names and texts of files.
+pub(crate) type Contents = Vec<(String, String)>;
+
+/// Returns `true` if the manifest in `directory` states the format of fronts.
+pub(crate) fn is_front(directory: &Path) -> bool {
+    #[derive(serde::Deserialize)]
+    struct Format {
+        format: String,
+    }
+    let manifest = read_file(directory, MANIFEST, MANIFEST_LIMIT);
+    let format = manifest.ok().and_then(|text| serde_json::from_str::<Format>(&text).ok());
+    format.is_some_and(|manifest| manifest.format == FRONT_FORMAT)
+}
+
 /// Reads the manifest and the files that it lists, and checks their names, sizes and digests.
 /// Streamed files are checked, but their contents are not returned.
-pub(crate) fn read(directory: &Path) -> Result<(Manifest, Vec<(String, String)>), String> {
-    let manifest = read_file(directory, "manifest.json", 1 << 20)?;
-    let manifest: Manifest =
-        serde_json::from_str(&manifest).map_err(|error| format!("manifest.json: {error}"))?;
-    if manifest.format != FORMAT {
-        return Err(format!("manifest.json: format `{}`, where `{FORMAT}` is expected", manifest.format));
+pub(crate) fn read(directory: &Path) -> Result<(Manifest, Contents), String> {
+    let manifest: Manifest = read_manifest(directory)?;
+    check_format(&manifest.format, FORMAT)?;
+    if matches!(manifest.claim, Claim::Front(_)) {
+        return Err(format!("{MANIFEST}: the certificate of a single plan cannot claim a front"));
     }
     let mut expected = vec![ARGUMENT, DOMAIN, PROBLEM, TASK, WITNESS];
     if manifest.claim != Claim::Unsolvable {
         expected.push(PLAN);
     }
-    if manifest.files.iter().any(|file| file.name == knowledge::ORIGIN) {
-        expected.extend([knowledge::DOCUMENT, knowledge::ORIGIN, derivations::DERIVATIONS]);
-    }
     if matches!(manifest.refutation, Refutation::Steps(_)) {
         expected.extend(STREAMED);
     }
+    let contents = read_files(directory, &manifest.files, expected)?;
+    Ok((manifest, contents))
+}
+
+/// Reads the manifest of a front and the files that it lists, and checks their names, sizes and digests.
+pub(crate) fn read_front(directory: &Path) -> Result<(FrontManifest, Contents), String> {
+    let manifest: FrontManifest = read_manifest(directory)?;
+    check_format(&manifest.format, FRONT_FORMAT)?;
+    let contents = read_files(directory, &manifest.files, vec![DOMAIN, FRONT, PROBLEM])?;
+    Ok((manifest, contents))
+}
+
+fn read_manifest<M: serde::de::DeserializeOwned>(directory: &Path) -> Result<M, String> {
+    let manifest = read_file(directory, MANIFEST, MANIFEST_LIMIT)?;
+    serde_json::from_str(&manifest).map_err(|error| format!("{MANIFEST}: {error}"))
+}
+
+fn check_format(format: &str, expected: &str) -> Result<(), String> {
+    if format == expected {
+        Ok(())
+    } else {
+        Err(format!("{MANIFEST}: format `{format}`, where `{expected}` is expected"))
+    }
+}
+
+/// Reads the listed files. Their names must be the `expected` ones and, if one of the files of the knowledge base is
+/// listed, those of all of its files.
+fn read_files(directory: &Path, files: &[File], mut expected: Vec<&str>) -> Result<Contents, String> {
+    if files.iter().any(|file| file.name == knowledge::ORIGIN) {
+        expected.extend([knowledge::DOCUMENT, knowledge::ORIGIN, derivations::DERIVATIONS]);
+    }
     expected.sort_unstable();
-    let mut names: Vec<&str> = manifest.files.iter().map(|file| file.name.as_str()).collect();
+    let mut names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
     names.sort_unstable();
     if names != expected {
         // The list may be long; its beginning suffices to show the difference.
         names.truncate(expected.len() + 1);
         return Err(format!(
-            "manifest.json: lists {}, where {} are expected",
+            "{MANIFEST}: lists {}, where {} are expected",
             names.join(", "),
             expected.join(", ")
         ));
     }
     let is_streamed = |file: &&File| STREAMED.contains(&file.name.as_str());
-    let (streamed, whole): (Vec<&File>, Vec<&File>) = manifest.files.iter().partition(is_streamed);
+    let (streamed, whole): (Vec<&File>, Vec<&File>) = files.iter().partition(is_streamed);
     for (files, limit) in [(whole, TEXT_LIMIT), (streamed, SIZE_LIMIT)] {
         let total = files.iter().try_fold(0_u64, |sum, file| sum.checked_add(file.bytes));
         if total.is_none_or(|total| total > limit) {
-            return Err(format!("manifest.json: the files are larger than {limit} bytes"));
+            return Err(format!("{MANIFEST}: the files are larger than {limit} bytes"));
         }
     }
     let mut contents = Vec::new();
-    for file in &manifest.files {
+    for file in files {
         if STREAMED.contains(&file.name.as_str()) {
             check_streamed(directory, file)?;
             continue;
@@ -76,7 +120,7 @@ pub(crate) fn read(directory: &Path) -> Result<(Manifest, Vec<(String, String)>)
         }
         contents.push((file.name.clone(), text));
     }
-    Ok((manifest, contents))
+    Ok(contents)
 }
 
 fn check_streamed(directory: &Path, file: &File) -> Result<(), String> {

@@ -15,6 +15,10 @@
 //! | `formula.cnf`, `legend.txt`, `proof.drat`, `hints.txt` | for small tasks: the formula "some plan of at most T steps is cheaper" in DIMACS, the meaning of its variables, its refutation, the antecedents (numbers of clauses) of each line of the refutation |
 //! | `argument.json` | the proof that no plan is cheaper: labels (states), potentials (lower bounds on the remaining cost) and needs (lower bounds on numbers that are required to reach the goal; see `metaplan-certificate`) |
 //!
+//! The certificate of a Pareto front is a directory with `manifest.json`, `domain.pddl`, `problem.pddl`, `front.txt` with the
+//! objectives and the values of the points, the files of the knowledge base, and one subdirectory for each of the
+//! certificates that prove it; see [`front`].
+//!
 //! The crate does not link the planner.
 //!
 #![doc = include_str!("../README.md")]
@@ -26,10 +30,12 @@ mod codes;
 pub mod derivations;
 pub mod digest;
 pub mod files;
+pub mod front;
 pub mod knowledge;
 pub mod manifest;
 pub mod measure;
 pub mod memory;
+mod parts;
 pub mod plan;
 pub mod task;
 pub mod watch;
@@ -37,5 +43,5 @@ pub mod watch;
 pub use answer::{VerificationAnswer, json};
 pub use check::Verifier;
 pub use codes::CODES;
-pub use manifest::{Claim, Subject, SubjectKind, Unchecked, Verification, VerifiedPart};
+pub use manifest::{Claim, Front, Subject, SubjectKind, Unchecked, Verification, VerifiedPart};
 pub use watch::{Watch, seconds};

@@ -8,6 +8,8 @@ use crate::digest::digest;
 
 /// Name and version of the certificate format.
 pub const FORMAT: &str = "metaplan-certificate/3";
+/// Name and version of the format of a front's certificate.
+pub const FRONT_FORMAT: &str = "metaplan-front/1";
 /// Upper limit on the total size of the streamed files, in bytes; see [`STREAMED`].
 pub const SIZE_LIMIT: u64 = 1 << 30;
 /// Upper limit on the total size of the files that are read into memory, in bytes.
@@ -19,6 +21,8 @@ pub const DOMAIN: &str = "domain.pddl";
 pub const PROBLEM: &str = "problem.pddl";
 /// Name of the file with the plan; absent if the claim is that no plan exists.
 pub const PLAN: &str = "plan.txt";
+/// Name of the file with the two objectives of a front and the values of its points.
+pub const FRONT: &str = "front.txt";
 /// Name of the file with the ground task.
 pub const TASK: &str = "task.json";
 /// Name of the file with the witness, an over-approximation of the reachable states: possible atoms
@@ -77,6 +81,33 @@ pub enum Claim {
     },
     /// There is no plan.
     Unsolvable,
+    /// These are all points of the Pareto front. A certificate of a front claims it; the manifest of a single
+    /// certificate cannot.
+    Front(Front),
+}
+
+/// A Pareto front: every plan has values that are at least those of one of the points in both objectives, each
+/// point has a plan with its values, and no point has values that are at least those of another point.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct Front {
+    /// The two expressions that are minimized, in PDDL.
+    pub objectives: [String; 2],
+    /// The values of the points, exact: decimals or fractions. The first value increases, and the second one
+    /// decreases.
+    pub points: Vec<[String; 2]>,
+}
+
+/// The list of the files of a front's certificate.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FrontManifest {
+    /// The format identifier, [`FRONT_FORMAT`].
+    pub format: String,
+    /// All files in the directory except the manifest. The certificates in its subdirectories have manifests of
+    /// their own.
+    pub files: Vec<File>,
 }
 
 /// A file of a certificate.
@@ -156,7 +187,7 @@ impl Subject {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct VerifiedPart {
     /// Name of the part: `files`, `derivations`, `knowledge`, `task`, `plan`, `argument`,
-    /// `formula`, `proof`, `steps` or `mission`; or `limits` if the time or memory limit was
+    /// `formula`, `proof`, `steps`, `point`, `front` or `mission`; or `limits` if the time or memory limit was
     /// reached; or `theorem` if the proved checker disagrees.
     pub part: &'static str,
     /// A summary of the check, or a description of the first defect as an error.

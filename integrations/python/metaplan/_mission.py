@@ -215,6 +215,7 @@ class Mission:
         self,
         *,
         pareto: tuple[str, str],
+        certificate: File | None = None,
         on_improvement: Callable[[Decimal, Decimal, float, int], bool | None] | None = None,
         **options: Unpack[PlanOptions],
     ) -> Front: ...

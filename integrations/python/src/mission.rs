@@ -445,6 +445,9 @@ fn planned(setup: &Arc<Setup>, wanted: Wanted, on_improvement: Option<&Py<PyAny>
     let answer = match &wanted.pareto {
         Some([first, second]) => {
             let front = planner.pareto([first, second])?;
+            if let Some(directory) = &wanted.certificate {
+                front.certify(directory)?;
+            }
             let json = serde_json::to_string(&front.answer()).unwrap_or_default();
             let solved = front.front.points.iter().filter(|point| point.solution.plan.is_some());
             let points = solved.map(|point| Numbers::of(&point.solution, &point.values, &[])).collect();

@@ -9,6 +9,7 @@ use planner::{
     Backend, Config, Engine, Limits, MetricUnbounded, Solution, Status, StepSemantics, Strategy, Thresholds,
 };
 
+use crate::certify;
 use crate::judge::{Case, Mode, Tally, plan_lines, project_verdict, rational, read, steps_of};
 
 use super::Puzzle;
@@ -197,7 +198,7 @@ pub fn check_objectives(puzzle: &Puzzle, expressions: &[Expr], case: &Case, tall
     if let Ok(task) = mission.ground(&problem, &metrics[..2], &Limits::none()) {
         let computed = planner::pareto(&task, &config(), &mut |_| {});
         tally.count(format!("front: {:?}", computed.status));
-        let points = computed.points.into_iter();
+        let points = computed.points.iter();
         let mut points: Vec<Vec<Number>> =
             points.map(|point| point.values.iter().map(rational).collect()).collect();
         points.retain(|point| !point.is_empty());
@@ -211,6 +212,11 @@ pub fn check_objectives(puzzle: &Puzzle, expressions: &[Expr], case: &Case, tall
         };
         if is_wrong {
             tally.fail(case, "a front is wrong", &format!("{}: {points:?}, not {pairs:?}", description()));
+        }
+        if let (Status::Optimal, [first, second, ..]) = (computed.status, &metrics[..]) {
+            let objectives = [first.clone(), second.clone()];
+            let front = (&computed.points[..], is_wrong);
+            certify::check_front(case, (&mission, &problem), &objectives, front, tally);
         }
     }
     tally.planning += started.elapsed();

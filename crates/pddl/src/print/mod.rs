@@ -8,8 +8,8 @@ mod soft;
 mod tree;
 
 use crate::ast::{
-    Action, ActionBody, Condition, Declaration, Direction, Domain, Identifier, InitialElement, Problem,
-    TypedName,
+    Action, ActionBody, Condition, Declaration, Direction, Domain, Expression, Identifier, InitialElement,
+    Problem, TypedName,
 };
 use layout::{Doc, layout, list, text};
 pub(crate) use tree::type_text;
@@ -61,6 +61,11 @@ pub fn print_problem(problem: &Problem) -> String {
         list(":metric", 2, [text(direction), tree::expression(&metric.expression)])
     }));
     layout(&list("define", 2, sections).broken())
+}
+
+/// Prints a numeric expression on one line.
+pub fn print_expression(expression: &Expression) -> String {
+    tree::expression(expression).on_one_line()
 }
 
 pub(crate) fn condition_text(condition: &Condition) -> String {

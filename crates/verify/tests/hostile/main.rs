@@ -18,7 +18,7 @@ const TIME_LIMIT: Duration = Duration::from_secs(20);
 
 fn originals() -> Vec<Files> {
     let certificates = certificates(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/certificates"));
-    assert_eq!(certificates.len(), 4);
+    assert_eq!(certificates.len(), 5);
     certificates
 }
 
@@ -45,7 +45,7 @@ fn withstand(seeds: std::ops::Range<u64>) -> usize {
     let mut accepted = 0;
     for (certificate, files) in originals().iter().enumerate() {
         for seed in seeds.clone() {
-            let mut draw = Draw::Random(seed * 4 + certificate as u64);
+            let mut draw = Draw::Random(seed * 5 + certificate as u64);
             let changed = mutate(files, &mut draw);
             let started = Instant::now();
             let outcome = verified(&changed);
@@ -68,7 +68,7 @@ fn the_small_certificates_are_verified() {
 fn changed_certificates_are_answered() {
     let accepted = withstand(0..150);
     // Some mutations have no effect, e.g. white space or the order of a list.
-    assert!(accepted > 0 && accepted < 300, "{accepted} of 600");
+    assert!(accepted > 0 && accepted < 375, "{accepted} of 750");
 }
 
 #[test]

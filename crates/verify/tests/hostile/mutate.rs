@@ -1,7 +1,7 @@
 //! Mutates the files of a certificate, driven by random numbers or by the bytes of a fuzzer.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use metaplan_verify::digest::digest;
 use serde_json::{Value, json};
@@ -51,10 +51,18 @@ pub fn certificates(folder: &Path) -> Vec<Files> {
         paths.sort();
         paths
     };
-    let name = |path: &Path| path.file_name().expect("a name").to_string_lossy().into_owned();
-    let read = |path: &std::path::PathBuf| (name(path), std::fs::read(path).expect("a file"));
     let folders = entries(folder).into_iter().filter(|path| path.join("manifest.json").is_file());
-    folders.map(|path| entries(&path).iter().map(read).collect()).collect()
+    let files = |folder: PathBuf| {
+        // The certificate of a front has subdirectories.
+        let inner = entries(&folder).into_iter();
+        let inner = inner.flat_map(|path| if path.is_dir() { entries(&path) } else { vec![path] });
+        let name = |path: &Path| {
+            let name = path.strip_prefix(&folder).expect("a file in the folder");
+            name.components().map(|part| part.as_os_str().to_string_lossy()).collect::<Vec<_>>().join("/")
+        };
+        inner.map(|path| (name(&path), std::fs::read(&path).expect("a file"))).collect()
+    };
+    folders.map(files).collect()
 }
 
 /// Mutates a certificate in up to three places. In most cases, the manifest is updated with the
@@ -84,15 +92,21 @@ pub fn mutate(files: &Files, draw: &mut Draw<'_>) -> Files {
 }
 
 fn mend(files: &mut Files) {
-    let Ok(mut manifest) = serde_json::from_slice::<Value>(&files["manifest.json"]) else { return };
-    let listed = manifest.get_mut("files").and_then(Value::as_array_mut);
-    for entry in listed.into_iter().flatten().filter_map(Value::as_object_mut) {
-        if let Some(text) = entry.get("name").and_then(Value::as_str).and_then(|name| files.get(name)) {
-            entry.insert("bytes".to_owned(), text.len().into());
-            entry.insert("sha256".to_owned(), digest(text).into());
+    let manifests: Vec<String> =
+        files.keys().filter(|name| name.ends_with("manifest.json")).cloned().collect();
+    for name in manifests {
+        let Ok(mut manifest) = serde_json::from_slice::<Value>(&files[&name]) else { continue };
+        let folder = name.strip_suffix("manifest.json").expect("a manifest");
+        let listed = manifest.get_mut("files").and_then(Value::as_array_mut);
+        for entry in listed.into_iter().flatten().filter_map(Value::as_object_mut) {
+            let file = entry.get("name").and_then(Value::as_str).map(|name| format!("{folder}{name}"));
+            if let Some(text) = file.and_then(|name| files.get(&name)) {
+                entry.insert("bytes".to_owned(), text.len().into());
+                entry.insert("sha256".to_owned(), digest(text).into());
+            }
         }
+        files.insert(name, manifest.to_string().into_bytes());
     }
-    files.insert("manifest.json".to_owned(), manifest.to_string().into_bytes());
 }
 
 /// Deletes, repeats or replaces a range of bytes.
@@ -225,6 +239,8 @@ fn collect(value: &Value, path: String, paths: &mut Vec<String>) {
 
 pub fn write(directory: &Path, files: &Files) {
     for (name, text) in files {
-        std::fs::write(directory.join(name), text).expect("a file");
+        let path = directory.join(name);
+        std::fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
+        std::fs::write(path, text).expect("a file");
     }
 }
