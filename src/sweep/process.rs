@@ -89,6 +89,14 @@ fn reader(pipe: Option<impl Read + Send + 'static>) -> std::thread::JoinHandle<S
     })
 }
 
+/// Kills a process that leads a process group, and the processes that it has started, such as an external SAT
+/// solver: these would keep the pipes open.
+fn kill(child: &mut Child) -> std::io::Result<()> {
+    #[cfg(unix)]
+    rustix::process::kill_process_group(rustix::process::Pid::from_child(child), rustix::process::Signal::KILL)?;
+    child.kill()
+}
+
 /// Waits for the end of a process. Returns its exit status, and `true` if `limit`, the time limit
 /// of a run, ended it. If a limit of `limits` is reached, kills the process and returns `None`.
 fn wait(
@@ -103,7 +111,7 @@ fn wait(
         }
         let is_late = limit.is_some_and(|limit| begun.elapsed() >= limit);
         if is_late || limits.reached() {
-            child.kill()?;
+            kill(child)?;
             child.wait()?;
             return Ok(is_late.then_some((None, true)));
         }

@@ -144,6 +144,27 @@ fn runs_end_at_their_time_limit_and_files_are_generated() {
     assert_eq!((outcome.status, &outcome.json()["timed_out"]), (1, &1.into()), "{outcome:#?}");
 }
 
+#[test]
+fn the_time_limit_of_a_run_ends_its_sat_solver() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let (study, pid) = (folder.path().join("study.toml"), folder.path().join("pid"));
+    let script = folder.path().join("solver.sh");
+    fs::write(&script, format!("echo $$ > {}\nexec sleep 1000\n", pid.display())).expect("it can be written");
+    let mission = root().join("missions/ugv.toml");
+    let text = format!(
+        "command = ['plan', '{}', '--engine', 'sat', '--solver', 'sh {}']\ntime_limit = 1\n",
+        mission.display(),
+        script.display()
+    );
+    fs::write(&study, text).expect("it can be written");
+    let outcome = sweep(&study.to_string_lossy(), &folder.path().join("results"), &[]);
+    assert_eq!((outcome.status, &outcome.json()["timed_out"]), (1, &1.into()), "{outcome:#?}");
+    let solver = fs::read_to_string(pid).expect("the solver was started");
+    // A process that has ended is a zombie until its new parent notices.
+    let state = fs::read_to_string(format!("/proc/{}/stat", solver.trim())).unwrap_or_default();
+    assert!(state.is_empty() || state.contains(") Z "), "{state}");
+}
+
 /// A study can vary pairs of places of the invented map. Its results equal those of the comparison of the
 /// map.
 #[test]
