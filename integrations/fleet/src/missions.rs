@@ -8,10 +8,12 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
 use metaplan::mapek::Loop;
 use metaplan::message::{Errors, Message};
 use metaplan::setup::Setup;
+use serde_json::Value;
 
 /// A version of a mission with the initial state of its loop.
 #[derive(Debug, Clone)]
@@ -20,6 +22,8 @@ pub struct Template {
     pub control: Loop,
     /// Checksum of the mission's files and settings, which identifies the version.
     pub digest: String,
+    /// Snapshot of the loop before its start.
+    pub snapshot: Arc<Value>,
 }
 
 /// Missions by name. The name is that of the manifest's file without `.toml`.
@@ -88,7 +92,8 @@ fn templates(directory: &Path) -> Result<BTreeMap<String, Template>, Errors> {
         match control {
             Ok(control) => {
                 let digest = control.digest();
-                templates.insert(name.to_owned(), Template { control, digest });
+                let snapshot = Arc::new(control.snapshot().0);
+                templates.insert(name.to_owned(), Template { control, digest, snapshot });
             }
             Err(errors) => wrong.extend(errors),
         }
