@@ -2,12 +2,11 @@
 //! events. So equal events at equal times lead to equal decisions, except for plans whose search was ended by a time
 //! limit.
 
-use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
-use metaplan::mapek::{Answer, Loop, Observation, Snapshot};
-use serde_json::{Value, json};
+use metaplan::mapek::{Answer, Baseline, Loop, Observation};
+use serde_json::Value;
 
 use crate::ids::Ids;
 use crate::missions::{Missions, Template};
@@ -29,8 +28,6 @@ pub struct Robot {
     ids: Ids,
     /// Requested change to another version of the mission.
     migration: Option<Migration>,
-    /// Initial snapshot of the version of the mission, if the loop is loaded.
-    initial: Arc<Value>,
     control: Control,
 }
 
@@ -38,7 +35,8 @@ pub struct Robot {
 enum Control {
     #[default]
     None,
-    Loaded(Box<Loop>),
+    /// The loop, and the initial state of its version of the mission.
+    Loaded(Box<Loop>, Arc<Baseline>),
     /// Snapshot that is not loaded yet.
     Stored(Value),
     /// The robot's last decision cannot be parsed.
@@ -180,8 +178,8 @@ impl Robot {
                 search.decided.enrolled = Some(name.to_owned());
                 self.mission = Some(name.to_owned());
                 (self.digest, self.enrolled) = (template.digest.clone(), event.time);
-                self.initial = Arc::clone(&template.snapshot);
-                self.control = Control::Loaded(Box::new(template.control.clone()));
+                self.control =
+                    Control::Loaded(Box::new(template.control.clone()), Arc::clone(&template.baseline));
                 return Ok(self.deliberate(search));
             }
             (Request::Enrol(_), Some(_)) => return Ok(Begun::Refused(Refused::Enrolled)),
@@ -220,7 +218,7 @@ impl Robot {
     /// # Errors
     /// The loop is not loaded, because [`Robot::begin`] did not precede.
     pub fn search(&mut self, mut search: Search) -> Result<Decided, Faulted> {
-        let Control::Loaded(control) = &mut self.control else {
+        let Control::Loaded(control, _) = &mut self.control else {
             return Err(Faulted("the loop of the robot is not loaded".to_owned()));
         };
         search.answers.extend(control.deliberate());
@@ -229,7 +227,7 @@ impl Robot {
 
     /// Plans without a search, if that is possible.
     fn deliberate(&mut self, mut search: Search) -> Begun {
-        if let Control::Loaded(control) = &mut self.control {
+        if let Control::Loaded(control, _) = &mut self.control {
             let Some(answers) = control.deliberate_at_once() else { return Begun::Search(search) };
             search.answers.extend(answers);
         }
@@ -240,7 +238,7 @@ impl Robot {
     /// the requested point. Returns `true` if the robot has changed; the new loop then has to plan. If the version does
     /// not fit, an error becomes an answer, and the request is dropped.
     fn migrate(&mut self, name: &str, missions: &Missions, search: &mut Search) -> Result<bool, Faulted> {
-        let (Some(migration), Control::Loaded(control)) = (&self.migration, &self.control) else {
+        let (Some(migration), Control::Loaded(control, _)) = (&self.migration, &self.control) else {
             return Ok(false);
         };
         let is_safe = control.is_between_actions()
@@ -256,8 +254,7 @@ impl Robot {
                 search.answers.extend(answers);
                 search.decided.migrated = true;
                 self.digest.clone_from(&template.digest);
-                self.initial = Arc::clone(&template.snapshot);
-                self.control = Control::Loaded(Box::new(next));
+                self.control = Control::Loaded(Box::new(next), Arc::clone(&template.baseline));
                 Ok(true)
             }
             Err(message) => {
@@ -273,9 +270,9 @@ impl Robot {
         self.event = decided.event;
         self.ids.extend(id.as_deref());
         let mut snapshot = Value::Null;
-        if let Control::Loaded(control) = &mut self.control {
+        if let Control::Loaded(control, baseline) = &mut self.control {
             decided.answers = control.decision(&answers).answers;
-            snapshot = difference(&self.initial, control.snapshot().0);
+            snapshot = baseline.difference(control);
         }
         decided.state = State {
             mission: self.mission.clone(),
@@ -293,14 +290,13 @@ impl Robot {
             let mission = self.mission.as_deref().unwrap_or_default();
             let template = version(missions, mission, &self.digest)?;
             let mut control = template.control.clone();
-            self.initial = Arc::clone(&template.snapshot);
             control
-                .restore(&Snapshot(complete(&self.initial, std::mem::take(snapshot))))
+                .restore(&template.baseline.snapshot(std::mem::take(snapshot)))
                 .map_err(|message| Faulted(message.text().to_owned()))?;
-            self.control = Control::Loaded(Box::new(control));
+            self.control = Control::Loaded(Box::new(control), Arc::clone(&template.baseline));
         }
         match &mut self.control {
-            Control::Loaded(control) => Ok(control),
+            Control::Loaded(control, _) => Ok(control),
             _ => Err(Faulted("the robot's last decision cannot be read: retire the robot".to_owned())),
         }
     }
@@ -313,48 +309,6 @@ fn version<'a>(missions: &'a Missions, name: &str, digest: &str) -> Result<&'a T
              start workers with `--former DIR` for the former files, or retire the robot"
         ))
     })
-}
-
-/// Returns the fields of a snapshot that differ from those of the initial snapshot. The facts (`init`), most of which
-/// never change, become the positions of removed initial facts and a list of added facts.
-fn difference(initial: &Value, mut snapshot: Value) -> Value {
-    let Some(fields) = snapshot.as_object_mut() else { return snapshot };
-    fields.retain(|name, value| initial.get(name) != Some(value));
-    if let (Some(Value::Array(facts)), Some(Value::Array(current))) =
-        (initial.get("init"), fields.get("init"))
-    {
-        let (mut kept, mut removed) = (0, Vec::new());
-        for (position, fact) in facts.iter().enumerate() {
-            if current.get(kept) == Some(fact) {
-                kept += 1;
-            } else {
-                removed.push(position);
-            }
-        }
-        let changes = json!([removed, current[kept..]]);
-        fields.insert("init".to_owned(), changes);
-    }
-    snapshot
-}
-
-/// Returns the snapshot with this [`difference`] from the initial one.
-fn complete(initial: &Value, difference: Value) -> Value {
-    let mut snapshot = initial.clone();
-    let (Some(fields), Value::Object(changes)) = (snapshot.as_object_mut(), difference) else {
-        return Value::Null;
-    };
-    for (name, change) in changes {
-        match (fields.get_mut(&name), &change[0], &change[1]) {
-            (Some(Value::Array(facts)), Value::Array(removed), Value::Array(added)) if name == "init" => {
-                let removed: BTreeSet<u64> = removed.iter().filter_map(Value::as_u64).collect();
-                let mut position = 0..;
-                facts.retain(|_| position.next().is_none_or(|position| !removed.contains(&position)));
-                facts.extend(added.iter().cloned());
-            }
-            _ => drop(fields.insert(name, change)),
-        }
-    }
-    snapshot
 }
 
 fn empty(event: u64) -> Decided {
@@ -387,23 +341,5 @@ fn request(head: &Value) -> Request<'_> {
             Some(point) => serde_json::from_value(point.clone()).ok(),
         }),
         _ => Request::Observe,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_difference_restores_the_snapshot() {
-        let initial = json!({"goal": null, "plan": [1], "init": ["a", "b", "c", ["b"], "d"]});
-        for facts in [&["a", "b", "c"][..], &[], &["c", "b", "x"], &["a", "c", "d", "e", "e"]] {
-            let snapshot = json!({"goal": "g", "plan": [1], "init": facts});
-            let change = difference(&initial, snapshot.clone());
-            assert!(change.get("plan").is_none());
-            assert_eq!(complete(&initial, change), snapshot);
-        }
-        assert_eq!(difference(&initial, initial.clone()), json!({}));
-        assert_eq!(complete(&initial, json!({})), initial);
     }
 }
