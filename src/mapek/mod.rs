@@ -20,6 +20,7 @@ mod adapt;
 mod analyze;
 mod answer;
 mod ask;
+mod baseline;
 mod beliefs;
 mod changes;
 mod control;
@@ -51,6 +52,7 @@ mod watch;
 
 pub(crate) use analyze::{available, changes, doubts, fact_text, inferred, ruled_out, unavailable};
 pub use answer::{Answer, Command, DesignChange, Effect, ObjectiveChange, OverdueOutcome};
+pub use baseline::Baseline;
 pub use beliefs::{Beliefs, Outlook};
 pub use control::Loop;
 pub(crate) use control::time_of_line;

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
 use pddl::ast::{Atom, Identifier, InitialElement, Name, Span, Term};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use crate::knowledge::{Knowledge, Part, Statement, Statements, Waiting};
 use crate::mapek::analyze::available;
@@ -64,6 +64,14 @@ fn essence(mut answer: Value) -> Value {
 pub struct Snapshot(pub Value);
 
 pub(super) fn snapshot(beliefs: &Beliefs) -> Snapshot {
+    let mut fields = fields(beliefs);
+    let facts = beliefs.mission.problem().init.iter().filter_map(element_to_record);
+    fields.insert("init".to_owned(), facts.collect());
+    Snapshot(Value::Object(fields))
+}
+
+/// Returns the fields of the snapshot except the facts (`init`), which can be large.
+pub(super) fn fields(beliefs: &Beliefs) -> Map<String, Value> {
     let statements = beliefs.mission.knowledge().map(Knowledge::statements).unwrap_or_default();
     let steps = |steps: &VecDeque<PlannedStep>| steps.iter().map(PlannedStep::to_record).collect::<Vec<_>>();
     let running = beliefs.running.as_ref().map(|running| {
@@ -83,9 +91,8 @@ pub(super) fn snapshot(beliefs: &Beliefs) -> Snapshot {
             running.sent_configuration,
         ])
     });
-    Snapshot(json!({
+    let fields = json!({
         "goal": beliefs.goal,
-        "init": beliefs.mission.problem().init.iter().filter_map(element_to_record).collect::<Vec<_>>(),
         "added": statements.added.iter().map(statement_to_record).collect::<Vec<_>>(),
         "removed": statements.removed.iter().map(statement_to_record).collect::<Vec<_>>(),
         "available": beliefs.available,
@@ -113,7 +120,11 @@ pub(super) fn snapshot(beliefs: &Beliefs) -> Snapshot {
         "now": microseconds(beliefs.now),
         "considered": microseconds(beliefs.considered),
         "filters": beliefs.filters.to_record(),
-    }))
+    });
+    match fields {
+        Value::Object(fields) => fields,
+        _ => Map::new(),
+    }
 }
 
 pub(super) fn restore(beliefs: &mut Beliefs, snapshot: &Snapshot) -> Result<(), Message> {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use metaplan::mapek::{Answer, Loop, PlannedStep};
+use metaplan::mapek::{Answer, Baseline, Loop, PlannedStep};
 use rules::{Engine, Fact};
 use serde_json::{Value, json};
 
@@ -237,6 +237,40 @@ fn random_events_leave_the_loop_sound() {
     for world in &WORLDS {
         for seed in 0..3 {
             run(world, seed, 300);
+        }
+    }
+}
+
+#[test]
+fn a_difference_from_the_baseline_gives_the_snapshot() {
+    for world in &WORLDS {
+        for seed in 10..13 {
+            let mut fuzz = Fuzz::new(world, seed);
+            let baseline = Baseline::new(&fuzz.pristine);
+            let pristine = fuzz.pristine.snapshot();
+            assert_eq!(baseline.difference(&fuzz.pristine), json!({}));
+            let mut control = fuzz.begin();
+            let mut has_other_facts = false;
+            for number in 1..=150 {
+                let (line, _) = fuzz.next(&control);
+                let answers = feed(&mut control, &line);
+                let _ = control.decision(&answers);
+                // A restored loop has facts without positions in a file, which must not be differences.
+                if number % 20 == 0 {
+                    let snapshot = control.snapshot();
+                    control = fuzz.pristine.clone();
+                    control.restore(&snapshot).expect("the snapshot fits");
+                }
+                let (difference, snapshot) = (baseline.difference(&control), control.snapshot());
+                let context = || format!("{} seed {seed}, line {number}: {line}", world.mission);
+                for (name, value) in snapshot.0.as_object().expect("an object") {
+                    let differs = pristine.0.get(name) != Some(value);
+                    assert_eq!(difference.get(name).is_some(), differs, "{name}: {}", context());
+                }
+                has_other_facts |= difference.get("init").is_some();
+                assert_eq!(baseline.snapshot(difference), snapshot, "{}", context());
+            }
+            assert!(has_other_facts, "{} seed {seed}", world.mission);
         }
     }
 }

@@ -18,7 +18,7 @@ use metaplan_fleet::{wire::Decided, worker};
 async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let directory = tempfile::tempdir()?;
     let missions = Missions::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../missions"))?;
-    let store = Local::open(directory.path(), 4, Duration::from_secs(2))?;
+    let store = Local::open(directory.path(), 4, 8, Duration::from_secs(2))?;
     let shared = Arc::new(Shared::new(store.clone(), missions, "worker-1".to_owned(), Settings::default()));
     let (stop, stopped) = tokio::sync::watch::channel(false);
     let worker = tokio::spawn(worker::run(shared, stopped));

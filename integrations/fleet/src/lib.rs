@@ -3,13 +3,13 @@
 //!
 //! Robots append events to the subject `ev.PARTITION.ROBOT`, and receive decisions on `dec.PARTITION.ROBOT`. Except in
 //! the default fleet, both subjects begin with the name of the fleet. A partition is a fixed group of robots. Both
-//! streams are persistent, and the stream of events is the journal. A worker leases partitions and runs the
+//! streams are persistent. The last decision about a robot contains its state. A worker owns partitions and runs the
 //! [loops](metaplan::mapek::Loop) of their robots.
 //!
 //! Every event that is not refused leads to exactly one decision, unless the robot is suspended because it cannot
 //! continue. A decision is appended only if the robot's previous decision is still the last one (compare-and-set on the
-//! last sequence of the subject). So a worker that still relies on an expired lease cannot decide an event twice:
-//! leases are for efficiency, and the chain of decisions guarantees correctness.
+//! last sequence of the subject). So two workers that own a partition at the same time cannot both decide an event: the
+//! division of partitions is for efficiency, and the chain of decisions guarantees correctness.
 //!
 //! ```
 //! use std::{path::Path, sync::Arc, time::Duration};
@@ -24,7 +24,7 @@
 //! # async fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let folder = tempfile::tempdir()?;
 //! # let directory = folder.path();
-//! let store = Local::open(directory, 4, Duration::from_secs(2))?;
+//! let store = Local::open(directory, 4, 8, Duration::from_secs(2))?;
 //! let missions = Missions::read(Path::new("../../missions"))?;
 //! let shared = Arc::new(Shared::new(store.clone(), missions, "worker-1".to_owned(), Settings::default()));
 //! let (stop, stopped) = tokio::sync::watch::channel(false);
@@ -51,8 +51,8 @@
 //! - [`store`]: the interface of a log, which NATS JetStream and a local directory implement.
 //! - [`robot`]: a single robot, which turns events into decisions, without clock and network.
 //! - [`missions`]: current and former versions of missions; [`ids`]: recognition of repeated messages.
-//! - [`partition`]: the robots of a partition: recovery, order, snapshots.
-//! - [`worker`]: leases and their balance, metrics, shutdown.
+//! - [`partition`]: the robots of a partition: order, loading, discarding of handled events.
+//! - [`worker`]: division of partitions among workers, metrics, shutdown.
 //! - [`health`]: state of a worker for liveness and readiness probes.
 //! - [`robots`](mod@robots): clients: append events, follow decisions, query the fleet.
 

@@ -280,7 +280,6 @@ fn status_text(status: &Status) -> String {
         "worker",
         "partitions",
         "robots",
-        "ready",
         "waiting",
         "decided",
         "refused",
@@ -292,7 +291,6 @@ fn status_text(status: &Status) -> String {
             name.clone(),
             own.partitions.to_string(),
             own.robots.to_string(),
-            own.warm.to_string(),
             own.waiting.to_string(),
             own.decided.to_string(),
             own.refused.to_string(),
@@ -301,19 +299,10 @@ fn status_text(status: &Status) -> String {
         ]);
     }
     let mut partitions = Table::new();
-    partitions.load_style(TableStyle::new()).set_header([
-        "partition",
-        "worker",
-        "epoch",
-        "saved up to event",
-    ]);
+    partitions.load_style(TableStyle::new()).set_header(["partition", "worker"]);
     for own in &status.partitions {
-        partitions.add_row([
-            own.partition.to_string(),
-            own.worker.clone().unwrap_or_else(|| "nobody".to_owned()),
-            own.epoch.to_string(),
-            own.events.to_string(),
-        ]);
+        partitions
+            .add_row([own.partition.to_string(), own.worker.clone().unwrap_or_else(|| "nobody".to_owned())]);
     }
     for table in [&mut workers, &mut partitions] {
         for column in table.column_iter_mut().skip(1) {

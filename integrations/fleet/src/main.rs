@@ -24,6 +24,9 @@ use tracing::level_filters::LevelFilter;
 mod endpoints;
 mod lines;
 
+/// Default number of decisions of each robot that are kept.
+const HISTORY: u32 = 8;
+
 /// Run the adaptation loops of many robots, on NATS JetStream or in one directory without a server.
 ///
 /// Input lines have the form `ROBOT EVENT`, output lines `ROBOT DECISION`. The first event of a robot is
@@ -63,6 +66,9 @@ enum Command {
         #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=65536))]
         /// Set the number of partitions if the directory is created.
         partitions: u32,
+        /// Keep this number of decisions of each robot.
+        #[arg(long, value_name = "N", default_value_t = HISTORY, value_parser = clap::value_parser!(u32).range(1..))]
+        history: u32,
     },
     /// Store events, which are lines `ROBOT EVENT` from standard input.
     Send {
@@ -108,12 +114,9 @@ struct Work {
     /// search durations. [default: number of processors]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
-    /// Set the number of robots that are kept in memory. Others are restored from snapshots when they have events.
+    /// Set the number of robots that are kept in memory. Others are loaded from the log when they have events.
     #[arg(long, value_name = "N", default_value_t = Settings::default().warm)]
     ready: usize,
-    /// Save a snapshot of a robot after this number of decisions.
-    #[arg(long, value_name = "N", default_value_t = Settings::default().save_every as u64, value_parser = clap::value_parser!(u64).range(1..))]
-    save_every: u64,
     /// Serve `/metrics` for Prometheus, `/live` and `/ready` at this `HOST:PORT`.
     #[arg(long, value_name = "ADDRESS")]
     metrics: Option<SocketAddr>,
@@ -146,6 +149,9 @@ struct Server {
     /// Set the number of servers that store the data (1, 3 or 5) if the fleet is created.
     #[arg(long, value_name = "N", default_value_t = 1)]
     replicas: usize,
+    /// Keep this number of decisions of each robot, if the fleet is created.
+    #[arg(long, value_name = "N", default_value_t = HISTORY, value_parser = clap::value_parser!(u32).range(1..))]
+    history: u32,
     /// Set the time in seconds after which a silent worker loses its partitions if the fleet is created.
     #[arg(long, value_name = "S", default_value_t = 10, value_parser = clap::value_parser!(u64).range(2..=3600))]
     lease: u64,
@@ -171,7 +177,12 @@ impl Server {
         let lease = Duration::from_secs(self.lease);
         let (fleet, partitions, replicas) = (self.fleet.clone(), self.partitions, self.replicas);
         let patience = Duration::from_secs(self.wait.unwrap_or(default_wait));
-        Nats::open(&access, &Layout { fleet, partitions, replicas, lease }, patience).await
+        Nats::open(
+            &access,
+            &Layout { fleet, partitions, replicas, history: self.history.into(), lease },
+            patience,
+        )
+        .await
     }
 }
 
@@ -181,7 +192,6 @@ impl Work {
         Settings {
             threads: self.threads.map_or(processors, usize::from),
             warm: self.ready,
-            save_every: self.save_every as usize,
             ..Settings::default()
         }
     }
@@ -252,9 +262,10 @@ async fn run(command: Command) -> Result<(), Errors> {
             let shared = work.shared(store, name, health)?;
             worker::run(shared, signals()?).await;
         }
-        Command::Up { local, after, work, partitions } => {
+        Command::Up { local, after, work, partitions, history } => {
             let lease = Duration::from_secs(10);
-            let store = Local::open(&local, partitions, lease).map_err(|message| vec![message])?;
+            let store =
+                Local::open(&local, partitions, history as usize, lease).map_err(|message| vec![message])?;
             let health = work.open_endpoints().await?;
             let shared = work.shared(store, own_name(), health)?;
             lines::up(shared, after, signals()?).await.map_err(|message| vec![message])?;

@@ -8,8 +8,9 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
-use metaplan::mapek::Loop;
+use metaplan::mapek::{Baseline, Loop};
 use metaplan::message::{Errors, Message};
 use metaplan::setup::Setup;
 
@@ -20,6 +21,8 @@ pub struct Template {
     pub control: Loop,
     /// Checksum of the mission's files and settings, which identifies the version.
     pub digest: String,
+    /// State of the loop before its start, from which the differences of snapshots are computed.
+    pub baseline: Arc<Baseline>,
 }
 
 /// Missions by name. The name is that of the manifest's file without `.toml`.
@@ -88,7 +91,8 @@ fn templates(directory: &Path) -> Result<BTreeMap<String, Template>, Errors> {
         match control {
             Ok(control) => {
                 let digest = control.digest();
-                templates.insert(name.to_owned(), Template { control, digest });
+                let baseline = Arc::new(Baseline::new(&control));
+                templates.insert(name.to_owned(), Template { control, digest, baseline });
             }
             Err(errors) => wrong.extend(errors),
         }

@@ -2,31 +2,32 @@
 //! events. So equal events at equal times lead to equal decisions, except for plans whose search was ended by a time
 //! limit.
 
+use std::sync::Arc;
 use std::time::Duration;
 
-use metaplan::mapek::{Answer, Loop, Observation, Snapshot};
+use metaplan::mapek::{Answer, Baseline, Loop, Observation};
 use serde_json::Value;
 
 use crate::ids::Ids;
 use crate::missions::{Missions, Template};
 use crate::store::Stored;
-use crate::wire::{Decided, FORMAT, Migration, SafePoint, Saved};
+use crate::wire::{Decided, FORMAT, Migration, SafePoint, State};
 
 /// State of a robot. Events that are not decided yet are not part of it.
 #[derive(Debug, Default)]
 pub struct Robot {
     /// Name of the robot's mission; `None` if the robot is not enrolled.
     pub mission: Option<String>,
-    /// Checksum of the version of the robot's mission.
-    pub digest: String,
-    /// Time of enrolment in microseconds since 1970.
-    pub enrolled: u64,
     /// Sequence number of the last event that was decided.
     pub event: u64,
+    /// Checksum of the version of the robot's mission.
+    digest: String,
+    /// Time of enrolment in microseconds since 1970.
+    enrolled: u64,
     /// Ids of decided events.
-    pub ids: Ids,
+    ids: Ids,
     /// Requested change to another version of the mission.
-    pub migration: Option<Migration>,
+    migration: Option<Migration>,
     control: Control,
 }
 
@@ -34,9 +35,12 @@ pub struct Robot {
 enum Control {
     #[default]
     None,
-    Warm(Box<Loop>),
-    /// Unloaded: compressed snapshot of a few kilobytes.
-    Cold(Vec<u8>),
+    /// The loop, and the initial state of its version of the mission.
+    Loaded(Box<Loop>, Arc<Baseline>),
+    /// Snapshot that is not loaded yet.
+    Stored(Value),
+    /// The robot's last decision cannot be parsed.
+    Unreadable,
 }
 
 /// Reason for refusing an event, which then changes nothing.
@@ -56,8 +60,6 @@ pub enum Refused {
     Misplaced,
     /// An event with the same message id was decided before.
     Repeated,
-    /// The robot was retired while it was suspended, before it handled the event.
-    Skipped,
 }
 
 impl Refused {
@@ -71,7 +73,6 @@ impl Refused {
             Self::Forged => "forged_id",
             Self::Misplaced => "wrong_partition",
             Self::Repeated => "repeated_id",
-            Self::Skipped => "retired_meanwhile",
         }
     }
 
@@ -89,11 +90,11 @@ impl Refused {
             Self::Forged => "the message id must be that of its robot: `ROBOT:NUMBER`",
             Self::Misplaced => "the robot belongs to another partition",
             Self::Repeated => "an event with this message id was decided before",
-            Self::Skipped => "the robot was suspended before this event, and retired after it",
         }
     }
 }
 
+#[derive(Clone, Copy)]
 enum Request<'a> {
     Enrol(&'a str),
     Retire,
@@ -126,72 +127,30 @@ pub struct Search {
 }
 
 impl Robot {
-    /// Restores a robot from its snapshot. If the version of its mission is missing, also returns the
-    /// reason; the robot can then only be [retired](Robot::retire_suspended).
-    pub fn restore(saved: &Saved, missions: &Missions) -> (Self, Option<Faulted>) {
-        let mut robot = Self {
-            mission: saved.mission.clone(),
-            digest: saved.digest.clone(),
-            enrolled: saved.enrolled,
-            event: saved.event,
-            ids: saved.ids.clone(),
-            migration: saved.migration.clone(),
-            control: Control::None,
-        };
-        let Some(name) = &saved.mission else { return (robot, None) };
-        robot.control = Control::Cold(compressed(&saved.known));
-        let missing = version(missions, name, &saved.digest).err();
-        (robot, missing)
+    /// Restores a robot from its last decision. The loop is loaded with the first event that needs it.
+    pub fn restore(last: Decided) -> Self {
+        let State { mission, digest, enrolled, migration, ids, snapshot } = last.state;
+        let control = if mission.is_some() { Control::Stored(snapshot) } else { Control::None };
+        Self { mission, event: last.event, digest, enrolled, ids, migration, control, ..Self::default() }
     }
 
-    /// Returns a snapshot of the robot. `decision` is the sequence number of its last decision.
-    pub fn save(&self, decision: u64) -> Saved {
-        let snapshot = match &self.control {
-            Control::None => Value::Null,
-            Control::Warm(control) => control.snapshot().0,
-            Control::Cold(bytes) => decompressed(bytes),
-        };
-        Saved {
-            mission: self.mission.clone(),
-            digest: self.digest.clone(),
-            enrolled: self.enrolled,
-            event: self.event,
-            decision,
-            known: snapshot,
-            migration: self.migration.clone(),
-            ids: self.ids.clone(),
-            behind: false,
-        }
-    }
-
-    /// Returns `true` if the loop is loaded in memory.
-    pub fn is_warm(&self) -> bool {
-        matches!(self.control, Control::Warm(_))
-    }
-
-    /// Replaces a loaded loop by its compressed snapshot, to save memory.
-    pub fn cool(&mut self) {
-        if let Control::Warm(control) = &self.control {
-            self.control = Control::Cold(compressed(&control.snapshot().0));
-        }
+    /// Returns a robot whose last decision cannot be parsed. It can only be retired.
+    pub fn unreadable() -> Self {
+        Self { mission: Some(String::new()), control: Control::Unreadable, ..Self::default() }
     }
 
     /// Decides an event: enrols the robot, retires it, changes the version of its mission, or lets its
-    /// loop handle the event. During recovery, `before` is the decision about this event that a former
-    /// owner has stored: its plans are used, and the new answers must be equal to its answers except
-    /// for the wording of explanations. Returns a [`Refused`] if the event is refused; the state of
-    /// the loop is then unchanged.
+    /// loop handle the event. Returns a [`Refused`] if the event is refused; the state is then
+    /// unchanged.
     ///
     /// # Errors
-    /// The robot cannot continue: its mission is missing, its snapshot does not fit the mission, or
-    /// the answers differ from those of `before`. Its state may be invalid and has to be recovered.
+    /// The robot cannot continue: its mission is missing, or its snapshot does not fit the mission.
     pub fn decide(
         &mut self,
         event: &Stored,
         missions: &Missions,
-        before: Option<&Decided>,
     ) -> Result<Result<Decided, Refused>, Faulted> {
-        Ok(match self.begin(event, missions, before)? {
+        Ok(match self.begin(event, missions)? {
             Begun::Decided(decided) => Ok(decided),
             Begun::Refused(refused) => Err(refused),
             Begun::Search(search) => Ok(self.search(search)?),
@@ -203,88 +162,55 @@ impl Robot {
     ///
     /// # Errors
     /// As for [`Robot::decide`].
-    pub fn begin(
-        &mut self,
-        event: &Stored,
-        missions: &Missions,
-        before: Option<&Decided>,
-    ) -> Result<Begun, Faulted> {
-        // A former owner may have decided an event that this version refuses.
-        if before.is_none() && event.id.as_ref().is_some_and(|id| self.ids.contains(id)) {
+    pub fn begin(&mut self, event: &Stored, missions: &Missions) -> Result<Begun, Faulted> {
+        if event.id.as_ref().is_some_and(|id| self.ids.contains(id)) {
             return Ok(Begun::Refused(Refused::Repeated));
         }
         let text = String::from_utf8_lossy(&event.payload);
         let head: Value = serde_json::from_str(&text).unwrap_or_default();
+        let request = request(&head);
         let mut search = Search { decided: empty(event.sequence), answers: Vec::new(), id: event.id.clone() };
-        let is_complete = match request(&head) {
-            Request::Enrol(name) => {
-                if self.mission.is_some() {
-                    return Ok(Begun::Refused(Refused::Enrolled));
-                }
-                let recorded = before.and_then(|before| before.digest.as_deref());
-                let template = match recorded {
-                    Some(digest) => version(missions, name, digest)?,
-                    None => match missions.get(name) {
-                        Some(template) => template,
-                        None => return Ok(Begun::Refused(Refused::Mission)),
-                    },
+        let name = match (request, self.mission.clone()) {
+            (Request::Enrol(name), None) => {
+                let Some(template) = missions.get(name) else {
+                    return Ok(Begun::Refused(Refused::Mission));
                 };
                 search.decided.enrolled = Some(name.to_owned());
-                search.decided.digest = Some(template.digest.clone());
                 self.mission = Some(name.to_owned());
                 (self.digest, self.enrolled) = (template.digest.clone(), event.time);
-                self.control = Control::Warm(Box::new(template.control.clone()));
-                self.deliberate(&mut search.answers, before)
+                self.control =
+                    Control::Loaded(Box::new(template.control.clone()), Arc::clone(&template.baseline));
+                return Ok(self.deliberate(search));
             }
+            (Request::Enrol(_), Some(_)) => return Ok(Begun::Refused(Refused::Enrolled)),
+            (_, None) => return Ok(Begun::Refused(Refused::Unknown)),
+            (_, Some(name)) => name,
+        };
+        search.decided.now = event.time.saturating_sub(self.enrolled);
+        match request {
             Request::Retire => {
-                if self.mission.is_none() {
-                    return Ok(Begun::Refused(Refused::Unknown));
-                }
-                return Ok(Begun::Decided(self.retire(event, before.is_some_and(|before| before.skips))));
+                *self = Self { ids: std::mem::take(&mut self.ids), ..Self::default() };
+                search.decided.retired = true;
+                return Ok(Begun::Decided(self.complete(search)));
             }
             Request::Migrate(safe_point) => {
-                let Some(name) = self.mission.clone() else { return Ok(Begun::Refused(Refused::Unknown)) };
-                let Some(safe_point) = safe_point else { return Ok(Begun::Refused(Refused::SafePoint)) };
-                let target = match before {
-                    Some(before) => before.target.clone(),
-                    None => match missions.get(&name) {
-                        Some(template) => Some(template.digest.clone()).filter(|own| *own != self.digest),
-                        None => return Ok(Begun::Refused(Refused::Mission)),
-                    },
-                };
-                search.decided.now = event.time.saturating_sub(self.enrolled);
-                self.warm(missions)?;
-                search.decided.target.clone_from(&target);
-                self.migration = target.map(|target| Migration { at: safe_point, target });
+                let Some(at) = safe_point else { return Ok(Begun::Refused(Refused::SafePoint)) };
+                let Some(current) = missions.get(&name) else { return Ok(Begun::Refused(Refused::Mission)) };
+                self.load(missions)?;
+                let target = Some(current.digest.clone()).filter(|target| *target != self.digest);
+                self.migration = target.map(|target| Migration { at, target });
                 // If the robot does not change its version now, nothing has to be planned.
-                !self.migrate(&name, missions, &mut search, before)?
-                    || self.deliberate(&mut search.answers, before)
+                if !self.migrate(&name, missions, &mut search)? {
+                    return Ok(Begun::Decided(self.complete(search)));
+                }
             }
-            Request::Observe => {
-                let Some(name) = self.mission.clone() else { return Ok(Begun::Refused(Refused::Unknown)) };
-                search.decided.now = event.time.saturating_sub(self.enrolled);
+            Request::Observe | Request::Enrol(_) => {
                 let now = Duration::from_micros(search.decided.now);
-                self.warm(missions)?;
-                let Control::Warm(control) = &mut self.control else {
-                    return Ok(Begun::Refused(Refused::Unknown));
-                };
-                search.answers = control.react(&Observation::parse(&text), now);
-                self.migrate(&name, missions, &mut search, before)?;
-                self.deliberate(&mut search.answers, before)
+                search.answers = self.load(missions)?.react(&Observation::parse(&text), now);
+                self.migrate(&name, missions, &mut search)?;
             }
-        };
-        if !is_complete && before.is_none() {
-            return Ok(Begun::Search(search));
         }
-        let decided = self.complete(search);
-        if let Some(before) = before
-            && !is_same(&decided, before)
-        {
-            let text =
-                format!("the stored decision of event {} differs from the computed one", event.sequence);
-            return Err(Faulted(text));
-        }
-        Ok(Begun::Decided(decided))
+        Ok(self.deliberate(search))
     }
 
     /// Runs the second phase of [`Robot::decide`]: searches for plans.
@@ -292,73 +218,43 @@ impl Robot {
     /// # Errors
     /// The loop is not loaded, because [`Robot::begin`] did not precede.
     pub fn search(&mut self, mut search: Search) -> Result<Decided, Faulted> {
-        let Control::Warm(control) = &mut self.control else {
+        let Control::Loaded(control, _) = &mut self.control else {
             return Err(Faulted("the loop of the robot is not loaded".to_owned()));
         };
         search.answers.extend(control.deliberate());
         Ok(self.complete(search))
     }
 
-    /// Retires a suspended robot, whatever its state. Its events that are not decided are refused.
-    pub fn retire_suspended(&mut self, event: &Stored) -> Decided {
-        self.retire(event, true)
-    }
-
-    fn retire(&mut self, event: &Stored, skips: bool) -> Decided {
-        self.ids.extend(event.id.as_deref());
-        let ids = std::mem::take(&mut self.ids);
-        *self = Self { ids: ids.clone(), event: event.sequence, ..Self::default() };
-        Decided { retired: true, skips, ids, ..empty(event.sequence) }
-    }
-
-    /// Plans without a search, or replays the plans of `before`. Returns `false` if a search is necessary; the loop
-    /// is then unchanged.
-    fn deliberate(&mut self, answers: &mut Vec<Answer>, before: Option<&Decided>) -> bool {
-        let Control::Warm(control) = &mut self.control else { return true };
-        let more = match before {
-            Some(before) => Some(control.deliberate_again(&before.plans)),
-            None => control.deliberate_at_once(),
-        };
-        let is_complete = more.is_some();
-        answers.extend(more.into_iter().flatten());
-        is_complete
+    /// Plans without a search, if that is possible.
+    fn deliberate(&mut self, mut search: Search) -> Begun {
+        if let Control::Loaded(control, _) = &mut self.control {
+            let Some(answers) = control.deliberate_at_once() else { return Begun::Search(search) };
+            search.answers.extend(answers);
+        }
+        Begun::Decided(self.complete(search))
     }
 
     /// Changes to another version of the mission if this was requested, the version is available, and the loop is at
-    /// the requested point. A recorded decision determines whether the robot changes. Returns `true` if the robot has
-    /// changed; the new loop then has to plan. If the version does not fit, an error becomes an answer, and the
-    /// request is dropped.
-    fn migrate(
-        &mut self,
-        name: &str,
-        missions: &Missions,
-        search: &mut Search,
-        before: Option<&Decided>,
-    ) -> Result<bool, Faulted> {
-        let (Some(migration), Control::Warm(control)) = (&self.migration, &self.control) else {
+    /// the requested point. Returns `true` if the robot has changed; the new loop then has to plan. If the version does
+    /// not fit, an error becomes an answer, and the request is dropped.
+    fn migrate(&mut self, name: &str, missions: &Missions, search: &mut Search) -> Result<bool, Faulted> {
+        let (Some(migration), Control::Loaded(control, _)) = (&self.migration, &self.control) else {
             return Ok(false);
         };
-        let template = if let Some(before) = before {
-            let Some(digest) = &before.digest else { return Ok(false) };
-            version(missions, name, digest)?
-        } else {
-            let is_safe = control.is_between_actions()
-                && (migration.at == SafePoint::ActionEnd || control.beliefs().reached());
-            match missions.version(name, &migration.target) {
-                Some(template) if is_safe => template,
-                _ => return Ok(false),
-            }
+        let is_safe = control.is_between_actions()
+            && (migration.at == SafePoint::ActionEnd || control.beliefs().reached());
+        let Some(template) = missions.version(name, &migration.target).filter(|_| is_safe) else {
+            return Ok(false);
         };
         let initial = version(missions, name, &self.digest)?;
         let mut next = template.control.clone();
-        search.decided.digest = Some(template.digest.clone());
         self.migration = None;
         match next.migrate(control, &initial.control) {
             Ok(answers) => {
                 search.answers.extend(answers);
                 search.decided.migrated = true;
                 self.digest.clone_from(&template.digest);
-                self.control = Control::Warm(Box::new(next));
+                self.control = Control::Loaded(Box::new(next), Arc::clone(&template.baseline));
                 Ok(true)
             }
             Err(message) => {
@@ -371,23 +267,38 @@ impl Robot {
 
     fn complete(&mut self, search: Search) -> Decided {
         let Search { mut decided, answers, id } = search;
-        if let Control::Warm(control) = &mut self.control {
-            let decision = control.decision(&answers);
-            (decided.answers, decided.plans) = (decision.answers, decision.plans);
-        }
         self.event = decided.event;
         self.ids.extend(id.as_deref());
+        let mut snapshot = Value::Null;
+        if let Control::Loaded(control, baseline) = &mut self.control {
+            decided.answers = control.decision(&answers).answers;
+            snapshot = baseline.difference(control);
+        }
+        decided.state = State {
+            mission: self.mission.clone(),
+            digest: self.digest.clone(),
+            enrolled: self.enrolled,
+            migration: self.migration.clone(),
+            ids: self.ids.clone(),
+            snapshot,
+        };
         decided
     }
 
-    fn warm(&mut self, missions: &Missions) -> Result<(), Faulted> {
-        let (Control::Cold(bytes), Some(mission)) = (&self.control, &self.mission) else { return Ok(()) };
-        let mut control = version(missions, mission, &self.digest)?.control.clone();
-        control
-            .restore(&Snapshot(decompressed(bytes)))
-            .map_err(|message| Faulted(message.text().to_owned()))?;
-        self.control = Control::Warm(Box::new(control));
-        Ok(())
+    fn load(&mut self, missions: &Missions) -> Result<&mut Loop, Faulted> {
+        if let Control::Stored(snapshot) = &mut self.control {
+            let mission = self.mission.as_deref().unwrap_or_default();
+            let template = version(missions, mission, &self.digest)?;
+            let mut control = template.control.clone();
+            control
+                .restore(&template.baseline.snapshot(std::mem::take(snapshot)))
+                .map_err(|message| Faulted(message.text().to_owned()))?;
+            self.control = Control::Loaded(Box::new(control), Arc::clone(&template.baseline));
+        }
+        match &mut self.control {
+            Control::Loaded(control, _) => Ok(control),
+            _ => Err(Faulted("the robot's last decision cannot be read: retire the robot".to_owned())),
+        }
     }
 }
 
@@ -408,14 +319,9 @@ fn empty(event: u64) -> Decided {
         enrolled: None,
         retired: false,
         migrated: false,
-        digest: None,
-        target: None,
-        skips: false,
-        ids: Ids::default(),
         answers: Vec::new(),
-        plans: Vec::new(),
         worker: String::new(),
-        epoch: 0,
+        state: State::default(),
     }
 }
 
@@ -436,23 +342,4 @@ fn request(head: &Value) -> Request<'_> {
         }),
         _ => Request::Observe,
     }
-}
-
-/// Returns `true` if two decisions have equal answers, except for the wording of explanations, and equally enrol,
-/// retire or migrate the robot.
-fn is_same(left: &Decided, right: &Decided) -> bool {
-    left.enrolled == right.enrolled
-        && left.retired == right.retired
-        && left.migrated == right.migrated
-        && left.target == right.target
-        && left.decision().agrees(&right.answers)
-}
-
-fn compressed(known: &Value) -> Vec<u8> {
-    lz4_flex::compress_prepend_size(known.to_string().as_bytes())
-}
-
-fn decompressed(bytes: &[u8]) -> Value {
-    let text = lz4_flex::decompress_size_prepended(bytes).unwrap_or_default();
-    serde_json::from_slice(&text).unwrap_or_default()
 }

@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::partition::pause;
-use crate::store::{Bucket, Entry, Fault, Message, Store, Stream};
-use crate::wire::{Address, Presence, Progress};
+use crate::partition::{pause, persist};
+use crate::store::{Fault, Message, Receipt, Store, Stream};
+use crate::wire::{Address, Decided, Presence};
+use crate::worker::owners;
 
 /// Appends the events of a robot. Each event is stored before the next one is sent, so events keep
 /// their order, and none is lost unless [`Sender::send`] fails. Repeated attempts store no event
@@ -54,31 +55,26 @@ impl<S: Store> Sender<S> {
             }
             let message = Message { subject: &subject, id: &id, after: None, payload: event.as_bytes() };
             let receipt = until_there(&self.store, message).await?;
-            if !receipt.is_known || self.is_own(&subject, receipt.sequence, event).await {
+            if !receipt.is_known || self.is_own(&subject, receipt.sequence, &id, event).await {
                 return Ok(receipt.sequence);
             }
         }
         Err(Fault::Conflict)
     }
 
-    /// Returns `true` if the stored message with this sequence number has the subject and payload
-    /// that were sent.
-    async fn is_own(&self, subject: &str, sequence: u64, event: &str) -> bool {
-        for attempt in 1.. {
-            match self.store.at(Stream::Events, sequence).await {
-                Ok(found) => {
-                    return found.is_some_and(|stored| {
-                        stored.subject == subject && stored.payload == event.as_bytes()
-                    });
-                }
-                Err(_) => pause(attempt).await,
-            }
+    /// Returns `true` if the event with this sequence number has the subject and payload that were sent, or was
+    /// discarded after the robot's decision about it.
+    async fn is_own(&self, subject: &str, sequence: u64, id: &str, event: &str) -> bool {
+        let stored = persist(|| self.store.event(sequence)).await;
+        if let Some(stored) = stored {
+            return stored.subject == subject && stored.payload == event.as_bytes();
         }
-        false
+        let last = persist(|| self.store.last(Stream::Decisions, subject)).await;
+        last.and_then(|last| Decided::parse(&last.payload)).is_some_and(|last| last.state.ids.contains(id))
     }
 }
 
-async fn until_there<S: Store>(store: &S, message: Message<'_>) -> Result<crate::store::Receipt, Fault> {
+async fn until_there<S: Store>(store: &S, message: Message<'_>) -> Result<Receipt, Fault> {
     for attempt in 1.. {
         match store.append(Stream::Events, message).await {
             Err(Fault::Unreachable(_)) => pause(attempt).await,
@@ -102,13 +98,8 @@ pub struct Status {
 pub struct PartitionStatus {
     /// Number of the partition.
     pub partition: u32,
-    /// Name of the worker that leases the partition, if any.
+    /// Name of the worker that owns the partition, if any.
     pub worker: Option<String>,
-    /// Number of times that a worker has taken over the partition, or has recovered it again.
-    pub epoch: u64,
-    /// Sequence number up to which snapshots contain the effects of all events, except those of
-    /// suspended or delayed robots.
-    pub events: u64,
 }
 
 /// Reads the status of a fleet.
@@ -116,26 +107,9 @@ pub struct PartitionStatus {
 /// # Errors
 /// The log cannot be read.
 pub async fn status<S: Store>(store: &S) -> Result<Status, Fault> {
-    let leases = texts(store.list(Bucket::Leases, None, 0).await?);
-    let workers = store.list(Bucket::Workers, None, 0).await?;
-    let progress = store.list(Bucket::Progress, None, 0).await?;
-    let progress: BTreeMap<String, Progress> = progress
-        .into_iter()
-        .filter_map(|entry| Some((entry.key, serde_json::from_slice(&entry.value).ok()?)))
-        .collect();
-    let partitions = (0..store.partitions()).map(|partition| {
-        let key = partition.to_string();
-        let position = progress.get(&key).cloned().unwrap_or_default();
-        let worker = leases.get(&key).cloned();
-        PartitionStatus { partition, worker, epoch: position.epoch, events: position.events }
-    });
-    let presence = |entry: Entry| Some((entry.key, serde_json::from_slice(&entry.value).ok()?));
-    Ok(Status {
-        partitions: partitions.collect(),
-        workers: workers.into_iter().filter_map(presence).collect(),
-    })
-}
-
-fn texts(entries: Vec<Entry>) -> BTreeMap<String, String> {
-    entries.into_iter().map(|entry| (entry.key, String::from_utf8_lossy(&entry.value).into_owned())).collect()
+    let workers = store.workers().await?;
+    let owners = owners(&workers, store.partitions());
+    let partitions = (0..store.partitions())
+        .map(|partition| PartitionStatus { partition, worker: owners.get(&partition).cloned() });
+    Ok(Status { partitions: partitions.collect(), workers })
 }

@@ -2,14 +2,13 @@
 
 use std::fmt;
 
-use metaplan::mapek::Decision;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::ids::Ids;
 
 /// Version of the data format, which every decision contains.
-pub const FORMAT: &str = "metaplan-fleet/1";
+pub const FORMAT: &str = "metaplan-fleet/2";
 
 const LONGEST_NAME: usize = 64;
 
@@ -61,7 +60,8 @@ impl fmt::Display for Address {
     }
 }
 
-/// Decision about an event, as stored in the stream of decisions.
+/// Decision about an event and the state of the robot after it, as stored in the stream of decisions. The last
+/// decision about a robot is all that a worker needs to continue.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Decided {
     /// Data format of the message, equal to [`FORMAT`].
@@ -79,40 +79,16 @@ pub struct Decided {
     /// `true` if with this event the robot has changed to another version of its mission.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub migrated: bool,
-    /// Checksum of a version of the mission: the version with which this event has enrolled the robot, or the one to
-    /// which the robot has changed, or could not change, after this event.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub digest: Option<String>,
-    /// Checksum of the version of the mission to which the robot changes at the next safe point, if this
-    /// event has requested that.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub target: Option<String>,
-    /// `true` if earlier events of the robot that have no decision are refused, because the robot was
-    /// suspended when this event retired it.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub skips: bool,
-    /// Ids of decided events, if this event has retired the robot. Nothing else is stored about a
-    /// retired robot.
-    #[serde(default, skip_serializing_if = "Ids::is_empty")]
-    pub ids: Ids,
     /// Answers in the format of `metaplan run`.
     pub answers: Vec<Value>,
-    /// Plans that were made for the decision, so that another worker can replay the decision
-    /// without planning.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub plans: Vec<Value>,
     /// Name of the worker that has decided.
     pub worker: String,
-    /// The partition's [`Progress::epoch`] at the time of the decision.
-    pub epoch: u64,
+    /// State of the robot after the event: JSON, compressed with LZ4, as base64.
+    #[serde(with = "packed")]
+    pub state: State,
 }
 
 impl Decided {
-    /// Returns the answers and plans as a decision of the loop.
-    pub fn decision(&self) -> Decision {
-        Decision { answers: self.answers.clone(), plans: self.plans.clone() }
-    }
-
     /// Parses a message of the stream of decisions. Returns `None` for other data or another
     /// version.
     pub fn parse(payload: &[u8]) -> Option<Self> {
@@ -120,50 +96,45 @@ impl Decided {
     }
 }
 
-/// Stored position of a partition, from which a new owner recovers. Each write requires the
-/// revision of the previous write, which rejects writes of former owners.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Progress {
-    /// Number of times that a worker has taken over the partition, or has recovered it again.
-    pub epoch: u64,
-    /// Sequence number up to which the effects of all events are contained in snapshots, except for
-    /// robots with [`Saved::behind`].
-    pub events: u64,
-    /// Sequence number up to which all decisions are contained in snapshots, except for robots with
-    /// [`Saved::behind`].
-    pub decisions: u64,
-    /// Revision of the last snapshot. A reader of snapshots has to wait for this revision, because
-    /// it may read from a server that lags behind.
-    pub snapshots: u64,
-}
-
-/// Snapshot of a robot after an event.
+/// State of a robot after a decision.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct Saved {
+pub struct State {
     /// Name of the robot's mission; `None` if the robot is not enrolled.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mission: Option<String>,
-    /// Checksum of the mission's files and settings.
-    #[serde(default)]
+    /// Checksum of the version of the mission.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
     pub digest: String,
     /// Time of enrolment in microseconds since 1970.
-    pub enrolled: u64,
-    /// Sequence number of the last event whose effect the snapshot contains.
-    pub event: u64,
-    /// Sequence number of the last decision that the snapshot contains.
-    pub decision: u64,
-    /// Snapshot of the robot's loop.
     #[serde(default)]
-    pub known: Value,
+    pub enrolled: u64,
     /// Requested change to another version of the mission.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub migration: Option<Migration>,
-    /// Ids of decided events.
+    /// Ids of decided events. Nothing else is stored about a retired robot.
     #[serde(default, skip_serializing_if = "Ids::is_empty")]
     pub ids: Ids,
-    /// `true` if the progress of the partition does not wait for this robot. A new owner has to read
-    /// the later events and decisions of the robot separately.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub behind: bool,
+    /// Snapshot of the robot's loop, as the difference from the initial snapshot of the mission.
+    #[serde(default, skip_serializing_if = "Value::is_null")]
+    pub snapshot: Value,
+}
+
+mod packed {
+    use base64::{Engine as _, engine::general_purpose::STANDARD};
+    use serde::{Deserialize as _, Deserializer, Serializer, de::Error as _, ser::Error as _};
+
+    use super::State;
+
+    pub(super) fn serialize<S: Serializer>(state: &State, to: S) -> Result<S::Ok, S::Error> {
+        let text = serde_json::to_vec(state).map_err(S::Error::custom)?;
+        to.serialize_str(&STANDARD.encode(lz4_flex::compress_prepend_size(&text)))
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<State, D::Error> {
+        let bytes = STANDARD.decode(String::deserialize(from)?).map_err(D::Error::custom)?;
+        let text = lz4_flex::decompress_size_prepended(&bytes).map_err(D::Error::custom)?;
+        serde_json::from_slice(&text).map_err(D::Error::custom)
+    }
 }
 
 /// Requested change of a robot to another version of its mission.
@@ -189,15 +160,13 @@ pub enum SafePoint {
 /// Status that a worker publishes about itself.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Presence {
-    /// Number of partitions that the worker owns.
+    /// Number of partitions that the worker runs.
     pub partitions: u32,
-    /// Number of robots in these partitions.
+    /// Number of robots in memory.
     pub robots: u64,
-    /// Number of robots whose loops are loaded in memory.
-    pub warm: u64,
     /// Number of events that are read but not decided.
     pub waiting: u64,
-    /// Number of events that were decided or replayed since the worker's start.
+    /// Number of events that were decided since the worker's start.
     pub decided: u64,
     /// Number of refused events, stopped robots and unreadable stored messages since the worker's
     /// start.
@@ -230,18 +199,14 @@ mod tests {
             enrolled: Some("ugv".to_owned()),
             retired: false,
             migrated: false,
-            digest: Some("0a1b".to_owned()),
-            target: None,
-            skips: false,
-            ids: Ids::default(),
             answers: vec![serde_json::json!({"answer": "plan_kept"})],
-            plans: Vec::new(),
             worker: "w".to_owned(),
-            epoch: 3,
+            state: State { digest: "0a1b".to_owned(), ..State::default() },
         };
         let text = serde_json::to_vec(&decided).expect("plain data");
-        assert_eq!(Decided::parse(&text), Some(decided));
-        assert_eq!(Decided::parse(b"{\"format\": \"metaplan-fleet/0\"}"), None);
-        assert_eq!(Decided::parse(b"\xff"), None);
+        assert_eq!(Decided::parse(&text).as_ref(), Some(&decided));
+        for wrong in [&text[..50], b"{\"format\": \"metaplan-fleet/0\"}", b"\xff"] {
+            assert_eq!(Decided::parse(wrong), None);
+        }
     }
 }

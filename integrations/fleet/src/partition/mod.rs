@@ -1,23 +1,19 @@
-//! A partition, i.e. a fixed group of robots, run by the worker that leases it.
+//! A partition, i.e. a fixed group of robots, run by one worker.
 //!
 //! Events are read in order. Each robot handles one event at a time, and robots run concurrently. A robot that cannot
-//! keep up, or is suspended, does not delay the others: its events stay in the log, and are read again separately. A
-//! decision is appended only if the robot's last decision has the expected sequence number. So only one of two workers
-//! can decide an event.
+//! keep up, or is suspended, does not delay the others: its events stay in the log, and are read again separately.
 //!
-//! Robots are saved periodically; the stored progress of the partition gives the positions from which events and
-//! decisions must be read again. A crash is possible between any two of these operations. A new owner reads the
-//! snapshots, replays later events with the recorded plans, and continues with the first undecided event.
+//! The state of a robot is part of its last decision. A decision is appended only if the robot's last decision has the
+//! expected sequence number, so only one of two workers can decide an event. A new owner of a partition reads the events
+//! that are still in the log, loads the last decision of their robots, and continues with the first undecided event.
+//! Events that are decided or refused are discarded from time to time.
 
-mod asking;
-mod keeping;
 mod own;
-mod slot;
-mod taking_over;
 mod task;
 mod threads;
 
 use std::collections::BTreeMap;
+use std::future::Future;
 use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -26,9 +22,8 @@ use tokio::sync::watch;
 
 use crate::health::Health;
 use crate::missions::Missions;
-use crate::store::Store;
+use crate::store::{Fault, Store};
 
-pub(crate) use asking::pause;
 use own::Partition;
 use threads::Threads;
 
@@ -39,21 +34,15 @@ pub struct Settings {
     /// (up to 25 ms, up to 400 ms, longer). The same number limits further searches on extra
     /// threads, and loops that work without a search.
     pub threads: usize,
-    /// Maximum number of idle robots loaded in memory. Others are kept as compressed snapshots and
-    /// loaded on demand. Robots that are handling events may exceed this number.
+    /// Maximum number of robots in memory. Others are loaded from their last decision when they have events. Robots
+    /// that are handling events may exceed this number.
     pub warm: usize,
-    /// Number of decisions after which a robot is saved, and number of events or decisions after
-    /// which the progress is written.
-    pub save_every: usize,
-    /// Time after which a robot with an unsaved decision is saved. It limits the number of events
-    /// that a new owner has to replay.
-    pub save_within: Duration,
-    /// Time between two checks whether robots have to be saved.
+    /// Number of handled events after which the events of a robot are discarded.
+    pub discard_every: usize,
+    /// Time after which a handled event is discarded.
+    pub discard_within: Duration,
+    /// Time between two checks whether events have to be discarded.
     pub look: Duration,
-    /// If half of this number of undecided events of a partition is in memory, a robot with 16 or
-    /// more of them gets no more. Its later events are read again once the earlier ones are
-    /// decided.
-    pub ahead: usize,
     /// Maximum time that a partition waits for running loops when it is given back. Their events are decided by
     /// the next owner.
     pub drain: Duration,
@@ -64,10 +53,9 @@ impl Default for Settings {
         Self {
             threads: 2,
             warm: 4096,
-            save_every: 64,
-            save_within: Duration::from_secs(30),
+            discard_every: 64,
+            discard_within: Duration::from_secs(30),
             look: Duration::from_millis(500),
-            ahead: 1024,
             drain: Duration::from_secs(5),
         }
     }
@@ -76,7 +64,7 @@ impl Default for Settings {
 /// State that all partitions of a worker share.
 #[derive(Debug)]
 pub struct Shared<S> {
-    /// The log with streams and buckets.
+    /// The log of the fleet.
     pub store: S,
     /// The missions of the worker.
     pub missions: Missions,
@@ -94,15 +82,13 @@ pub struct Shared<S> {
 /// Counters of a worker: current numbers of robots and events, and totals since the start.
 #[derive(Debug, Default)]
 pub struct Counts {
-    /// Number of robots in the worker's partitions.
+    /// Number of robots in memory.
     pub robots: AtomicU64,
-    /// Number of robots loaded in memory.
-    pub warm: AtomicU64,
     /// Number of events that are read but not decided.
     pub waiting: AtomicU64,
-    /// Number of leased partitions that are running.
+    /// Number of partitions that are running.
     pub partitions: AtomicU64,
-    /// Number of events that were decided or replayed.
+    /// Number of events that were decided.
     pub decided: AtomicU64,
     /// Number of refused events, stopped robots and unreadable stored messages.
     pub refused: AtomicU64,
@@ -132,43 +118,34 @@ impl<S> Shared<S> {
 pub enum Order {
     /// Continue to handle events.
     Go,
-    /// Finish running decisions, save everything and end.
+    /// Finish running decisions, discard handled events, and end.
     Drain,
-    /// End immediately without saving, because the lease is lost: another worker has it, or it could
-    /// not be renewed in time.
-    Abandon,
 }
 
-/// Reason why the execution of a partition has ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum End {
-    /// The worker has ordered the end.
-    Ordered,
-    /// The partition has to be recovered again: another worker has written data that only the owner
-    /// writes, or the loop of a robot has panicked.
-    Fenced,
-}
-
-/// Recovers and runs a partition until it is ordered to end, or until it has to be recovered again
-/// ([`End::Fenced`]). [`Order::Abandon`] or a dropped sender of `orders` ends it immediately,
-/// [`Order::Drain`] after everything is saved.
-pub async fn serve<S: Store>(shared: Arc<Shared<S>>, partition: u32, orders: watch::Receiver<Order>) -> End {
-    let mut abandoned = orders.clone();
-    let work = async {
-        match Partition::recover(&shared, partition).await {
-            Ok(own) => own.run(orders).await,
-            Err(end) => end,
-        }
-    };
-    let is_abandoned = async move {
-        loop {
-            if *abandoned.borrow_and_update() == Order::Abandon || abandoned.changed().await.is_err() {
-                return;
-            }
-        }
-    };
+/// Runs a partition until it is ordered to end, or until the sender of `orders` is dropped.
+pub async fn serve<S: Store>(shared: Arc<Shared<S>>, partition: u32, orders: watch::Receiver<Order>) {
+    let mut dropped = orders.clone();
     tokio::select! {
-        end = work => end,
-        () = is_abandoned => End::Ordered,
+        () = Partition::new(shared, partition).run(orders) => {}
+        () = async { while dropped.changed().await.is_ok() {} } => {}
     }
+}
+
+/// Repeats an operation with pauses until it succeeds.
+pub(crate) async fn persist<T, F: Future<Output = Result<T, Fault>>>(operation: impl Fn() -> F) -> T {
+    let mut attempt = 1;
+    loop {
+        match operation().await {
+            Ok(value) => return value,
+            Err(_) => pause(attempt).await,
+        }
+        attempt += 1;
+    }
+}
+
+/// Waits for a random time before another attempt. The upper limit is 10 ms · 2^attempt, and at most 5 s.
+/// Random pauses prevent synchronised retries.
+pub(crate) async fn pause(attempt: u32) {
+    let limit = 5_000.min(10_u64 << attempt.min(10));
+    tokio::time::sleep(Duration::from_millis(fastrand::u64(1..=limit))).await;
 }

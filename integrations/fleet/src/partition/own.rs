@@ -1,5 +1,5 @@
-//! Execution of a partition: reads events, refuses invalid ones, runs the loops of robots, unloads
-//! robots that were not used recently, and starts checkpoints.
+//! Execution of a partition: reads events, refuses those with a wrong address, runs the loops of robots, unloads robots
+//! that were not used recently, and discards handled events.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::Ordering;
@@ -10,83 +10,116 @@ use futures::future::BoxFuture;
 use futures::stream::{BoxStream, FuturesUnordered, StreamExt as _};
 use tokio::sync::watch;
 
-use super::asking::{pause, persist};
-use super::slot::{Done, Outcome, Slot};
-use super::task::Task;
-use super::{End, Order, Shared};
-use crate::robot::{Refused, Robot, is_retirement};
+use super::task::{Loaded, Outcome, Task};
+use super::{Order, Shared, pause, persist};
+use crate::robot::{Refused, is_retirement};
 use crate::store::{Fault, Store, Stored, Stream};
-use crate::wire::{Address, Progress, partition_of};
+use crate::wire::{Address, partition_of};
 
 pub(super) struct Partition<S> {
-    pub(super) shared: Arc<Shared<S>>,
-    pub(super) number: u32,
-    pub(super) progress: Progress,
-    pub(super) revision: u64,
-    pub(super) slots: BTreeMap<String, Slot>,
-    /// Sequence numbers of the last event that was read, and of the last known decision, both over all
-    /// robots of the partition.
-    pub(super) seen: (u64, u64),
-    /// Greatest known revision of the snapshots of the partition's robots.
-    pub(super) snapshots: u64,
-    /// Sequence number of the last decision at the time of the recovery.
-    pub(super) recovered: u64,
+    shared: Arc<Shared<S>>,
+    number: u32,
+    slots: BTreeMap<String, Slot>,
+    /// Sequence number of the last event that was read.
+    seen: u64,
+    jobs: FuturesUnordered<BoxFuture<'static, Done>>,
+    /// Number of events that are read but not handled.
+    waiting: usize,
     /// Number of robots with events that have to be read again.
-    pub(super) behind: usize,
-    pub(super) jobs: FuturesUnordered<BoxFuture<'static, Done>>,
-    pub(super) waiting: usize,
-    pub(super) is_progressing: bool,
-    pub(super) clock: u64,
-    pub(super) recent: VecDeque<(u64, String)>,
+    behind: usize,
+    /// Names of robots with the number of the use that is described in [`Slot::used`], in the order of these numbers.
+    recent: VecDeque<(u64, String)>,
+    clock: u64,
 }
 
-/// Number of undecided events that each robot can have in memory, regardless of other robots.
-const FEW: usize = 16;
+/// A robot in memory, with its queue.
+#[derive(Default)]
+#[expect(clippy::struct_excessive_bools, reason = "they are independent of each other")]
+struct Slot {
+    /// State of the robot. `None` while an event is being handled, and if the state is not loaded.
+    loaded: Option<Loaded>,
+    is_busy: bool,
+    /// `true` if the robot is included in the number of loaded robots.
+    is_counted: bool,
+    waiting: VecDeque<Stored>,
+    /// Sequence numbers of the first and the last event that are not in the queue and have to be read again, because
+    /// the queue was full.
+    omitted: Option<(u64, u64)>,
+    is_refilling: bool,
+    /// `true` if the robot cannot continue. Its events stay in the log, except that one can retire the robot.
+    is_suspended: bool,
+    /// Sequence number of the last event that was decided or refused.
+    handled: u64,
+    /// Number of handled events since the last time that events of the robot were discarded, and the time of the
+    /// first of them.
+    obsolete: usize,
+    since: Option<Instant>,
+    is_discarding: bool,
+    /// Number of events that the partition had handled when the robot was last used.
+    used: u64,
+    /// Estimated duration of the robot's next search, if it has searched before.
+    search: Option<Duration>,
+}
+
+impl Slot {
+    fn is_idle(&self) -> bool {
+        let is_working = self.is_busy || self.is_refilling || self.is_discarding || self.is_suspended;
+        !is_working && self.waiting.is_empty() && self.omitted.is_none()
+    }
+}
+
+enum Done {
+    /// An event was handled.
+    Handled { task: Task, event: Stored, outcome: Outcome },
+    /// Omitted events of a robot were read again: the first `MAX_PAGE`, or all up to `last`.
+    Refilled { robot: String, events: Vec<Stored>, last: u64 },
+    /// Handled events of a robot were discarded, or could not be discarded.
+    Discarded { robot: String },
+}
+
+/// Maximum number of undecided events that each robot has in memory before it is refilled.
+const MAX_QUEUE: usize = 16;
 
 const MAX_PAGE: usize = 64;
 
 impl<S: Store> Partition<S> {
-    pub(super) fn slot(&mut self, robot: &str) -> &mut Slot {
-        if !self.slots.contains_key(robot) {
-            self.shared.counts.robots.fetch_add(1, Ordering::Relaxed);
-            let slot = Slot { robot: Some(Box::default()), ..Slot::default() };
-            self.slots.insert(robot.to_owned(), slot);
+    pub(super) fn new(shared: Arc<Shared<S>>, number: u32) -> Self {
+        shared.counts.partitions.fetch_add(1, Ordering::Relaxed);
+        Self {
+            shared,
+            number,
+            slots: BTreeMap::new(),
+            seen: 0,
+            jobs: FuturesUnordered::new(),
+            waiting: 0,
+            behind: 0,
+            recent: VecDeque::new(),
+            clock: 0,
         }
-        self.slots.get_mut(robot).expect("it is there now")
     }
 
-    pub(super) async fn run(mut self, mut orders: watch::Receiver<Order>) -> End {
+    pub(super) async fn run(mut self, mut orders: watch::Receiver<Order>) {
         let (mut backoff, mut reached) = (0, 0);
         let mut events: Option<BoxStream<'static, Result<Stored, Fault>>> = None;
         let mut drained: Option<Instant> = None;
         let mut look = tokio::time::interval(self.shared.settings.look);
         look.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
-        let behind = self.slots.iter().filter(|(_, slot)| slot.behind.is_some());
-        for robot in behind.map(|(name, _)| name.clone()).collect::<Vec<_>>() {
-            self.begin(&robot);
-        }
         loop {
-            if self.waiting == 0 && self.behind == 0 && reached != self.seen.0 {
-                reached = self.seen.0;
+            if self.waiting == 0 && self.behind == 0 && reached != self.seen {
+                reached = self.seen;
                 let mut positions = self.shared.counts.reached.lock().unwrap_or_else(PoisonError::into_inner);
                 positions.insert(self.number, reached);
             }
-            let order = *orders.borrow_and_update();
-            let is_draining = order == Order::Drain;
+            let is_draining = *orders.borrow_and_update() == Order::Drain;
             if is_draining {
-                let drained = drained.get_or_insert_with(|| {
-                    self.save(true);
-                    Instant::now()
-                });
-                if drained.elapsed() >= self.shared.settings.drain {
-                    return End::Ordered;
+                let since = drained.get_or_insert_with(Instant::now);
+                let is_late = since.elapsed() >= self.shared.settings.drain;
+                if is_late || self.jobs.is_empty() && !self.discard_all(true) {
+                    return;
                 }
             }
-            if is_draining && self.jobs.is_empty() && !self.save(true) && !self.advance(true) {
-                return End::Ordered;
-            }
             if events.is_none() && !is_draining {
-                if let Ok(stream) = self.shared.store.follow(Stream::Events, self.number, self.seen.0).await {
+                if let Ok(stream) = self.shared.store.follow(Stream::Events, self.number, self.seen).await {
                     events = Some(stream);
                 } else {
                     backoff += 1;
@@ -96,16 +129,12 @@ impl<S: Store> Partition<S> {
             tokio::select! {
                 biased;
                 done = self.jobs.next(), if !self.jobs.is_empty() => {
-                    if let Some(done) = done && let Err(end) = self.done(done, is_draining) {
-                        return end;
+                    if let Some(done) = done {
+                        self.done(done, is_draining);
                     }
                 }
                 _ = orders.changed() => {}
-                _ = look.tick() => {
-                    self.save(false);
-                    self.advance(false);
-                    self.forget();
-                }
+                _ = look.tick() => drop(self.discard_all(false)),
                 message = next(&mut events), if !is_draining && events.is_some() => {
                     if let Some(Ok(event)) = message {
                         backoff = 0;
@@ -120,131 +149,59 @@ impl<S: Store> Partition<S> {
         }
     }
 
-    /// Queues the next event of the stream for its robot, or refuses it. Ignores events that were
-    /// read before, events that the robot's snapshot contains, and events of suspended robots
-    /// except their retirement. Omits the event, to be read again, if too many events are queued or
-    /// if earlier ones of the robot were omitted.
+    /// Queues the next event of the stream for its robot, or refuses it because of its address. Omits the event, to
+    /// be read again, if the queue of the robot is full or if earlier events of the robot were omitted.
     fn read(&mut self, event: Stored) {
-        if event.sequence <= self.seen.0 {
+        if event.sequence <= self.seen {
             return;
         }
-        self.seen.0 = event.sequence;
-        let Some(address) = self.address(&event) else { return };
-        if !self.slots.contains_key(&address.robot) {
-            // Events of unknown robots are refused here unless they enrol the robot with a known
-            // mission, so that they create no state.
-            let refused = match enrolment(&event.payload) {
-                Some(mission) if self.shared.missions.get(&mission).is_some() => None,
-                Some(_) => Some(Refused::Mission),
-                None => Some(Refused::Unknown),
-            };
-            if let Some(refused) = refused {
-                self.say(&event, refused);
-                return;
-            }
+        self.seen = event.sequence;
+        let Some(address) = Address::parse(&event.subject) else {
+            self.refuse(None, "wrong_subject");
+            self.discard(&event.subject, &event.subject, event.sequence);
+            return;
+        };
+        if partition_of(&address.robot, self.shared.store.partitions()) != self.number {
+            self.say(&event, Refused::Misplaced);
+            self.discard(&event.subject, &event.subject, event.sequence);
+            return;
         }
-        let is_full = self.waiting >= self.shared.settings.ahead / 2;
-        let slot = self.slot(&address.robot);
-        if slot.behind.is_some() {
-            slot.omitted = event.sequence;
-        } else if is_full && slot.waiting.len() >= FEW {
-            slot.behind = Some(event.sequence);
-            slot.omitted = event.sequence;
+        let slot = self.slots.entry(address.robot.clone()).or_default();
+        if let Some((_, last)) = &mut slot.omitted {
+            *last = event.sequence;
+        } else if slot.waiting.len() >= MAX_QUEUE {
+            slot.omitted = Some((event.sequence, event.sequence));
             self.behind += 1;
         } else {
-            self.queue(&address.robot, event);
+            slot.waiting.push_back(event);
+            self.count_waiting(1);
             self.begin(&address.robot);
         }
     }
 
-    /// Parses the address of an event. Refuses the event and returns `None` if the address or its
-    /// partition is wrong, or if the message id is not one of the robot.
-    fn address(&self, event: &Stored) -> Option<Address> {
-        let Some(address) = Address::parse(&event.subject) else {
-            self.refuse(None, "wrong_subject");
-            return None;
-        };
-        let forged = event
-            .id
-            .as_ref()
-            .is_some_and(|id| id.split_once(':').is_none_or(|(robot, _)| robot != address.robot));
-        let refused = if partition_of(&address.robot, self.shared.store.partitions()) != self.number {
-            Refused::Misplaced
-        } else if forged {
-            Refused::Forged
-        } else {
-            return Some(address);
-        };
-        self.say(event, refused);
-        None
+    fn count_waiting(&mut self, change: isize) {
+        self.waiting = self.waiting.wrapping_add_signed(change);
+        self.shared.counts.waiting.fetch_add(change.cast_unsigned() as u64, Ordering::Relaxed);
     }
 
-    fn queue(&mut self, robot: &str, event: Stored) {
-        let slot = self.slot(robot);
-        if slot.robot.as_ref().is_some_and(|robot| event.sequence <= robot.event) {
-            return;
-        }
-        slot.waiting.push_back(event);
-        self.waiting += 1;
-        self.shared.counts.waiting.fetch_add(1, Ordering::Relaxed);
-    }
-
-    fn dequeue(&mut self, name: &str) -> Option<Stored> {
-        let event = self.slots.get_mut(name)?.waiting.pop_front()?;
-        self.waiting -= 1;
-        self.shared.counts.waiting.fetch_sub(1, Ordering::Relaxed);
-        Some(event)
-    }
-
-    /// Starts to handle the next queued event of a robot, if the robot is idle. Drops events of a
-    /// suspended robot except its retirement, and refuses events that a former owner has skipped.
-    /// Starts to read more events of the robot if the queue lacks some.
+    /// Starts to handle the next queued event of a robot, if the robot is idle. Drops events of a suspended robot
+    /// except its retirement. Starts to read more events of the robot if the queue lacks some.
     fn begin(&mut self, name: &str) {
-        let last_decision = self.seen.1;
         loop {
             self.refill(name);
-            if self.slots.get(name).is_none_or(|slot| slot.robot.is_none()) {
-                return;
-            }
-            let Some(event) = self.dequeue(name) else { return };
-            let Some(slot) = self.slots.get_mut(name) else { return };
-            let is_suspended = slot.suspended.is_some();
-            if is_suspended && !is_retirement(&event.payload) {
+            let Some(slot) = self.slots.get_mut(name).filter(|slot| !slot.is_busy) else { return };
+            let Some(event) = slot.waiting.pop_front() else { return };
+            if slot.is_suspended && !is_retirement(&event.payload) {
+                self.count_waiting(-1);
                 continue;
             }
-            while slot.before.front().is_some_and(|(_, decided)| decided.event < event.sequence) {
-                slot.before.pop_front();
-            }
-            let next =
-                slot.before.front().map(|(_, decided)| (decided.event == event.sequence, decided.skips));
-            if next == Some((false, true)) {
-                self.say(&event, Refused::Skipped);
-                continue;
-            }
-            let before = if next.is_some_and(|next| next.0) { slot.before.pop_front() } else { None };
-            let Some(robot) = slot.robot.take() else { return };
-            // The progress must not pass the end of a suspension before a snapshot contains it.
-            slot.is_apart &= !is_suspended;
-            // The position of a replayed decision must not be passed by the progress until the decision
-            // is listed as unsaved.
-            let last_decision =
-                before.as_ref().map_or(last_decision, |(decision, _)| last_decision.min(decision - 1));
-            slot.at = Some((event.sequence, last_decision));
-            let task = Task {
-                shared: Arc::clone(&self.shared),
-                name: name.to_owned(),
-                partition: self.number,
-                epoch: self.progress.epoch,
-                chain: slot.chain,
-                recovered: self.recovered,
-                was_refused: before.is_none() && !slot.before.is_empty(),
-                before,
-                is_suspended,
-                estimate: slot.search,
-            };
-            self.waiting += 1;
-            self.shared.counts.waiting.fetch_add(1, Ordering::Relaxed);
-            self.jobs.push(Box::pin(task.run(robot, event)));
+            slot.is_busy = true;
+            let task = Task { name: name.to_owned(), loaded: slot.loaded.take(), estimate: slot.search };
+            let shared = Arc::clone(&self.shared);
+            self.jobs.push(Box::pin(async move {
+                let (task, outcome) = task.run(&shared, &event).await;
+                Done::Handled { task, event, outcome }
+            }));
             return;
         }
     }
@@ -252,151 +209,163 @@ impl<S: Store> Partition<S> {
     /// Starts to read events of a robot that were omitted, if its queue is almost empty.
     fn refill(&mut self, name: &str) {
         let Some(slot) = self.slots.get_mut(name) else { return };
-        let Some(first) = slot.behind.filter(|_| !slot.is_refilling && slot.waiting.len() < FEW / 2) else {
-            return;
-        };
+        let is_needed = !slot.is_refilling && slot.waiting.len() < MAX_QUEUE / 2;
+        let Some((first, last)) = slot.omitted.filter(|_| is_needed) else { return };
         slot.is_refilling = true;
-        slot.omitted = 0;
-        let (shared, name) = (Arc::clone(&self.shared), name.to_owned());
-        let subject = Address { partition: self.number, robot: name.clone() }.to_string();
+        let (shared, robot) = (Arc::clone(&self.shared), name.to_owned());
+        let subject = self.subject(name);
         self.jobs.push(Box::pin(async move {
-            let read = || shared.store.of_subject(Stream::Events, &subject, first - 1, MAX_PAGE);
-            let events = persist(read).await;
-            Done::Refilled { robot: name, events }
+            let events = persist(|| shared.store.events(&subject, first - 1, MAX_PAGE)).await;
+            // If the page is not full, there are no other events up to `last`: they were discarded.
+            let last = if events.len() < MAX_PAGE { last } else { 0 };
+            Done::Refilled { robot, events, last }
         }));
     }
 
-    fn refilled(&mut self, name: &str, events: Vec<Stored>) {
-        let is_page_full = events.len() == MAX_PAGE;
-        let mut last = 0;
-        for event in events {
-            // Later events are still to come from the stream.
-            if event.sequence <= self.seen.0 {
-                last = event.sequence;
-                if self.address(&event).is_some() {
-                    self.queue(name, event);
-                }
-            }
-        }
+    fn refilled(&mut self, name: &str, mut events: Vec<Stored>, last: u64) {
         let Some(slot) = self.slots.get_mut(name) else { return };
+        // Later events are still to come from the stream.
+        events.retain(|event| event.sequence <= self.seen);
+        let read = events.last().map_or(0, |event| event.sequence).max(last);
+        let count = events.len();
+        slot.waiting.extend(events);
         slot.is_refilling = false;
-        let is_complete = !is_page_full && slot.omitted <= last;
-        slot.behind = slot.behind.filter(|_| !is_complete).map(|first| first.max(last + 1));
-        self.behind -= usize::from(is_complete);
+        slot.omitted =
+            slot.omitted.filter(|(_, last)| *last > read).map(|(first, last)| (first.max(read + 1), last));
+        self.behind -= usize::from(slot.omitted.is_none());
+        self.count_waiting(count.cast_signed());
     }
 
-    fn done(&mut self, done: Done, is_draining: bool) -> Result<(), End> {
-        match done {
-            Done::Taken { robot: name, own, event, outcome, search } => {
-                self.taken(&name, own, &event, outcome, search)?;
-                // A busy robot is never idle between events, so it is saved between two events
-                // here.
-                let limit = self.shared.settings.save_every;
-                if self.slots.get(&name).is_some_and(|slot| slot.unsaved.len() >= limit) {
-                    self.save_robot(&name);
-                }
-                if !is_draining {
-                    self.begin(&name);
-                }
+    fn done(&mut self, done: Done, is_draining: bool) {
+        let robot = match done {
+            Done::Handled { task, event, outcome } => {
+                let robot = task.name.clone();
+                self.handled(&robot, task, &event, outcome);
+                robot
             }
-            Done::Kept { robot, event, behind, revision } => {
-                let revision = revision.map_err(|_| End::Fenced)?;
-                self.snapshots = self.snapshots.max(revision);
-                metrics::counter!("metaplan_fleet_snapshots_total").increment(1);
+            Done::Refilled { robot, events, last } => {
+                self.refilled(&robot, events, last);
+                robot
+            }
+            Done::Discarded { robot } => {
                 if let Some(slot) = self.slots.get_mut(&robot) {
-                    slot.is_saving = false;
-                    slot.is_apart = behind;
-                    slot.revision = revision;
-                    while slot.unsaved.front().is_some_and(|(first, _)| *first <= event) {
-                        slot.unsaved.pop_front();
-                    }
-                    slot.since = (!slot.unsaved.is_empty()).then(Instant::now);
+                    slot.is_discarding = false;
                 }
+                robot
             }
-            Done::Removed { robot, outcome } => {
-                outcome.map_err(|_| End::Fenced)?;
-                if let Some(slot) = self.slots.get_mut(&robot) {
-                    (slot.is_saving, slot.revision) = (false, 0);
-                }
-                self.forget();
-            }
-            Done::Refilled { robot, events } => {
-                self.refilled(&robot, events.map_err(|_| End::Fenced)?);
-                if !is_draining {
-                    self.begin(&robot);
-                }
-            }
-            Done::Progressed { progress, revision } => {
-                self.is_progressing = false;
-                self.revision = revision.map_err(|_| End::Fenced)?;
-                self.progress = progress;
+        };
+        if !is_draining {
+            self.begin(&robot);
+        }
+        // A robot that is not enrolled, or not loaded, needs no memory after its events are discarded.
+        if let Some(slot) = self.slots.get(&robot).filter(|slot| slot.is_idle()) {
+            let is_unknown = slot.loaded.as_ref().is_some_and(|loaded| loaded.robot.mission.is_none());
+            if slot.obsolete == 0 && (is_unknown || slot.loaded.is_none()) {
+                self.count_loaded(&robot, false);
+                self.slots.remove(&robot);
+            } else if is_unknown {
+                self.discard_of(&robot);
             }
         }
-        Ok(())
     }
 
-    fn taken(
-        &mut self,
-        name: &str,
-        own: Box<Robot>,
-        event: &Stored,
-        outcome: Outcome,
-        search: Option<Duration>,
-    ) -> Result<(), End> {
-        self.waiting -= 1;
-        self.shared.counts.waiting.fetch_sub(1, Ordering::Relaxed);
+    /// Updates the number of loaded robots of the worker.
+    fn count_loaded(&mut self, name: &str, is_loaded: bool) {
+        let Some(slot) = self.slots.get_mut(name).filter(|slot| slot.is_counted != is_loaded) else { return };
+        slot.is_counted = is_loaded;
+        let change = if is_loaded { 1 } else { u64::MAX };
+        self.shared.counts.robots.fetch_add(change, Ordering::Relaxed);
+    }
+
+    fn handled(&mut self, name: &str, task: Task, event: &Stored, outcome: Outcome) {
+        self.count_waiting(-1);
         self.clock += 1;
-        let clock = self.clock;
-        let warm = own.is_warm();
-        let Some(slot) = self.slots.get_mut(name) else { return Ok(()) };
-        slot.robot = Some(own);
-        slot.search = search;
-        let at = slot.at.take();
-        match (slot.used > 0, warm) {
-            (false, true) => drop(self.shared.counts.warm.fetch_add(1, Ordering::Relaxed)),
-            (true, false) => drop(self.shared.counts.warm.fetch_sub(1, Ordering::Relaxed)),
-            _ => {}
-        }
-        slot.used = if warm { clock } else { 0 };
+        self.count_loaded(name, task.loaded.is_some());
+        let Some(slot) = self.slots.get_mut(name) else { return };
+        (slot.is_busy, slot.loaded, slot.search, slot.used) = (false, task.loaded, task.estimate, self.clock);
         match outcome {
-            Outcome::Decided(decision) => {
-                if slot.suspended.take().is_some() {
-                    // The robot is retired: its former state is not needed.
-                    slot.unsaved.clear();
-                }
-                slot.chain = Some(slot.chain.unwrap_or_default().max(decision));
-                slot.unsaved.push_back((event.sequence, decision));
-                slot.since.get_or_insert_with(Instant::now);
-                self.seen.1 = self.seen.1.max(decision);
-                self.shared.counts.decided.fetch_add(1, Ordering::Relaxed);
-            }
+            // If the robot was suspended, this decision has retired it.
+            Outcome::Decided => slot.is_suspended = false,
+            Outcome::Faulted(_) => slot.is_suspended = true,
+            Outcome::Known | Outcome::Refused(_) => {}
+        }
+        if !matches!(outcome, Outcome::Faulted(_)) {
+            slot.handled = event.sequence;
+            slot.obsolete += 1;
+            slot.since.get_or_insert_with(Instant::now);
+        }
+        let is_due = slot.obsolete >= self.shared.settings.discard_every;
+        match outcome {
+            Outcome::Known => {}
+            Outcome::Decided => drop(self.shared.counts.decided.fetch_add(1, Ordering::Relaxed)),
             Outcome::Refused(refused) => self.say(event, refused),
             Outcome::Faulted(why) => {
-                // The next owner replays the decision of a former owner about this event, and all later ones.
-                let last_decision = at.map_or(self.recovered, |(_, last_decision)| last_decision);
-                self.fault(name, event.sequence, last_decision + 1, &why);
+                metrics::counter!("metaplan_fleet_faulted_total").increment(1);
+                tracing::error!(partition = self.number, robot = name, "robot suspended: {why}");
+                self.refuse(Some((self.subject(name), format!("the robot is suspended: {why}"))), "faulted");
             }
-            Outcome::Fenced => return Err(End::Fenced),
         }
-        if warm {
-            self.recent.push_back((clock, name.to_owned()));
-            self.cool();
+        if is_due {
+            self.discard_of(name);
         }
-        Ok(())
+        self.recent.push_back((self.clock, name.to_owned()));
+        self.unload();
     }
 
-    /// Unloads idle robots of this partition, the least recently used ones first, while the worker
-    /// has more loaded robots than its limit.
-    fn cool(&mut self) {
-        let counts = &self.shared.counts;
-        while counts.warm.load(Ordering::Relaxed) > self.shared.settings.warm as u64 {
+    /// Unloads idle robots, the least recently used ones first, while the worker has more loaded robots than its
+    /// limit.
+    fn unload(&mut self) {
+        while self.shared.counts.robots.load(Ordering::Relaxed) > self.shared.settings.warm as u64 {
             let Some((used, name)) = self.recent.pop_front() else { return };
-            let Some(slot) = self.slots.get_mut(&name).filter(|slot| slot.used == used) else { continue };
-            let Some(robot) = &mut slot.robot else { continue };
-            robot.cool();
-            slot.used = 0;
-            counts.warm.fetch_sub(1, Ordering::Relaxed);
+            let Some(slot) = self.slots.get_mut(&name).filter(|slot| slot.used == used && slot.is_idle())
+            else {
+                continue;
+            };
+            slot.loaded = None;
+            let is_obsolete = slot.obsolete == 0;
+            self.count_loaded(&name, false);
+            if is_obsolete {
+                self.slots.remove(&name);
+            }
         }
+        // Entries of robots that were used again are obsolete.
+        if self.recent.len() > 2 * self.slots.len() + MAX_QUEUE {
+            let slots = &self.slots;
+            self.recent.retain(|(used, name)| slots.get(name).is_some_and(|slot| slot.used == *used));
+        }
+    }
+
+    /// Starts to discard the handled events of all robots that are due: those with an event that was handled
+    /// [`Settings::discard_within`](super::Settings::discard_within) ago, or, with `all`, all others, too. Returns
+    /// `true` if a job was started.
+    fn discard_all(&mut self, all: bool) -> bool {
+        let within = self.shared.settings.discard_within;
+        let is_due = |slot: &Slot| slot.since.is_some_and(|since| all || since.elapsed() >= within);
+        let due = self.slots.iter().filter(|(_, slot)| is_due(slot)).map(|(name, _)| name.clone());
+        let due: Vec<String> = due.collect();
+        due.iter().filter(|name| self.discard_of(name)).count() > 0
+    }
+
+    fn discard_of(&mut self, name: &str) -> bool {
+        let subject = self.subject(name);
+        let Some(slot) = self.slots.get_mut(name).filter(|slot| !slot.is_discarding) else { return false };
+        (slot.obsolete, slot.since, slot.is_discarding) = (0, None, true);
+        let last = slot.handled;
+        self.discard(name, &subject, last);
+        true
+    }
+
+    /// Starts to discard events. If that fails, the next owner of the partition discards them.
+    fn discard(&self, robot: &str, subject: &str, last: u64) {
+        let (shared, robot, subject) = (Arc::clone(&self.shared), robot.to_owned(), subject.to_owned());
+        self.jobs.push(Box::pin(async move {
+            let _ = shared.store.discard(&subject, last).await;
+            Done::Discarded { robot }
+        }));
+    }
+
+    fn subject(&self, robot: &str) -> String {
+        Address { partition: self.number, robot: robot.to_owned() }.to_string()
     }
 
     /// Counts a refused event, and publishes the reason as a notice to the clients of the robot.
@@ -404,7 +373,7 @@ impl<S: Store> Partition<S> {
         self.refuse(Some((event.subject.clone(), refused.sentence().to_owned())), refused.name());
     }
 
-    pub(super) fn refuse(&self, notice: Option<(String, String)>, reason: &'static str) {
+    fn refuse(&self, notice: Option<(String, String)>, reason: &'static str) {
         self.shared.counts.refused.fetch_add(1, Ordering::Relaxed);
         metrics::counter!("metaplan_fleet_refused_total", "reason" => reason).increment(1);
         if let Some((subject, text)) = notice {
@@ -412,42 +381,16 @@ impl<S: Store> Partition<S> {
             tokio::spawn(async move { shared.store.notice(&subject, &text).await });
         }
     }
-
-    /// Suspends a robot, so that it handles no event until one retires it, and publishes the reason `why`.
-    /// `event` and `decision` are the sequence numbers of the event that failed and of the decision that
-    /// would have followed it. The events of the robot are read again by the next owner of the partition.
-    pub(super) fn fault(&mut self, robot: &str, event: u64, decision: u64, why: &str) {
-        metrics::counter!("metaplan_fleet_faulted_total").increment(1);
-        tracing::error!(partition = self.number, robot, "robot suspended: {why}");
-        let subject = Address { partition: self.number, robot: robot.to_owned() }.to_string();
-        let slot = self.slot(robot);
-        slot.suspended = Some(slot.unsaved.front().copied().unwrap_or((event, decision)));
-        slot.unsaved.clear();
-        let text = format!("the robot is suspended: {why}");
-        self.refuse(Some((subject, text)), "faulted");
-    }
 }
 
 impl<S> Drop for Partition<S> {
     fn drop(&mut self) {
         let counts = &self.shared.counts;
-        let warm = self.slots.values().filter(|slot| slot.used > 0).count();
-        counts.warm.fetch_sub(warm as u64, Ordering::Relaxed);
-        counts.robots.fetch_sub(self.slots.len() as u64, Ordering::Relaxed);
+        let loaded = self.slots.values().filter(|slot| slot.is_counted).count();
+        counts.robots.fetch_sub(loaded as u64, Ordering::Relaxed);
         counts.waiting.fetch_sub(self.waiting as u64, Ordering::Relaxed);
         counts.partitions.fetch_sub(1, Ordering::Relaxed);
     }
-}
-
-fn enrolment(payload: &[u8]) -> Option<String> {
-    #[derive(serde::Deserialize)]
-    struct Head {
-        event: String,
-        #[serde(default)]
-        mission: String,
-    }
-    let head: Head = serde_json::from_slice(payload).ok()?;
-    (head.event == "enrol").then_some(head.mission)
 }
 
 async fn next(

@@ -3,10 +3,10 @@
 //! Work without a search has threads of its own. Searches have a pool of threads for each class of durations (a
 //! multilevel feedback queue): a search begins in the class of the robot's last searches, or, for a robot that has
 //! not searched, in the class of the last searches for its mission. A search that exceeds the maximum duration of its
-//! class moves to the next class. The operating system shares the processors among the pools.
+//! class leaves its place to another one, and continues. Afterwards its robot and its mission have another class, so few
+//! searches do that. The operating system shares the processors among the threads.
 
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -17,25 +17,12 @@ use tokio::task::JoinError;
 /// short searches on a busy machine.
 const MAX_DURATIONS: [Duration; 2] = [Duration::from_millis(25), Duration::from_millis(400)];
 
-const CLASSES: usize = MAX_DURATIONS.len() + 1;
-
 #[derive(Debug)]
 pub(crate) struct Threads {
     quick: Semaphore,
-    searches: [Semaphore; CLASSES],
-    /// Number of searches that run on extra threads. They have exceeded the maximum of their class while the pool of
-    /// the next class was full.
-    extra: AtomicUsize,
-    max_extra: usize,
+    searches: [Semaphore; MAX_DURATIONS.len() + 1],
+    /// Estimated duration of the next search by mission.
     costs: Mutex<BTreeMap<String, Duration>>,
-}
-
-struct Extra<'a>(&'a AtomicUsize);
-
-impl Drop for Extra<'_> {
-    fn drop(&mut self) {
-        self.0.fetch_sub(1, Ordering::Relaxed);
-    }
 }
 
 impl Threads {
@@ -43,8 +30,6 @@ impl Threads {
         Self {
             quick: Semaphore::new(count),
             searches: std::array::from_fn(|_| Semaphore::new(count)),
-            extra: AtomicUsize::new(0),
-            max_extra: count,
             costs: Mutex::default(),
         }
     }
@@ -70,67 +55,41 @@ impl Threads {
             let outcome = work();
             (outcome, begun.elapsed())
         };
-        let (mut class, mut permit) = self.enter(mission, estimate).await;
+        let (class, permit) = self.enter(mission, estimate).await;
         let mut task = tokio::task::spawn_blocking(timed);
-        let mut extra = None;
-        let (outcome, duration) = loop {
-            // Without a permit the search runs on an extra thread until it ends.
-            let Some(limit) = MAX_DURATIONS.get(class).filter(|_| permit.is_some()) else {
-                break task.await?;
-            };
-            if let Ok(outcome) = tokio::time::timeout(*limit, &mut task).await {
-                break outcome?;
-            }
-            class += 1;
+        let limit = MAX_DURATIONS.get(class).copied().unwrap_or(Duration::MAX);
+        let (outcome, duration) = if let Ok(done) = tokio::time::timeout(limit, &mut task).await {
+            done?
+        } else {
             // Robots of this mission that have not searched yet begin in the next class.
-            self.learn(mission, *limit * 2);
-            if let Ok(next) = self.searches[class].try_acquire() {
-                permit = Some(next);
-            } else if let Some(reserved) = self.extra() {
-                extra = Some(reserved);
-                permit = None;
-            } else {
-                tokio::select! {
-                    outcome = &mut task => break outcome?,
-                    next = self.searches[class].acquire() => permit = next.ok(),
-                }
-            }
+            self.learn(mission, limit * 2);
+            drop(permit);
+            task.await?
         };
-        drop(extra);
         self.learn(mission, duration);
         Ok((outcome, updated(estimate.unwrap_or_default(), duration)))
     }
 
-    /// Waits for a thread of the class of a search. The class may change while the search waits.
+    /// Waits for a place in the class of a search. The class may change while the search waits.
     async fn enter(&self, mission: &str, estimate: Option<Duration>) -> (usize, Option<SemaphorePermit<'_>>) {
+        let class = || class(estimate.unwrap_or_else(|| self.learn(mission, Duration::ZERO)));
         loop {
-            let class = self.class_of(mission, estimate);
-            let permit = self.searches[class].acquire().await.ok();
-            if permit.is_none() || class >= self.class_of(mission, estimate) {
-                return (class, permit);
+            let begun = class();
+            let permit = self.searches[begun].acquire().await.ok();
+            if permit.is_none() || begun >= class() {
+                return (begun, permit);
             }
         }
     }
 
-    fn class_of(&self, mission: &str, estimate: Option<Duration>) -> usize {
-        class(estimate.unwrap_or_else(|| self.cost(mission)))
-    }
-
-    fn extra(&self) -> Option<Extra<'_>> {
-        let add = |count| (count < self.max_extra).then_some(count + 1);
-        let added = self.extra.fetch_update(Ordering::Relaxed, Ordering::Relaxed, add);
-        added.is_ok().then(|| Extra(&self.extra))
-    }
-
-    fn cost(&self, mission: &str) -> Duration {
-        let costs = self.costs.lock().unwrap_or_else(PoisonError::into_inner);
-        costs.get(mission).copied().unwrap_or_default()
-    }
-
-    fn learn(&self, mission: &str, duration: Duration) {
+    /// Updates the estimate for a mission after a search, or returns it unchanged if `duration` is zero.
+    fn learn(&self, mission: &str, duration: Duration) -> Duration {
         let mut costs = self.costs.lock().unwrap_or_else(PoisonError::into_inner);
         let cost = costs.entry(mission.to_owned()).or_default();
-        *cost = updated(*cost, duration);
+        if duration > Duration::ZERO {
+            *cost = updated(*cost, duration);
+        }
+        *cost
     }
 }
 
@@ -162,7 +121,7 @@ mod tests {
             let threads = Arc::clone(&threads);
             long.spawn(async move { threads.search("slow", None, sleep(2_000)).await.map(|_| ()) });
         }
-        // In this time, the first long searches move to the last class.
+        // In this time, the first long searches leave their places, and others enter the last class.
         tokio::time::sleep(Duration::from_millis(600)).await;
         let mut worst = Duration::ZERO;
         for _ in 0..50 {
@@ -173,10 +132,7 @@ mod tests {
             assert!(estimate >= Duration::from_millis(1));
         }
         assert!(worst < Duration::from_secs(1), "{worst:?}");
-        assert!(threads.extra.load(Ordering::Relaxed) <= 2);
-        long.abort_all();
-        while long.join_next().await.is_some() {}
-        assert_eq!(threads.extra.load(Ordering::Relaxed), 0);
+        assert_eq!(threads.searches[2].available_permits(), 0, "long searches are in the last class");
     }
 
     #[test]

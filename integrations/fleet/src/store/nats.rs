@@ -1,20 +1,21 @@
 //! NATS JetStream as a log.
 //!
-//! The streams are called `FLEET-events` and `FLEET-decisions`, and there is a bucket for each [`Bucket`]. The subjects
-//! of the default fleet `fleet` have no prefix (`ev.PARTITION.ROBOT`). Those of another fleet begin with its name
-//! (`FLEET.ev.PARTITION.ROBOT`), so that several fleets can share the servers. An existing fleet keeps the subjects and
-//! the number of replicas with which it was created.
+//! The streams are called `FLEET-events` and `FLEET-decisions`, and the bucket `FLEET-workers` has the status of the
+//! workers, whose entries expire. The subjects of the default fleet `fleet` have no prefix (`ev.PARTITION.ROBOT`). Those
+//! of another fleet begin with its name (`FLEET.ev.PARTITION.ROBOT`), so that several fleets can share the servers. An
+//! existing fleet keeps the settings with which it was created.
 //!
-//! The last message of a subject and the message with a sequence number are read from the leader of the stream. Values
-//! of a bucket may be read from a replica that lags behind; conditional writes then fail. Consumers may lag behind,
-//! too, so a caller passes the sequence number up to which a consumer has to read.
+//! The last message of a subject and the message with a sequence number are read from the leader of the stream.
+//! Consumers may read from a replica that lags behind, so a caller passes the sequence number up to which a consumer
+//! has to read.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use async_nats::jetstream::consumer::{AckPolicy, DeliverPolicy, pull};
 use async_nats::jetstream::context::{Context, PublishError, PublishErrorKind};
-use async_nats::jetstream::kv::{self, CreateErrorKind, Operation, UpdateErrorKind};
+use async_nats::jetstream::kv;
 use async_nats::jetstream::message::{PublishMessage, StreamMessage};
 use async_nats::jetstream::stream::{self, LastRawMessageErrorKind};
 use async_nats::jetstream::{self};
@@ -23,8 +24,8 @@ use futures::stream::BoxStream;
 use futures::{StreamExt as _, TryStreamExt as _};
 use metaplan::message::Message as Diagnostic;
 
-use super::{Bucket, Entry, Fault, Message, Receipt, Store, Stored, Stream};
-use crate::wire::is_name;
+use super::{Fault, Message, Receipt, Store, Stored, Stream};
+use crate::wire::{Presence, is_name};
 
 /// Settings for the connection to NATS servers.
 #[derive(Debug, Clone, Default)]
@@ -41,23 +42,26 @@ pub struct Access {
     pub certificate: Option<(PathBuf, PathBuf)>,
 }
 
-/// Parameters with which missing streams and buckets are created. Existing ones keep their own
-/// partitions, replicas and lease.
+/// Parameters with which a missing fleet is created. An existing fleet keeps its own.
 #[derive(Debug, Clone)]
 pub struct Layout {
-    /// Name of the fleet, with which the names of its streams and buckets begin: up to 64 letters, digits, `-` and
-    /// `_`.
+    /// Name of the fleet, with which the names of its streams begin: up to 64 letters, digits, `-` and `_`.
     pub fleet: String,
     /// Number of partitions, which never changes.
     pub partitions: u32,
     /// Number of replicas: 1, 3 or 5.
     pub replicas: usize,
-    /// Time after which leases expire unless they are renewed.
+    /// Number of decisions that are kept of each robot, at least 1; -1 keeps all.
+    pub history: i64,
+    /// Time after which the status of a worker expires.
     pub lease: Duration,
 }
 
 /// Name of the fleet whose subjects have no prefix.
 pub const DEFAULT_FLEET: &str = "fleet";
+
+/// Start of the descriptions of the streams, with the version of the data format.
+const DESCRIPTION: &str = "format=2 partitions=";
 
 const BATCH: usize = 500;
 
@@ -76,11 +80,10 @@ pub struct Nats {
     context: Context,
     partitions: u32,
     lease: Duration,
-    fleet: String,
     /// First tokens of all subjects of the fleet: empty, or `FLEET.`.
     prefix: String,
     streams: [stream::Stream<()>; 2],
-    buckets: [kv::Store; 4],
+    workers: kv::Store,
 }
 
 fn failed(error: impl std::fmt::Display) -> Fault {
@@ -163,7 +166,8 @@ impl Nats {
                     match Self::with(client, context, layout).await {
                         Ok(store) => return Ok(store),
                         Err(OpenError::ForeignStream(name)) => {
-                            return Err(wrong(&format_args!("the stream {name} is not one of a fleet")));
+                            let text = format!("the stream {name} is not one of a fleet of this version");
+                            return Err(wrong(&text));
                         }
                         Err(OpenError::Store(fault)) => wrong(&fault),
                     }
@@ -181,14 +185,18 @@ impl Nats {
 
     async fn with(client: Client, context: Context, layout: &Layout) -> Result<Self, OpenError> {
         let prefix = subject_prefix(&layout.fleet);
+        let name = |kind| {
+            format!("{}-{}", layout.fleet, if kind == Stream::Events { "events" } else { "decisions" })
+        };
         let config = |kind: Stream| stream::Config {
-            name: stream_name(&layout.fleet, kind),
+            name: name(kind),
             subjects: vec![format!("{prefix}{}.*.*", kind.prefix())],
             num_replicas: layout.replicas,
             duplicate_window: WINDOW,
+            max_messages_per_subject: if kind == Stream::Decisions { layout.history } else { -1 },
             // The number of partitions is stored in the description, so that all clients agree on
             // it.
-            description: Some(format!("partitions={}", layout.partitions)),
+            description: Some(format!("{DESCRIPTION}{}", layout.partitions)),
             allow_direct: true,
             ..stream::Config::default()
         };
@@ -197,43 +205,36 @@ impl Nats {
             let created = context.get_or_create_stream(config(kind)).await.map_err(failed)?;
             let existing = &created.cached_info().config;
             let layout_of = || {
-                let partitions =
-                    existing.description.as_deref()?.strip_prefix("partitions=")?.parse().ok()?;
+                let partitions = existing.description.as_deref()?.strip_prefix(DESCRIPTION)?.parse().ok()?;
                 let prefix = existing.subjects.first()?.strip_suffix(&format!("{}.*.*", kind.prefix()))?;
                 Some((partitions, prefix.to_owned()))
             };
-            (partitions, prefix) =
-                layout_of().ok_or_else(|| OpenError::ForeignStream(stream_name(&layout.fleet, kind)))?;
+            (partitions, prefix) = layout_of().ok_or_else(|| OpenError::ForeignStream(name(kind)))?;
         }
-        let mut buckets = Vec::new();
-        for kind in Bucket::ALL {
-            let bucket = format!("{}-{}", layout.fleet, kind.name());
+        let bucket = format!("{}-workers", layout.fleet);
+        let workers = if let Ok(store) = context.get_key_value(&bucket).await {
+            store
+        } else {
             let config = kv::Config {
                 bucket: bucket.clone(),
                 num_replicas: layout.replicas,
-                max_age: if kind.expires() { layout.lease } else { Duration::ZERO },
+                max_age: layout.lease,
                 ..kv::Config::default()
             };
-            let existing = context.get_key_value(&bucket).await;
-            buckets.push(match existing {
+            match context.create_key_value(config).await {
                 Ok(store) => store,
-                Err(_) => match context.create_key_value(config).await {
-                    Ok(store) => store,
-                    // Another client may have created the bucket in the meantime.
-                    Err(_) => context.get_key_value(&bucket).await.map_err(failed)?,
-                },
-            });
-        }
-        let [events, decisions] = Stream::ALL.map(|kind| stream_name(&layout.fleet, kind));
+                // Another client may have created the bucket in the meantime.
+                Err(_) => context.get_key_value(&bucket).await.map_err(failed)?,
+            }
+        };
+        let [events, decisions] = Stream::ALL.map(name);
         let streams = [
             context.get_stream_no_info(events).await.map_err(failed)?,
             context.get_stream_no_info(decisions).await.map_err(failed)?,
         ];
         // The lease time is that of the creation of the bucket, not of `layout`.
-        let leases: &kv::Store = &buckets[Bucket::Leases as usize];
-        let lease = leases.status().await.map_err(failed)?.max_age();
-        let buckets = buckets.try_into().map_err(|_| failed("a bucket is missing"))?;
-        Ok(Self { client, context, partitions, lease, fleet: layout.fleet.clone(), prefix, streams, buckets })
+        let lease = workers.status().await.map_err(failed)?.max_age();
+        Ok(Self { client, context, partitions, lease, prefix, streams, workers })
     }
 
     /// Returns the number of messages of a stream.
@@ -268,20 +269,16 @@ impl Nats {
         &self.streams[stream as usize]
     }
 
-    fn bucket(&self, bucket: Bucket) -> &kv::Store {
-        &self.buckets[bucket as usize]
-    }
-
-    /// Reads the messages of a stream that match `filter`, beginning as `from` requires, as far as the extent states.
-    /// Calls `take` with each message and its sequence number.
-    async fn read(
+    /// Reads the messages of a stream that match `filter`, beginning as `from` requires: to the end, and at least to
+    /// the sequence number `reach`, but at most `most` messages.
+    async fn read<I: Sync>(
         &self,
-        name: &str,
+        stream: &stream::Stream<I>,
         filter: String,
         from: DeliverPolicy,
-        Extent { reach, most }: Extent,
-        mut take: impl FnMut(jetstream::Message, u64),
-    ) -> Result<(), Fault> {
+        reach: u64,
+        most: usize,
+    ) -> Result<Vec<jetstream::Message>, Fault> {
         let config = pull::Config {
             filter_subject: filter,
             deliver_policy: from,
@@ -291,56 +288,32 @@ impl Nats {
             num_replicas: 1,
             ..pull::Config::default()
         };
-        let consumer: jetstream::consumer::PullConsumer =
-            self.context.create_consumer_on_stream(config, name).await.map_err(failed)?;
+        let consumer = stream.create_consumer(config).await.map_err(failed)?;
         let mut pending = consumer.cached_info().num_pending;
-        let (mut last, mut expected, mut total) = (0, 1, 0);
-        while (pending > 0 || last < reach) && total < most {
-            let wanted = BATCH.min(most - total);
+        let (mut last, mut messages) = (0, Vec::new());
+        while (pending > 0 || last < reach) && messages.len() < most {
+            let wanted = BATCH.min(most - messages.len());
             let mut batch =
                 consumer.fetch().max_messages(wanted).expires(PATIENCE).messages().await.map_err(failed)?;
-            let mut got = 0;
+            let before = messages.len();
             while let Some(message) = batch.try_next().await.map_err(failed)? {
-                let (sequence, number, rest) = {
+                let number;
+                {
                     let info = message.info().map_err(failed)?;
-                    (info.stream_sequence, info.consumer_sequence, info.pending)
-                };
-                if number != expected {
+                    (last, number, pending) = (info.stream_sequence, info.consumer_sequence, info.pending);
+                }
+                messages.push(message);
+                if number != messages.len() as u64 {
                     return Err(failed("messages were lost"));
                 }
-                expected += 1;
-                got += 1;
-                last = sequence;
-                pending = rest;
-                take(message, sequence);
             }
-            total += got;
-            if got == 0 {
+            if messages.len() == before {
                 return Err(failed("the server lacks messages that it should have"));
             }
         }
         // The server would also remove an unused consumer by itself, but later.
-        let _ = self.context.delete_consumer_from_stream(consumer.cached_info().name.as_str(), name).await;
-        Ok(())
-    }
-}
-
-/// Part of a stream to read: to the end, and at least to the sequence number `reach`, but at most `most` messages.
-struct Extent {
-    reach: u64,
-    most: usize,
-}
-
-impl Extent {
-    fn all(reach: u64) -> Self {
-        Self { reach, most: usize::MAX }
-    }
-}
-
-fn stream_name(fleet: &str, stream: Stream) -> String {
-    match stream {
-        Stream::Events => format!("{fleet}-events"),
-        Stream::Decisions => format!("{fleet}-decisions"),
+        let _ = stream.delete_consumer(&consumer.cached_info().name).await;
+        Ok(messages)
     }
 }
 
@@ -414,37 +387,15 @@ impl Store for Nats {
         Ok(messages.map(move |message| stored(&message.map_err(failed)?)).boxed())
     }
 
-    async fn history(&self, kind: Stream, partition: u32, after: u64) -> Result<Vec<Stored>, Fault> {
-        let filter = self.subject(kind, &format!("{partition}.*"));
-        let reach = self.end(kind, partition).await?;
+    async fn events(&self, subject: &str, after: u64, most: usize) -> Result<Vec<Stored>, Fault> {
+        let reach = self.last(Stream::Events, subject).await?.map_or(0, |last| last.sequence);
         if reach <= after {
             return Ok(Vec::new());
         }
-        let mut messages = Vec::new();
         let from = DeliverPolicy::ByStartSequence { start_sequence: after + 1 };
-        let name = stream_name(&self.fleet, kind);
-        self.read(&name, filter, from, Extent::all(reach), |message, _| messages.push(stored(&message)))
-            .await?;
-        messages.into_iter().collect()
-    }
-
-    async fn of_subject(
-        &self,
-        kind: Stream,
-        subject: &str,
-        after: u64,
-        most: usize,
-    ) -> Result<Vec<Stored>, Fault> {
-        let reach = self.last(kind, subject).await?.map_or(0, |last| last.sequence);
-        if reach <= after {
-            return Ok(Vec::new());
-        }
-        let mut messages = Vec::new();
-        let from = DeliverPolicy::ByStartSequence { start_sequence: after + 1 };
-        let (name, filter) = (stream_name(&self.fleet, kind), self.subject(kind, subject));
-        let limits = Extent { reach, most };
-        self.read(&name, filter, from, limits, |message, _| messages.push(stored(&message))).await?;
-        messages.into_iter().collect()
+        let filter = self.subject(Stream::Events, subject);
+        let messages = self.read(self.stream(Stream::Events), filter, from, reach, most).await?;
+        messages.iter().map(stored).collect()
     }
 
     async fn end(&self, kind: Stream, partition: u32) -> Result<u64, Fault> {
@@ -481,62 +432,37 @@ impl Store for Nats {
         }
     }
 
-    async fn at(&self, kind: Stream, sequence: u64) -> Result<Option<Stored>, Fault> {
-        match self.stream(kind).get_raw_message(sequence).await {
+    async fn event(&self, sequence: u64) -> Result<Option<Stored>, Fault> {
+        match self.stream(Stream::Events).get_raw_message(sequence).await {
             Ok(message) => Ok(Some(raw(&message))),
             Err(error) if matches!(error.kind(), LastRawMessageErrorKind::NoMessageFound) => Ok(None),
             Err(error) => Err(failed(error)),
         }
     }
 
-    async fn get(&self, bucket: Bucket, key: &str) -> Result<Option<Entry>, Fault> {
-        let found = self.bucket(bucket).entry(key).await.map_err(failed)?;
-        Ok(found.filter(|entry| entry.operation == Operation::Put).map(|entry| Entry {
-            key: key.to_owned(),
-            value: entry.value.to_vec(),
-            revision: entry.revision,
-        }))
+    async fn discard(&self, subject: &str, last: u64) -> Result<(), Fault> {
+        let filter = self.subject(Stream::Events, subject);
+        let purge = self.stream(Stream::Events).purge().filter(filter).sequence(last + 1);
+        purge.await.map(|_| ()).map_err(failed)
     }
 
-    async fn put(&self, bucket: Bucket, key: &str, value: &[u8], after: u64) -> Result<u64, Fault> {
-        let value = value.to_vec().into();
-        if after == 0 {
-            return self.bucket(bucket).create(key, value).await.map_err(|error| match error.kind() {
-                CreateErrorKind::AlreadyExists => Fault::Conflict,
-                _ => failed(error),
-            });
+    async fn announce(&self, worker: &str, status: Option<&Presence>) -> Result<(), Fault> {
+        match status.map(serde_json::to_vec).transpose().map_err(failed)? {
+            Some(text) => self.workers.put(worker, text.into()).await.map(|_| ()).map_err(failed),
+            None => self.workers.delete(worker).await.map_err(failed),
         }
-        self.bucket(bucket).update(key, value, after).await.map_err(|error| match error.kind() {
-            UpdateErrorKind::WrongLastRevision => Fault::Conflict,
-            _ => failed(error),
-        })
     }
 
-    async fn remove(&self, bucket: Bucket, key: &str, revision: u64) -> Result<(), Fault> {
-        let removed = self.bucket(bucket).delete_expect_revision(key, Some(revision)).await;
-        removed.map_err(|error| match error.kind() {
-            UpdateErrorKind::WrongLastRevision => Fault::Conflict,
-            _ => failed(error),
-        })
-    }
-
-    async fn list(&self, bucket: Bucket, partition: Option<u32>, at_least: u64) -> Result<Vec<Entry>, Fault> {
-        let name = format!("KV_{}-{}", self.fleet, bucket.name());
-        let prefix = format!("$KV.{}-{}.", self.fleet, bucket.name());
-        let filter =
-            partition.map_or_else(|| format!("{prefix}>"), |partition| format!("{prefix}{partition}.*"));
-        let mut entries = Vec::new();
-        let extent = Extent::all(at_least);
-        self.read(&name, filter, DeliverPolicy::LastPerSubject, extent, |message, revision| {
-            let is_gone = message.headers.as_ref().is_some_and(|headers| {
-                headers.get("KV-Operation").is_some() || headers.get("Nats-Marker-Reason").is_some()
-            });
-            if let Some(key) = message.subject.strip_prefix(&prefix).filter(|_| !is_gone) {
-                entries.push(Entry { key: key.to_owned(), value: message.payload.to_vec(), revision });
-            }
-        })
-        .await?;
-        Ok(entries)
+    async fn workers(&self) -> Result<BTreeMap<String, Presence>, Fault> {
+        let prefix = format!("$KV.{}.", self.workers.name);
+        let (filter, from) = (format!("{prefix}>"), DeliverPolicy::LastPerSubject);
+        let messages = self.read(&self.workers.stream, filter, from, 0, usize::MAX).await?;
+        // A message that removes a value has no JSON.
+        let status = messages.iter().filter_map(|message| {
+            let name = message.subject.strip_prefix(&prefix)?.to_owned();
+            Some((name, serde_json::from_slice(&message.payload).ok()?))
+        });
+        Ok(status.collect())
     }
 
     async fn notice(&self, subject: &str, text: &str) {

@@ -19,9 +19,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
+use futures::StreamExt as _;
 use metaplan_fleet::robots::{Sender, status};
 use metaplan_fleet::store::nats::{Access, Layout, Nats};
-use metaplan_fleet::store::{Message, Store, Stored, Stream};
+use metaplan_fleet::store::{Fault, Message, Store, Stored, Stream};
 use metaplan_fleet::wire::{Address, Decided, partition_of};
 use serde_json::{Value, json};
 
@@ -58,21 +59,34 @@ fn script(number: usize, lines: usize) -> Script {
 async fn open(cluster: &Cluster, lease: u64) -> Nats {
     let access = Access { url: cluster.url(), ..Access::default() };
     let lease = Duration::from_secs(lease);
-    let layout = Layout { fleet: "fleet".to_owned(), partitions: PARTITIONS, replicas: 3, lease };
+    let layout =
+        Layout { fleet: "fleet".to_owned(), partitions: PARTITIONS, replicas: 3, history: -1, lease };
     match Nats::open(&access, &layout, Duration::from_secs(60)).await {
         Ok(store) => store,
         Err(error) => panic!("the servers do not answer: {}: {}", error.message, cluster.logs()),
     }
 }
 
-async fn read(store: &Nats, stream: Stream, partition: u32) -> Vec<Stored> {
+/// Returns all decisions of a partition.
+async fn read(store: &Nats, partition: u32) -> Vec<Stored> {
     for _ in 0..60 {
-        match store.history(stream, partition, 0).await {
-            Ok(messages) => return messages,
-            Err(_) => tokio::time::sleep(Duration::from_millis(500)).await,
+        if let Ok(messages) = try_read(store, partition).await {
+            return messages;
         }
+        tokio::time::sleep(Duration::from_millis(500)).await;
     }
     panic!("partition {partition} cannot be read");
+}
+
+async fn try_read(store: &Nats, partition: u32) -> Result<Vec<Stored>, Fault> {
+    let end = store.end(Stream::Decisions, partition).await?;
+    let mut messages: Vec<Stored> = Vec::new();
+    let mut reader = store.follow(Stream::Decisions, partition, 0).await?;
+    while messages.last().map_or(0, |last| last.sequence) < end {
+        let next = tokio::time::timeout(Duration::from_secs(10), reader.next()).await;
+        messages.push(next.ok().flatten().unwrap_or(Err(Fault::Conflict))?);
+    }
+    Ok(messages)
 }
 
 /// Sends an invalid message every 100 ms until `over` is true. Returns the number of messages that
@@ -118,20 +132,23 @@ async fn schedule(seed: u64, robots: usize, scripts: &[Script]) {
     let sent = Arc::new(AtomicU64::new(0));
     let mut senders = tokio::task::JoinSet::new();
     for robot in 0..robots {
-        let mut sender = Sender::new(store.clone(), &format!("robot-{robot}"), "");
+        let mut sender = Sender::new(store.clone(), &name(robot), "");
         let events = scripts[robot % scripts.len()].0.clone();
         let sent = Arc::clone(&sent);
         let pause = number("SECONDS", 20) * 2000 / events.len() as u64;
         senders.spawn(async move {
+            let mut sequences = Vec::new();
             for event in &events {
                 tokio::time::sleep(Duration::from_millis(fastrand::u64(0..=pause))).await;
-                sender.send(event).await.expect("events are short");
+                sequences.push(sender.send(event).await.expect("events are short"));
                 sent.fetch_add(1, Ordering::Relaxed);
             }
+            (robot, sequences)
         });
     }
+    let mut sequences = BTreeMap::new();
     while let Some(done) = senders.join_next().await {
-        done.expect("a robot says all that it has to say");
+        sequences.extend([done.expect("a robot says all that it has to say")]);
     }
     let said = begun.elapsed();
     let expected = sent.load(Ordering::Relaxed);
@@ -143,7 +160,7 @@ async fn schedule(seed: u64, robots: usize, scripts: &[Script]) {
     for _ in 0..900 {
         decided = 0;
         for partition in 0..PARTITIONS {
-            decided += read(&store, Stream::Decisions, partition).await.len() as u64;
+            decided += read(&store, partition).await.len() as u64;
         }
         if decided >= expected {
             break;
@@ -162,47 +179,42 @@ async fn schedule(seed: u64, robots: usize, scripts: &[Script]) {
         );
     }
     assert_eq!(decided, expected, "seed {seed}: {}", cluster.logs());
-    verify(&store, robots, scripts, seed).await;
+    verify(&store, &sequences, scripts, seed).await;
 }
 
-/// Checks that every robot has sent all its events, in order and once, and that it received the
-/// answers of a single local loop.
-async fn verify(store: &Nats, robots: usize, scripts: &[Script], seed: u64) {
-    let mut said: BTreeMap<String, Vec<Stored>> = BTreeMap::new();
+/// Checks that every robot received the answers of a single local loop to its events, which have these sequence
+/// numbers, in order and once, and that handled events are discarded.
+async fn verify(store: &Nats, sequences: &BTreeMap<usize, Vec<u64>>, scripts: &[Script], seed: u64) {
     let mut made: BTreeMap<String, Vec<Decided>> = BTreeMap::new();
     for partition in 0..PARTITIONS {
-        for message in read(store, Stream::Events, partition).await {
-            let robot = Address::parse(&message.subject).expect("an address").robot;
-            said.entry(robot).or_default().push(message);
-        }
-        for message in read(store, Stream::Decisions, partition).await {
+        for message in read(store, partition).await {
             let robot = Address::parse(&message.subject).expect("an address").robot;
             made.entry(robot).or_default().push(Decided::parse(&message.payload).expect("a decision"));
         }
     }
-    assert_eq!(made.len(), robots, "seed {seed}");
-    for robot in 0..robots {
-        let (name, (events, answers)) = (format!("robot-{robot}"), &scripts[robot % scripts.len()]);
-        // Messages that other clients have sent in the robot's name have another id, or no id.
-        let prefix = format!("{name}:");
-        let own = |message: &&Stored| {
-            let id = message.id.as_deref().and_then(|id| id.strip_prefix(&prefix));
-            id.is_some_and(|id| id.parse::<u64>().is_ok())
-                && message.subject == Address::of(&name, PARTITIONS).to_string()
-        };
-        let said: Vec<&Stored> = said[&name].iter().filter(own).collect();
-        let texts: Vec<&[u8]> = said.iter().map(|message| message.payload.as_slice()).collect();
-        let wanted: Vec<&[u8]> = events.iter().map(String::as_bytes).collect();
-        assert!(texts == wanted, "seed {seed}: {name} was not heard as it spoke");
+    assert_eq!(made.len(), sequences.len(), "seed {seed}");
+    for (robot, sequences) in sequences {
+        let (name, answers) = (name(*robot), &scripts[robot % scripts.len()].1);
         let made = &made[&name];
-        let sequences: Vec<u64> = made.iter().map(|own| own.event).collect();
-        let wanted: Vec<u64> = said.iter().map(|message| message.sequence).collect();
-        assert_eq!(sequences, wanted, "seed {seed}: {name}: each event once, in order");
+        let events: Vec<u64> = made.iter().map(|own| own.event).collect();
+        assert_eq!(events, *sequences, "seed {seed}: {name}: each event once, in order");
         for (own, expected) in made.iter().zip(answers) {
             let (own_answers, expected) = (scripts::essence(&own.answers), scripts::essence(expected));
             assert_eq!(own_answers, expected, "seed {seed}: {name}, event {}", own.event);
         }
     }
+    for _ in 0..90 {
+        let count = store.count(Stream::Events).await.unwrap_or(u64::MAX);
+        if count == 0 {
+            return;
+        }
+        tokio::time::sleep(Duration::from_secs(1)).await;
+    }
+    panic!("seed {seed}: {:?} events are not discarded", store.count(Stream::Events).await);
+}
+
+fn name(robot: usize) -> String {
+    format!("robot-{robot}")
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -220,8 +232,7 @@ async fn nothing_is_lost_repeated_or_out_of_order() {
     }
 }
 
-/// Measures events per second, latencies and memory for 1, 2 and 4 workers (variable `WORKERS`), in
-/// comparison with local loops.
+/// Measures events per second, the time of a single event, and memory for 1, 2 and 4 workers (variable `WORKERS`).
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 #[ignore = "needs nats-server and an idle machine; figures mean something in a release build only"]
 async fn figures() {
@@ -230,16 +241,6 @@ async fn figures() {
     }
     let (robots, lines) = (number("ROBOTS", 1000) as usize, number("EVENTS", 20) as usize);
     let scripts: Vec<Script> = (0..robots.min(24)).map(|own| script(own, lines)).collect();
-    let begun = Instant::now();
-    let alone = scripts.iter().enumerate().map(|(own, (events, _))| {
-        let (mission, _) = scripts::SCENARIOS[own % scripts::SCENARIOS.len()];
-        scripts::alone(mission, events).len()
-    });
-    let count: usize = alone.sum();
-    println!(
-        "one thread of one process: {:.0} events/s, reading missions included",
-        rate(count, begun.elapsed())
-    );
     let list = std::env::var("WORKERS").unwrap_or_else(|_| "1,2,4".to_owned());
     for workers in list.split(',').filter_map(|text| text.parse::<usize>().ok()) {
         let cluster = Cluster::begin(0);
@@ -247,55 +248,34 @@ async fn figures() {
         for worker in 0..workers {
             cluster.begin_worker(worker, PARTITIONS, 10);
         }
-        tokio::time::sleep(Duration::from_secs(8)).await;
-        let (said, decided) = say_all(&store, robots, &scripts).await;
-        let events = robots * lines;
-        let late = latencies(&store).await;
-        let calm = calm(&store, robots.min(50)).await;
+        tokio::time::sleep(Duration::from_secs(15)).await;
+        let begun = Instant::now();
+        let mut senders = tokio::task::JoinSet::new();
+        for robot in 0..robots {
+            let mut sender = Sender::new(store.clone(), &name(robot), "");
+            let events = scripts[robot % scripts.len()].0.clone();
+            senders.spawn(async move {
+                for event in &events {
+                    sender.send(event).await.expect("events are short");
+                }
+            });
+        }
+        senders.join_all().await;
+        let said = begun.elapsed();
+        while store.count(Stream::Decisions).await.expect("it can be read") < (robots * lines) as u64 {
+            tokio::time::sleep(Duration::from_millis(50)).await;
+        }
+        let (decided, late) = (begun.elapsed(), calm(&store, robots.min(50)).await);
+        let rate = |time: Duration| (robots * lines) as f64 / time.as_secs_f64();
         println!(
-            "{workers} workers: {events} events of {robots} robots said at {:.0}/s, decided at {:.0}/s; flat out latency median {:.1} ms, 99 percent {:.1} ms; one at a time median {:.1} ms, 99 percent {:.1} ms; memory {} MB each, servers {} MB",
-            rate(events, said),
-            rate(events, decided),
+            "{workers} workers, {robots} robots: events said at {:.0}/s, decided at {:.0}/s; one at a time median {:.1} ms, 99 percent {:.1} ms; memory {} MB each, servers {} MB",
+            rate(said),
+            rate(decided),
             late[late.len() / 2],
             late[late.len() * 99 / 100],
-            calm[calm.len() / 2],
-            calm[calm.len() * 99 / 100],
             (0..workers).map(|own| cluster.memory(&format!("w{own}"))).max().unwrap_or_default(),
             (0..3).map(|own| cluster.memory(&format!("s{own}"))).max().unwrap_or_default(),
         );
-    }
-}
-
-fn rate(count: usize, time: Duration) -> f64 {
-    count as f64 / time.as_secs_f64()
-}
-
-/// Sends all events of all robots. Returns the time until all are sent, and the time until all are
-/// decided.
-async fn say_all(store: &Nats, robots: usize, scripts: &[Script]) -> (Duration, Duration) {
-    let begun = Instant::now();
-    let mut senders = tokio::task::JoinSet::new();
-    for robot in 0..robots {
-        let mut sender = Sender::new(store.clone(), &format!("robot-{robot}"), "");
-        let events = scripts[robot % scripts.len()].0.clone();
-        senders.spawn(async move {
-            for event in &events {
-                sender.send(event).await.expect("events are short");
-            }
-            events.len()
-        });
-    }
-    let mut expected = 0;
-    while let Some(done) = senders.join_next().await {
-        expected += done.expect("a robot says all that it has to say");
-    }
-    let said = begun.elapsed();
-    loop {
-        let count = store.count(Stream::Decisions).await.expect("it can be read");
-        if count >= expected as u64 {
-            return (said, begun.elapsed());
-        }
-        tokio::time::sleep(Duration::from_millis(50)).await;
     }
 }
 
@@ -304,42 +284,22 @@ async fn say_all(store: &Nats, robots: usize, scripts: &[Script]) -> (Duration, 
 async fn calm(store: &Nats, robots: usize) -> Vec<f64> {
     let mut late = Vec::new();
     for number in 0..200 {
-        let robot = format!("robot-{}", number % robots);
-        let mut sender = Sender::new(store.clone(), &robot, &format!("calm{number}."));
+        let mut sender = Sender::new(store.clone(), &name(number % robots), &format!("calm{number}."));
         let subject = sender.address().to_string();
-        let known = store.last(Stream::Decisions, &subject).await.expect("it can be read");
-        let known = known.map_or(0, |last| last.sequence);
         let status = if (number / robots).is_multiple_of(2) { "FALSE" } else { "OK" };
         let event =
             json!({"event": "component_status", "component": "c_kinect", "status": status}).to_string();
         let begun = Instant::now();
-        sender.send(&event).await.expect("the event is short");
-        while store
-            .last(Stream::Decisions, &subject)
-            .await
-            .expect("it can be read")
-            .map_or(0, |own| own.sequence)
-            == known
-        {
+        let sequence = sender.send(&event).await.expect("the event is short");
+        loop {
+            let last = store.last(Stream::Decisions, &subject).await.expect("it can be read");
+            if last.and_then(|last| Decided::parse(&last.payload)).is_some_and(|last| last.event == sequence)
+            {
+                break;
+            }
             tokio::time::sleep(Duration::from_micros(200)).await;
         }
         late.push(begun.elapsed().as_secs_f64() * 1000.0);
-    }
-    late.sort_by(f64::total_cmp);
-    late
-}
-
-/// Returns the times between storage of an event and storage of its decision in milliseconds,
-/// sorted.
-async fn latencies(store: &Nats) -> Vec<f64> {
-    let mut late = Vec::new();
-    for partition in 0..PARTITIONS {
-        let events: BTreeMap<u64, u64> =
-            read(store, Stream::Events, partition).await.iter().map(|own| (own.sequence, own.time)).collect();
-        for message in read(store, Stream::Decisions, partition).await {
-            let decided = Decided::parse(&message.payload).expect("a decision");
-            late.push((message.time - events[&decided.event]) as f64 / 1000.0);
-        }
     }
     late.sort_by(f64::total_cmp);
     late

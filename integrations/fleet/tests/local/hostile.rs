@@ -2,14 +2,16 @@
 //! which are answered with an error, and with writes of former owners, which are rejected.
 
 use std::sync::atomic::Ordering;
+use std::time::Duration;
 
 use metaplan_fleet::partition::{Order, Settings, serve};
 use metaplan_fleet::robots::Sender;
-use metaplan_fleet::store::{Bucket, Fault, Message, Store, Stream};
-use metaplan_fleet::wire::Address;
+use metaplan_fleet::store::{Fault, Message, Store, Stream};
+use metaplan_fleet::wire::{Address, Decided};
+use metaplan_fleet::worker;
 use tokio::sync::watch;
 
-use super::{assert_same, decided, decisions, open, scripts, shared, work};
+use super::{all, assert_same, decided, decisions, open, scripts, shared, tell, work};
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn hostile_messages_change_nothing_and_are_counted() {
@@ -95,25 +97,62 @@ async fn forged_ids_keep_nobody_from_saying_something() {
     for event in &events {
         again.send(event).await.expect("it is our own directory");
     }
-    let stored = store.history(Stream::Events, 0, 0).await.expect("it can be read");
+    let stored = all(&store, Stream::Events).await;
     let good: Vec<&[u8]> =
         stored.iter().filter(|own| own.subject == "0.good").map(|own| own.payload.as_slice()).collect();
     assert_eq!(good, events.iter().map(String::as_bytes).collect::<Vec<_>>(), "each once, though sent twice");
 }
 
 #[tokio::test]
-async fn an_old_epoch_is_refused() {
+async fn a_decision_without_its_predecessor_is_rejected() {
     let folder = tempfile::tempdir().expect("a directory");
     let store = open(folder.path(), 1);
-    let message = |id: &'static str, after| Message { subject: "0.r", id, after: Some(after), payload: b"x" };
-    let first = store.append(Stream::Decisions, message("a", 0)).await.expect("the first one").sequence;
-    store.append(Stream::Decisions, message("b", first)).await.expect("the second one");
-    assert_eq!(store.append(Stream::Decisions, message("c", first)).await, Err(Fault::Conflict));
-    let again = store.append(Stream::Decisions, message("b", first)).await.expect("it is there");
-    assert!(again.is_known);
-    let old = store.put(Bucket::Progress, "0", b"1", 0).await.expect("there is none");
-    store.put(Bucket::Progress, "0", b"2", old).await.expect("it is the last");
-    assert_eq!(store.put(Bucket::Progress, "0", b"3", old).await, Err(Fault::Conflict));
-    assert_eq!(store.put(Bucket::Progress, "0", b"3", 0).await, Err(Fault::Conflict));
-    assert_eq!(store.remove(Bucket::Progress, "0", old).await, Err(Fault::Conflict));
+    let message = |after| Message { subject: "0.r", id: "", after: Some(after), payload: b"x" };
+    let first = store.append(Stream::Decisions, message(0)).await.expect("the first one").sequence;
+    store.append(Stream::Decisions, message(first)).await.expect("the second one");
+    for after in [0, first] {
+        assert_eq!(store.append(Stream::Decisions, message(after)).await, Err(Fault::Conflict));
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_robot_whose_last_decision_is_unreadable_can_be_retired() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let store = open(folder.path(), 1);
+    let mut notices = store.notices();
+    let message = Message { subject: "0.r", id: "", after: Some(0), payload: b"{}" };
+    store.append(Stream::Decisions, message).await.expect("the first one");
+    let events =
+        [r#"{"event": "tick"}"#, r#"{"event": "retire"}"#, r#"{"event": "enrol", "mission": "ugv"}"#];
+    let sequences = tell(&store, "r", &events.map(str::to_owned)).await;
+    let (stop, stopped) = watch::channel(false);
+    let worker = tokio::spawn(worker::run(shared(store.clone(), "one", Settings::default()), stopped));
+    while all(&store, Stream::Decisions).await.len() < 3 {
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    stop.send_replace(true);
+    worker.await.expect("it ends in order");
+    let made = all(&store, Stream::Decisions).await;
+    let made: Vec<u64> =
+        made.iter().filter_map(|own| Decided::parse(&own.payload)).map(|decided| decided.event).collect();
+    assert_eq!(made, sequences[1..]);
+    assert!(notices.try_recv().expect("there is a notice").1.contains("cannot be read"));
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn an_event_that_is_sent_again_after_its_decision_is_not_stored_with_another_id() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let store = open(folder.path(), 1);
+    let events = scripts::play("ugv", "kinect_at_wp2", 1, 5).0;
+    for copy in 0..2 {
+        let mut sender = Sender::new(store.clone(), "r", "s");
+        for event in &events {
+            sender.send(event).await.expect("it is our own directory");
+        }
+        // The second copy is stored, because this log forgets the ids of discarded events, and is refused.
+        work(&store, "one", Settings::default(), events.len()).await;
+        let ids: Vec<_> = all(&store, Stream::Events).await.into_iter().map(|event| event.id).collect();
+        assert!(copy == 1 || ids.is_empty(), "{ids:?}");
+    }
+    assert_eq!(decisions(&store).await["r"].len(), events.len());
 }

@@ -3,11 +3,11 @@
 use std::time::Duration;
 
 use metaplan_fleet::partition::Settings;
-use metaplan_fleet::store::{Store, Stream};
+use metaplan_fleet::store::Stream;
 use metaplan_fleet::wire::Address;
 use serde_json::json;
 
-use super::{assert_same, decisions, open, scripts, tell, work};
+use super::{all, assert_same, decisions, open, scripts, tell, work};
 
 fn flaps(count: usize) -> Vec<String> {
     let flap = |number: usize| {
@@ -28,15 +28,14 @@ async fn a_robot_with_many_events_does_not_delay_another_one() {
     let (many, few) = (flaps(400), flaps(2));
     let first = tell(&store, "sick", &many).await;
     let second = tell(&store, "well", &few).await;
-    let settings =
-        Settings { ahead: 32, save_every: 7, look: Duration::from_millis(5), ..Settings::default() };
+    let settings = Settings { discard_every: 7, look: Duration::from_millis(5), ..Settings::default() };
     // The partition changes its owner while events of `sick` are not in the queue.
     work(&store, "one", settings, 150).await;
     work(&store, "two", settings, many.len() + few.len()).await;
     let made = decisions(&store).await;
     assert_same("sick", &made["sick"], &first, &scripts::alone("ugv", &many));
     assert_same("well", &made["well"], &second, &scripts::alone("ugv", &few));
-    let order = store.history(Stream::Decisions, 0, 0).await.expect("it can be read");
+    let order = all(&store, Stream::Decisions).await;
     let subject = Address::of("well", 1).to_string();
     let last = order.iter().rposition(|decision| decision.subject == subject).expect("it is decided");
     assert!(last < 100, "the last decision for `well` is number {last} of {}", order.len());

@@ -16,11 +16,12 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
+use futures::StreamExt as _;
 use metaplan_fleet::missions::Missions;
 use metaplan_fleet::partition::{Settings, Shared};
 use metaplan_fleet::store::local::Local;
-use metaplan_fleet::store::{Message, Store, Stream};
-use metaplan_fleet::wire::{Address, Decided, is_name};
+use metaplan_fleet::store::{Message, Store, Stored, Stream};
+use metaplan_fleet::wire::{Address, Decided};
 use metaplan_fleet::worker;
 use serde_json::Value;
 use tokio::sync::watch;
@@ -31,7 +32,7 @@ fn missions() -> Missions {
 }
 
 fn open(directory: &Path, partitions: u32) -> Local {
-    Local::open(directory, partitions, Duration::from_millis(400))
+    Local::open(directory, partitions, usize::MAX - 1, Duration::from_millis(400))
         .unwrap_or_else(|message| panic!("{message}"))
 }
 
@@ -50,17 +51,30 @@ async fn tell<S: Store>(store: &S, robot: &str, events: &[String]) -> Vec<u64> {
     sequences
 }
 
-async fn decisions<S: Store>(store: &S) -> BTreeMap<String, Vec<Decided>> {
-    let mut all: BTreeMap<String, Vec<Decided>> = BTreeMap::new();
+/// Returns the messages of a stream in a log with a single partition, or those of all partitions.
+async fn all<S: Store>(store: &S, stream: Stream) -> Vec<Stored> {
+    let mut messages = Vec::new();
     for partition in 0..store.partitions() {
-        for message in store.history(Stream::Decisions, partition, 0).await.expect("it can be read") {
-            let address = Address::parse(&message.subject).expect("an address");
-            assert!(is_name(&address.robot));
-            let decided = Decided::parse(&message.payload).expect("a decision");
-            all.entry(address.robot).or_default().push(decided);
+        let end = store.end(stream, partition).await.expect("it can be read");
+        let mut reader = store.follow(stream, partition, 0).await.expect("it can be read");
+        let mut last = 0;
+        while last < end {
+            let message = reader.next().await.expect("it does not end").expect("it can be read");
+            last = message.sequence;
+            messages.push(message);
         }
     }
-    all
+    messages
+}
+
+async fn decisions<S: Store>(store: &S) -> BTreeMap<String, Vec<Decided>> {
+    let mut decisions: BTreeMap<String, Vec<Decided>> = BTreeMap::new();
+    for message in all(store, Stream::Decisions).await {
+        let address = Address::parse(&message.subject).expect("an address");
+        let decided = Decided::parse(&message.payload).expect("a decision");
+        decisions.entry(address.robot).or_default().push(decided);
+    }
+    decisions
 }
 
 async fn decided<S: Store>(store: &S, count: usize) {
@@ -111,7 +125,7 @@ async fn robots_are_answered_as_by_a_loop_of_their_own() {
     }
     // The limit of loaded robots is below the number of robots, so that all robots are unloaded and
     // restored.
-    let settings = Settings { warm: 2, save_every: 5, ..Settings::default() };
+    let settings = Settings { warm: 2, discard_every: 5, ..Settings::default() };
     work(&store, "one", settings, count / 3).await;
     work(&store, "two", settings, count).await;
     let decided = decisions(&store).await;
@@ -119,6 +133,7 @@ async fn robots_are_answered_as_by_a_loop_of_their_own() {
     for (robot, (sequences, answers)) in &expected {
         assert_same(robot, &decided[robot], sequences, answers);
     }
+    assert_eq!(all(&store, Stream::Events).await, [], "decided events are discarded");
     let workers: std::collections::BTreeSet<&str> =
         decided.values().flatten().map(|own| own.worker.as_str()).collect();
     assert_eq!(workers.into_iter().collect::<Vec<_>>(), ["one", "two"]);
@@ -128,8 +143,29 @@ async fn robots_are_answered_as_by_a_loop_of_their_own() {
 fn one_process_has_a_directory() {
     let folder = tempfile::tempdir().expect("a directory");
     let _first = open(folder.path(), 4);
-    let second = Local::open(folder.path(), 4, Duration::from_secs(1));
+    let second = Local::open(folder.path(), 4, 8, Duration::from_secs(1));
     assert_eq!(second.expect_err("it is in use").code, "N310");
+}
+
+#[tokio::test]
+async fn only_the_last_decisions_of_a_robot_are_kept() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let store = Local::open(folder.path(), 1, 3, Duration::from_secs(1))
+        .unwrap_or_else(|message| panic!("{message}"));
+    let mut last = 0;
+    for number in 0..10_u8 {
+        let payload = [number];
+        let message = Message { subject: "0.r", id: "", after: Some(last), payload: &payload };
+        last = store.append(Stream::Decisions, message).await.expect("it is the last one").sequence;
+        let other = Message { subject: "0.s", after: None, ..message };
+        store.append(Stream::Decisions, other).await.expect("it is unconditional");
+        store.append(Stream::Events, other).await.expect("it is unconditional");
+    }
+    let kept = all(&store, Stream::Decisions).await;
+    let kept: Vec<u8> = kept.iter().filter(|own| own.subject == "0.r").map(|own| own.payload[0]).collect();
+    assert_eq!(kept, [7, 8, 9]);
+    store.discard("0.s", 7).await.expect("it can be written");
+    assert_eq!(all(&store, Stream::Events).await.len(), 3);
 }
 
 #[test]
