@@ -168,7 +168,8 @@ pub fn published(mission: &Coadaptation, priority: Priority) -> Option<Published
         [greatest(0), mission.battery.map_or(greatest(1), |b| f64::from(b.initial) * f64::from(b.unit))];
     let utility = |values: &[f64; 3]| {
         let single = [1.0 - values[0] / scale[0], 1.0 - (values[1] / scale[1]).min(1.0), values[2]];
-        let weighted = single.iter().enumerate().map(|(of, u)| u * WEIGHTS[usize::from(of != priority as usize)]);
+        let weighted =
+            single.iter().enumerate().map(|(of, u)| u * WEIGHTS[usize::from(of != priority as usize)]);
         weighted.sum::<f64>()
     };
     let best = candidates.iter().max_by(|(.., a), (.., b)| utility(a).total_cmp(&utility(b)))?;

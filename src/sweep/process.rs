@@ -93,7 +93,10 @@ fn reader(pipe: Option<impl Read + Send + 'static>) -> std::thread::JoinHandle<S
 /// solver: these would keep the pipes open.
 fn kill(child: &mut Child) -> std::io::Result<()> {
     #[cfg(unix)]
-    rustix::process::kill_process_group(rustix::process::Pid::from_child(child), rustix::process::Signal::KILL)?;
+    rustix::process::kill_process_group(
+        rustix::process::Pid::from_child(child),
+        rustix::process::Signal::KILL,
+    )?;
     child.kill()
 }
 

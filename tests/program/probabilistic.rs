@@ -412,10 +412,12 @@ fn exported_published_setting_matches_its_execution() {
         let published_plan = published(&mission, priority).expect("a route");
         let number =
             routes.iter().position(|route| *route == published_plan.route).expect("one of the five") + 1;
-        let believed = [published_plan.time, published_plan.energy, published_plan.not_collided][priority as usize];
+        let believed =
+            [published_plan.time, published_plan.energy, published_plan.not_collided][priority as usize];
         assert!((value(question, number) - believed).abs() < 1e-9, "{question}: {believed}");
         let values: Vec<f64> = (1..=5).map(|route| value(question, route)).collect();
-        let best = values.iter().copied().reduce(if priority == Priority::Safety { f64::max } else { f64::min });
+        let best =
+            values.iter().copied().reduce(if priority == Priority::Safety { f64::max } else { f64::min });
         assert!((value(question, 0) - best.expect("five")).abs() < 1e-9, "{question}: {values:?}");
     }
     let arguments = ["export", "missions/camara_like.toml", "--to", "jani", "--setting", "published"];
