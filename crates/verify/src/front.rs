@@ -4,8 +4,8 @@
 //! Let the points be sorted by the first objective, with the values (a₁, b₁), …, (aₙ, bₙ). The certificate of the
 //! point i proves that aᵢ is the least value of the first objective among the plans with a second value less than
 //! bᵢ₋₁ (for i = 1, among all plans). One more certificate proves that bₙ is the least value of the second objective.
-//! So every plan has values that are at least those of some point: the first point whose second value is not greater
-//! than that of the plan. This is the ε-constraint method \[1\], read as a proof.
+//! Every plan therefore has values that are at least those of some point: the first point whose second value is not
+//! greater than that of the plan. This is the ε-constraint method \[1\], read as a proof.
 //!
 //! \[1\] Y. Haimes, L. Lasdon, D. Wismer: On a bicriterion formulation of the problems of integrated system
 //! identification and system optimization, IEEE Trans. SMC 1(3), 1971.

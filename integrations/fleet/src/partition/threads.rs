@@ -3,8 +3,8 @@
 //! Work without a search has threads of its own. Searches have a pool of threads for each class of durations (a
 //! multilevel feedback queue): a search begins in the class of the robot's last searches, or, for a robot that has
 //! not searched, in the class of the last searches for its mission. A search that exceeds the maximum duration of its
-//! class leaves its place to another one, and continues. Afterwards its robot and its mission have another class, so few
-//! searches do that. The operating system shares the processors among the threads.
+//! class leaves its place to another one, and continues. Afterwards its robot and its mission have a higher class, so this
+//! happens rarely. The operating system shares the processors among the threads.
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};

@@ -3,7 +3,7 @@
 //! NATS JetStream and a local directory implement the interface. Both store data durably before
 //! they acknowledge it, and number messages from 1 in the order of appends. They reject an append
 //! if the last message of the subject is not the expected predecessor. Events are kept until they are
-//! discarded, and the last decisions of each robot are kept for ever.
+//! discarded. The last decisions of each robot never expire.
 
 pub mod local;
 pub mod nats;
