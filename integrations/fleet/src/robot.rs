@@ -131,7 +131,7 @@ impl Robot {
     pub fn restore(last: Decided) -> Self {
         let State { mission, digest, enrolled, migration, ids, snapshot } = last.state;
         let control = if mission.is_some() { Control::Stored(snapshot) } else { Control::None };
-        Self { mission, event: last.event, digest, enrolled, ids, migration, control, ..Self::default() }
+        Self { mission, event: last.event, digest, enrolled, ids, migration, control }
     }
 
     /// Returns a robot whose last decision cannot be parsed. It can only be retired.

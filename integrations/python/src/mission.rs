@@ -446,7 +446,7 @@ fn planned(setup: &Arc<Setup>, wanted: Wanted, on_improvement: Option<&Py<PyAny>
         Some([first, second]) => {
             let front = planner.pareto([first, second])?;
             if let Some(directory) = &wanted.certificate {
-                front.certify(directory)?;
+                front.certify(directory).map_err(Errors::from)?;
             }
             let json = serde_json::to_string(&front.answer()).unwrap_or_default();
             let solved = front.front.points.iter().filter(|point| point.solution.plan.is_some());
