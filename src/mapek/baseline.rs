@@ -24,8 +24,8 @@ impl Baseline {
     }
 
     /// Returns the fields of the loop's snapshot that differ from those of the baseline, as a JSON object. The
-    /// facts (`init`), if they differ, are a pair: the positions of removed initial facts, and a list of facts at the
-    /// end. Has the same precondition as [`Loop::snapshot`].
+    /// facts (`init`), if they differ, are a pair: the positions of removed initial facts, and the facts that follow
+    /// the remaining ones. Has the same precondition as [`Loop::snapshot`].
     pub fn difference(&self, control: &Loop) -> Value {
         let mut changes = fields(control.beliefs());
         changes.retain(|name, value| self.snapshot.get(name) != Some(value));
@@ -43,7 +43,7 @@ impl Baseline {
     }
 
     /// Returns the snapshot that has this [difference](Self::difference) from the baseline. Its value is `null` if
-    /// the difference is no object.
+    /// the difference is not an object.
     pub fn snapshot(&self, difference: Value) -> Snapshot {
         let mut snapshot = self.snapshot.clone();
         let (Some(fields), Value::Object(changes)) = (snapshot.as_object_mut(), difference) else {
