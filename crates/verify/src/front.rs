@@ -66,9 +66,9 @@ impl Front {
     }
 }
 
-/// Returns the problem of a certificate of a front. If `is_point`, it minimizes the first objective, and its goal requires a
-/// second value less than `previous`, the second value of the preceding point, if there is one. Otherwise it minimizes
-/// the second objective without a limit.
+/// Returns the problem of a certificate of a front. If `is_point`, it minimizes the first objective, and its goal
+/// requires a second value less than `previous`, the second value of the preceding point, if there is one. Otherwise
+/// it minimizes the second objective without a limit.
 pub fn member_problem(
     problem: &Problem,
     [first, second]: &[Metric; 2],

@@ -11,7 +11,8 @@ use crate::worker::owners;
 
 /// Appends the events of a robot. Each event is stored before the next one is sent, so events keep
 /// their order, and none is lost unless [`Sender::send`] fails. Repeated attempts store no event
-/// twice (with NATS: for ten minutes).
+/// twice (with NATS: for ten minutes; in a directory: until the event is discarded), and no event is decided
+/// twice. An event that is refused before its acknowledgement arrives can be stored again, under another id.
 #[derive(Debug)]
 pub struct Sender<S> {
     store: S,
@@ -27,7 +28,7 @@ impl<S: Store> Sender<S> {
     ///
     /// If a second sender has the same session, it must send the same events in the same order. It
     /// then creates the same message ids. So no event is decided twice, and none is stored twice
-    /// (with NATS: within ten minutes).
+    /// (with NATS: within ten minutes; in a directory: until it is discarded).
     pub fn new(store: S, robot: &str, session: &str) -> Self {
         let address = Address::of(robot, store.partitions());
         Self { store, address, session: session.to_owned(), number: 0 }

@@ -124,8 +124,8 @@ impl<S: Store> Worker<S> {
 
 /// Returns the owner of each partition, by the number of the partition. Each worker that is not shutting down owns
 /// an equal share of the partitions, rounded up or down. A partition belongs to the worker with the highest hash of
-/// both names (rendezvous hashing [1]) among those with less than their share. So few partitions change their owner if
-/// a worker joins or leaves.
+/// both names (rendezvous hashing [1]) among those with less than their share. Most partitions therefore keep their owner
+/// if a worker joins or leaves.
 ///
 /// [1] Thaler and Ravishankar, Using name-based mappings to increase hit rates, IEEE/ACM Transactions on Networking
 /// 6(1), 1998.
@@ -139,7 +139,8 @@ pub(crate) fn owners(workers: &BTreeMap<String, Presence>, partitions: u32) -> B
             counts.values().min().copied().unwrap_or_default().max(partitions / counts.len().max(1) as u32);
         let share = if counts.values().all(|count| *count >= share) { share + 1 } else { share };
         let hash = |name: &str| {
-            // CRC-32 is linear, so it would give all partitions to one of two workers without this multiplication.
+            // CRC-32 is linear: the hashes for two names of the same length differ in the same bits for every partition.
+            // Without this multiplication, one bit would decide between the two workers.
             u64::from(crc32fast::hash(format!("{partition} {name}").as_bytes()))
                 .wrapping_mul(0x9e37_79b9_7f4a_7c15)
                 >> 20
