@@ -28,7 +28,10 @@ EXAMPLES = pathlib.Path(__file__).resolve().parents[2] / "examples"
 SCOUT = EXAMPLES / "nav2" / "mission.toml"
 START = 30.0  # s until the program must be ready
 SETTLED = 3.0  # s without another request after which an adaptation is over
-AT_ONCE = 0.1  # s, upper limit on the first exchange with a new participant
+AT_ONCE = 0.1  # s, upper limit on the median of the first exchange with a new participant
+# s, upper limit on each first exchange. Other processes delay some of them by 0.1 to 0.5 s. One that waits for the next announcement of Fast DDS
+# takes 0.9 to 1.2 s, and one that waits for the next heartbeat 3 s.
+LATEST = 0.8
 ATTEMPTS = 5
 
 ANOTHER_DEFINITION = "has another definition of"
@@ -131,15 +134,16 @@ def poll(is_so: Callable[[], bool], what: str, within: float) -> float:
     return time.monotonic() - started
 
 
-def check_latencies(what: str, measure: Callable[[], list[float]], limit: float = AT_ONCE) -> None:
-    """Fails if the longest of several latencies exceeds the limit in every attempt; other processes may delay some of them."""
+def check_latencies(what: str, measure: Callable[[], list[float]]) -> None:
+    """Fails if the median or the longest of several latencies exceeds its limit in every attempt."""
     for _ in range(ATTEMPTS):
         latencies = measure()
-        median, longest = 1000 * statistics.median(latencies), 1000 * max(latencies)
-        print(f"  {len(latencies)} {what}: median {median:.1f} ms, longest {longest:.1f} ms", flush=True)
-        if longest <= 1000 * limit:
+        median, longest, load = statistics.median(latencies), max(latencies), os.getloadavg()[0]
+        figures = f"median {1000 * median:.1f} ms, longest {1000 * longest:.1f} ms, load {load:.1f}"
+        print(f"  {len(latencies)} {what}: {figures}", flush=True)
+        if median <= AT_ONCE and longest <= LATEST:
             return
-    raise Failure(f"{what}: longer than {1000 * limit:.0f} ms in each of {ATTEMPTS} attempts")
+    raise Failure(f"{what}: {figures} in the last of {ATTEMPTS} attempts")
 
 
 class Scout:

@@ -21,6 +21,7 @@ import time
 from harness import (
     AT_ONCE,
     EXAMPLES,
+    LATEST,
     PROGRAM,
     SCOUT,
     SETTLED,
@@ -118,8 +119,7 @@ def fresh_publishers(count: int) -> None:
         return latencies
 
     with nodes(modes):
-        # The mode manager and the polling of the log delay some of them on a busy machine. The defect takes 3 s.
-        check_latencies("diagnostics", measure, 5 * AT_ONCE)
+        check_latencies("diagnostics", measure)
 
 
 def departure() -> None:
@@ -164,8 +164,7 @@ def cold_starts(role: str, count: int) -> None:
     late = [round(1000 * latency) for latency in latencies if latency > AT_ONCE]
     median, load = 1000 * statistics.median(latencies), os.getloadavg()[0]
     print(f"  {count} starts of the {role}: median {median:.1f} ms, {len(late)} above 100 ms {late}, load {load:.1f}", flush=True)
-    # A busy machine delays some answers. Those that wait for the next announcement of Fast DDS take 0.9 to 1.2 s.
-    check(latencies[-1] < 8 * AT_ONCE, True, "every first answer within 800 ms")
+    check(latencies[-1] <= LATEST, True, f"every first answer within {LATEST} s")
 
 
 def driver() -> None:
