@@ -4,13 +4,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use rules::{Derivation, Fact, Literal, Reason, Symbols, Value};
+use serde::{Deserialize, Serialize};
 
 use crate::knowledge::{Fault, Knowledge};
 use crate::mapek::answer::{Answer, DesignChange, ObjectiveChange};
 use crate::mapek::beliefs::Beliefs;
 use crate::mapek::monitor::Base;
 
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Findings {
     pub(super) lost: BTreeSet<String>,
     pub(super) gained: BTreeSet<String>,

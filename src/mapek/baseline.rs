@@ -25,9 +25,10 @@ impl Baseline {
 
     /// Returns the fields of the loop's snapshot that differ from those of the baseline, as a JSON object. The
     /// facts (`init`), if they differ, are a pair: the positions of removed initial facts, and the facts that follow
-    /// the remaining ones. Has the same precondition as [`Loop::snapshot`].
+    /// the remaining ones.
     pub fn difference(&self, control: &Loop) -> Value {
         let mut changes = fields(control.beliefs());
+        changes.insert("agenda".to_owned(), control.agenda_record());
         changes.retain(|name, value| self.snapshot.get(name) != Some(value));
         let (mut current, mut removed) = (facts(control).peekable(), Vec::new());
         for (position, fact) in self.facts.iter().enumerate() {

@@ -1,8 +1,10 @@
 //! Record of the changes caused by observations, passed from the monitor to analysis and planning.
 
+use serde::{Deserialize, Serialize};
+
 use crate::mapek::answer::Answer;
 
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub(super) struct Changes {
     pub(super) base: Base,
@@ -22,11 +24,13 @@ pub(super) struct Changes {
     pub(super) interruptions: Vec<String>,
     /// Reasons to plan, as sentences, that apply even if the current plan is valid.
     pub(super) reasons: Vec<String>,
+    /// Answers about filtered reports. The reaction has already returned those of a pending deliberation.
+    #[serde(skip)]
     pub(super) filtered: Vec<Answer>,
 }
 
 /// Extent of a change of the knowledge base.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub(super) enum Base {
     #[default]
     Nothing,

@@ -5,6 +5,7 @@ use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
 
 use planner::Limits;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use tracing::info_span;
 
@@ -65,7 +66,8 @@ pub(crate) fn time_of_line(
     }
 }
 
-#[derive(Debug, Clone, Default)]
+/// Pending deliberation.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 struct Agenda {
     changes: Changes,
     findings: Findings,
@@ -383,10 +385,16 @@ impl Loop {
         answers
     }
 
-    /// Returns a snapshot of the beliefs. Must be called only after deliberation, because a pending deliberation is not
-    /// part of the snapshot.
+    /// Returns a snapshot of the beliefs and of the pending deliberation, if there is one.
     pub fn snapshot(&self) -> Snapshot {
-        record::snapshot(&self.beliefs)
+        let mut snapshot = record::snapshot(&self.beliefs);
+        snapshot.0["agenda"] = self.agenda_record();
+        snapshot
+    }
+
+    /// Returns the pending deliberation as JSON; `null` if there is none.
+    pub(super) fn agenda_record(&self) -> Value {
+        serde_json::to_value(&self.agenda).unwrap_or_default()
     }
 
     /// Restores the state from a snapshot of a loop of the same mission.
@@ -395,7 +403,10 @@ impl Loop {
     /// The snapshot is damaged or does not fit the mission.
     pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), Message> {
         self.planner.memo.clear();
-        self.agenda = None;
+        let agenda = snapshot.0.get("agenda").unwrap_or(&Value::Null);
+        self.agenda = Option::deserialize(agenda).map_err(|error| {
+            Message::error("M320", format!("the snapshot does not fit the mission: {error}"))
+        })?;
         record::restore(&mut self.beliefs, snapshot)
     }
 }

@@ -1,8 +1,9 @@
 //! Delivers random valid and invalid events to a loop and checks invariants after each event.
 
 use std::collections::BTreeSet;
+use std::time::Duration;
 
-use metaplan::mapek::{Answer, Baseline, Loop, PlannedStep};
+use metaplan::mapek::{Answer, Baseline, Loop, Observation, PlannedStep};
 use rules::{Engine, Fact};
 use serde_json::{Value, json};
 
@@ -237,6 +238,36 @@ fn random_events_leave_the_loop_sound() {
     for world in &WORLDS {
         for seed in 0..3 {
             run(world, seed, 300);
+        }
+    }
+}
+
+#[test]
+fn a_restored_loop_completes_a_pending_deliberation() {
+    for world in &WORLDS {
+        for seed in 20..23 {
+            let mut fuzz = Fuzz::new(world, seed);
+            let mut control = fuzz.pristine.clone();
+            let mut answered = 0;
+            for number in 0..100 {
+                for _ in 0..fuzz.random.usize(..3) {
+                    let (line, _) = fuzz.next(&control);
+                    control.react(&Observation::parse(&line), Duration::ZERO);
+                }
+                let mut restored = fuzz.pristine.clone();
+                restored.restore(&control.snapshot()).expect("the snapshot fits");
+                let (again, answers) = (restored.deliberate(), control.deliberate());
+                answered += answers.len();
+                let (again, decision) = (restored.decision(&again), control.decision(&answers));
+                assert!(again.agrees(&decision.answers), "{} seed {seed}, round {number}", world.mission);
+                assert_eq!(
+                    restored.snapshot(),
+                    control.snapshot(),
+                    "{} seed {seed}, round {number}",
+                    world.mission
+                );
+            }
+            assert!(answered > 20, "{} seed {seed}: {answered} answers", world.mission);
         }
     }
 }

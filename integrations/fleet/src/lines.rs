@@ -129,11 +129,18 @@ fn line(message: &Stored) -> Option<(String, String)> {
     if let (Some(mission), Some(object)) = (decided.enrolled, line.as_object_mut()) {
         object.insert("enrolled".to_owned(), Value::String(mission));
     }
-    if let (true, Some(object)) = (decided.migrated, line.as_object_mut()) {
-        object.insert("migrated".to_owned(), Value::Bool(true));
-    }
-    if let (true, Some(object)) = (decided.retired, line.as_object_mut()) {
-        object.insert("retired".to_owned(), Value::Bool(true));
+    let Decided { migrated, retired, planning, planned, late, .. } = decided;
+    let flags = [
+        ("migrated", migrated),
+        ("retired", retired),
+        ("planning", planning),
+        ("planned", planned),
+        ("late", late),
+    ];
+    for (name, flag) in flags {
+        if let (true, Some(object)) = (flag, line.as_object_mut()) {
+            object.insert(name.to_owned(), Value::Bool(true));
+        }
     }
     Some((address.robot, line.to_string()))
 }

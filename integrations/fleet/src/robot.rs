@@ -5,7 +5,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use metaplan::mapek::{Answer, Baseline, Loop, Observation};
+use metaplan::mapek::{Answer, Baseline, Loop, Observation, Thinker, Thoughts};
 use serde_json::Value;
 
 use crate::ids::Ids;
@@ -23,7 +23,7 @@ pub struct Robot {
     /// Checksum of the version of the robot's mission.
     digest: String,
     /// Time of enrolment in microseconds since 1970.
-    enrolled: u64,
+    pub(crate) enrolled: u64,
     /// Ids of decided events.
     ids: Ids,
     /// Requested change to another version of the mission.
@@ -113,7 +113,7 @@ pub enum Begun {
     Decided(Decided),
     /// The event is refused and has changed nothing.
     Refused(Refused),
-    /// A search for a plan is necessary: [`Robot::search`] completes the decision.
+    /// A search for a plan is necessary: [`Robot::search`] or [`Robot::finish`] completes the decision.
     Search(Search),
 }
 
@@ -225,6 +225,55 @@ impl Robot {
         Ok(self.complete(search))
     }
 
+    /// Completes a decision with the plans that were found in the meantime. Without usable plans, the decision has only
+    /// the reaction, and planning [stays pending](Self::is_pending).
+    pub fn finish(&mut self, mut search: Search, thoughts: Option<Thoughts>) -> Decided {
+        if let Control::Loaded(control, _) = &mut self.control {
+            match thoughts.and_then(|thoughts| control.deliberate_with(thoughts, false)) {
+                Some(answers) => search.answers.extend(answers),
+                None => search.decided.planning = true,
+            }
+        }
+        self.complete(search)
+    }
+
+    /// Returns the decision that completes the last ones with these plans. Returns `None` if planning is not pending, or
+    /// the plans cannot be used. Plans for an outdated problem can be used only if `is_late` is `true`.
+    pub fn plan(&mut self, thoughts: Thoughts, is_late: bool) -> Option<Decided> {
+        let Control::Loaded(control, _) = &mut self.control else { return None };
+        let late = !control.is_answered_by(&thoughts);
+        let answers = control.has_agenda().then(|| control.deliberate_with(thoughts, is_late))??;
+        let now = u64::try_from(control.beliefs().now().as_micros()).unwrap_or(u64::MAX);
+        let decided = Decided { now, planned: true, late, ..empty(self.event) };
+        Some(self.complete(Search { decided, answers, id: None }))
+    }
+
+    /// Returns `true` if the last decision lacks a plan, which has to be searched for.
+    pub fn is_pending(&self) -> bool {
+        match &self.control {
+            Control::Loaded(control, _) => control.has_agenda(),
+            Control::Stored(snapshot) => snapshot.get("agenda").is_some_and(Value::is_object),
+            Control::None | Control::Unreadable => false,
+        }
+    }
+
+    /// Returns a copy of the loop that searches for the pending plan. Returns `None` if no plan is
+    /// [pending](Self::is_pending).
+    ///
+    /// # Errors
+    /// As for [`Robot::decide`].
+    pub fn thinker(&mut self, missions: &Missions) -> Result<Option<Thinker>, Faulted> {
+        if !self.is_pending() {
+            return Ok(None);
+        }
+        Ok(Some(self.load(missions)?.thinker()))
+    }
+
+    /// Returns the [number](Loop::question) of the current planning problem; 0 if the loop is not loaded.
+    pub fn question(&self) -> u64 {
+        if let Control::Loaded(control, _) = &self.control { control.question() } else { 0 }
+    }
+
     /// Plans without a search, if that is possible.
     fn deliberate(&mut self, mut search: Search) -> Begun {
         if let Control::Loaded(control, _) = &mut self.control {
@@ -319,6 +368,9 @@ fn empty(event: u64) -> Decided {
         enrolled: None,
         retired: false,
         migrated: false,
+        planning: false,
+        planned: false,
+        late: false,
         answers: Vec::new(),
         worker: String::new(),
         state: State::default(),

@@ -79,6 +79,17 @@ pub struct Decided {
     /// `true` if with this event the robot has changed to another version of its mission.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub migrated: bool,
+    /// `true` if the decision contains only the reaction to the event, because the search for a plan takes longer. A
+    /// decision with `planned` follows.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub planning: bool,
+    /// `true` if the decision completes earlier decisions, the last of which was about this event.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub planned: bool,
+    /// `true` if the plan was found for an earlier planning problem, but also fits the current one. This happens only
+    /// after several searches that were cancelled.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub late: bool,
     /// Answers in the format of `metaplan run`.
     pub answers: Vec<Value>,
     /// Name of the worker that has decided.
@@ -199,6 +210,9 @@ mod tests {
             enrolled: Some("ugv".to_owned()),
             retired: false,
             migrated: false,
+            planning: true,
+            planned: false,
+            late: false,
             answers: vec![serde_json::json!({"answer": "plan_kept"})],
             worker: "w".to_owned(),
             state: State { digest: "0a1b".to_owned(), ..State::default() },

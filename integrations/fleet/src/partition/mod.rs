@@ -1,7 +1,11 @@
 //! A partition, i.e. a fixed group of robots, run by one worker.
 //!
 //! Events are read in order. Each robot handles one event at a time, and robots run concurrently. A robot that cannot
-//! keep up, or is suspended, does not delay the others: its events stay in the log, and are read again separately.
+//! keep up, or is suspended, does not delay the others: its events stay in the log, and are read again one by one.
+//!
+//! A search for a plan does not delay the reaction to events. If the search takes longer than [`Settings::patience`],
+//! the reaction is published without a plan. Each further event is handled in the meantime. If it changes the planning
+//! problem, the search starts again. A further decision contains the plan.
 //!
 //! The state of a robot is part of its last decision. A decision is appended only if the robot's last decision has the
 //! expected sequence number, so only one of two workers can decide an event. A new owner of a partition reads the events
@@ -34,6 +38,9 @@ pub struct Settings {
     /// (up to 25 ms, up to 400 ms, longer). The same number limits further searches on extra
     /// threads, and loops that work without a search.
     pub threads: usize,
+    /// Time for which a decision waits for a plan. If the search takes longer, the reaction to the event is published
+    /// without it, and further events are handled in the meantime.
+    pub patience: Duration,
     /// Maximum number of robots in memory. Others are loaded from their last decision when they have events. Robots
     /// that are handling events may exceed this number.
     pub warm: usize,
@@ -52,6 +59,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             threads: 2,
+            patience: Duration::from_millis(25),
             warm: 4096,
             discard_every: 64,
             discard_within: Duration::from_secs(30),

@@ -8,9 +8,10 @@ use std::time::{Duration, Instant};
 
 use futures::future::BoxFuture;
 use futures::stream::{BoxStream, FuturesUnordered, StreamExt as _};
+use metaplan::mapek::Thoughts;
 use tokio::sync::watch;
 
-use super::task::{Loaded, Outcome, Task};
+use super::task::{Loaded, Outcome, Planning, Stop, Task};
 use super::{Order, Shared, pause, persist};
 use crate::robot::{Refused, is_retirement};
 use crate::store::{Fault, Store, Stored, Stream};
@@ -25,8 +26,8 @@ pub(super) struct Partition<S> {
     jobs: FuturesUnordered<BoxFuture<'static, Done>>,
     /// Number of events that are read but not handled.
     waiting: usize,
-    /// Number of robots with events that have to be read again.
-    behind: usize,
+    /// Number of robots whose last decision lacks a plan.
+    pending: usize,
     /// Names of robots with the number of the use that is described in [`Slot::used`], in the order of these numbers.
     recent: VecDeque<(u64, String)>,
     clock: u64,
@@ -39,13 +40,20 @@ struct Slot {
     /// State of the robot. `None` while an event is being handled, and if the state is not loaded.
     loaded: Option<Loaded>,
     is_busy: bool,
+    /// `true` if the last decision lacks a plan. Then its event is not discarded, so that a new owner of the partition
+    /// searches for the plan.
+    is_pending: bool,
+    /// The search for a plan that is running.
+    search: Option<Search>,
+    /// Plans that were found.
+    thoughts: Option<Thoughts>,
+    /// Number of consecutive cancelled searches.
+    cancelled: u32,
     /// `true` if the robot is included in the number of loaded robots.
     is_counted: bool,
     waiting: VecDeque<Stored>,
-    /// Sequence numbers of the first and the last event that are not in the queue and have to be read again, because
-    /// the queue was full.
-    omitted: Option<(u64, u64)>,
-    is_refilling: bool,
+    /// Sequence numbers of the events after those in `waiting`. They are read again when it is their turn.
+    later: VecDeque<u64>,
     /// `true` if the robot cannot continue. Its events stay in the log, except that one can retire the robot.
     is_suspended: bool,
     /// Sequence number of the last event that was decided or refused.
@@ -58,29 +66,39 @@ struct Slot {
     /// Number of events that the partition had handled when the robot was last used.
     used: u64,
     /// Estimated duration of the robot's next search, if it has searched before.
-    search: Option<Duration>,
+    estimate: Option<Duration>,
+}
+
+struct Search {
+    /// [Number](crate::robot::Robot::question) of the planning problem.
+    question: u64,
+    stop: Stop,
+    is_cancelled: bool,
 }
 
 impl Slot {
     fn is_idle(&self) -> bool {
-        let is_working = self.is_busy || self.is_refilling || self.is_discarding || self.is_suspended;
-        !is_working && self.waiting.is_empty() && self.omitted.is_none()
+        let is_working = self.is_busy || self.is_discarding || self.is_suspended;
+        let is_planning = self.is_pending || self.search.is_some() || self.thoughts.is_some();
+        !is_working && !is_planning && self.waiting.is_empty() && self.later.is_empty()
     }
 }
 
 enum Done {
-    /// An event was handled.
-    Handled { task: Task, event: Stored, outcome: Outcome },
-    /// Omitted events of a robot were read again: the first `MAX_PAGE`, or all up to `last`.
-    Refilled { robot: String, events: Vec<Stored>, last: u64 },
+    /// An event was handled, or, without a sequence number, planning was started or concluded.
+    Handled { task: Task, sequence: Option<u64>, outcome: Outcome, planning: Option<Planning> },
+    /// A search has ended. There are no plans if it has panicked.
+    Planned { robot: String, result: Option<(Thoughts, Duration)> },
     /// Handled events of a robot were discarded, or could not be discarded.
     Discarded { robot: String },
 }
 
-/// Maximum number of undecided events that each robot has in memory before it is refilled.
+/// Maximum number of undecided events that each robot has in memory. Only the sequence numbers of further ones are.
 const MAX_QUEUE: usize = 16;
 
-const MAX_PAGE: usize = 64;
+/// Maximum number of consecutive cancelled searches of a robot. The next search runs to its end; otherwise events that
+/// change the planning problem all the time would prevent every plan.
+const MAX_CANCELLED: u32 = 3;
 
 impl<S: Store> Partition<S> {
     pub(super) fn new(shared: Arc<Shared<S>>, number: u32) -> Self {
@@ -92,7 +110,7 @@ impl<S: Store> Partition<S> {
             seen: 0,
             jobs: FuturesUnordered::new(),
             waiting: 0,
-            behind: 0,
+            pending: 0,
             recent: VecDeque::new(),
             clock: 0,
         }
@@ -105,7 +123,7 @@ impl<S: Store> Partition<S> {
         let mut look = tokio::time::interval(self.shared.settings.look);
         look.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
         loop {
-            if self.waiting == 0 && self.behind == 0 && reached != self.seen {
+            if self.waiting == 0 && self.pending == 0 && reached != self.seen {
                 reached = self.seen;
                 let mut positions = self.shared.counts.reached.lock().unwrap_or_else(PoisonError::into_inner);
                 positions.insert(self.number, reached);
@@ -113,6 +131,8 @@ impl<S: Store> Partition<S> {
             let is_draining = *orders.borrow_and_update() == Order::Drain;
             if is_draining {
                 let since = drained.get_or_insert_with(Instant::now);
+                // The next owner plans.
+                self.slots.values_mut().for_each(|slot| slot.search = None);
                 let is_late = since.elapsed() >= self.shared.settings.drain;
                 if is_late || self.jobs.is_empty() && !self.discard_all(true) {
                     return;
@@ -149,8 +169,7 @@ impl<S: Store> Partition<S> {
         }
     }
 
-    /// Queues the next event of the stream for its robot, or refuses it because of its address. Omits the event, to
-    /// be read again, if the queue of the robot is full or if earlier events of the robot were omitted.
+    /// Queues the next event of the stream for its robot, or refuses it because of its address.
     fn read(&mut self, event: Stored) {
         if event.sequence <= self.seen {
             return;
@@ -162,21 +181,18 @@ impl<S: Store> Partition<S> {
             return;
         };
         if partition_of(&address.robot, self.shared.store.partitions()) != self.number {
-            self.say(&event, Refused::Misplaced);
+            self.say(event.subject.clone(), Refused::Misplaced);
             self.discard(&event.subject, &event.subject, event.sequence);
             return;
         }
         let slot = self.slots.entry(address.robot.clone()).or_default();
-        if let Some((_, last)) = &mut slot.omitted {
-            *last = event.sequence;
-        } else if slot.waiting.len() >= MAX_QUEUE {
-            slot.omitted = Some((event.sequence, event.sequence));
-            self.behind += 1;
-        } else {
+        if slot.waiting.len() < MAX_QUEUE && slot.later.is_empty() {
             slot.waiting.push_back(event);
-            self.count_waiting(1);
-            self.begin(&address.robot);
+        } else {
+            slot.later.push_back(event.sequence);
         }
+        self.count_waiting(1);
+        self.begin(&address.robot);
     }
 
     fn count_waiting(&mut self, change: isize) {
@@ -184,67 +200,58 @@ impl<S: Store> Partition<S> {
         self.shared.counts.waiting.fetch_add(change.cast_unsigned() as u64, Ordering::Relaxed);
     }
 
-    /// Starts to handle the next queued event of a robot, if the robot is idle. Drops events of a suspended robot
-    /// except its retirement. Starts to read more events of the robot if the queue lacks some.
+    /// Starts the next work of a robot, if the robot is idle: concludes planning, handles the next queued event, or starts
+    /// to plan.
     fn begin(&mut self, name: &str) {
-        loop {
-            self.refill(name);
-            let Some(slot) = self.slots.get_mut(name).filter(|slot| !slot.is_busy) else { return };
-            let Some(event) = slot.waiting.pop_front() else { return };
-            if slot.is_suspended && !is_retirement(&event.payload) {
-                self.count_waiting(-1);
-                continue;
-            }
-            slot.is_busy = true;
-            let task = Task { name: name.to_owned(), loaded: slot.loaded.take(), estimate: slot.search };
-            let shared = Arc::clone(&self.shared);
-            self.jobs.push(Box::pin(async move {
-                let (task, outcome) = task.run(&shared, &event).await;
-                Done::Handled { task, event, outcome }
-            }));
+        let subject = self.subject(name);
+        let Some(slot) = self.slots.get_mut(name).filter(|slot| !slot.is_busy) else { return };
+        let thoughts = slot.thoughts.take();
+        let event = if thoughts.is_none() { slot.waiting.pop_front() } else { None };
+        let later = || slot.later.pop_front().filter(|_| thoughts.is_none());
+        let sequence = event.as_ref().map(|event| event.sequence).or_else(later);
+        if thoughts.is_none() && sequence.is_none() && (!slot.is_pending || slot.search.is_some()) {
             return;
         }
-    }
-
-    /// Starts to read events of a robot that were omitted, if its queue is almost empty.
-    fn refill(&mut self, name: &str) {
-        let Some(slot) = self.slots.get_mut(name) else { return };
-        let is_needed = !slot.is_refilling && slot.waiting.len() < MAX_QUEUE / 2;
-        let Some((first, last)) = slot.omitted.filter(|_| is_needed) else { return };
-        slot.is_refilling = true;
-        let (shared, robot) = (Arc::clone(&self.shared), name.to_owned());
-        let subject = self.subject(name);
+        slot.is_busy = true;
+        let (is_late, may_search) = (slot.cancelled >= MAX_CANCELLED, slot.search.is_none());
+        let loaded = slot.loaded.take();
+        let mut task = Task { name: name.to_owned(), subject, loaded, estimate: slot.estimate };
+        let (shared, is_suspended) = (Arc::clone(&self.shared), slot.is_suspended);
         self.jobs.push(Box::pin(async move {
-            let events = persist(|| shared.store.events(&subject, first - 1, MAX_PAGE)).await;
-            // If the page is not full, there are no other events up to `last`: they were discarded.
-            let last = if events.len() < MAX_PAGE { last } else { 0 };
-            Done::Refilled { robot, events, last }
+            let (outcome, planning) = match (thoughts, sequence) {
+                (Some(thoughts), _) => (task.conclude(&shared, thoughts, is_late).await, None),
+                (None, None) => task.start_planning(&shared).await,
+                (None, Some(sequence)) => {
+                    let is_known = task.loaded.as_ref().is_some_and(|loaded| sequence <= loaded.robot.event);
+                    let event = match event {
+                        None if !is_known => persist(|| shared.store.event(sequence)).await,
+                        event => event,
+                    };
+                    match event {
+                        // A suspended robot can only be retired.
+                        Some(event) if is_suspended && !is_retirement(&event.payload) => {
+                            (Outcome::Suspended, None)
+                        }
+                        Some(event) => task.run(&shared, &event, may_search).await,
+                        // It is decided, and perhaps discarded.
+                        None => (Outcome::Known, None),
+                    }
+                }
+            };
+            Done::Handled { task, sequence, outcome, planning }
         }));
-    }
-
-    fn refilled(&mut self, name: &str, mut events: Vec<Stored>, last: u64) {
-        let Some(slot) = self.slots.get_mut(name) else { return };
-        // Later events are still to come from the stream.
-        events.retain(|event| event.sequence <= self.seen);
-        let read = events.last().map_or(0, |event| event.sequence).max(last);
-        let count = events.len();
-        slot.waiting.extend(events);
-        slot.is_refilling = false;
-        slot.omitted =
-            slot.omitted.filter(|(_, last)| *last > read).map(|(first, last)| (first.max(read + 1), last));
-        self.behind -= usize::from(slot.omitted.is_none());
-        self.count_waiting(count.cast_signed());
     }
 
     fn done(&mut self, done: Done, is_draining: bool) {
         let robot = match done {
-            Done::Handled { task, event, outcome } => {
+            Done::Handled { task, sequence, outcome, planning } => {
                 let robot = task.name.clone();
-                self.handled(&robot, task, &event, outcome);
+                self.handled(&robot, task, sequence, outcome);
+                self.follow_search(&robot, planning);
                 robot
             }
-            Done::Refilled { robot, events, last } => {
-                self.refilled(&robot, events, last);
+            Done::Planned { robot, result } => {
+                self.planned(&robot, result);
                 robot
             }
             Done::Discarded { robot } => {
@@ -277,39 +284,88 @@ impl<S: Store> Partition<S> {
         self.shared.counts.robots.fetch_add(change, Ordering::Relaxed);
     }
 
-    fn handled(&mut self, name: &str, task: Task, event: &Stored, outcome: Outcome) {
-        self.count_waiting(-1);
+    fn handled(&mut self, name: &str, task: Task, sequence: Option<u64>, outcome: Outcome) {
+        self.count_waiting(-isize::from(sequence.is_some()));
         self.clock += 1;
         self.count_loaded(name, task.loaded.is_some());
         let Some(slot) = self.slots.get_mut(name) else { return };
-        (slot.is_busy, slot.loaded, slot.search, slot.used) = (false, task.loaded, task.estimate, self.clock);
-        match outcome {
-            // If the robot was suspended, this decision has retired it.
-            Outcome::Decided => slot.is_suspended = false,
-            Outcome::Faulted(_) => slot.is_suspended = true,
-            Outcome::Known | Outcome::Refused(_) => {}
+        (slot.is_busy, slot.estimate, slot.used) = (false, task.estimate, self.clock);
+        let is_decided = matches!(outcome, Outcome::Decided);
+        // If the robot was suspended, this decision has retired it.
+        slot.is_suspended &= !is_decided;
+        let robot = task.loaded.as_ref().map(|loaded| &loaded.robot);
+        let is_pending = robot.map_or(slot.is_pending, |robot| robot.is_pending());
+        let plan = robot.filter(|_| is_decided).map(|robot| robot.event);
+        if let Some(robot) = robot {
+            let is_outdated = |search: &Search| {
+                !is_pending || search.question != robot.question() && slot.cancelled < MAX_CANCELLED
+            };
+            if let Some(search) = slot.search.as_mut().filter(|search| is_outdated(search)) {
+                search.stop.set();
+                search.is_cancelled = true;
+            }
         }
-        if !matches!(outcome, Outcome::Faulted(_)) {
-            slot.handled = event.sequence;
-            slot.obsolete += 1;
-            slot.since.get_or_insert_with(Instant::now);
+        slot.loaded = task.loaded;
+        match sequence.filter(|_| !matches!(outcome, Outcome::Faulted(_) | Outcome::Suspended)).or(plan) {
+            Some(last) => {
+                slot.handled = if is_pending { last - 1 } else { last };
+                slot.obsolete += 1;
+                slot.since.get_or_insert_with(Instant::now);
+            }
+            None => {}
         }
         let is_due = slot.obsolete >= self.shared.settings.discard_every;
+        self.set_pending(name, is_pending);
         match outcome {
-            Outcome::Known => {}
-            Outcome::Decided => drop(self.shared.counts.decided.fetch_add(1, Ordering::Relaxed)),
-            Outcome::Refused(refused) => self.say(event, refused),
-            Outcome::Faulted(why) => {
-                metrics::counter!("metaplan_fleet_faulted_total").increment(1);
-                tracing::error!(partition = self.number, robot = name, "robot suspended: {why}");
-                self.refuse(Some((self.subject(name), format!("the robot is suspended: {why}"))), "faulted");
+            Outcome::Known | Outcome::Suspended | Outcome::Outdated => {}
+            Outcome::Decided => {
+                self.shared.counts.decided.fetch_add(u64::from(sequence.is_some()), Ordering::Relaxed);
             }
+            Outcome::Refused(refused) => self.say(self.subject(name), refused),
+            Outcome::Faulted(why) => self.suspend(name, &why),
         }
         if is_due {
             self.discard_of(name);
         }
         self.recent.push_back((self.clock, name.to_owned()));
         self.unload();
+    }
+
+    fn set_pending(&mut self, name: &str, is_pending: bool) {
+        let Some(slot) = self.slots.get_mut(name) else { return };
+        self.pending = self.pending + usize::from(is_pending) - usize::from(slot.is_pending);
+        slot.is_pending = is_pending;
+        slot.cancelled = if is_pending { slot.cancelled } else { 0 };
+    }
+
+    fn suspend(&mut self, name: &str, why: &str) {
+        self.set_pending(name, false);
+        let Some(slot) = self.slots.get_mut(name) else { return };
+        slot.is_suspended = true;
+        metrics::counter!("metaplan_fleet_faulted_total").increment(1);
+        tracing::error!(partition = self.number, robot = name, "robot suspended: {why}");
+        self.refuse(Some((self.subject(name), format!("the robot is suspended: {why}"))), "faulted");
+    }
+
+    /// Waits for a search for a plan of a robot, besides other work.
+    fn follow_search(&mut self, name: &str, planning: Option<Planning>) {
+        let Some(slot) = self.slots.get_mut(name) else { return };
+        let Some(Planning { question, stop, result }) = planning else { return };
+        slot.search = Some(Search { question, stop, is_cancelled: false });
+        let robot = name.to_owned();
+        self.jobs.push(Box::pin(async move { Done::Planned { robot, result: result.await } }));
+    }
+
+    fn planned(&mut self, name: &str, result: Option<(Thoughts, Duration)>) {
+        let Some(slot) = self.slots.get_mut(name) else { return };
+        let is_cancelled = slot.search.take().is_none_or(|search| search.is_cancelled);
+        match result {
+            None => self.suspend(name, "its loop has panicked"),
+            Some(_) if is_cancelled => slot.cancelled += 1,
+            Some((thoughts, estimate)) => {
+                (slot.estimate, slot.thoughts) = (Some(estimate), Some(thoughts));
+            }
+        }
     }
 
     /// Unloads idle robots, the least recently used ones first, while the worker has more loaded robots than its
@@ -369,8 +425,8 @@ impl<S: Store> Partition<S> {
     }
 
     /// Counts a refused event, and publishes the reason as a notice to the clients of the robot.
-    fn say(&self, event: &Stored, refused: Refused) {
-        self.refuse(Some((event.subject.clone(), refused.sentence().to_owned())), refused.name());
+    fn say(&self, subject: String, refused: Refused) {
+        self.refuse(Some((subject, refused.sentence().to_owned())), refused.name());
     }
 
     fn refuse(&self, notice: Option<(String, String)>, reason: &'static str) {

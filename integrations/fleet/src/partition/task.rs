@@ -2,8 +2,11 @@
 //! and appends the decision if the robot's last decision is still the expected one.
 
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use futures::future::{BoxFuture, FutureExt as _};
+use metaplan::mapek::{Thinker, Thoughts};
 
 use super::{Shared, pause, persist};
 use crate::robot::{Begun, Faulted, Refused, Robot};
@@ -18,7 +21,10 @@ pub(super) struct Loaded {
 
 pub(super) struct Task {
     pub(super) name: String,
+    /// Subject of the robot's messages.
+    pub(super) subject: String,
     pub(super) loaded: Option<Loaded>,
+    /// Estimated duration of the robot's next search, if it has searched before.
     pub(super) estimate: Option<Duration>,
 }
 
@@ -28,135 +34,245 @@ pub(super) enum Outcome {
     Known,
     Refused(Refused),
     Faulted(String),
+    /// The robot is suspended, so the event stays in the log.
+    Suspended,
+    /// The plans cannot be used, because the planning problem has changed.
+    Outdated,
 }
 
+/// A search for a plan that continues after the decision.
+pub(super) struct Planning {
+    /// [Number](Robot::question) of the planning problem.
+    pub(super) question: u64,
+    pub(super) stop: Stop,
+    /// The plans and the new estimate of the duration of a search. `None` if the search has panicked.
+    pub(super) result: BoxFuture<'static, Option<(Thoughts, Duration)>>,
+}
+
+/// Flag that interrupts a search. It is set when this value is dropped.
+pub(super) struct Stop(Arc<AtomicBool>);
+
+impl Stop {
+    pub(super) fn set(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+impl Drop for Stop {
+    fn drop(&mut self) {
+        self.set();
+    }
+}
+
+/// Result of an event: the outcome, and the search for a plan that continues.
+pub(super) type Handled = (Outcome, Option<Planning>);
+
 impl Task {
-    /// Handles an event until it is decided by this worker or another one, refused, or the robot cannot continue.
-    pub(super) async fn run<S: Store>(mut self, shared: &Arc<Shared<S>>, event: &Stored) -> (Self, Outcome) {
+    /// Handles an event until it is decided by this worker or another one, refused, or the robot cannot continue. Starts
+    /// no search if `may_search` is `false`.
+    pub(super) async fn run<S: Store>(
+        &mut self,
+        shared: &Arc<Shared<S>>,
+        event: &Stored,
+        may_search: bool,
+    ) -> Handled {
         for attempt in 1.. {
-            let Loaded { robot, chain } = match self.loaded.take() {
-                Some(loaded) => loaded,
-                None => load(shared, &event.subject).await,
-            };
-            if event.sequence <= robot.event {
+            let Loaded { robot, chain } = self.load(shared).await;
+            let id = event.id.as_ref();
+            let is_forged =
+                id.is_some_and(|id| id.split_once(':').is_none_or(|(robot, _)| robot != self.name));
+            if event.sequence <= robot.event || is_forged {
+                let outcome = if is_forged { Outcome::Refused(Refused::Forged) } else { Outcome::Known };
                 self.loaded = Some(Loaded { robot, chain });
-                return (self, Outcome::Known);
+                return (outcome, None);
             }
-            let is_forged = event
-                .id
-                .as_ref()
-                .is_some_and(|id| id.split_once(':').is_none_or(|(robot, _)| robot != self.name));
-            if is_forged {
-                self.loaded = Some(Loaded { robot, chain });
-                return (self, Outcome::Refused(Refused::Forged));
-            }
-            let Some((robot, decided)) = self.work(shared, robot, event.clone()).await else {
-                return (self, Outcome::Faulted("its loop has panicked".to_owned()));
+            let begun = Instant::now();
+            let Some((robot, decided, planning)) = self.decide(shared, robot, event, may_search).await else {
+                return (Outcome::Faulted("its loop has panicked".to_owned()), None);
             };
-            let mut decided = match decided {
-                Err(Faulted(why)) => return (self, Outcome::Faulted(why)),
+            metrics::histogram!("metaplan_fleet_decision_seconds").record(begun.elapsed());
+            let outcome = match decided {
+                Err(Faulted(why)) => Outcome::Faulted(why),
                 Ok(Err(refused)) => {
                     self.loaded = Some(Loaded { robot, chain });
-                    return (self, Outcome::Refused(refused));
+                    Outcome::Refused(refused)
                 }
-                Ok(Ok(decided)) => decided,
+                Ok(Ok(decided)) => match self.publish(shared, decided, robot, chain, event.time).await {
+                    // Another worker has decided, or an unacknowledged attempt has succeeded. The robot is loaded
+                    // again to find out.
+                    Outcome::Outdated => {
+                        pause(attempt).await;
+                        continue;
+                    }
+                    outcome => outcome,
+                },
             };
-            decided.worker.clone_from(&shared.worker);
-            match publish(shared, event, &decided, chain).await {
-                Ok(chain) => {
-                    self.loaded = Some(Loaded { robot, chain });
-                    return (self, Outcome::Decided);
-                }
-                Err(Fault::TooLong(length)) => {
-                    let why = format!("a decision of {length} bytes is longer than the server accepts");
-                    return (self, Outcome::Faulted(why));
-                }
-                // Another worker has decided, or an unacknowledged attempt has succeeded. The robot is loaded
-                // again to find out.
-                Err(_) => {
-                    metrics::counter!("metaplan_fleet_fenced_total").increment(1);
-                    pause(attempt).await;
-                }
-            }
+            return (outcome, planning);
         }
-        (self, Outcome::Known)
+        (Outcome::Known, None)
     }
 
-    /// Runs the loop of the robot. Returns `None` after a panic.
-    async fn work<S: Store>(
+    /// Starts a search if the last decision lacks a plan.
+    pub(super) async fn start_planning<S: Store>(&mut self, shared: &Arc<Shared<S>>) -> Handled {
+        let Loaded { mut robot, chain } = self.load(shared).await;
+        let own = Arc::clone(shared);
+        let prepare = move || {
+            let thinker = robot.thinker(&own.missions);
+            (robot, thinker)
+        };
+        let Ok((robot, thinker)) = shared.threads.quick(prepare).await else {
+            return (Outcome::Faulted("its loop has panicked".to_owned()), None);
+        };
+        match thinker {
+            Err(Faulted(why)) => (Outcome::Faulted(why), None),
+            Ok(thinker) => {
+                let planning = thinker.map(|thinker| self.planning(shared, &robot, thinker));
+                self.loaded = Some(Loaded { robot, chain });
+                (Outcome::Known, planning)
+            }
+        }
+    }
+
+    /// Publishes the decision that completes the last ones with these plans.
+    pub(super) async fn conclude<S: Store>(
+        &mut self,
+        shared: &Arc<Shared<S>>,
+        thoughts: Thoughts,
+        is_late: bool,
+    ) -> Outcome {
+        let Some(Loaded { mut robot, chain }) = self.loaded.take() else { return Outcome::Outdated };
+        let own = Arc::clone(shared);
+        let conclude = move || {
+            let begun = Instant::now();
+            let decided = robot.plan(thoughts, is_late);
+            count(&own, begun.elapsed());
+            (robot, decided)
+        };
+        let Ok((robot, decided)) = shared.threads.quick(conclude).await else {
+            return Outcome::Faulted("its loop has panicked".to_owned());
+        };
+        let Some(decided) = decided else {
+            self.loaded = Some(Loaded { robot, chain });
+            return Outcome::Outdated;
+        };
+        let time = robot.enrolled + decided.now;
+        self.publish(shared, decided, robot, chain, time).await
+    }
+
+    /// Lets the robot decide an event. Returns `None` after a panic.
+    async fn decide<S: Store>(
         &mut self,
         shared: &Arc<Shared<S>>,
         mut robot: Box<Robot>,
-        event: Stored,
-    ) -> Option<(Box<Robot>, Result<Result<Decided, Refused>, Faulted>)> {
-        let begun = Instant::now();
-        let own = Arc::clone(shared);
+        event: &Stored,
+        may_search: bool,
+    ) -> Option<(Box<Robot>, Result<Result<Decided, Refused>, Faulted>, Option<Planning>)> {
+        let (own, event) = (Arc::clone(shared), event.clone());
         let first = move || {
             let begun = Instant::now();
             let outcome = robot.begin(&event, &own.missions);
+            let thinker = match &outcome {
+                Ok(Begun::Search(_)) if may_search => robot.thinker(&own.missions).ok().flatten(),
+                _ => None,
+            };
             count(&own, begun.elapsed());
-            (robot, outcome)
+            (robot, outcome, thinker)
         };
-        let (mut robot, outcome) = shared.threads.quick(first).await.ok()?;
-        let work = match outcome {
-            Err(faulted) => (robot, Err(faulted)),
-            Ok(Begun::Decided(decided)) => (robot, Ok(Ok(decided))),
-            Ok(Begun::Refused(refused)) => (robot, Ok(Err(refused))),
-            Ok(Begun::Search(search)) => {
-                let own = Arc::clone(shared);
-                let mission = robot.mission.clone().unwrap_or_default();
-                let second = move || {
-                    let begun = Instant::now();
-                    let decided = robot.search(search);
-                    count(&own, begun.elapsed());
-                    (robot, decided.map(Ok))
-                };
-                let (work, estimate) = shared.threads.search(&mission, self.estimate, second).await.ok()?;
-                self.estimate = Some(estimate);
-                work
-            }
+        let (mut robot, outcome, thinker) = shared.threads.quick(first).await.ok()?;
+        let search = match outcome {
+            Err(faulted) => return Some((robot, Err(faulted), None)),
+            Ok(Begun::Decided(decided)) => return Some((robot, Ok(Ok(decided)), None)),
+            Ok(Begun::Refused(refused)) => return Some((robot, Ok(Err(refused)), None)),
+            Ok(Begun::Search(search)) => search,
         };
-        metrics::histogram!("metaplan_fleet_decision_seconds").record(begun.elapsed());
-        Some(work)
-    }
-}
-
-async fn load<S: Store>(shared: &Shared<S>, subject: &str) -> Loaded {
-    let last = persist(|| shared.store.last(Stream::Decisions, subject)).await;
-    let chain = last.as_ref().map_or(0, |last| last.sequence);
-    let robot = match last.map(|last| Decided::parse(&last.payload)) {
-        Some(Some(decided)) => Robot::restore(decided),
-        Some(None) => Robot::unreadable(),
-        None => Robot::default(),
-    };
-    Loaded { robot: Box::new(robot), chain }
-}
-
-/// Appends a decision if the robot's last decision has the sequence number `chain`. Retries until the result is known.
-/// Returns the sequence number of the decision.
-async fn publish<S: Store>(
-    shared: &Shared<S>,
-    event: &Stored,
-    decided: &Decided,
-    chain: u64,
-) -> Result<u64, Fault> {
-    let payload = serde_json::to_vec(decided).unwrap_or_default();
-    // Without an id, so that the server compares the chain also for a repeated attempt.
-    let message = Message { subject: &event.subject, id: "", after: Some(chain), payload: &payload };
-    for attempt in 1.. {
-        match shared.store.append(Stream::Decisions, message).await {
-            Err(Fault::Unreachable(_)) => {}
-            result => {
-                let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-                let late = now.saturating_sub(Duration::from_micros(event.time));
-                metrics::histogram!("metaplan_fleet_latency_seconds").record(late);
-                return result.map(|receipt| receipt.sequence);
-            }
+        let mut planning = thinker.map(|thinker| self.planning(shared, &robot, thinker));
+        let mut thoughts = None;
+        if let Some(Planning { result, .. }) = &mut planning
+            && let Ok(result) = tokio::time::timeout(shared.settings.patience, result).await
+        {
+            let (plans, estimate) = result?;
+            (thoughts, self.estimate, planning) = (Some(plans), Some(estimate), None);
         }
-        metrics::counter!("metaplan_fleet_retries_total").increment(1);
-        pause(attempt).await;
+        let own = Arc::clone(shared);
+        let second = move || {
+            let begun = Instant::now();
+            let decided = robot.finish(search, thoughts);
+            count(&own, begun.elapsed());
+            (robot, decided)
+        };
+        let (robot, decided) = shared.threads.quick(second).await.ok()?;
+        Some((robot, Ok(Ok(decided)), planning))
     }
-    Err(Fault::Conflict)
+
+    fn planning<S: Store>(&self, shared: &Arc<Shared<S>>, robot: &Robot, thinker: Thinker) -> Planning {
+        let (shared, estimate) = (Arc::clone(shared), self.estimate);
+        let mission = robot.mission.clone().unwrap_or_default();
+        let (question, stop) = (robot.question(), Stop(thinker.stop()));
+        let own = Arc::clone(&shared);
+        let think = move || {
+            let begun = Instant::now();
+            let thoughts = thinker.think();
+            count(&own, begun.elapsed());
+            thoughts
+        };
+        let result = async move { shared.threads.search(&mission, estimate, think).await.ok() };
+        Planning { question, stop, result: result.boxed() }
+    }
+
+    /// Takes the robot from memory, or loads it from its last decision.
+    async fn load<S: Store>(&mut self, shared: &Shared<S>) -> Loaded {
+        if let Some(loaded) = self.loaded.take() {
+            return loaded;
+        }
+        let last = persist(|| shared.store.last(Stream::Decisions, &self.subject)).await;
+        let chain = last.as_ref().map_or(0, |last| last.sequence);
+        let robot = match last.map(|last| Decided::parse(&last.payload)) {
+            Some(Some(decided)) => Robot::restore(decided),
+            Some(None) => Robot::unreadable(),
+            None => Robot::default(),
+        };
+        Loaded { robot: Box::new(robot), chain }
+    }
+
+    /// Appends a decision if the robot's last decision has the sequence number `chain`. Retries until the result is
+    /// known, which is [`Outcome::Outdated`] if another decision is the last one. `time` is that of the event in
+    /// microseconds since 1970.
+    async fn publish<S: Store>(
+        &mut self,
+        shared: &Shared<S>,
+        mut decided: Decided,
+        robot: Box<Robot>,
+        chain: u64,
+        time: u64,
+    ) -> Outcome {
+        decided.worker.clone_from(&shared.worker);
+        let payload = serde_json::to_vec(&decided).unwrap_or_default();
+        // Without an id, so that the server compares the chain also for a repeated attempt.
+        let message = Message { subject: &self.subject, id: "", after: Some(chain), payload: &payload };
+        for attempt in 1.. {
+            match shared.store.append(Stream::Decisions, message).await {
+                Ok(receipt) => {
+                    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+                    let late = now.saturating_sub(Duration::from_micros(time));
+                    metrics::histogram!("metaplan_fleet_latency_seconds").record(late);
+                    self.loaded = Some(Loaded { robot, chain: receipt.sequence });
+                    return Outcome::Decided;
+                }
+                Err(Fault::TooLong(length)) => {
+                    let why = format!("a decision of {length} bytes is longer than the server accepts");
+                    return Outcome::Faulted(why);
+                }
+                Err(Fault::Conflict) => {
+                    metrics::counter!("metaplan_fleet_fenced_total").increment(1);
+                    return Outcome::Outdated;
+                }
+                Err(Fault::Unreachable(_)) => {}
+            }
+            metrics::counter!("metaplan_fleet_retries_total").increment(1);
+            pause(attempt).await;
+        }
+        Outcome::Outdated
+    }
 }
 
 fn count<S>(shared: &Shared<S>, duration: Duration) {

@@ -4,18 +4,28 @@
 //! multilevel feedback queue): a search begins in the class of the robot's last searches, or, for a robot that has
 //! not searched, in the class of the last searches for its mission. A search that exceeds the maximum duration of its
 //! class leaves its place to another one, and continues. Afterwards its robot and its mission have a higher class, so this
-//! happens rarely. The operating system shares the processors among the threads.
+//! happens rarely. The operating system shares the processors among the threads; those of the longer classes have a
+//! lower priority.
 
 use std::collections::BTreeMap;
-use std::sync::{Mutex, PoisonError};
+use std::sync::atomic::{AtomicI32, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use tokio::sync::{Semaphore, SemaphorePermit};
+use tokio::sync::{Semaphore, SemaphorePermit, oneshot};
 use tokio::task::JoinError;
 
 /// Maximum durations of the searches of each class but the last one, which has no maximum. The second class is for
 /// short searches on a busy machine.
 const MAX_DURATIONS: [Duration; 2] = [Duration::from_millis(25), Duration::from_millis(400)];
+
+/// Nice value of the thread of a search in each class. If threads compete, those with a higher value get less processor
+/// time.
+const NICENESS: [i32; MAX_DURATIONS.len() + 1] = [0, 5, 15];
+
+/// A search has failed: its thread has panicked or could not be started.
+#[derive(Debug)]
+pub(crate) struct Panicked;
 
 #[derive(Debug)]
 pub(crate) struct Threads {
@@ -29,7 +39,10 @@ impl Threads {
     pub(crate) fn new(count: usize) -> Self {
         Self {
             quick: Semaphore::new(count),
-            searches: std::array::from_fn(|_| Semaphore::new(count)),
+            searches: std::array::from_fn(|class| {
+                let is_last = class == MAX_DURATIONS.len();
+                Semaphore::new(if is_last { 1.max(count - 1) } else { count })
+            }),
             costs: Mutex::default(),
         }
     }
@@ -43,31 +56,38 @@ impl Threads {
     }
 
     /// Runs a search. `estimate` is the expected duration, if the robot has searched before. Also
-    /// returns the [new estimate](updated). Fails if the search panics.
+    /// returns the [new estimate](updated).
     pub(crate) async fn search<T: Send + 'static>(
         &self,
         mission: &str,
         estimate: Option<Duration>,
         work: impl FnOnce() -> T + Send + 'static,
-    ) -> Result<(T, Duration), JoinError> {
-        let timed = move || {
-            let begun = Instant::now();
-            let outcome = work();
-            (outcome, begun.elapsed())
-        };
+    ) -> Result<(T, Duration), Panicked> {
         let (class, permit) = self.enter(mission, estimate).await;
-        let mut task = tokio::task::spawn_blocking(timed);
+        let (send, mut outcome) = oneshot::channel();
+        let thread = Arc::new(AtomicI32::new(0));
+        let own = Arc::clone(&thread);
+        let timed = move || {
+            own.store(thread_number(), Ordering::Relaxed);
+            set_niceness(&own, class);
+            let begun = Instant::now();
+            // Nobody waits any longer if the partition was given back.
+            let _ = send.send((work(), begun.elapsed()));
+        };
+        // A thread of its own, because a thread cannot raise its priority again.
+        std::thread::Builder::new().name("search".to_owned()).spawn(timed).map_err(|_| Panicked)?;
         let limit = MAX_DURATIONS.get(class).copied().unwrap_or(Duration::MAX);
-        let (outcome, duration) = if let Ok(done) = tokio::time::timeout(limit, &mut task).await {
-            done?
+        let (result, duration) = if let Ok(done) = tokio::time::timeout(limit, &mut outcome).await {
+            done.map_err(|_| Panicked)?
         } else {
             // Robots of this mission that have not searched yet begin in the next class.
             self.learn(mission, limit * 2);
             drop(permit);
-            task.await?
+            set_niceness(&thread, class + 1);
+            outcome.await.map_err(|_| Panicked)?
         };
         self.learn(mission, duration);
-        Ok((outcome, updated(estimate.unwrap_or_default(), duration)))
+        Ok((result, updated(estimate.unwrap_or_default(), duration)))
     }
 
     /// Waits for a place in the class of a search. The class may change while the search waits.
@@ -91,6 +111,26 @@ impl Threads {
         }
         *cost
     }
+}
+
+/// Returns the number of the current thread, or 0 where priorities of threads are not supported.
+fn thread_number() -> i32 {
+    #[cfg(target_os = "linux")]
+    return rustix::thread::gettid().as_raw_nonzero().get();
+    #[cfg(not(target_os = "linux"))]
+    0
+}
+
+/// Sets the nice value of the thread with this number to that of a class.
+fn set_niceness(thread: &AtomicI32, class: usize) {
+    // On Linux, the call applies to a thread, although POSIX defines it for a process. A refused change delays other
+    // work, but makes no result wrong.
+    #[cfg(target_os = "linux")]
+    if let Some(number) = rustix::process::Pid::from_raw(thread.load(Ordering::Relaxed)) {
+        let _ = rustix::process::setpriority_process(Some(number), NICENESS[class]);
+    }
+    #[cfg(not(target_os = "linux"))]
+    let _ = (thread, NICENESS[class]);
 }
 
 fn class(duration: Duration) -> usize {

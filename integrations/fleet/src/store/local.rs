@@ -317,13 +317,6 @@ impl Store for Local {
         Ok(stream::unfold(state, next).boxed())
     }
 
-    async fn events(&self, subject: &str, after: u64, most: usize) -> Result<Vec<Stored>, Fault> {
-        self.read(|messages| {
-            let events = messages.of_subject(Stream::Events, subject).filter(|event| event.sequence > after);
-            events.take(most).map(|event| Stored::clone(event)).collect()
-        })
-    }
-
     async fn end(&self, stream: Stream, partition: u32) -> Result<u64, Fault> {
         let range = (stream, partition, 0)..=(stream, partition, u64::MAX);
         self.read(|messages| messages.by_partition.range(range).next_back().map_or(0, |(key, _)| key.2))

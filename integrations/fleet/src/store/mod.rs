@@ -110,15 +110,6 @@ pub trait Store: Clone + Send + Sync + 'static {
         after: u64,
     ) -> impl Future<Output = Result<BoxStream<'static, Result<Stored, Fault>>, Fault>> + Send;
 
-    /// Returns the events of one subject after a sequence number, in ascending order, but at most
-    /// the first `most`. Events that are appended during the call may be missing.
-    fn events(
-        &self,
-        subject: &str,
-        after: u64,
-        most: usize,
-    ) -> impl Future<Output = Result<Vec<Stored>, Fault>> + Send;
-
     /// Returns the sequence number of the last message of a partition that exists, or 0 for an empty
     /// partition.
     fn end(&self, stream: Stream, partition: u32) -> impl Future<Output = Result<u64, Fault>> + Send;

@@ -6,14 +6,13 @@
 //! existing fleet keeps the settings with which it was created.
 //!
 //! The last message of a subject and the message with a sequence number are read from the leader of the stream.
-//! Consumers may read from a replica that lags behind, so a caller passes the sequence number up to which a consumer
-//! has to read.
+//! Consumers may read from a replica that lags behind.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use async_nats::jetstream::consumer::{AckPolicy, DeliverPolicy, pull};
+use async_nats::jetstream::consumer::{DeliverPolicy, pull};
 use async_nats::jetstream::context::{Context, PublishError, PublishErrorKind};
 use async_nats::jetstream::kv;
 use async_nats::jetstream::message::{PublishMessage, StreamMessage};
@@ -62,8 +61,6 @@ pub const DEFAULT_FLEET: &str = "fleet";
 
 /// Start of the descriptions of the streams, with the version of the data format.
 const DESCRIPTION: &str = "format=2 partitions=";
-
-const BATCH: usize = 500;
 
 /// Timeout of a request to the server.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -268,53 +265,6 @@ impl Nats {
     fn stream(&self, stream: Stream) -> &stream::Stream<()> {
         &self.streams[stream as usize]
     }
-
-    /// Reads the messages of a stream that match `filter`, beginning as `from` requires: to the end, and at least to
-    /// the sequence number `reach`, but at most `most` messages.
-    async fn read<I: Sync>(
-        &self,
-        stream: &stream::Stream<I>,
-        filter: String,
-        from: DeliverPolicy,
-        reach: u64,
-        most: usize,
-    ) -> Result<Vec<jetstream::Message>, Fault> {
-        let config = pull::Config {
-            filter_subject: filter,
-            deliver_policy: from,
-            ack_policy: AckPolicy::None,
-            inactive_threshold: PATIENCE * 6,
-            memory_storage: true,
-            num_replicas: 1,
-            ..pull::Config::default()
-        };
-        let consumer = stream.create_consumer(config).await.map_err(failed)?;
-        let mut pending = consumer.cached_info().num_pending;
-        let (mut last, mut messages) = (0, Vec::new());
-        while (pending > 0 || last < reach) && messages.len() < most {
-            let wanted = BATCH.min(most - messages.len());
-            let mut batch =
-                consumer.fetch().max_messages(wanted).expires(PATIENCE).messages().await.map_err(failed)?;
-            let before = messages.len();
-            while let Some(message) = batch.try_next().await.map_err(failed)? {
-                let number;
-                {
-                    let info = message.info().map_err(failed)?;
-                    (last, number, pending) = (info.stream_sequence, info.consumer_sequence, info.pending);
-                }
-                messages.push(message);
-                if number != messages.len() as u64 {
-                    return Err(failed("messages were lost"));
-                }
-            }
-            if messages.len() == before {
-                return Err(failed("the server lacks messages that it should have"));
-            }
-        }
-        // The server would also remove an unused consumer by itself, but later.
-        let _ = stream.delete_consumer(&consumer.cached_info().name).await;
-        Ok(messages)
-    }
 }
 
 fn subject_prefix(fleet: &str) -> String {
@@ -387,17 +337,6 @@ impl Store for Nats {
         Ok(messages.map(move |message| stored(&message.map_err(failed)?)).boxed())
     }
 
-    async fn events(&self, subject: &str, after: u64, most: usize) -> Result<Vec<Stored>, Fault> {
-        let reach = self.last(Stream::Events, subject).await?.map_or(0, |last| last.sequence);
-        if reach <= after {
-            return Ok(Vec::new());
-        }
-        let from = DeliverPolicy::ByStartSequence { start_sequence: after + 1 };
-        let filter = self.subject(Stream::Events, subject);
-        let messages = self.read(self.stream(Stream::Events), filter, from, reach, most).await?;
-        messages.iter().map(stored).collect()
-    }
-
     async fn end(&self, kind: Stream, partition: u32) -> Result<u64, Fault> {
         let last = self.last(kind, &format!("{partition}.*")).await?;
         Ok(last.map_or(0, |last| last.sequence))
@@ -454,15 +393,18 @@ impl Store for Nats {
     }
 
     async fn workers(&self) -> Result<BTreeMap<String, Presence>, Fault> {
-        let prefix = format!("$KV.{}.", self.workers.name);
-        let (filter, from) = (format!("{prefix}>"), DeliverPolicy::LastPerSubject);
-        let messages = self.read(&self.workers.stream, filter, from, 0, usize::MAX).await?;
-        // A message that removes a value has no JSON.
-        let status = messages.iter().filter_map(|message| {
-            let name = message.subject.strip_prefix(&prefix)?.to_owned();
-            Some((name, serde_json::from_slice(&message.payload).ok()?))
-        });
-        Ok(status.collect())
+        let read = async {
+            let keys = self.workers.keys().await.map_err(failed)?;
+            let names: Vec<String> = keys.try_collect().await.map_err(failed)?;
+            let mut workers = BTreeMap::new();
+            for name in names {
+                // A status may have expired in the meantime.
+                let text = self.workers.get(&name).await.map_err(failed)?.unwrap_or_default();
+                workers.extend(serde_json::from_slice(&text).ok().map(|status| (name, status)));
+            }
+            Ok(workers)
+        };
+        tokio::time::timeout(PATIENCE, read).await.map_err(failed)?
     }
 
     async fn notice(&self, subject: &str, text: &str) {

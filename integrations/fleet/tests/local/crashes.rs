@@ -71,10 +71,6 @@ impl Store for Crashing {
         self.through(self.inner.follow(stream, partition, after)).await
     }
 
-    async fn events(&self, subject: &str, after: u64, most: usize) -> Result<Vec<Stored>, Fault> {
-        self.through(self.inner.events(subject, after, most)).await
-    }
-
     async fn end(&self, stream: Stream, partition: u32) -> Result<u64, Fault> {
         self.inner.end(stream, partition).await
     }

@@ -5,6 +5,7 @@
 mod crashes;
 mod hostile;
 mod isolation;
+mod planning;
 mod program;
 mod repeated;
 mod scripts;
@@ -36,7 +37,11 @@ fn open(directory: &Path, partitions: u32) -> Local {
         .unwrap_or_else(|message| panic!("{message}"))
 }
 
+/// Patience with which each decision contains its plan, so that the answers do not depend on the speed of this machine.
+const PATIENT: Duration = Duration::from_secs(60);
+
 fn shared<S: Store>(store: S, name: &str, settings: Settings) -> Arc<Shared<S>> {
+    let settings = Settings { patience: PATIENT, ..settings };
     Arc::new(Shared::new(store, missions(), name.to_owned(), settings))
 }
 

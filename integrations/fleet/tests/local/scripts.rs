@@ -4,10 +4,11 @@
 use std::path::Path;
 use std::time::Duration;
 
-use metaplan::mapek::{Loop, Observation};
+use metaplan::mapek::{Baseline, Loop, Observation};
 use metaplan::planner::Limits;
 use metaplan::setup::Setup;
 use metaplan::simulate::Strategy;
+use metaplan_fleet::wire::Decided;
 use serde_json::{Value, json};
 
 pub(super) const SCENARIOS: [(&str, &str); 4] = [
@@ -50,6 +51,55 @@ pub(super) fn alone(mission: &str, events: &[String]) -> Vec<Vec<Value>> {
     for event in &events[1..] {
         let own = control.handle(&Observation::parse(event), Duration::ZERO);
         answers.push(control.decision(&own).answers);
+    }
+    answers
+}
+
+/// Checks that decisions are those of a single local loop that reacts to each event, and plans when a decision contains
+/// a plan: each event has one decision, in order, and the answers are equal. If an action has progressed during a search,
+/// the plan is not reported as optimal, so this is not compared. A plan for an earlier planning problem is not checked.
+pub(super) fn assert_replayed(mission: &str, events: &[String], decided: &[Decided], sequences: &[u64]) {
+    let made: Vec<u64> = decided.iter().filter(|made| !made.planned).map(|made| made.event).collect();
+    assert_eq!(made, sequences, "each event once, in order");
+    let Setup { mission, settings, .. } = setup(mission);
+    let initial = Loop::new(mission, settings).unwrap_or_else(|errors| panic!("{errors}"));
+    let (baseline, mut control) = (Baseline::new(&initial), initial.clone());
+    let mut events = events.iter();
+    for (number, made) in decided.iter().enumerate() {
+        let mut answers = Vec::new();
+        if !made.planned {
+            let event = events.next().expect("there are as many events");
+            // The first event enrols the robot.
+            if number > 0 {
+                answers.extend(control.react(&Observation::parse(event), Duration::ZERO));
+            }
+        }
+        if !made.planning && !made.late {
+            answers.extend(control.deliberate());
+        }
+        if !made.late {
+            let expected = control.decision(&answers).answers;
+            let essence = |answers| if made.planned { unproved(essence(answers)) } else { essence(answers) };
+            assert_eq!(essence(&made.answers), essence(&expected), "decision {number} of {}", decided.len());
+        }
+        assert!(made.late || control.has_agenda() == made.planning, "decision {number} of {}", decided.len());
+        if made.planned {
+            control = initial.clone();
+            let snapshot = baseline.snapshot(made.state.snapshot.clone());
+            control.restore(&snapshot).expect("the snapshot fits");
+        }
+    }
+    assert!(!control.has_agenda(), "the last plan is missing");
+}
+
+/// Removes from answers whether plans are optimal.
+fn unproved(mut answers: Vec<Value>) -> Vec<Value> {
+    for answer in answers.iter_mut().filter_map(Value::as_object_mut) {
+        if answer["answer"].as_str().is_some_and(|kind| kind.starts_with("plan_")) {
+            for field in ["optimal", "because", "status"] {
+                answer.remove(field);
+            }
+        }
     }
     answers
 }

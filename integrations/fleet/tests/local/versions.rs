@@ -18,7 +18,7 @@ use metaplan_fleet::worker;
 use tempfile::TempDir;
 use tokio::sync::watch;
 
-use super::{all, assert_same, decided, decisions, open, scripts, tell};
+use super::{PATIENT, all, assert_same, decided, decisions, open, scripts, tell};
 
 /// Directories with two versions of the mission `ugv`: the original, and one with a setting.
 struct Versions(TempDir);
@@ -47,7 +47,8 @@ impl Versions {
     }
 
     fn shared(&self, store: &Local, names: &[&str]) -> Arc<Shared<Local>> {
-        let settings = Settings { discard_every: 2, look: Duration::from_millis(5), ..Settings::default() };
+        let look = Duration::from_millis(5);
+        let settings = Settings { patience: PATIENT, discard_every: 2, look, ..Settings::default() };
         Arc::new(Shared::new(store.clone(), self.missions(names), names.join("+"), settings))
     }
 }
