@@ -1,6 +1,8 @@
 """The deployment files are valid by their schemas, and ask for no more rights than they need."""
 
 import configparser
+import json
+import re
 import shutil
 import subprocess
 import sys
@@ -20,6 +22,15 @@ CONTAINERFILES = [ROOT / "Containerfile", EXAMPLES / "Containerfile", ROOT / "in
 RESOURCES = list(yaml.safe_load_all((EXAMPLES / "statefulset.yaml").read_text()))
 KINDS = {resource["kind"]: resource for resource in RESOURCES}
 COMPOSE = yaml.safe_load((EXAMPLES / "compose.yaml").read_text())
+
+SOURCES = "\n".join(path.read_text() for path in sorted((ROOT / "integrations/fleet/src").rglob("*.rs")))
+METRICS = {name: kind for kind, name in re.findall(r'metrics::(counter|gauge|histogram)!\(\s*"(\w+)"', SOURCES)}
+MANUAL = (ROOT / "docs/how-to/machines.md").read_text()
+RUNBOOK = (ROOT / "docs/how-to/operate-fleet.md").read_text()
+DASHBOARD = json.loads((EXAMPLES / "grafana.json").read_text())
+ALERTS_TEXT = (EXAMPLES / "alerts.yaml").read_text()
+ALERTS = [rule for group in yaml.safe_load(ALERTS_TEXT)["groups"] for rule in group["rules"]]
+QUERIES = [target["expr"] for panel in DASHBOARD["panels"] for target in panel["targets"]]
 
 
 def of_git(*words):
@@ -125,3 +136,75 @@ def test_systemd_has_no_complaint_of_the_unit(tmp_path):
     copy.write_text(UNIT.read_text().replace("/usr/local/bin/metaplan-ros", sys.executable))
     out = subprocess.run(["systemd-analyze", "verify", "--man=no", copy], capture_output=True, text=True, check=False)
     assert out.returncode == 0 and not out.stderr.strip(), out.stderr
+
+
+def metrics_in(text):
+    """The metrics that a text names. The exporter adds `_sum` and `_count` to the name of a histogram, which it renders as a summary."""
+    names = set()
+    for name in re.findall(r"\bmetaplan_fleet_\w+", text):
+        base = re.sub(r"_(sum|count)$", "", name)
+        names.add(base if METRICS.get(base) == "histogram" else name)
+    return names
+
+
+def test_the_sources_have_metrics():
+    assert set(METRICS.values()) == {"counter", "gauge", "histogram"} and len(METRICS) >= 11
+    # Each macro of the sources has its name as a literal, so that the pattern finds it.
+    assert len(re.findall(r"metrics::(?:counter|gauge|histogram)!", SOURCES)) == len(METRICS)
+
+
+def test_metrics_of_the_files_are_those_of_the_sources():
+    table = MANUAL.partition("## Metrics and probes")[2]
+    for text in (table, "\n".join(QUERIES)):
+        assert metrics_in(text) == METRICS.keys()
+    for text in (MANUAL, ALERTS_TEXT, RUNBOOK, json.dumps(DASHBOARD)):
+        assert metrics_in(text) <= METRICS.keys()
+
+
+def test_quantiles_are_those_of_the_exporter():
+    """The exporter's builder sets neither buckets nor quantiles, so there are no `_bucket` series."""
+    assert not re.search(r"set_(native_)?(buckets|quantiles)", SOURCES)
+    text = "\n".join([*QUERIES, *(rule["expr"] for rule in ALERTS)])
+    assert "histogram_quantile" not in text and "_bucket" not in text
+    assert set(re.findall(r'quantile="([^"]*)"', text)) <= {"0", "0.5", "0.9", "0.95", "0.99", "0.999", "1"}
+
+
+def test_reasons_of_the_runbook_are_those_of_the_sources():
+    robot = (ROOT / "integrations/fleet/src/robot.rs").read_text()
+    own = set(re.findall(r'Self::\w+ => "(\w+)",', robot)) | set(re.findall(r'self\.refuse\(.*"(\w+)"\)', SOURCES))
+    section = RUNBOOK.partition("## Events are refused")[2].partition("\n## ")[0]
+    assert set(re.findall(r"^\| `(\w+)` \|", section, re.MULTILINE)) - {"reason"} == own
+    assert set(re.findall(r'reason!="(\w+)"', ALERTS_TEXT)) <= own
+
+
+def test_alerts_of_the_runbook_are_those_of_the_file():
+    rows = re.findall(r"^\| \[(\w+)\]\(#([\w-]+)\) \| `([^`]*)` \| (\w*) *\|$", RUNBOOK, re.MULTILINE)
+    assert [(name, expression, time) for name, _, expression, time in rows] == [
+        (rule["alert"], " ".join(rule["expr"].split()), rule.get("for", "")) for rule in ALERTS
+    ]
+    headings = {re.sub(r"[^\w -]", "", heading).lower().replace(" ", "-") for heading in re.findall(r"^## (.*)$", RUNBOOK, re.MULTILINE)}
+    assert {anchor for anchor in re.findall(r"\]\(#([\w-]+)\)", RUNBOOK)} <= headings
+
+
+@pytest.mark.parametrize("words", [["check", "rules", EXAMPLES / "alerts.yaml"], ["test", "rules", Path(__file__).parent / "alerts.yaml"]], ids=lambda words: words[0])
+def test_promtool_accepts_the_alerts(words):
+    if not shutil.which("promtool"):
+        pytest.skip("promtool is not there")
+    out = subprocess.run(["promtool", *words], capture_output=True, text=True, check=False)
+    assert out.returncode == 0, out.stdout + out.stderr
+
+
+def test_the_dashboard_can_be_imported_everywhere():
+    variables = {variable["name"]: variable for variable in DASHBOARD["templating"]["list"]}
+    assert variables["datasource"]["type"] == "datasource" and variables["datasource"]["query"] == "prometheus"
+    # Every panel and query uses the data source that the reader selects.
+    own = {"type": "prometheus", "uid": "${datasource}"}
+    panels = DASHBOARD["panels"]
+    for part in [*panels, *(target for panel in panels for target in panel["targets"]), variables["job"], variables["instance"]]:
+        assert part["datasource"] == own
+    for query in QUERIES:
+        assert set(re.findall(r"\$(\w+)", query)) <= {"job", "instance", "__rate_interval"} and 'job="$job"' in query
+    assert "://" not in json.dumps(DASHBOARD) and not DASHBOARD["links"] and "id" not in DASHBOARD
+    assert len({panel["id"] for panel in panels}) == len(panels)
+    places = {(x, y) for panel in panels for x in range(panel["gridPos"]["x"], panel["gridPos"]["x"] + panel["gridPos"]["w"]) for y in [panel["gridPos"]["y"]]}
+    assert len(places) == sum(panel["gridPos"]["w"] for panel in panels) and all(x < 24 for x, _ in places)
