@@ -204,7 +204,7 @@ fn states(statement: &str, claim: &Claim) -> bool {
 }
 
 fn failed(what: &str, error: &dyn std::fmt::Display) -> Message {
-    Message::error("M145", format!("the proved checker cannot be run: {what}: {error}"))
+    Message::error("M145", format!("the proved checker (`--proved`) cannot be run: {what}: {error}"))
 }
 
 fn read(file: &Path) -> Result<String, Message> {

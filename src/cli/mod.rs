@@ -96,7 +96,8 @@ enum Subcommands {
     /// Export a mission for other planners, with the facts from the knowledge base.
     #[command(after_long_help = examples::EXPORT)]
     Export(export::Arguments),
-    /// Write a plan as an HTML page or picture: timeline, map, search, designs with reasons, before and after.
+    /// Write a plan or a journal as an HTML page: timeline, map, search, reasons for designs, effects of
+    /// changes.
     #[command(after_long_help = examples::REPORT)]
     Report(report::Arguments),
     /// Run the adaptation loop: events in, adaptations out, one JSON object per line.

@@ -58,7 +58,7 @@ impl Live {
             return Err(Message::error("M332", text));
         }
         let failed = |error: io::Error| {
-            Message::error("M332", format!("nothing can be served at {}: {error}", address.0))
+            Message::error("M332", format!("the server cannot listen on {}: {error}", address.0))
         };
         let listener = TcpListener::bind(address.0).map_err(failed)?;
         let address = listener.local_addr().map_err(failed)?;

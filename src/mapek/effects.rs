@@ -193,8 +193,8 @@ mod tests {
         }
     }
 
-    /// A report of the action implies its reconfiguration, but does not prove that no copy of the
-    /// reconfiguration is on its way.
+    /// A report about an action shows that its reconfiguration was carried out. A copy of the reconfiguration request
+    /// may still be in transit, so the next reconfiguration supersedes it.
     #[test]
     fn a_reconfiguration_supersedes_the_implied_one() {
         let (mut beliefs, mut answers) = (beliefs(), Vec::new());

@@ -48,8 +48,8 @@ use crate::concurrent::timed_relaxed_plan::{TimedRelaxation, TimedRelaxedPlan};
 const MAX_ROUNDS: usize = 60;
 /// Upper limit on the number of states that one best-first search evaluates.
 const MAX_ESCAPE: usize = 100;
-/// Upper limit on the number of best-first searches per goal. Orders that need more are dropped, so that
-/// tasks whose goals conflict leave the time to the other searches.
+/// Upper limit on the number of best-first searches per goal. An order that needs more is dropped. Otherwise,
+/// this search would take too much time from the other searches on tasks with conflicting goals.
 const MAX_ESCAPES: usize = 3;
 /// Number of orders after which the search ends if it has found no plan.
 const MAX_FAILURES: usize = 12;

@@ -301,7 +301,8 @@ impl<'a, T: TimeNumber> Search<'a, T> {
         }
         let depth = origin.map_or(0, |origin| origin.depth);
         if let Some(id) = self.store.add(situation, origin) {
-            // The critical path takes the longest, so it is evaluated only when the node would be expanded.
+            // The critical-path bound is the most expensive one to compute, so it is computed only when the
+            // node would be expanded.
             let is_evaluated = self.critical_path.is_none();
             self.open.push(Reverse((value.0, value.1, remaining.sum, depth, id, is_evaluated)));
         }
