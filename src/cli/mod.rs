@@ -85,7 +85,7 @@ enum Subcommands {
     /// Compare Metaplan with probabilistic model checking on a co-adaptation mission.
     #[command(after_long_help = examples::COMPARE)]
     Compare(compare::Arguments),
-    /// Choose a design for each function that needs one, without a task plan, as MROS does.
+    /// Choose a design for each function that needs one, without a task plan, similarly to MROS.
     #[command(after_long_help = examples::CONFIGURE)]
     Configure(configure::Arguments),
     /// Import a mission from the files of another tool.
