@@ -164,8 +164,8 @@ fn traced(cli: &Cli) -> Result<Exit, Failure> {
     }
 }
 
-/// `--color` also applies to messages about faulty arguments, even if these arguments precede the
-/// option.
+/// Parses the command line. `--color` also applies to messages about faulty arguments, even if these arguments
+/// precede the option.
 fn parse() -> Cli {
     let words: Vec<String> = std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
     let beside = words.iter().zip(words.iter().skip(1)).filter(|(word, _)| *word == "--color");

@@ -77,7 +77,7 @@ pub(super) struct TemporalTask<T: TimeNumber = Int> {
     /// Per preference that can be violated: operators of which at least one is applicable in the
     /// final state if the preference is violated. These operators never occur in a plan.
     pub(super) violations: Vec<Vec<OperatorId>>,
-    /// Checked on complete plans.
+    /// Deadlines of trajectory constraints, which are checked on complete plans.
     pub(super) deadlines: Vec<Deadline<T>>,
     /// Whether the search covers every plan with all its possible times, so that exhausting the
     /// search is a proof.

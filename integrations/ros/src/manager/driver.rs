@@ -129,7 +129,7 @@ struct Driver {
     settings: Settings,
     /// `true` while the lifecycle state is active. Otherwise, tasks are refused and other inputs wait.
     active: Arc<AtomicBool>,
-    /// In milliseconds.
+    /// Time limit of a call, in milliseconds.
     timeout: Arc<AtomicU64>,
     clock: Arc<Clock>,
     /// Time of `clock` when this driver was created.
