@@ -24,7 +24,7 @@ pub fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
     (domain, problem)
 }
 
-/// The validator checks the plan and its metric.
+/// Plans with chosen durations. The validator checks the plan and its metric.
 pub fn solve(domain: &Domain, problem: &Problem, separation: &BigRational, limits: &Limits) -> Solution {
     let config = GroundConfig::default().with_limits(limits.clone());
     let task =

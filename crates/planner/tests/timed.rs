@@ -16,7 +16,8 @@ fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
     (domain, problem)
 }
 
-/// With `Engine::Sat`, only the SAT solver is used, up to horizon 8.
+/// Returns the best plan, if there is one. With `Engine::Sat`, only the SAT solver is used, up to horizon
+/// 8.
 fn plan(domain: &Domain, problem: &Problem, engine: Engine) -> Option<Plan> {
     let task =
         ground(domain, problem, &GroundConfig::default()).unwrap_or_else(|errors| panic!("{errors:?}"));

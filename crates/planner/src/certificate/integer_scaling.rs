@@ -60,7 +60,8 @@ impl Scales {
     }
 }
 
-/// The scale must be a multiple of the denominator of `number`.
+/// Returns the product of `number` and `scale`, which must be a multiple of the denominator of
+/// `number`.
 pub(super) fn scaled<N: TaskNumber>(number: &N, scale: &Integer) -> Integer {
     let number = number.to_rational();
     if let Some(integer) = number.to_int() {

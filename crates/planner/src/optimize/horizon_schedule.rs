@@ -128,8 +128,8 @@ fn decide(
     })
 }
 
-/// Returns `None` if the task has numeric variables or the number of states overflows. A shortest
-/// plan has fewer steps than there are states, because it visits no state twice.
+/// Returns the number of states, counting unreachable ones. A shortest plan has fewer steps, because it
+/// visits no state twice. Returns `None` if the task has numeric variables or the number overflows.
 fn states(task: &Task) -> Option<usize> {
     if !task.initial.numbers.is_empty() {
         return None;

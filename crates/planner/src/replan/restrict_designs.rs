@@ -71,7 +71,8 @@ pub(super) fn restrict(
 }
 
 impl SharedTables {
-    /// Returns `None` if a slot has no remaining design.
+    /// Restricts the slots of an operator to the allowed designs. Returns `None` if a slot has no remaining
+    /// design.
     fn operator(
         &mut self,
         task: &Task,

@@ -64,7 +64,8 @@ type Priority<T> = (T, T, T, u32, u32, bool);
 pub(super) struct Search<'a, T: TimeNumber = Int> {
     concurrent: &'a TemporalTask<T>,
     estimate: &'a Estimate<T>,
-    /// `None` if its bound for the initial state is no better than that of `estimate`.
+    /// Critical-path heuristic; `None` if its bound for the initial state is no better than that of
+    /// `estimate`.
     critical_path: Option<CriticalPath<'a, T>>,
     /// Lower bounds on costs and resources; `None` if they are not needed or could not be computed.
     bounds: Option<&'a Bounds>,
