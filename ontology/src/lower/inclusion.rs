@@ -269,7 +269,8 @@ impl InclusionGraph {
         }
     }
 
-    /// Compares nested restrictions up to `depth` levels.
+    /// Returns the restrictions that are conditions and include `restriction`. Nested restrictions are compared up to
+    /// `depth` levels.
     fn including(
         &self,
         restriction: &ClassExpression,

@@ -28,9 +28,9 @@ impl Scales {
         Self { numbers: unit(), costs: unit(), times: unit(), bounds: unit() }
     }
 
-    /// Cost bounds are counted in multiples of `unit`. Returns `None` if an effect multiplies a
-    /// number by a fraction (its values then have no common denominator), or a denominator has too
-    /// many bits.
+    /// Computes the factors for a task whose cost bounds are counted in multiples of `unit`.
+    /// Returns `None` if an effect multiplies a number by a fraction (its values then have no
+    /// common denominator), or a denominator has too many bits.
     pub(super) fn of(task: &Task<Rational>, unit: &Rational) -> Option<Self> {
         let mut numbers = CommonDenominator::of_at_most(MOST_BITS);
         let mut times = CommonDenominator::of_at_most(MOST_BITS);

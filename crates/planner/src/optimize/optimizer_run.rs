@@ -242,7 +242,7 @@ impl<'a> Run<'a> {
         cost(self.task, &steps).map(|cost| GroundPlan { steps, cost })
     }
 
-    /// After an internal contradiction, nothing counts as proved.
+    /// Returns the solution of the run. After an internal contradiction, it counts nothing as proved.
     pub(super) fn finish(
         self,
         status: Status,

@@ -135,7 +135,8 @@ impl Preference {
     }
 }
 
-/// Greatest fixpoint, because effects on numbers read other numbers.
+/// Computes for each number whether less or more of it is never worse. The result is a greatest fixpoint, because
+/// effects on numbers read other numbers.
 fn preferences(task: &Task, weights: &[(NumericId, Int)]) -> Vec<Preference> {
     let mut preferences = vec![Preference { less: true, more: true }; task.initial.numbers.len()];
     // More of a compared expression, and less of the cost, is never worse.
