@@ -48,6 +48,7 @@ impl Live {
     /// Starts the server. A token is required unless the address is a loopback address. Without
     /// `painter`, plans are not drawn.
     ///
+    /// # Errors
     /// The token is missing, or the server cannot listen on the address.
     pub fn open(address: Address, token: Option<Token>, painter: Option<Painter>) -> Result<Self, Message> {
         // Other machines on the network could otherwise read the run.

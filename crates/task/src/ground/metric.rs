@@ -25,6 +25,7 @@ use pddl::ast::Direction;
 /// Computes the costs of all operators, and stores the parts of the metrics that are not operator costs in the
 /// task.
 ///
+/// # Errors
 /// A metric is not linear, reads a function without a value, or contains a fluent with state-dependent changes
 /// although `generality` does not allow this. It is also an error if the deadline has passed or the run is
 /// interrupted.
