@@ -1,8 +1,10 @@
 //! Strips the symbols of the program in release builds.
 //!
-//! Cargo ignores `strip` of a profile for a package that has overrides of this profile, as this one has.
+//! The setting `strip` of the profile has no effect on this package: Cargo ignores it for each package with an
+//! override section, here `[profile.release.package.metaplan]`.
 
-/// Passes the option to the linker, except in builds with debug information and on platforms with other linkers.
+/// Passes `--strip-all` to the linker in release builds without debug information, if the target environment is
+/// `gnu` or `musl`.
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
     let is =

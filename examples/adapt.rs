@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let component = words.get(1).map_or("c_kinect", String::as_str);
     let setup = Setup::read(Path::new(manifest))?;
 
-    // The certificate contains all data with which the optimality of the plan can be checked.
+    // The certificate contains everything that is needed to check that the plan is optimal.
     let planned = Planner::new(&setup.mission)?.time_limit(Duration::from_secs(60)).plan()?;
     println!("{}", planned.solution.verdict());
     let directory = std::env::temp_dir().join(format!("metaplan-adapt-{}", std::process::id()));

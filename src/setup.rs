@@ -41,7 +41,7 @@ struct Sections {
     /// Settings of the adaptation loop.
     #[serde(default)]
     adaptation: AdaptationSection,
-    /// The symbols of the probabilistic process, for `compare` and for `export` to PRISM and JANI.
+    /// The symbols and parameters of the probabilistic process, for `compare` and for `export` to PRISM and JANI.
     #[serde(default)]
     probabilistic: Roles,
     /// Settings for pictures.
@@ -63,7 +63,7 @@ pub struct Setup {
     pub settings: Settings,
     /// Unit of the times in the domain, e.g. of durations.
     pub time_unit: TimeUnit,
-    /// Names of the PDDL symbols from which the co-adaptation process (Markov decision process of the mission) is
+    /// PDDL symbols and parameters from which the co-adaptation process (Markov decision process of the mission) is
     /// built.
     pub roles: Roles,
     /// Scenarios by name.

@@ -33,7 +33,7 @@ t:fg a t:FunctionGrounding ; t:solvesO t:o ; t:typeFD s:fd_all_thrusters .
 s:c_thruster_1 t:c_status \"FALSE\" .
 ";
 
-/// In milliseconds.
+/// Running times in milliseconds.
 #[derive(Clone, Copy, Debug)]
 struct Times {
     wall: f64,

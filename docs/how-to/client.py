@@ -13,7 +13,7 @@ class Loop:
         self.answers.put({"answer": "end"})
 
     def wait(self):
-        """The answers to one line, up to `handled`; the first call has `ready` and the first plan."""
+        """Yields the answers to a line, except `handled`. The first call yields `ready` and the first plan."""
         while (answer := self.answers.get())["answer"] not in ("handled", "end"):
             yield answer
 

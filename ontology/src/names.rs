@@ -54,7 +54,7 @@ impl Names {
         self.numbers.get(name).copied()
     }
 
-    /// The text of a blank node begins with `_:`.
+    /// Returns the text with this number: an IRI, or for a blank node a text that begins with `_:`.
     pub(crate) fn text(&self, number: u32) -> &Iri {
         &self.texts[number as usize]
     }
@@ -67,7 +67,7 @@ impl Names {
         self.texts.len()
     }
 
-    /// The keys are the addresses of the shared texts, the values are ranks in alphabetical order.
+    /// Returns the alphabetical ranks of all texts, by the addresses of the shared texts.
     pub(crate) fn ranks(&self) -> FxHashMap<*const u8, u32> {
         let mut sorted: Vec<&Iri> = self.texts.iter().collect();
         // Interned texts are distinct, so an unstable sort is deterministic.
@@ -75,7 +75,7 @@ impl Names {
         sorted.into_iter().zip(0..).map(|(iri, rank)| (iri.as_ptr(), rank)).collect()
     }
 
-    /// `blank` returns the number of a blank node.
+    /// Converts a triple to its compact form. `blank` returns the number of a blank node.
     pub(crate) fn compact(
         &mut self,
         triple: Triple,

@@ -318,7 +318,8 @@ fn resembles(first: &Axiom, second: &Axiom) -> bool {
     individuals_of(second).into_iter().any(|individual| individuals_of(first).contains(&individual))
 }
 
-/// A blank node of one document never denotes an individual of another document.
+/// Rejects retractions with anonymous individuals: a blank node of one document never denotes an individual of
+/// another document.
 fn reject_anonymous(retractions: &Ontology) -> Result<(), Errors> {
     let is_anonymous = |statement: &dyn Debug| format!("{statement:?}").contains(ANONYMOUS);
     let axioms =

@@ -133,7 +133,8 @@ impl Engine {
         })
     }
 
-    /// An error comes with the delta that restores the stated facts.
+    /// Applies an update in an engine without equality, and returns the changes of all facts. An error comes with the
+    /// delta that restores the stated facts.
     pub(crate) fn apply_plainly(&mut self, delta: Delta) -> Result<Delta, (Error, Delta)> {
         self.replan().map_err(|error| (error, Delta::default()))?;
         let stated = state_change(self, delta);

@@ -46,10 +46,10 @@ pub enum Reason {
         /// Positions in [`Derivation::steps`] of the facts matched by the relation atoms of the body, in
         /// order.
         supports: Vec<usize>,
-        /// Facts whose absence the negated atoms of the body require, in order. Empty if the derivation is of
-        /// [`Engine::everything`](crate::Engine::everything).
+        /// Facts that the negated atoms of the body require to be absent, in order. Empty if the derivation comes
+        /// from [`Engine::everything`](crate::Engine::everything).
         absent: Vec<Fact>,
-        /// Aggregates of the body, in order. Empty if the derivation is of
+        /// Aggregates of the body, in order. Empty if the derivation comes from
         /// [`Engine::everything`](crate::Engine::everything).
         aggregates: Vec<Aggregated>,
     },

@@ -108,7 +108,7 @@ impl<'a> Lowering<'a> {
         Some(Template { relation: self.relation(predicate, &terms), arguments: sources(&terms) })
     }
 
-    /// `outer_conditions` contains the conditions already lowered.
+    /// Lowers an aggregate of a rule. `outer_conditions` contains the conditions already lowered.
     fn aggregate(
         &mut self,
         position: usize,

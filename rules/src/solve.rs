@@ -7,7 +7,8 @@ use crate::source::Source;
 use crate::symbol::Symbol;
 
 impl Round<'_> {
-    /// Returns no match if the budget is exhausted.
+    /// Extends each match by the values of the unbound arguments for which the built-in holds. Returns
+    /// no match if the budget is exhausted.
     pub fn solve(
         &self,
         block: &[Symbol],

@@ -235,7 +235,7 @@ impl Relation {
         self.rows.find(hash(arguments.iter().copied()), |&row| self.row(row) == arguments).copied()
     }
 
-    /// The row must not exist yet.
+    /// Adds a row, which must not exist yet, and returns its number.
     pub fn insert(&mut self, arguments: &[Symbol], state: u8, record: Record) -> Row {
         let row = if let Some(row) = self.free.pop() {
             let start = row as usize * self.arity;
@@ -259,7 +259,7 @@ impl Relation {
         row
     }
 
-    /// The number of the row may be reused.
+    /// Removes a row. Its number may be reused.
     pub fn remove(&mut self, row: Row) {
         let (values, arity) = (&self.arguments, self.arity);
         let row_of = |row: Row| &values[row as usize * arity..(row as usize + 1) * arity];
@@ -279,7 +279,7 @@ impl Relation {
         self.indexes.iter().any(|index| index.columns == columns && index.excluded_rule.is_none())
     }
 
-    /// `columns` is a bit mask. Builds the index on first use.
+    /// Returns the number of the index on the columns of a bit mask. Builds the index on first use.
     pub fn index(&mut self, columns: u32) -> usize {
         self.index_without(columns, None)
     }

@@ -136,8 +136,9 @@ pub struct ComparisonAnswer {
     start: Option<String>,
     /// Goal of the mission; null for the mission's own start and goal.
     goal: Option<String>,
-    /// The compared plans and policies, each with `kind` (`a` to `f`), `name` and the measures. A
-    /// measure is null if it is infinite or undefined.
+    /// The compared plans and policies (`kind` `a` to `e`) and, if the comparison is complete, lower bounds (`kind`
+    /// `f`). Each row has `kind`, `name` and the measures. A measure is null if it is infinite or undefined, or if
+    /// there is no bound on it.
     #[schemars(with = "Vec<std::collections::BTreeMap<String, serde_json::Value>>")]
     candidates: Vec<Row>,
     #[serde(flatten)]

@@ -50,9 +50,11 @@ struct StrategyPart {
     reconfigurations: Option<SamplePart>,
     /// Number of different configurations of requested actions.
     configurations: Option<SamplePart>,
-    /// Number of runs in which the strategy did better than the loop; null if the loop was not simulated.
+    /// Number of runs in which the strategy did better than the adaptation loop (strategy `joint`); null if the
+    /// loop was not simulated.
     better_than_joint: Option<usize>,
-    /// Number of runs in which the strategy did worse than the loop.
+    /// Number of runs in which the strategy did worse than the adaptation loop; null if the loop was not
+    /// simulated.
     worse_than_joint: Option<usize>,
 }
 
@@ -77,7 +79,7 @@ struct RunPart {
     accomplished: bool,
     /// Whether the robot was lost because its `lifeline` reached 0.
     lost: bool,
-    /// Whether the time budget was exhausted first.
+    /// Whether the run ended because the time budget was exhausted.
     out_of_time: bool,
     /// Whether the strategy gave up.
     gave_up: bool,

@@ -19,7 +19,7 @@ pub(super) fn files(mission: &Mission) -> Result<Option<[(&'static str, String);
     let Some(knowledge) = mission.knowledge() else { return Ok(None) };
     let sources = knowledge.sources();
     let first = |messages: Vec<Message>| {
-        let unreadable = || Message::error("M120", "the knowledge base cannot be read again");
+        let unreadable = || Message::error("M120", "no certificate: the knowledge base cannot be read again");
         messages.into_iter().next().unwrap_or_else(unreadable)
     };
     let (document, _) = ontology::convert_files(&sources.documents, &sources.options, OutputSyntax::NTriples)

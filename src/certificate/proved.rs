@@ -1,9 +1,9 @@
 //! Runs the proved checker (`proved/`, extracted from Coq) on a certificate, and compares its answer with that of
 //! `metaplan-verify`.
 //!
-//! Two programs are called. `metaplan-proved-prepare` writes evidence for the claim and need not be trusted.
-//! `metaplan-proved-check` checks the evidence with the function about which the theorems `optimal` and
-//! `unsolvable` are proved.
+//! `metaplan-proved-prepare` writes evidence for the claim and need not be trusted. One of two other programs checks
+//! the evidence with the function about which theorems are proved: `metaplan-proved-check` for a plan or its absence
+//! (theorems `optimal` and `unsolvable`), `metaplan-proved-front` for a Pareto front (theorem `front_optimal`).
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -18,8 +18,8 @@ use crate::message::Message;
 const PREPARE: &str = "metaplan-proved-prepare";
 const CHECK: &str = "metaplan-proved-check";
 const FRONT: &str = "metaplan-proved-front";
-/// Exit status of the programs on success. The next two constants are other exit statuses of
-/// `metaplan-proved-check` and `metaplan-proved-front`; `proved/ocaml/check.ml` defines them.
+/// Exit status of the programs on success. The next two constants are other exit statuses of `metaplan-proved-check`
+/// and `metaplan-proved-front`, as defined in `proved/ocaml/check.ml` and `check_front.ml`.
 const PROVED: i32 = 0;
 const REJECTED: i32 = 3;
 const NOT_PROVED: i32 = 30;
@@ -204,7 +204,7 @@ fn states(statement: &str, claim: &Claim) -> bool {
 }
 
 fn failed(what: &str, error: &dyn std::fmt::Display) -> Message {
-    Message::error("M145", format!("the proved checker cannot be run: {what}: {error}"))
+    Message::error("M145", format!("the proved checker (`--proved`) cannot be run: {what}: {error}"))
 }
 
 fn read(file: &Path) -> Result<String, Message> {

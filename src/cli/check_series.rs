@@ -17,13 +17,15 @@ const MOST: usize = 100_000;
 
 pub struct Combination {
     pub settings: Settings,
-    /// Only constants for which a series is given, in the order of the command line.
+    /// The constants for which a series is given, with their values, in the order of the command
+    /// line.
     pub varied: Vec<(String, String)>,
 }
 
 pub type Row<'a> = (&'a Combination, &'a [Result<Report, Error>]);
 
-/// The value of the last constant changes fastest.
+/// Returns all combinations of the values of the constants. The value of the last constant changes
+/// fastest.
 pub fn combinations(constants: &[(String, String)]) -> Result<Vec<Combination>, Failure> {
     let mut combinations = vec![Combination { settings: Settings::new(), varied: Vec::new() }];
     for (name, text) in constants {
@@ -119,7 +121,7 @@ fn header<'a>(heads: &[&'a str], rows: &[Row<'a>]) -> Vec<&'a str> {
     varied.iter().map(|(name, _)| &name[..]).chain(heads.iter().copied()).collect()
 }
 
-/// Finite values are written as doubles.
+/// Formats the results as CSV. Finite values are written as doubles.
 pub fn csv(heads: &[&str], rows: &[Row<'_>]) -> String {
     let plain = |answer: &Answer| match answer {
         Answer::Finite(quantity) => number(quantity.value),

@@ -50,7 +50,8 @@ pub struct Arguments {
     /// Stop after this many seconds with the comparisons so far.
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     time_limit: Option<Duration>,
-    /// Compare for this many pairs of start and goal instead of the mission's pair, spread evenly over all pairs.
+    /// Compare for this many pairs of start and goal, evenly selected from all pairs, instead of the mission's
+    /// pair.
     #[arg(long, value_name = "N")]
     pairs: Option<usize>,
     /// Compare for another pair of start and goal than the mission's.

@@ -50,7 +50,7 @@ impl Shared {
         Self(Arc::new(Mutex::new(Some(SoFar::default()))))
     }
 
-    /// Does nothing once the results are being shown, because the program then ends.
+    /// Changes the results. Does nothing once they are being shown, because the program then ends.
     pub fn change(&self, change: impl FnOnce(&mut SoFar)) {
         if let Some(so_far) = &mut *self.0.lock().unwrap_or_else(PoisonError::into_inner) {
             change(so_far);

@@ -153,7 +153,7 @@ fn cost_text(answer: &BestPlan, best: &BestPlan) -> String {
     }
 }
 
-/// `about` marks the bound as approximate.
+/// Describes an alteration. `about` marks the bound as approximate.
 fn alteration_text(alteration: &Alteration, about: bool) -> String {
     let Alteration { name, from, to } = alteration;
     let now = from.as_ref().map(|from| format!(" (now {})", decimal(from))).unwrap_or_default();

@@ -85,7 +85,7 @@ enum Subcommands {
     /// Compare Metaplan with probabilistic model checking on a co-adaptation mission.
     #[command(after_long_help = examples::COMPARE)]
     Compare(compare::Arguments),
-    /// Choose a design for each function that needs one, without a task plan, as MROS does.
+    /// Choose a design for each function that needs one, without a task plan, similarly to MROS.
     #[command(after_long_help = examples::CONFIGURE)]
     Configure(configure::Arguments),
     /// Import a mission from the files of another tool.
@@ -96,7 +96,8 @@ enum Subcommands {
     /// Export a mission for other planners, with the facts from the knowledge base.
     #[command(after_long_help = examples::EXPORT)]
     Export(export::Arguments),
-    /// Write a plan as an HTML page or picture: timeline, map, search, designs with reasons, before and after.
+    /// Write a plan or a journal as an HTML page: timeline, map, search, reasons for designs, effects of
+    /// changes.
     #[command(after_long_help = examples::REPORT)]
     Report(report::Arguments),
     /// Run the adaptation loop: events in, adaptations out, one JSON object per line.
@@ -163,8 +164,8 @@ fn traced(cli: &Cli) -> Result<Exit, Failure> {
     }
 }
 
-/// `--color` also applies to messages about faulty arguments, even if these arguments precede the
-/// option.
+/// Parses the command line. `--color` also applies to messages about faulty arguments, even if these arguments
+/// precede the option.
 fn parse() -> Cli {
     let words: Vec<String> = std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
     let beside = words.iter().zip(words.iter().skip(1)).filter(|(word, _)| *word == "--color");

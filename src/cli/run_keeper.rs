@@ -116,7 +116,7 @@ impl<'a> KeeperSession<'a> {
         warn_if_unrecorded(self.common, of_loop);
     }
 
-    /// With a journal, records the line before it is handled.
+    /// Handles a line. With a journal, records the line before it is handled.
     fn handle(
         &mut self,
         text: &str,

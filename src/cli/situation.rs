@@ -174,8 +174,8 @@ impl Situation {
     }
 }
 
-/// A scenario that does not exist or cannot be simulated (M108) is a usage error. One that does not
-/// fit the mission is bad input.
+/// Chooses the exit status of errors in a scenario. A scenario that does not exist or cannot be simulated
+/// (M108) is a usage error. One that does not fit the mission is bad input.
 pub(super) fn scenario_failure(messages: Errors) -> Failure {
     let is_usage = messages.iter().any(|message| message.code == "M108");
     Failure { exit: if is_usage { Exit::Usage } else { Exit::BadInput }, messages }

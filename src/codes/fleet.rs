@@ -15,7 +15,7 @@ pub const CODES: &[[&str; 4]] = &[
     ],
     [
         "N302",
-        "Signals cannot be handled, or threads cannot be started.",
+        "The signal handler cannot be installed, or threads cannot be started.",
         "The operating system refuses a handler or a thread.",
         "The message gives the reason. Without the handler a worker cannot shut down in order.",
     ],

@@ -4,7 +4,7 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "N100",
         "`metaplan-ros` cannot start.",
-        "Signals cannot be handled, `--mission` is missing, or `--journal` is given to a role without persistent state.",
+        "The signal handler cannot be installed, `--mission` is missing, or `--journal` is given to a role without persistent state.",
         "Use `--mission FILE`. `--journal` is only for the manager and the reasoner.",
     ],
     [

@@ -16,7 +16,7 @@ use serde::Deserialize;
 use crate::message::{Errors, Message};
 use crate::mission::Mission;
 
-/// The PDDL symbols of the co-adaptation process; the section `[probabilistic]` of a manifest.
+/// The PDDL symbols and the parameters of the co-adaptation process; the section `[probabilistic]` of a manifest.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[allow(missing_docs, reason = "the names are those of the roles")]
@@ -292,7 +292,9 @@ impl Coadaptation {
                 problems.push(Message::error("M122", text));
             }
             if let Some(value) = probabilities.into_iter().find(|value| **value < zero || **value > one) {
-                problems.push(Message::error("M122", format!("{what} has a probability of {value}")));
+                let text =
+                    format!("{what} has a probability of {value}; probabilities must be between 0 and 1");
+                problems.push(Message::error("M122", text));
             }
         };
         for arc in &self.arcs {

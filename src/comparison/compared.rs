@@ -18,7 +18,7 @@ use crate::mission::{Mission, Planning as _};
 pub struct Compared<'m> {
     /// The mission for which plans are computed.
     pub mission: &'m Mission,
-    /// Names of the PDDL symbols from which the process is built.
+    /// PDDL symbols and parameters from which the process is built.
     pub roles: &'m Roles,
     /// Data of the process.
     pub coadaptation: &'m Coadaptation,

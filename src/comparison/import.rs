@@ -67,7 +67,7 @@ pub struct Files {
     pub problem: String,
     /// Coordinates of the places, the text of `positions.csv`.
     pub positions: String,
-    /// Warnings about parts of the map that are ignored or assumed.
+    /// Warnings about parts of the map that are ignored, and about assumptions that replace missing data.
     pub warnings: Vec<Message>,
 }
 

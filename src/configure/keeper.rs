@@ -45,7 +45,7 @@ pub enum Service {
         /// The new design. `None` if the objective was removed.
         to: Option<String>,
         /// Reasons, as sentences: why the objective needs a design, why better designs were not chosen, and which
-        /// requirements the new design misses. Or that the objective was removed.
+        /// requirements the new design misses. If the objective was removed, the only reason is the removal.
         because: Vec<String>,
         /// `true` if it is proved that no choice for all objectives in need is better, or if the objective was
         /// removed.

@@ -23,7 +23,7 @@ impl Canvas {
         Self { painter, shown: Mutex::default() }
     }
 
-    /// Does not wait for a drawing in progress.
+    /// Replaces the current plan. Does not wait for a drawing in progress.
     pub(super) fn take(&self, outlook: Option<Outlook>) {
         *self.lock() = Shown { outlook: outlook.map(Arc::new), drawn: None };
     }

@@ -84,7 +84,8 @@ impl Hub {
         }
     }
 
-    /// Above the limits, drops the oldest lines, and the keys that changed longest ago.
+    /// Adds a line, which is the latest one about these keys. Above the limits, drops the oldest lines, and the keys
+    /// that changed longest ago.
     fn take(&self, line: Arc<str>, keys: Vec<String>) {
         let mut state = self.lock();
         let number = state.end();
@@ -181,7 +182,7 @@ impl HubSender {
         self.enqueue(Entry::Planned { exists, under_way });
     }
 
-    /// Blocks while the queue is full.
+    /// Reports the end of the run. Blocks while the queue is full.
     pub(super) fn end(&self) {
         let _ = self.queue.send(None);
     }

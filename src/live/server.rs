@@ -49,7 +49,7 @@ impl Live {
     /// `painter`, plans are not drawn.
     ///
     /// # Errors
-    /// The token is missing, or the address cannot be served.
+    /// The token is missing, or the server cannot listen on the address.
     pub fn open(address: Address, token: Option<Token>, painter: Option<Painter>) -> Result<Self, Message> {
         // Other machines on the network could otherwise read the run.
         if !address.is_loopback() && token.is_none() {
@@ -58,7 +58,7 @@ impl Live {
             return Err(Message::error("M332", text));
         }
         let failed = |error: io::Error| {
-            Message::error("M332", format!("nothing can be served at {}: {error}", address.0))
+            Message::error("M332", format!("the server cannot listen on {}: {error}", address.0))
         };
         let listener = TcpListener::bind(address.0).map_err(failed)?;
         let address = listener.local_addr().map_err(failed)?;
@@ -203,7 +203,7 @@ fn refuse(stream: &mut TcpStream, (status, words): Refused) -> io::Result<()> {
     send(stream, &(head + &text))
 }
 
-/// Stops when the run ends, the client disconnects, or the client is too slow.
+/// Sends the event stream to a client until the run ends, the client disconnects, or the client is too slow.
 fn events(shared: &SharedState, stream: &mut TcpStream) -> io::Result<()> {
     send(
         stream,
@@ -234,7 +234,7 @@ fn stanzas(lines: &[Arc<str>]) -> String {
     lines.iter().flat_map(|line| ["data: ", line, "\n\n"]).collect()
 }
 
-/// Fails if the connection does not accept the whole text within [`CLIENT_TIMEOUT`].
+/// Sends a text. Fails if the connection does not accept the whole text within [`CLIENT_TIMEOUT`].
 fn send(stream: &mut TcpStream, text: &str) -> io::Result<()> {
     let begun = Instant::now();
     let mut remaining = text.as_bytes();

@@ -55,7 +55,7 @@ pub(super) fn due(beliefs: &Beliefs, settings: &Settings) -> Option<Duration> {
     effects.chain(action).min()
 }
 
-/// The deadline of the action applies to its request.
+/// Returns `true` if the effect requests an action. The deadline of the action then applies to it.
 fn is_request(effect: &Effect) -> bool {
     matches!(effect.command, Command::Request { .. })
 }

@@ -193,8 +193,8 @@ mod tests {
         }
     }
 
-    /// A report of the action implies its reconfiguration, but does not prove that no copy of the
-    /// reconfiguration is on its way.
+    /// A report about an action shows that its reconfiguration was carried out. A copy of the reconfiguration request
+    /// may still be in transit, so the next reconfiguration supersedes it.
     #[test]
     fn a_reconfiguration_supersedes_the_implied_one() {
         let (mut beliefs, mut answers) = (beliefs(), Vec::new());
@@ -207,8 +207,8 @@ mod tests {
             last.map(|effect| effect.supersedes.clone())
         };
         assert_eq!(superseded(&beliefs), Some(vec![1]));
-        // After the acknowledgement of effect 3, no copy of an earlier reconfiguration can be on its way, so
-        // the next one supersedes none.
+        // After the acknowledgement of effect 3, no copy of an earlier reconfiguration can be in transit, so the next
+        // one supersedes none.
         let _ = beliefs.acknowledge(3);
         request(&mut beliefs, step("fd_amcl_kinect"), &mut answers);
         assert_eq!(superseded(&beliefs), Some(Vec::new()));

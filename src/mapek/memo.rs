@@ -76,7 +76,7 @@ impl StoredQuestion {
     }
 }
 
-/// Plans do not depend on the numbers of action and request.
+/// Returns the parts of an action under way on which plans depend: not the numbers of the action and of its request.
 fn relevant_part(running: &Running) -> (&PlannedStep, &num_rational::BigRational) {
     (&running.step, &running.progress)
 }

@@ -252,7 +252,7 @@ impl BeliefUpdate<'_> {
         running.ok_or_else(|| Refusal::new("M305", format!("no action {action} is under way")))
     }
 
-    /// A report of the start also confirms the arrival of the request.
+    /// Records that an action has started. This also confirms that its request has arrived.
     fn confirm_started(&mut self, action: u64) -> Result<&mut Running, Refusal> {
         let request = self.running(action)?.request;
         self.beliefs.confirm_request(request);

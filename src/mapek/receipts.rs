@@ -84,7 +84,7 @@ impl Receipts {
         self.functions.get(function).into_iter().flat_map(|history| history.superseded.keys())
     }
 
-    /// Returns the effect numbers of a function's reconfigurations of which a copy may still be on its way: they were
+    /// Returns the effect numbers of a function's reconfigurations of which a copy may still be in transit: they were
     /// superseded, or their arrival was only implied, without an acknowledgement.
     pub(super) fn unanswered(&self, function: &str) -> impl Iterator<Item = &u64> {
         let implied = self.functions.get(function).and_then(|history| history.implied.as_ref());

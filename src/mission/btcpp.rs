@@ -67,7 +67,7 @@ fn ports(mission: &Mission, step: &Step) -> Vec<(String, String)> {
     names.zip(step.arguments.iter().cloned()).collect()
 }
 
-/// A port name begins with a letter and is not reserved.
+/// Converts the name of a parameter to a port name, which begins with a letter and is not reserved.
 fn port(parameter: &str) -> String {
     let is_taken = RESERVED.iter().any(|reserved| reserved.eq_ignore_ascii_case(parameter));
     let begins = parameter.starts_with(|first: char| first.is_ascii_alphabetic());

@@ -197,8 +197,9 @@ impl Relations<'_> {
                 let rows = part.name().map_or(0, |name| self.rows(name).len());
                 let is_test = part.name().is_none() || part.is_type();
                 let is_apart = free == operands.len() && !bound.is_empty();
-                // Lexicographic: fully bound conjuncts, no unbound tests, no Cartesian products,
-                // few new variables, and small relations come first.
+                // Lexicographic cost: fully bound conjuncts come first. Tests with unbound variables come last,
+                // after Cartesian products. The others are ordered by the number of new variables, then by the
+                // number of rows.
                 (free > 0, is_test && free > 0, is_apart && free > 0, free, rows)
             };
             let best = (0..remaining.len()).min_by_key(|&index| cost(remaining[index])).unwrap_or(0);

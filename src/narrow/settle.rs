@@ -64,7 +64,8 @@ pub(super) struct Additions<'a> {
     pub atoms: Vec<(&'a Atom, Vec<&'a Name>)>,
 }
 
-/// Unary predicates count as classes unless they are in `varying`.
+/// Returns the atoms that an action may add, and the classes that it requires. Unary predicates count as classes unless
+/// they are in `varying`.
 pub(super) fn additions<'a>(action: &'a Action, varying: &BTreeSet<Name>) -> Additions<'a> {
     let (conditions, effects): (Vec<&Condition>, Vec<&Effect>) = match &action.body {
         ActionBody::Instantaneous { precondition, effect } => (vec![precondition], vec![effect]),

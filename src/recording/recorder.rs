@@ -83,7 +83,7 @@ impl Recorder {
         }
     }
 
-    /// If the writer thread has ended, e.g. after an error, the entry is lost.
+    /// Sends an entry to the writer thread. If this thread has ended, e.g. after an error, the entry is lost.
     fn send(&self, entry: Entry) {
         let _ = self.entries.send(entry);
     }
@@ -94,7 +94,7 @@ impl Recorder {
     }
 }
 
-/// Flushes at most [`INTERVAL`] after an entry.
+/// Writes entries to the recording until it ends. Flushes at most [`INTERVAL`] after an entry.
 fn write(mut recording: Recording<File>, entries: &Receiver<Entry>) -> io::Result<()> {
     // Time at which the entries that are not flushed have to be flushed.
     let mut due: Option<Instant> = None;

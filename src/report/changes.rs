@@ -163,8 +163,8 @@ fn cost_and_design_differences(before: &Plan, after: &Plan, [old_cost, new_cost]
     texts
 }
 
-/// An action that occurs several times is counted as often as it occurs in both plans. Designs are
-/// ignored.
+/// Returns a sentence about the number of actions that both plans contain. An action that occurs several
+/// times is counted as often as it occurs in both plans. Designs are ignored.
 fn shared(before: &Plan, after: &Plan) -> String {
     let mut old: Vec<&str> = before.steps.iter().map(|step| step.label.as_str()).collect();
     let in_both = after.steps.iter().filter(|step| {

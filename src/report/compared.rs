@@ -161,7 +161,7 @@ fn accomplished(done: usize, all: usize) -> String {
     }
 }
 
-/// The text is short enough for a small screen.
+/// Returns a text for a strategy without accomplished missions. It is short enough for a small screen.
 fn none_accomplished(missions: usize) -> String {
     format!("0 of {missions} accomplished")
 }
@@ -217,7 +217,7 @@ fn mean(sample: &Sample) -> String {
     }
 }
 
-/// More digits of a simulated value would only be noise.
+/// Formats a simulated value with at most two decimals. More digits would only be noise.
 fn rounded(value: f64) -> String {
     hundredths(value).to_string()
 }

@@ -6,8 +6,9 @@ use planner::{Front, Status};
 use crate::report::plan::plan_picture;
 use crate::report::seen::Seen;
 
-/// Returns the picture of a Pareto front. `objectives` are the texts of the two objectives. The
-/// plans must have all arguments of the mission's domain.
+/// Returns the picture of a Pareto front. `objectives` contains the texts of the two objectives.
+/// Each step of the plans must have all arguments of its action in the mission's domain, including
+/// the designs.
 pub fn front_sheet(seen: Seen<'_>, objectives: &[String], front: &Front) -> Sheet {
     let solved: Vec<_> = front.points.iter().filter(|point| point.solution.plan.is_some()).collect();
     let verdict = match front.status {

@@ -10,7 +10,7 @@ use crate::report::plan::drawn;
 use crate::report::positions::Positions;
 use crate::report::seen::{Designs, Scene, known_designs};
 
-/// Further steps are only counted.
+/// Maximum number of steps in a picture. Further steps are only counted.
 const MAX_STEPS: usize = 500;
 
 /// Draws remaining plans of a loop. The designs of the mission and the coordinates of places do not

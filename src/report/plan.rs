@@ -112,7 +112,7 @@ fn label(step: &Step, configuration: &[(String, String)]) -> String {
     std::iter::once(step.action.as_str()).chain(words).collect::<Vec<_>>().join(" ")
 }
 
-/// Times are omitted, because they differ between runs.
+/// Returns the progress of the search. Times are omitted, because they differ between runs.
 fn search(solution: &Solution) -> Vec<picture::Progress> {
     let moments = solution.statistics.history.iter().map(|moment| {
         let cost =

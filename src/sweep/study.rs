@@ -100,7 +100,8 @@ enum Scalar {
 struct Pairs {
     /// Manifest of a mission whose problem defines places.
     mission: PathBuf,
-    /// Maximum number of pairs, spread evenly over all pairs. Default: all.
+    /// Maximum number of pairs. If there are more pairs, a selection is used that is evenly spread over all of
+    /// them. Default: all.
     #[serde(default)]
     most: Option<usize>,
 }

@@ -115,7 +115,7 @@ impl Page {
         self.blocks.iter().any(Block::has_commands)
     }
 
-    /// The kind of the test, which the runner prints, lists missing programs and fixtures.
+    /// Creates the test of a page. Its kind, which the runner prints, lists missing programs and fixtures.
     fn trial(self) -> Trial {
         let mut missing: Vec<String> = self.blocks.iter().flat_map(Block::missing).collect();
         missing.sort();

@@ -233,7 +233,8 @@ impl<'a> Life<'a> {
     }
 }
 
-/// `missions` is the number of generated missions. Returns the number of lines.
+/// Runs random lives of robots with shipped and generated missions; `lives` and `missions` are the numbers of
+/// lives and of generated missions. Returns the number of lines.
 fn check(lives: u64, missions: u64) -> usize {
     let mut places = shipped();
     places.extend(suave());

@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use crate::common::{control, feed};
 
-/// Returns `None` for irrelevant answers.
+/// Describes an answer in a few words. Returns `None` for irrelevant answers.
 fn words(answer: &Answer) -> Option<String> {
     Some(match answer {
         Answer::Inferred { designs, objectives } => {
@@ -39,7 +39,7 @@ fn words(answer: &Answer) -> Option<String> {
     })
 }
 
-/// The line `start` starts the loop.
+/// Checks the answers to each line of a script. The line `start` starts the loop.
 fn check(control: &mut Loop, script: &[(&str, &[&str])]) {
     for (line, expected) in script {
         let answers = if *line == "start" { control.start() } else { feed(control, line) };

@@ -88,7 +88,7 @@ impl Fuzz {
         control
     }
 
-    /// The flag is `true` if the line is valid.
+    /// Generates a line, with `true` if the line is valid.
     pub fn next(&mut self, control: &Loop) -> (String, bool) {
         let random = &mut self.random;
         if random.u32(..10) == 0 {

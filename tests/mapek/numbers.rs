@@ -14,7 +14,7 @@ fn ugv() -> Loop {
     control
 }
 
-/// `expected` is `None` for an accepted line.
+/// Checks the answer to a line. `expected` is `None` for an accepted line.
 fn check(control: &mut Loop, line: &str, expected: Option<&str>) {
     let kind = |answer: &Answer| match answer {
         Answer::Duplicate { .. } => Some("duplicate".to_owned()),

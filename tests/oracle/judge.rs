@@ -176,7 +176,8 @@ pub fn read(domain: &str, problem: &str) -> Result<(Mission, Problem), Errors> {
     Ok((mission, problem))
 }
 
-/// The head start of the search varies with the name of the task, so that all engines are used.
+/// Returns the configuration of the planner for a task. The head start of the search varies with the name of the
+/// task, so that all engines are used.
 fn config(name: &str, limits: Limits, thresholds: Thresholds) -> Config {
     let sum: usize = name.bytes().map(usize::from).sum();
     let config = Config::default().with_limits(limits);
@@ -470,7 +471,7 @@ pub fn is_over(tally: &Tally) -> bool {
     !tally.failures.is_empty() && std::env::var_os("ORACLE_STOP").is_some()
 }
 
-/// `default` is the default of `ORACLE_TASKS`.
+/// Judges the cases of random tasks. `default` is the default of `ORACLE_TASKS`.
 pub fn run(default: u64, cases: impl Fn(u64) -> Vec<Case>) -> Tally {
     let (from, tasks) = (setting("ORACLE_FROM", 0), setting("ORACLE_TASKS", default));
     let mut tally = Tally::default();

@@ -57,7 +57,7 @@ impl Puzzle {
         self.task.metric.as_ref().is_some_and(|(maximize, _)| *maximize)
     }
 
-    /// The steps have no gaps between them.
+    /// Returns the steps of a plan, without gaps between them.
     fn steps(&self, plan: &[usize]) -> Vec<Step> {
         let mut clock = model::whole(0);
         let step = |number: &usize| {

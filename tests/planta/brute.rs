@@ -174,8 +174,7 @@ impl Task {
         }
     }
 
-    /// The variables get unique names in `scope`. Returns the names and the conditions on their
-    /// types.
+    /// Declares variables, which get unique names in `scope`. Returns the names and the conditions on their types.
     fn declare(&mut self, list: &[pddl::ast::TypedName], scope: &mut Binding) -> (Vec<String>, Vec<Part>) {
         let mut names = Vec::new();
         let mut type_conditions = Vec::new();

@@ -80,7 +80,7 @@ fn examples(real: &Path) -> Vec<Example> {
     ]
 }
 
-/// Returns `None` if the program proves that there is no plan.
+/// Returns the number of steps of the best plan, or `None` if the program proves that there is no plan.
 fn planned(input: &Input) -> Option<usize> {
     let (status, stdout, stderr) = metaplan(&input.arguments("plan", &["--format", "json"]));
     let answer: Value =

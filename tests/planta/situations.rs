@@ -36,7 +36,7 @@ fn grid(real: &Path, nodes: &str, with_designs: bool) -> Input {
     }
 }
 
-/// Panics unless optimality is proved.
+/// Plans with the program and returns its answer. Panics unless optimality is proved.
 fn plan(input: &Input, options: &[&str]) -> Value {
     let (status, stdout, stderr) =
         metaplan(&input.arguments("plan", &[&["--format", "json"], options].concat()));

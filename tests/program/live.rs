@@ -263,7 +263,7 @@ fn late_clients_receive_the_current_state() {
     }
 }
 
-/// In kB.
+/// Returns the peak resident memory of a run in kB.
 fn memory(run: &Run) -> Option<u64> {
     let status = std::fs::read_to_string(format!("/proc/{}/status", run.child.id())).ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

@@ -3,7 +3,7 @@
 
 use crate::common::{headlines, metaplan_in, root};
 
-/// The lines begin at line 9 of the manifest. All commands must reject it with the message
+/// Checks that all commands reject a manifest with these lines, which begin at line 9, with the message
 /// `expected`.
 fn check(lines: &str, expected: &str) {
     let directory = tempfile::tempdir().expect("a directory");

@@ -115,7 +115,7 @@ fn least_time(mission: &Coadaptation, risk: Risk) -> Option<BigRational> {
     (!solution.infinite.contains(0)).then(|| solution.values[0].clone())
 }
 
-/// Returns `None` if the planner proves that there is no plan.
+/// Returns the cost of the best plan, or `None` if the planner proves that there is no plan.
 fn planned(mission: &Mission) -> Option<f64> {
     let (problem, _) = mission.filled().expect("filled");
     let task = mission.ground(&problem, &[], &planner::Limits::none()).expect("ground");

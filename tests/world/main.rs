@@ -122,7 +122,7 @@ fn no_schedule_violates_a_demand() {
     assert!(violations_found.is_empty(), "{}", summary(&violations_found));
 }
 
-/// With an even seed, the effects sent at the start can be lost, too.
+/// Returns the faults of a seed. With an even seed, the effects sent at the start can be lost, too.
 fn faults(seed: u64) -> Faults {
     let faults = Faults::of(seed);
     if seed.is_multiple_of(2) { faults.with_lost_start() } else { faults }

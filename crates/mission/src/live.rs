@@ -118,8 +118,8 @@ impl Mission {
         self.own.contains(&Name::new(design))
     }
 
-    /// Returns `true` if the problem decides on the availability of a design and states that the
-    /// design is available.
+    /// Returns `true` if the availability of a design is stated only by the problem (see
+    /// [`decides_on`](Self::decides_on)), and the problem states that the design is available.
     pub fn provides(&self, design: &str) -> bool {
         let declared = self.domain.predicates.iter().map(|declared| &declared.identifier.name);
         let mut predicates = declared.filter(|name| self.bindings.is_availability(name));

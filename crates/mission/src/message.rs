@@ -25,7 +25,7 @@ impl std::ops::Deref for Message {
     }
 }
 
-/// What a message says.
+/// The contents of a message.
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Details {
@@ -47,10 +47,10 @@ pub struct Details {
     /// Help: a possible correction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub help: Option<String>,
-    /// The source line, where there is one, and that of another place that matters.
+    /// Source lines: that of the location, and that of a related location, if there are any.
     #[serde(skip)]
     excerpts: Vec<Excerpt>,
-    /// The message as a terminal shows it.
+    /// The message formatted for a terminal.
     #[serde(skip)]
     text: String,
 }

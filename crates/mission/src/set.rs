@@ -15,7 +15,7 @@ impl Mission {
     /// - a numeric function of the problem with its arguments (`battery=30`, `travel_time wp1
     ///   wp2=3`);
     /// - a predicate with all its arguments, set to true or false (`pipeline_found pl1=true`);
-    /// - a predicate without its last argument, which becomes the value (`robot_at=wp2`): it
+    /// - a predicate without its last argument, which is given as the value (`robot_at=wp2`): the new fact
     ///   replaces all facts that differ in the last argument only.
     ///
     /// # Errors

@@ -199,8 +199,7 @@ impl<'s> Sink<'s> {
         self.diagnostics.len() + self.beyond_limit
     }
 
-    /// If the sink is full, further diagnostics are only counted, so suggestions for them need not
-    /// be computed.
+    /// Returns `true` if further diagnostics are only counted, so that suggestions for them need not be computed.
     pub(crate) fn is_full(&self) -> bool {
         self.diagnostics.len() > MAX_DIAGNOSTICS
     }

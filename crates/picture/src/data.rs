@@ -170,7 +170,7 @@ pub struct Report {
     pub description: String,
     /// Differences of the current situation from the mission's files, each in a few words.
     pub situation: Vec<String>,
-    /// The plan without the differences in `situation`; `None` to show only the current plan.
+    /// The plan for the situation without these differences; `None` to show only the current plan.
     pub before: Option<Plan>,
     /// The plan for the current situation.
     pub plan: Plan,

@@ -148,7 +148,8 @@ impl<'a> Planner<'a> {
         Ok(pareto(&task, &config, &mut hear))
     }
 
-    /// The returned function sets the interrupt flag if the callback returns `Break`.
+    /// Returns a function that passes each improvement to the callback, and sets the interrupt flag if the callback
+    /// returns `Break`.
     fn hear(&mut self) -> impl FnMut(Improvement) {
         let flag = self.config.limits.interrupt();
         let report = &mut self.report;

@@ -24,7 +24,7 @@ fn solve(domain: &str, problem: &str, engine: Engine, head_start: usize) -> Solu
     optimize(&task, &config, &mut |_| {})
 }
 
-/// `None` means that no plan exists.
+/// Checks the optimal cost with several engines. `None` means that no plan exists.
 fn check(name: &str, domain: &str, problem: &str, expected: Option<&str>) {
     for (engine, head_start) in WAYS {
         let solution = solve(domain, problem, engine, head_start);

@@ -40,7 +40,7 @@ pub fn written(plan: &Plan) -> String {
     text
 }
 
-/// The validator computes the metric. The error is the reason why the plan is invalid.
+/// Returns the metric that the validator computes. The error is the reason why the plan is invalid.
 pub fn metric(
     domain: &Domain,
     problem: &Problem,
@@ -57,7 +57,8 @@ pub fn metric(
     }
 }
 
-/// `None` means that the planner must prove that there is no plan.
+/// Checks the metric and the actions of the best plan. `None` means that the planner must prove that there is
+/// no plan.
 pub fn check(
     name: &str,
     domain: &str,
@@ -262,7 +263,7 @@ struct Sample {
     problem: String,
 }
 
-/// If `is_locked`, all actions with a duration use the same resource.
+/// Generates a random task. If `is_locked`, all actions with a duration use the same resource.
 fn sample(random: &mut Random, is_locked: bool) -> Sample {
     let mut domain = String::from(
         "(define (domain d) (:requirements :durative-actions :disjunctive-preconditions) (:predicates (p) (q) (r) (idle))

@@ -51,7 +51,7 @@ fn durative(name: &str, duration: &str, condition: &str, effect: &str) -> String
     )
 }
 
-/// The atoms are `p`, `q`, `r` and `g`. The number `x` is initially 2.
+/// Checks the answer for a task with the atoms `p`, `q`, `r` and `g`, and the number `x`, initially 2.
 fn check(actions: &[String], init: &str, goal: &str, expected: &str) {
     let domain =
         format!("(define (domain d) (:predicates (p) (q) (r) (g)) (:functions (x))\n{})", actions.concat());

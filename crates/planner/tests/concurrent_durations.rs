@@ -24,7 +24,7 @@ pub fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
     (domain, problem)
 }
 
-/// The validator checks the plan and its metric.
+/// Plans with chosen durations. The validator checks the plan and its metric.
 pub fn solve(domain: &Domain, problem: &Problem, separation: &BigRational, limits: &Limits) -> Solution {
     let config = GroundConfig::default().with_limits(limits.clone());
     let task =
@@ -63,7 +63,7 @@ pub fn metric(
     }
 }
 
-/// Uses a separation of 1/1000.
+/// Checks status, metric and steps of the solution, with a separation of 1/1000.
 fn check(name: &str, domain: &str, problem: &str, expected: (Status, Option<&str>, &[&str])) {
     let (domain, problem) = parse(domain, problem);
     let solution = solve(&domain, &problem, &rational(1, 1000), &Limits::none());
@@ -368,7 +368,8 @@ fn sample(random: &mut Random) -> (String, String, [Vec<i128>; 3]) {
 
 const LAST: i128 = 4;
 
-/// Plans have up to three actions. All starts and durations are multiples of the separation.
+/// Returns the best metric over all plans with up to three actions, whose starts and durations are multiples
+/// of the separation.
 fn brute_force(durations: &[Vec<i128>; 3], domain: &Domain, problem: &Problem) -> Option<BigRational> {
     let separation = rational(1, 1);
     let mut best: Option<BigRational> = None;

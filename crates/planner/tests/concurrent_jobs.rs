@@ -57,7 +57,8 @@ fn lengths(jobs: usize, seed: u64) -> Vec<i64> {
     (0..jobs).map(|_| 10 + random.below(31)).collect()
 }
 
-/// In thousandths, with a thousandth between two actions of a robot.
+/// Returns the makespan of an assignment of jobs to robots, in thousandths, with a thousandth
+/// between two actions of a robot.
 fn makespan(robots: usize, lengths: &[i64], assignment: impl Iterator<Item = usize>) -> i64 {
     let mut loads = vec![0; robots];
     for (length, robot) in lengths.iter().zip(assignment) {

@@ -9,7 +9,7 @@ use pddl::{Source, read};
 
 use crate::widths;
 
-/// Uses a separation of 1/1000. The validator executes the plan.
+/// Checks status and metric of the solution, with a separation of 1/1000. The validator executes the plan.
 fn check(actions: &str, init: &str, goal: &str, expected: (Status, Option<&str>)) {
     let domain =
         format!("(define (domain d) (:predicates (p) (q) (g) (on ?x)) (:functions (fuel) (log)) {actions})");

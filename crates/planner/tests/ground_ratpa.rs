@@ -102,7 +102,8 @@ impl<'d> World<'d> {
         world
     }
 
-    /// `None` if a variable of the atom is unbound or a constant is unknown.
+    /// Returns the atom with its variables replaced. Returns `None` if a variable of the atom is unbound or a
+    /// constant is unknown.
     fn fact(&self, atom: &Atom, parameters: &[(Name, Vec<usize>)], bound: &[usize]) -> Option<Fact> {
         let object = |term: &Term| match term {
             Term::Variable(variable) => {
@@ -115,7 +116,7 @@ impl<'d> World<'d> {
         Some((folded(&atom.predicate.name), arguments))
     }
 
-    /// Static conditions of the instances hold. Numbers are ignored.
+    /// Returns the action instances whose static conditions hold. Numbers are ignored.
     fn instances(&self) -> Vec<Instance> {
         let mut found = Vec::new();
         for index in 0..self.schemas.len() {

@@ -43,7 +43,7 @@ impl Mission {
         Self { waypoints, corridors, designs: [designs(), designs()] }
     }
 
-    /// Visits no waypoint twice.
+    /// Enumerates the ways that visit no waypoint twice.
     fn ways(&self) -> Vec<Way> {
         let start = Way { stations: vec![0], designs: Vec::new(), time: 0, energy: 0 };
         let (mut open, mut found) = (vec![start], Vec::new());
@@ -71,7 +71,8 @@ impl Mission {
         found
     }
 
-    /// If `reversed`, the names of waypoints and designs sort in reverse order.
+    /// Returns domain and problem as PDDL text. If `reversed`, the names of waypoints and designs sort
+    /// in reverse order.
     fn text(&self, reversed: bool) -> (String, String) {
         let domain = "(define (domain d) (:types place function design)
           (:predicates (at ?p - place) (way ?a ?b - place) (fd_solve_f ?d - design ?f - function))

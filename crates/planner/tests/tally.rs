@@ -5,13 +5,15 @@ use std::time::Duration;
 use metaplan_planner::{Config, GroundConfig, Limits, Solution, Status, Thresholds, ground, optimize};
 use pddl::ast::{Domain, Problem};
 
-/// With a head start of 1, all optional parts of the search are used from the start.
+/// Returns limits for tests. With a head start of 1, all optional parts of the search are used from
+/// the start.
 pub fn limits(head_start: usize) -> Limits {
     let thresholds = if head_start == 1 { Thresholds::NONE } else { Thresholds::default() };
     Limits::none().with_thresholds(thresholds)
 }
 
-/// Returns `None` if the planner rejects the task; `reason` is the only admitted reason.
+/// Solves a task. Returns `None` if the planner rejects the task; `reason` is the only admitted
+/// reason.
 pub fn solve(domain: &Domain, problem: &Problem, reason: &str) -> Option<Solution> {
     let task = match ground(domain, problem, &GroundConfig::default()) {
         Ok(task) => task,

@@ -16,7 +16,8 @@ fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
     (domain, problem)
 }
 
-/// With `Engine::Sat`, only the SAT solver is used, up to horizon 8.
+/// Returns the best plan, if there is one. With `Engine::Sat`, only the SAT solver is used, up to horizon
+/// 8.
 fn plan(domain: &Domain, problem: &Problem, engine: Engine) -> Option<Plan> {
     let task =
         ground(domain, problem, &GroundConfig::default()).unwrap_or_else(|errors| panic!("{errors:?}"));
@@ -203,9 +204,9 @@ fn sample(random: &mut Random) -> Sample {
     Sample { durations, events, domain, problem }
 }
 
-/// Plans have up to three actions. All times in the files are integers. An action that is possible
-/// at some time is therefore also possible directly after the previous action, or such that it
-/// starts or ends at an event or half a unit later. Times are doubled.
+/// Returns the best value over all plans with up to three actions. All times in the files are integers. An
+/// action that is possible at some time is therefore also possible directly after the previous action, or
+/// such that it starts or ends at an event or half a unit later. Times are doubled.
 fn brute_force(task: &Sample, domain: &Domain, problem: &Problem) -> Option<i64> {
     let mut best = None;
     let mut open: Vec<(i64, String, usize)> = vec![(0, String::new(), 0)];

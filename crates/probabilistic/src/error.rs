@@ -49,8 +49,8 @@ pub enum Error {
     StateLimit {
         /// Number of reached states.
         states: usize,
-        /// The upper limit on the number of states. If choices or transitions cannot be numbered, equal to
-        /// `states`.
+        /// Upper limit on the number of states. It equals `states` if the model has too many choices or
+        /// transitions instead of too many states.
         limit: usize,
     },
     /// The caller cancelled the exploration.

@@ -311,7 +311,8 @@ impl Writer<'_> {
             }
         };
         let mut entry = json!({ "name": variable.name, "type": kind });
-        // Without an initial value, all values that the condition on initial states admits are initial.
+        // In JANI, a variable without an initial value can start with every value that `restrict-initial` admits.
+        // Initial values are therefore written only if the model has no such condition.
         if self.model.initial.is_none() {
             entry["initial-value"] = variable.initial.as_ref().map_or(least, |value| self.expression(value));
         }

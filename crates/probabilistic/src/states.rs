@@ -135,8 +135,8 @@ impl<S: Eq + Hash> States<S> {
         }
     }
 
-    /// Returns the number of a state after [`Self::probe`], and adds the state if it is new.
-    /// Returns `None` if there are too many states.
+    /// Returns the number of a state, and adds the state if it is new. `probe` is the result of
+    /// [`Self::probe`] for this state. Returns `None` if there are too many states.
     pub(crate) fn insert(&mut self, state: S, probe: Probe) -> Option<u32> {
         if let Some(number) = probe.number_plus_one.checked_sub(1) {
             return Some(number);

@@ -23,7 +23,7 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "E304",
         "Numbers are too large.",
-        "A number exceeds the range of integers after scaling, or no scale converts the fractions to integers.",
+        "A number is too large after scaling to integers, or no admissible factor scales all fractions to integers.",
         "Use fewer decimals, or other units. `plan` falls back to exact rationals if possible.",
     ],
     [

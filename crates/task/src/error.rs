@@ -62,10 +62,10 @@ pub enum Error {
         /// Source location.
         place: Place,
     },
-    /// A number that exceeds the integers of the planner after scaling, or fractions that no common factor
-    /// makes integers.
+    /// A number that is too large for the integers of the planner after scaling, or fractions that no
+    /// admissible factor scales to integers.
     #[error(
-        "{what}: a number exceeds 2^118 after scaling to integers, or has fractions that no scale makes integers"
+        "{what}: a number is too large after scaling to integers, or no admissible factor scales all fractions to integers"
     )]
     Overflow {
         /// Description of the quantity that contains the number.

@@ -222,12 +222,13 @@ pub fn missing(resource: Resource, detail: &str) {
     missing_in(std::thread::current().name().unwrap_or("unknown"), resource, detail);
 }
 
-/// As [`missing`], for a test that does not run in a thread of its name.
+/// Like [`missing`], for a test whose thread is not named after it. `test` is the name of the test.
 ///
 /// # Panics
-/// As [`missing`].
+/// Panics under the same conditions as [`missing`].
 pub fn missing_in(test: &str, resource: Resource, detail: &str) {
-    // Cargo sets the name of the package, because tests of different packages may have the same name.
+    // The name of the package, which Cargo sets, is added because tests of different packages may have the
+    // same name.
     let test =
         std::env::var("CARGO_PKG_NAME").map_or_else(|_| test.to_owned(), |name| format!("{name} {test}"));
     match Settings::from_environment().report(&test, resource, detail) {

@@ -142,7 +142,8 @@ pub fn successors(task: &Task, state: &State) -> Vec<(State, Int)> {
 }
 
 /// Returns the minimum cost of a plan, by Dijkstra's algorithm over the reachable states. `None` if there is
-/// no plan. Requires costs that are not negative, and finitely many reachable states unless there is a plan.
+/// no plan. Requires costs that are not negative, and finitely many reachable states with a lower cost than
+/// the cheapest plan. If there is no plan, the task must have finitely many reachable states.
 pub fn optimum(task: &Task) -> Option<Int> {
     let mut best = FxHashMap::from_iter([(task.initial.clone(), 0)]);
     let mut states = vec![task.initial.clone()];

@@ -73,8 +73,9 @@ fn check_format(format: &str, expected: &str) -> Result<(), String> {
     }
 }
 
-/// Reads the listed files. Their names must be the `expected` ones and, if one of the files of the knowledge base is
-/// listed, those of all of its files.
+/// Reads the listed files, and checks their sizes and digests. The list must contain exactly the `expected` files,
+/// and either all or none of the files of the knowledge base. Streamed files are checked, but their contents are not
+/// returned.
 fn read_files(directory: &Path, files: &[File], mut expected: Vec<&str>) -> Result<Contents, String> {
     if files.iter().any(|file| file.name == knowledge::ORIGIN) {
         expected.extend([knowledge::DOCUMENT, knowledge::ORIGIN, derivations::DERIVATIONS]);

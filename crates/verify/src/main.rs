@@ -61,7 +61,7 @@ fn main() -> ExitCode {
     })
 }
 
-/// With `--smt`, the verification conditions are written first.
+/// Verifies the certificate. With `--smt`, the verification conditions are written first.
 fn run(arguments: &Arguments) -> Result<Verification, Errors> {
     let Arguments { directory, format, smt, time_limit } = arguments.clone();
     let watch = Watch::start(time_limit, move |report| std::process::exit(show(report, format).into()));

@@ -147,7 +147,8 @@ pub struct Subject {
 pub enum SubjectKind {
     /// The PDDL files of the certificate, wherever they come from.
     Files,
-    /// The PDDL files, and that they follow from the knowledge base of the certificate.
+    /// The PDDL files of the certificate. It was also checked that they follow from the knowledge base of the
+    /// certificate.
     Knowledge,
     /// The files of a mission in its present situation, its knowledge base among them if it has one.
     Mission,

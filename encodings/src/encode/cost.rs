@@ -43,8 +43,8 @@ pub struct CostLimit<'a> {
 pub enum CostEncoding {
     /// The sum of the costs, bounded by the limit.
     Sum,
-    /// Weighted literals for core-guided search, without a bound on their sum. Clauses exclude only an amount
-    /// that alone exceeds the gap between the limit and the lower bound.
+    /// Weighted literals for core-guided search, without a bound on their sum. Clauses exclude only single amounts that
+    /// exceed the gap between the limit and the lower bound.
     Apart,
 }
 

@@ -96,11 +96,11 @@ pub enum VariableMeaning {
     Design { slot: u32, design: u32, step: u32 },
     /// An operator of the group is executed at the step.
     Group { group: u32, step: u32 },
-    /// The accumulated reduced cost (cost beyond the lower bound) is at least `amount`, after source of cost number
-    /// `stage` of the step before `step`. The condition implies the literal; the converse is not encoded.
+    /// The accumulated reduced cost (cost beyond the lower bound) is at least `amount`, after the cost source with
+    /// number `stage` of the step before `step`. The condition implies the literal; the converse is not encoded.
     CostAtLeast { amount: Int, step: u32, stage: u32 },
-    /// Source of cost number `stage` at the step adds this amount. The choices that cause the amount imply the literal;
-    /// the converse is not encoded.
+    /// The cost source with number `stage` adds this amount at the step; with `CostEncoding::Apart`, at least this
+    /// amount. The choices that cause exactly this amount imply the literal; the converse is not encoded.
     Increment { amount: Int, step: u32, stage: u32 },
     /// The conditional effect with this index of the operator takes place at the step.
     Fires { operator: u32, effect: u32, step: u32 },

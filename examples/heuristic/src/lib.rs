@@ -10,7 +10,8 @@ use task::task::{Fact, Operator, State, Task};
 /// Lower bound on the cost to the goal from the number of false goal facts.
 #[derive(Debug)]
 pub struct GoalCount {
-    /// Goal facts of basic variables. Rules derive the other variables, so that one step can change any number of them.
+    /// Goal facts of basic variables. Goal facts of derived variables are not counted, because a single step can change
+    /// any number of derived variables.
     goal_facts: Vec<Fact>,
     /// Upper bound on the number of goal facts that one operator makes true; at least 1.
     facts_per_step: usize,

@@ -24,7 +24,7 @@ const UPKEEP: Duration = Duration::from_secs(5);
 
 type Response = (&'static str, String);
 
-/// Starts to serve the endpoints at `address`, until the program ends.
+/// Opens the HTTP endpoints at `address`, and serves them in the background until the program ends.
 pub(crate) async fn open(address: SocketAddr, health: Arc<Health>) -> Result<(), Message> {
     let wrong = |error: &dyn std::fmt::Display| Message::error("N301", format!("{address}: {error}"));
     let listener = TcpListener::bind(address).await.map_err(|error| wrong(&error))?;

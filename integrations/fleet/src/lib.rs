@@ -49,6 +49,7 @@
 //! ```
 //!
 //! - [`store`]: the interface of a log, which NATS JetStream and a local directory implement.
+//! - [`wire`]: data formats of messages and of stored values, and syntax of subjects.
 //! - [`robot`]: a single robot, which turns events into decisions, without clock and network.
 //! - [`missions`]: current and former versions of missions; [`ids`]: recognition of repeated messages.
 //! - [`partition`]: the robots of a partition: order, loading, discarding of handled events.

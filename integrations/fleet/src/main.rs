@@ -286,7 +286,7 @@ async fn run(command: Command) -> Result<(), Errors> {
         Command::Status { server, format } => {
             let store = server.open(10).await.map_err(|message| vec![message])?;
             let status = status(&store).await.map_err(|fault| {
-                vec![Message::error("N312", format!("the fleet cannot be read: {fault}"))]
+                vec![Message::error("N312", format!("the status of the fleet cannot be read: {fault}"))]
             })?;
             lines::status(&status, format == "json").map_err(|message| vec![message])?;
         }
@@ -310,7 +310,8 @@ fn signals() -> Result<watch::Receiver<bool>, Errors> {
             std::process::exit(130);
         }
     };
-    ctrlc::set_handler(handler)
-        .map_err(|error| vec![Message::error("N302", format!("signals cannot be handled: {error}"))])?;
+    ctrlc::set_handler(handler).map_err(|error| {
+        vec![Message::error("N302", format!("the signal handler cannot be installed: {error}"))]
+    })?;
     Ok(heard)
 }

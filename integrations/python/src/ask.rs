@@ -1,5 +1,5 @@
 //! Functions that need no mission: verification of certificates, queries of knowledge bases, model
-//! checking, explanation of codes.
+//! checking, explanation of message codes.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

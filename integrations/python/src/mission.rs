@@ -367,7 +367,7 @@ impl Mission {
     }
 }
 
-/// Reads a mission with released interpreter lock, and checks that its inputs fit together.
+/// Reads a mission with the interpreter lock released, and checks that its inputs fit together.
 fn made(py: Python<'_>, read: impl FnOnce() -> Result<Setup, Errors> + Send) -> PyResult<Mission> {
     let checked = move || {
         let setup = read()?;
@@ -403,7 +403,7 @@ fn joined(
     Ok(missions::Mission::new(name, knowledge, bindings, domain, problem)?.into())
 }
 
-/// Reason why there is no answer: faults of the inputs, or a Python exception.
+/// Reason why there is no answer: errors of Metaplan, or a Python exception.
 enum Stop {
     Wrong(Errors),
     Raised(PyErr),

@@ -120,8 +120,9 @@ fn start() -> Result<(), Errors> {
             std::process::exit(130);
         }
     };
-    ctrlc::set_handler(handler)
-        .map_err(|error| vec![Message::error("N100", format!("signals cannot be handled: {error}"))])?;
+    ctrlc::set_handler(handler).map_err(|error| {
+        vec![Message::error("N100", format!("the signal handler cannot be installed: {error}"))]
+    })?;
     let Arguments { role, mission, settings, journal, executor, allow_commands, seconds, output, .. } =
         arguments;
     if journal.is_some() && matches!(role, Role::Planner | Role::Controller | Role::Discover) {

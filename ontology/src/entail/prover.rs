@@ -45,7 +45,8 @@ impl Prover {
         Ok(Self { base })
     }
 
-    /// `number` distinguishes the fresh individuals of one proof. They occur nowhere else.
+    /// Returns the name of a fresh individual, which occurs nowhere else. `number` distinguishes
+    /// the fresh individuals of one proof.
     pub(super) fn fresh(number: usize) -> Iri {
         format!("urn:metaplan:any:{number}").into()
     }

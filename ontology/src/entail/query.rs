@@ -13,8 +13,8 @@ const MAX_PARTIAL_ANSWERS: usize = 100_000;
 type Assignment = BTreeMap<Iri, Iri>;
 
 impl Prover {
-    /// The anonymous individuals are the variables of the query. The query is open if there is no answer, or
-    /// if the budget of partial answers is exhausted.
+    /// Answers a conjunctive query, whose variables are the anonymous individuals of the statements. The
+    /// answer is open if none is found, or if the budget of partial answers is exhausted.
     pub(super) fn conjunctive_query(&self, statements: &[&Axiom]) -> Result<Answer, Error> {
         let mut budget = MAX_PARTIAL_ANSWERS;
         let explanation = self.extend(&Assignment::new(), statements.to_vec(), &mut budget)?;

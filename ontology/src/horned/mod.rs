@@ -178,7 +178,8 @@ impl Builder {
         self.rules.extend(indices.map(|index| (index, rule.clone())));
     }
 
-    /// Returns `None` for the marker atom that normalisation adds to an empty body or head.
+    /// Converts an atom of a rule. Returns `None` for the marker atom that normalisation adds to an empty
+    /// body or head.
     fn atom(&mut self, atom: &ho::Atom<RcStr>) -> Option<Atom> {
         Some(match atom {
             ho::Atom::BuiltInAtom { pred, args } => {

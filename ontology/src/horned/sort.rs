@@ -14,7 +14,7 @@ const DATA: u8 = 2;
 /// Sort key: kind of the assertion, then the ranks of up to three names.
 type Key = (u8, u32, u32, u32);
 
-/// Works in place, because there may be millions of axioms.
+/// Sorts axioms and removes duplicates. Works in place, because there may be millions of axioms.
 pub(super) fn axioms(axioms: &mut Vec<AnnotatedAxiom>, names: &Names) {
     let ranks = names.ranks();
     let rank = |iri: &Iri| ranks.get(&iri.as_ptr()).copied();

@@ -269,7 +269,8 @@ impl InclusionGraph {
         }
     }
 
-    /// Compares nested restrictions up to `depth` levels.
+    /// Returns the restrictions that are conditions and include `restriction`. Nested restrictions are compared up to
+    /// `depth` levels.
     fn including(
         &self,
         restriction: &ClassExpression,
@@ -308,7 +309,8 @@ impl InclusionGraph {
         including
     }
 
-    /// The result contains `class` itself. Nested restrictions are compared up to `depth` levels.
+    /// Returns the superclasses of a class that follow from the stated inclusions, including `class` itself. Nested
+    /// restrictions are compared up to `depth` levels.
     fn supers(&self, class: &ClassExpression, depth: usize, memo: &mut Memo) -> BTreeSet<ClassExpression> {
         let key = (class.clone(), depth);
         if let Some(supers) = memo.supers.get(&key) {

@@ -61,7 +61,7 @@ fn canonical(rule: &rules::Rule) -> (Vec<rules::Atom>, Vec<rules::Atom>) {
     (body, rule.head.iter().map(|atom| renamed(atom, &mut number)).collect())
 }
 
-/// Returns aggregates unchanged.
+/// Returns the atom with its variables replaced. Aggregates are returned unchanged.
 fn renamed(atom: &rules::Atom, name: &mut dyn FnMut(Variable) -> Term) -> rules::Atom {
     use rules::Atom as A;
     let mut term = |term: Term| match term {

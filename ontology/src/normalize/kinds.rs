@@ -33,7 +33,8 @@ struct Use {
     entity: bool,
 }
 
-/// `classes` contains undeclared classes that occur in triples outside of `graph`.
+/// Declares the undeclared classes and properties of `graph`, with a warning for each. `classes` contains undeclared
+/// classes that occur in triples outside of `graph`.
 pub(crate) fn declare(graph: &mut Graph, mut classes: BTreeSet<String>, warnings: &mut Vec<Warning>) {
     let (declared, mut properties) = (Declared::of(graph), BTreeMap::new());
     for (_, triple) in graph.iter() {

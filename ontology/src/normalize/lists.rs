@@ -9,7 +9,8 @@ use crate::graph::{Graph, iri_of, subject_of};
 use crate::owl::{AnnotatedAxiom, Axiom, ClassExpression, Iri};
 use crate::vocab::{owl, rdf};
 
-/// Returns the axioms with many members, which horned-owl does not have to read.
+/// Rewrites the axioms with lists in the graph. Returns the axioms with many members, which horned-owl does not have
+/// to read.
 pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) -> Vec<AnnotatedAxiom> {
     let groups = groups(graph);
     pairs(graph, owl::ALL_DISJOINT_CLASSES, owl::DISJOINT_WITH, warnings);

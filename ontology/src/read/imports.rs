@@ -72,8 +72,8 @@ impl Resolver {
         Ok(Self { catalogs, files: OnceCell::new(), directories: options.directories.clone() })
     }
 
-    /// `importer` is `None` if the importing document has no path. Returns an error if the catalog next to
-    /// that document cannot be used.
+    /// Finds the document of an import, if there is one. `importer` is `None` if the importing document has no path.
+    /// Returns an error if the catalog next to that document cannot be used.
     pub(crate) fn resolve(
         &self,
         import: &str,

@@ -23,7 +23,7 @@ pub(super) fn locate(warnings: &mut [Warning], texts: &[(String, Text)]) {
         unlocated.retain_mut(|warning| {
             let Warning::Undeclared { iri, position, .. } = &mut **warning else { return false };
             *position = offset(iri, words).map(|offset| Position::of_offset(name, &text, offset));
-            // A warning with a position is not searched in further documents.
+            // Once a warning has a position, its name is not searched for in further documents.
             position.is_none()
         });
     }

@@ -119,7 +119,8 @@ fn string_length(text: &[u8]) -> usize {
     text.len()
 }
 
-/// Standard prefixes such as `owl:` and `xsd:` need no declaration.
+/// Returns the first prefix without a declaration, with its offset. Standard prefixes such as `owl:` and `xsd:`
+/// need no declaration.
 fn undeclared_prefix(words: Words) -> Option<(usize, String)> {
     let mut declared: Vec<&[u8]> =
         vec![b"owl:", b"rdf:", b"rdfs:", b"xsd:", b"xml:", b"_:", b"swrl:", b"swrlb:"];

@@ -75,7 +75,8 @@ fn is_iri_reference(text: &[u8]) -> bool {
             || inside.is_empty())
 }
 
-/// Skips XML declaration, comments and document type. The second result is the text after the name.
+/// Returns the name of the root element of an XML document and the text after the name. Skips the XML
+/// declaration, comments and the document type declaration before it.
 fn xml_root(mut text: &[u8]) -> Option<(&[u8], &[u8])> {
     loop {
         text = &text[text.iter().position(|&byte| byte == b'<')? + 1..];

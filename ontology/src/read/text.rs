@@ -1,5 +1,5 @@
-//! Texts of documents after parsing. They are needed only to find positions for messages and may be large, so
-//! the text of a file is read again on demand.
+//! Texts of parsed documents. After parsing, they are needed only to find positions for messages and to
+//! recognise equal documents. They may be large, so the text of a file is read again on demand.
 
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};

@@ -205,7 +205,8 @@ impl Runtime {
         delete
     }
 
-    /// Returns no individuals in latch mode.
+    /// Returns the individuals that hold measurements of the attribute types for which a design has
+    /// estimations; none in latch mode.
     fn measurements(&self, design: Symbol) -> Vec<Symbol> {
         if self.mode == Mode::Latch {
             return Vec::new();

@@ -84,7 +84,7 @@ fn measurements(facts: Facts) -> Vec<Warning> {
     unmeasured.map(|kind| Warning::NothingMeasured { attribute: iri(facts, kind) }).collect()
 }
 
-/// Compares literals by value.
+/// Reports individuals with several stated values of a functional property. Literals are compared by value.
 fn several_values(ontology: &Ontology) -> Vec<Warning> {
     let functional: BTreeSet<&Iri> = ontology.axioms.iter().filter_map(functional).collect();
     // Axioms are sorted, so that the values of one property of one individual are adjacent.

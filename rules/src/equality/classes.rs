@@ -47,7 +47,7 @@ pub(super) struct Classes {
 }
 
 impl Classes {
-    /// A name without other equal names represents itself.
+    /// Returns the representative of a name. A name without other equal names represents itself.
     pub fn find(&self, name: Symbol) -> Symbol {
         self.representatives.get(&name).copied().unwrap_or(name)
     }
@@ -124,7 +124,7 @@ impl Classes {
         }
     }
 
-    /// The representative of the larger class remains.
+    /// Makes two names equal. The representative of the larger class remains.
     pub fn join(&mut self, left: Symbol, right: Symbol) {
         let (left, right) = (self.find(left), self.find(right));
         if left == right {

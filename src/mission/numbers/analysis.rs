@@ -227,7 +227,8 @@ impl<'m> Numbers<'m> {
         }
     }
 
-    /// Considers only durations that follow from values that nothing changes.
+    /// Adds the negative durations of an action to `negative`. Considers only durations that follow from values that
+    /// nothing changes.
     fn negative_durations(&self, action: &Action, negative: &mut BTreeSet<NegativeDuration>) {
         let ActionBody::Durative { duration, .. } = &action.body else { return };
         let conditions = conditions(&action.body);

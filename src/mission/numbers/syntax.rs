@@ -29,7 +29,7 @@ pub(super) fn bound_arguments(atom: &Atom, binding: &Binding<'_>) -> Option<Vec<
     atom.arguments.iter().map(|term| object(term, binding).cloned()).collect()
 }
 
-/// `binding` must bind all variables of the atom.
+/// Returns the arguments of an atom. `binding` must bind all its variables.
 pub(super) fn grounded(atom: &Atom, binding: &Binding<'_>) -> Vec<Name> {
     bound_arguments(atom, binding).unwrap_or_default()
 }

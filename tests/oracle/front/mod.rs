@@ -82,7 +82,7 @@ fn exported(mission: &Mission) -> (Mission, [String; 2]) {
     (mission.unwrap_or_else(|messages| panic!("{messages:#?}\n{}\n{}", texts[0], texts[1])), texts)
 }
 
-/// If the mission is refused, returns the codes of the messages as an error.
+/// Plans a mission. If it is refused, returns the codes of the messages as an error.
 fn plan(mission: &Mission, mode: &Mode, thresholds: Thresholds) -> Result<Answer, String> {
     let (problem, _) = mission.filled().unwrap_or_else(|messages| panic!("{messages:#?}"));
     let limits = Limits::none().with_thresholds(thresholds);

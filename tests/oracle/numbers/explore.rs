@@ -36,7 +36,8 @@ enum Measure<'g> {
 }
 
 impl<'g> Measures<'g> {
-    /// Without a metric in the task, the first measure is the default metric (definition, 9).
+    /// Prepares the exploration. Without a metric in the task, the first measure is the default metric
+    /// (definition, 9).
     pub fn new(ground: &'g Ground) -> Self {
         let has_durations = ground.instances.iter().any(|instance| !instance.duration.is_zero());
         let metric_measure = match &ground.metric {

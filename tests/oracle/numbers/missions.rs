@@ -60,7 +60,7 @@ pub fn mission(rng: &mut Rng) -> Task {
     mission_with(rng, designs)
 }
 
-/// `designs` is the number of designs of the first function.
+/// Generates a mission. `designs` is the number of designs of the first function.
 pub fn mission_with(rng: &mut Rng, designs: usize) -> Task {
     let mut builder = Builder::new(rng, designs);
     builder.values();

@@ -25,7 +25,7 @@ pub fn power_of_ten(exponent: usize) -> BigInt {
     BigInt::from(10).pow(u32::try_from(exponent).expect("a small exponent"))
 }
 
-/// Returns `None` if the number has more than 200 digits after the point.
+/// Formats a number as a decimal. Returns `None` if the number has more than 200 digits after the point.
 pub fn text_of(value: &Number) -> Option<String> {
     let (mut digits, mut power) = (0, BigInt::one());
     while !(&power % value.denom()).is_zero() {
@@ -168,7 +168,7 @@ pub struct Task {
     pub atoms: Vec<(usize, Vec<usize>)>,
     pub values: Vec<(usize, Vec<usize>, Number)>,
     pub goal: Vec<Condition>,
-    /// `true` for maximisation, and the expression.
+    /// The metric: `true` for maximisation, and the expression.
     pub metric: Option<(bool, Expr)>,
 }
 

@@ -140,7 +140,8 @@ fn happen(moments: &[&Moment], state: &State) -> Option<State> {
     Some(after)
 }
 
-/// Returns `None` if effects on the same number conflict, and for a division by zero.
+/// Combines an effect with earlier simultaneous effects. Returns `None` if effects on the same number
+/// conflict, and for a division by zero.
 fn combine(
     numbers: &mut Vec<(usize, Combined)>,
     change: Change,

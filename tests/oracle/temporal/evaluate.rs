@@ -94,7 +94,7 @@ impl World {
         Ok(atoms)
     }
 
-    /// `bound` contains the objects of the variables.
+    /// Evaluates a condition. `bound` contains the objects of the variables.
     pub fn holds(&self, condition: &Condition, state: &State, bound: &[usize]) -> Result<bool, Obstacle> {
         let atoms = self.derived(state)?;
         self.holds_with(condition, atoms, state, &mut bound.to_vec())

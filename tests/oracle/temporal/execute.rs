@@ -35,7 +35,7 @@ pub fn execute(world: &World, steps: &[(usize, Q, Q)]) -> Result<Q, Obstacle> {
     value(world, &run.state, total, steps.len())
 }
 
-/// An undefined goal does not hold.
+/// Checks that the goal holds in a state. An undefined goal does not hold.
 pub fn goal(world: &World, state: &State) -> Result<(), Obstacle> {
     match world.holds(&world.task.goal, state, &[]) {
         Ok(true) => Ok(()),

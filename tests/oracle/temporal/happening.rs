@@ -113,7 +113,7 @@ impl Happening {
         Ok(after)
     }
 
-    /// The happenings must not interfere.
+    /// Joins two simultaneous happenings, which must not interfere.
     fn joined(mut self, other: Self) -> Result<Self, Obstacle> {
         self.reads |= other.reads;
         self.reads_values |= other.reads_values;
@@ -212,7 +212,7 @@ impl World {
         self.values[function]
     }
 
-    /// Fails if a condition does not hold in `state`.
+    /// Returns the happening of an end of an instance. Fails if a condition does not hold in `state`.
     pub fn happening(&self, instance: usize, end: End, state: &State) -> Result<Happening, Obstacle> {
         let (action, bound) = &self.instances[instance];
         let action: &Action = &self.task.actions[*action];

@@ -173,7 +173,7 @@ impl Maker {
         self.is_derived(predicate) || self.designs.is_some_and(|(solves, _)| solves == predicate)
     }
 
-    /// `set` excludes predicates that effects and events must not change.
+    /// Generates an atom. `set` excludes predicates that effects and events must not change.
     fn atom(&mut self, variables: usize, set: bool) -> Atom {
         let mut predicate = self.random.usize(..self.task.predicates.len());
         while set && self.is_fixed(predicate) {

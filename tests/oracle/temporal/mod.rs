@@ -89,13 +89,14 @@ fn case_of(name: String, task: Task, unit: Option<Q>) -> Case {
     case_up_to(if unit.is_none() { CAP } else { OVERLAP_CAP }, name, task, unit)
 }
 
-/// Returns `None` if the task of the seed has no derived predicate.
+/// Generates a case with derived predicates. Returns `None` if the task of the seed has none.
 pub fn with_derived(seed: u64) -> Option<Case> {
     let task = Maker::make(seed, None);
     (!task.axioms.is_empty()).then(|| case_of(format!("derived-{seed}"), task, None))
 }
 
-/// The answer is open if the oracle would exceed `cap` nodes.
+/// Creates the case of a task, with the answer of the oracle. The answer is open if the oracle would exceed
+/// `cap` nodes.
 fn case_up_to(cap: usize, name: String, task: Task, unit: Option<Q>) -> Case {
     let world = World::new(task);
     let truth = match unit {

@@ -191,7 +191,7 @@ impl Task {
         }
     }
 
-    /// `depth` is the number of bound variables.
+    /// Formats a condition as PDDL. `depth` is the number of bound variables.
     fn condition(&self, condition: &Condition, depth: usize) -> String {
         let list = |word: &str, parts: &[Condition]| {
             let parts: String =
@@ -225,7 +225,7 @@ impl Task {
         }
     }
 
-    /// The time specifier is empty for instantaneous actions.
+    /// Formats an effect as PDDL. The time specifier is empty for instantaneous actions.
     fn effect(&self, effect: &Effect, time: &str, depth: usize) -> String {
         let at = |text: String| if time.is_empty() { text } else { format!("({time} {text})") };
         let list = |parts: &[Effect], depth: usize| {

@@ -14,7 +14,8 @@ use crate::faithful::verdict::Cause;
 use crate::faithful::world::World;
 use pddl::ast::{Condition, Expression};
 
-/// `linked` contains the derived atoms that are variables of the task.
+/// Computes bounds on the derived atoms that hold in states that satisfy the invariant. `linked` contains
+/// the derived atoms that are variables of the task.
 pub(super) fn axioms(
     world: &World<'_>,
     invariant: &Invariant,

@@ -22,8 +22,8 @@ pub(super) struct Made<'m> {
 
 pub(super) enum Mismatch {
     Differs(String),
-    /// It is not proved that at most one of these atoms (the values of a variable) holds after the
-    /// case. Or too many partial states would have to be examined.
+    /// The comparison is undecided: either it is not proved that at most one of these atoms (the
+    /// values of a variable) holds after the case, or the limit on partial states is reached.
     Unknown(String),
 }
 

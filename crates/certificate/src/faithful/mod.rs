@@ -169,8 +169,8 @@ impl<'f> Files<'f> {
         if (self.stop)() { Err(Cause::Stopped) } else { Ok(()) }
     }
 
-    /// The cases cover all executions of the instance in states that satisfy the invariant. An
-    /// empty list proves that the instance is executable in no such state.
+    /// Returns cases that cover all executions of the instance in states that satisfy the invariant. An empty list
+    /// proves that the instance is executable in no such state.
     fn cases(&self, instance: &Instance, invariant: &Invariant, axioms: &Axioms) -> Result<Vec<Case>> {
         self.stopped()?;
         if instance.requires.iter().any(|key| !invariant.may_hold(key)) {

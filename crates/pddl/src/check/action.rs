@@ -138,8 +138,8 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// A derived predicate follows from its axioms, so neither effects nor the initial state can
-    /// set it.
+    /// Checks that an atom to be set is not derived. A derived predicate follows from its axioms,
+    /// so neither effects nor the initial state can set it.
     pub(super) fn check_basic(&mut self, atom: &'a Atom) {
         let Identifier { name, span } = &atom.predicate;
         if self.symbols.derived.contains(name) {

@@ -72,7 +72,7 @@ pub(super) fn objective(
     checker.sink.finish()
 }
 
-/// Also returns `true` if the domain is a template for PLANTA's `OWLToPDDL`.
+/// Returns the errors and warnings of a domain, and `true` if the domain is a template for PLANTA's `OWLToPDDL`.
 fn check_domain_with(domain: &Domain, source: &Source, symbols: &Symbols<'_>) -> (Vec<Diagnostic>, bool) {
     let mut checker = Checker::new(symbols, source);
     checker.in_domain = true;

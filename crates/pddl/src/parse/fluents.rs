@@ -69,7 +69,7 @@ pub(super) struct Assigned {
     pub(super) time: EffectTime,
     pub(super) function: Identifier,
     pub(super) arguments: Vec<Term>,
-    /// `None` for `undefined`.
+    /// Assigned value; `None` for `undefined`.
     pub(super) value: Option<Term>,
     pub(super) variables: Vec<TypedName>,
     /// Generated variables for the values of object-fluent terms within the assignment.

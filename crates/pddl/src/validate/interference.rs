@@ -19,7 +19,7 @@ use super::world::{Symbol, World};
 #[derive(Debug, Clone)]
 struct Pattern {
     symbol: Symbol,
-    /// `None` matches all arguments.
+    /// Arguments to match; `None` matches all arguments.
     arguments: Option<SmallVec<[Slot; 4]>>,
 }
 

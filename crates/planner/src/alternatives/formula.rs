@@ -22,7 +22,8 @@ use task::task::Task;
 use crate::alternatives::choices::{Alternatives, Choice, forced, shares};
 use crate::optimize::Config;
 
-/// Returns `None` if the formula cannot be built within the limits.
+/// Finds further cheapest plans by solving a formula repeatedly. Returns `None` if the formula cannot be built
+/// within the limits.
 pub(super) fn by_formula(
     context: Context<'_>,
     bounds: &Bounds,
@@ -100,7 +101,8 @@ impl Run<'_> {
         self.solver.add_clause(&clause);
     }
 
-    /// If the formula is satisfiable, also returns the decoded plan, unless it is not executable.
+    /// Solves the formula under assumptions. If it is satisfiable, also returns the decoded plan, unless the plan
+    /// is not executable.
     fn solve(&mut self, assumptions: &[Lit]) -> (Answer, Option<Vec<GroundStep>>) {
         let answer = self.solver.solve(assumptions);
         if answer != Answer::Satisfiable {

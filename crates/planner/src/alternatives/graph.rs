@@ -108,7 +108,8 @@ enum Known {
 }
 
 impl Labels {
-    /// Each label also represents all states that are no better in any compared number.
+    /// Creates an empty set of labels. Each label will also represent all states that are no better in any
+    /// compared number.
     fn comparing(task: &Task) -> Self {
         let asked = directions(task).into_iter().enumerate();
         Self::new(task, asked.filter(|(_, asked)| !(asked.up && asked.down)).collect())

@@ -45,7 +45,7 @@ pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Conf
     by_graph.or_else(|| by_formula(context, &bounds, first, most, config)).or(Some(unknown))
 }
 
-/// Returns `None` if graph search is not applicable to the task.
+/// Finds further cheapest plans as paths of a graph. Returns `None` if graph search is not applicable to the task.
 fn by_graph(context: Context<'_>, bounds: &Bounds, first: &GroundPlan, most: usize) -> Option<Alternatives> {
     let task = context.task;
     let mut is_enough = |graph: &Graph| List::new(context, first, most, graph).0.is_full();
@@ -91,7 +91,8 @@ impl List {
     }
 }
 
-/// The graph must be complete, and each of its paths to a goal must be a plan.
+/// Returns the choices of the first plan that all cheapest plans share. The graph must be complete, and each of its
+/// paths to a goal must be a plan.
 fn shared(task: &Task, first: &[GroundStep], graph: &Graph) -> Vec<Choice> {
     let layers = Paths::new(graph).layers(first.len());
     let mut choices = Choice::all(first);

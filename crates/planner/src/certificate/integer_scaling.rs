@@ -28,9 +28,9 @@ impl Scales {
         Self { numbers: unit(), costs: unit(), times: unit(), bounds: unit() }
     }
 
-    /// Cost bounds are counted in multiples of `unit`. Returns `None` if an effect multiplies a
-    /// number by a fraction (its values then have no common denominator), or a denominator has too
-    /// many bits.
+    /// Computes the factors for a task whose cost bounds are counted in multiples of `unit`.
+    /// Returns `None` if an effect multiplies a number by a fraction (its values then have no
+    /// common denominator), or a denominator has too many bits.
     pub(super) fn of(task: &Task<Rational>, unit: &Rational) -> Option<Self> {
         let mut numbers = CommonDenominator::of_at_most(MOST_BITS);
         let mut times = CommonDenominator::of_at_most(MOST_BITS);
@@ -60,7 +60,8 @@ impl Scales {
     }
 }
 
-/// The scale must be a multiple of the denominator of `number`.
+/// Returns the product of `number` and `scale`, which must be a multiple of the denominator of
+/// `number`.
 pub(super) fn scaled<N: TaskNumber>(number: &N, scale: &Integer) -> Integer {
     let number = number.to_rational();
     if let Some(integer) = number.to_int() {

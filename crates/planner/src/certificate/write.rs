@@ -63,9 +63,9 @@ pub fn certify_exact(task: &ExactTask, solution: &Solution, limits: &Limits) -> 
     certified(context, (solution, cost), &scales, bounds, |rounded| &rounded.bounds)
 }
 
-/// `bounds` computes a heuristic and the scales of its numbers, and `plain` returns the integer
-/// bounds in it. `scales` is used if grounding already proves that the task is unsolvable. Returns
-/// `None` in the cases that [`certify`] lists.
+/// Writes the certificate of a solution. `bounds` computes a heuristic and the scales of its numbers, and `plain`
+/// returns the integer bounds in it. `scales` is used if grounding already proves that the task is unsolvable.
+/// Returns `None` in the cases that [`certify`] lists.
 fn certified<N: TaskNumber, E: Heuristic<N>>(
     context: Context<'_, N>,
     (solution, cost): (&Solution, Option<N>),

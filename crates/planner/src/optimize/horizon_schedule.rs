@@ -94,8 +94,8 @@ impl HorizonSchedule {
     }
 }
 
-/// Has no budget. If there is no plan, a limit is reached, or the formulas become too large,
-/// returns a solution without a plan as an error.
+/// Finds a first plan without a limit on the work. If there is no plan, a time or memory limit is reached,
+/// or the formulas become too large, returns a solution without a plan as an error.
 pub(super) fn first_plan(run: &mut Run<'_>, bounds: &Bounds) -> Result<GroundPlan, Box<Solution>> {
     let mut first = HorizonSchedule::new(run);
     loop {
@@ -128,8 +128,8 @@ fn decide(
     })
 }
 
-/// Returns `None` if the task has numeric variables or the number of states overflows. A shortest
-/// plan has fewer steps than there are states, because it visits no state twice.
+/// Returns the number of states, counting unreachable ones. A shortest plan has fewer steps, because it
+/// visits no state twice. Returns `None` if the task has numeric variables or the number overflows.
 fn states(task: &Task) -> Option<usize> {
     if !task.initial.numbers.is_empty() {
         return None;

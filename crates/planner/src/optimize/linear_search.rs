@@ -5,8 +5,9 @@ use encodings::sat::Answer;
 
 use crate::optimize::optimizer_run::{Best, Run, StrategyOutcome};
 
-/// Stores each plan in `best`. A lower cost limit only adds clauses, so learnt clauses stay valid.
-/// Stops after `budget` conflicts, or at a time or memory limit.
+/// Finds cheaper and cheaper plans of a formula, and stores each of them in `best`. A lower cost limit
+/// only adds clauses, so learnt clauses stay valid. Stops after `budget` conflicts, or at a time or memory
+/// limit.
 pub(super) fn linear_search_down(
     run: &mut Run<'_>,
     mut encoding: Encoding<'_>,

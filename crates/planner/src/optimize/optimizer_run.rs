@@ -121,8 +121,8 @@ impl<'a> Run<'a> {
         (self.report)(improvement);
     }
 
-    /// With a horizon, formulas are sequential; otherwise, the configured semantics takes
-    /// precedence.
+    /// Returns the step semantics of formulas. With a horizon, they are sequential; otherwise, the configured
+    /// semantics takes precedence over `unless_given`.
     pub(super) fn semantics(&self, unless_given: StepSemantics) -> StepSemantics {
         match self.config.horizon {
             Some(_) => StepSemantics::Sequential,
@@ -130,8 +130,8 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Returns `None` if the formula cannot be built within the limits, for example with at most
-    /// `max_clauses` clauses.
+    /// Encodes the task as a formula. Returns `None` if the formula cannot be built within the limits, for example
+    /// with at most `max_clauses` clauses.
     pub(super) fn encoding(
         &self,
         allowed: &[Vec<bool>],
@@ -147,9 +147,9 @@ impl<'a> Run<'a> {
         Some(encoding)
     }
 
-    /// If the plans with a cost of at most `limit` have no proved bound on their number of steps,
-    /// the formula has as many steps as the configured horizon or, without a horizon, about twice
-    /// as many as the best plan.
+    /// Returns the scope of a formula for plans with a cost of at most `limit`. If these plans have no proved bound
+    /// on their number of steps, the formula has as many steps as the configured horizon or, without a horizon,
+    /// about twice as many as the best plan.
     pub(super) fn extent(
         &self,
         bounds: &Bounds,
@@ -172,7 +172,7 @@ impl<'a> Run<'a> {
         Ok(FormulaScope { limit, allowed, step_bound })
     }
 
-    /// The solver stops at a limit or after `budget` conflicts.
+    /// Starts a SAT solver, which stops at a limit or after `budget` conflicts.
     pub(super) fn live(&self, budget: u64) -> IncrementalSolver {
         IncrementalSolver {
             solver: self.config.backend.start(&self.config.limits, budget),
@@ -231,8 +231,8 @@ impl<'a> Run<'a> {
         (answer, plan)
     }
 
-    /// The formula should admit only plans; this check detects errors of the encoding. Returns
-    /// `None` if the plan is not executable or its cost overflows.
+    /// Checks the steps of a decoded plan, and returns the plan. The formula should admit only plans; this check
+    /// detects errors of the encoding. Returns `None` if the plan is not executable or its cost overflows.
     fn check(&mut self, steps: Vec<GroundStep>) -> Option<GroundPlan> {
         if pass(self.task, &self.task.initial, &steps).is_none() {
             self.report_internal_contradiction("a formula admits a sequence of actions that is not a plan");
@@ -242,7 +242,7 @@ impl<'a> Run<'a> {
         cost(self.task, &steps).map(|cost| GroundPlan { steps, cost })
     }
 
-    /// After an internal contradiction, nothing counts as proved.
+    /// Returns the solution of the run. After an internal contradiction, it counts nothing as proved.
     pub(super) fn finish(
         self,
         status: Status,

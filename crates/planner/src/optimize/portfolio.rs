@@ -69,7 +69,7 @@ struct Portfolio<'r, 'a> {
     improvement_share: i32,
 }
 
-/// `None` if the next component continues.
+/// Result of the turn of a component: the end of planning, or `None` if the next component continues.
 type Turn = Option<Ending>;
 
 enum Ending {

@@ -30,15 +30,17 @@ const CONFIRM_LIMIT: usize = 400;
 /// costs arise from scaled products of decimals.
 const CONFIRM_COST: Int = 1 << 64;
 
-/// The SAT solver tries to confirm optimality if this takes little time or is configured (see
-/// [`confirm`]). The proof by the bound counts even if it is not confirmed.
+/// Returns the solution for a plan whose cost equals the lower bound. The SAT solver tries to confirm optimality
+/// if this takes little time or is configured (see [`confirm`]). The proof by the bound counts even if it is not
+/// confirmed.
 pub(super) fn proved_by_bound(mut run: Run<'_>, best: &Best) -> Solution {
     let proof = confirm(&mut run, &best.plan).unwrap_or(Proof::Bound);
     into_solution(run, best, 0, Some(proof))
 }
 
-/// The SAT solver tries to confirm optimality if the engine includes it and this takes little time
-/// or is configured. The proof by search counts even if it is not confirmed.
+/// Returns the solution for a plan that an exhausted search has proved optimal. The SAT solver tries to confirm
+/// optimality if the engine includes it and this takes little time or is configured. The proof by search counts
+/// even if it is not confirmed.
 pub(super) fn proved_by_search(mut run: Run<'_>, bounds: &Bounds, plan: GroundPlan, lower: Int) -> Solution {
     let mut best = Best { plan, lower };
     run.announce(&best, best.plan.steps.len());

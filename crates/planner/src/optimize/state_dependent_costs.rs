@@ -24,7 +24,7 @@ use task::task::{Condition, NumericId, Objective, Operator, State, Task};
 /// Number of rounds of the interval analysis before widening, and also the number of narrowing rounds.
 const ROUNDS: usize = 3;
 
-/// `None` represents an infinite bound.
+/// Range of a number. `None` represents an infinite bound.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Interval {
     low: Option<Int>,
@@ -52,13 +52,13 @@ pub(super) struct StateDependentCosts {
     weights: Vec<(NumericId, Int)>,
     /// For each number: whether less or more of it is never worse.
     pub(super) preferences: Vec<Preference>,
-    /// Its constant operator costs are lower bounds on the increase of the exact cost.
+    /// The task with constant operator costs, which are lower bounds on the increase of the exact cost.
     pub(super) priced: Task,
 }
 
 impl StateDependentCosts {
-    /// Returns `None` if the cost of an operator has no bound of at least 0, or if numbers
-    /// overflow.
+    /// Computes a lower bound on the increase of the exact cost by each operator. Returns `None` if an operator has no
+    /// bound of at least 0, or if numbers overflow.
     ///
     /// # Errors
     /// Fails if the deadline has passed or the interrupt flag is set.
@@ -93,7 +93,7 @@ impl StateDependentCosts {
         })
     }
 
-    /// `None` if the plan is not executable or a number overflows.
+    /// Returns the exact cost of a plan, or `None` if the plan is not executable or a number overflows.
     pub(super) fn total(&self, task: &Task, plan: &GroundPlan) -> Option<Int> {
         let states = pass(task, &task.initial, &plan.steps)?;
         let paid = cost(task, &plan.steps)?.checked_mul(self.factor)?;
@@ -135,7 +135,8 @@ impl Preference {
     }
 }
 
-/// Greatest fixpoint, because effects on numbers read other numbers.
+/// Computes for each number whether less or more of it is never worse. The result is a greatest fixpoint, because
+/// effects on numbers read other numbers.
 fn preferences(task: &Task, weights: &[(NumericId, Int)]) -> Vec<Preference> {
     let mut preferences = vec![Preference { less: true, more: true }; task.initial.numbers.len()];
     // More of a compared expression, and less of the cost, is never worse.
@@ -270,7 +271,7 @@ impl<'i> Guarded<'i> {
         if is_low { bounds.max() } else { bounds.min() }
     }
 
-    /// A bound that overflows is infinite.
+    /// Returns the range of a linear expression. A bound that overflows is infinite.
     fn range(&self, linear: &Linear<Int>) -> Interval {
         let Linear { coefficients, quantity } = linear;
         let low = self.extreme(coefficients, true).and_then(|sum| sum.checked_add(quantity.minimum()));

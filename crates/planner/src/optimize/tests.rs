@@ -30,8 +30,8 @@ fn config(backend: &Backend, strategy: Strategy, limits: Limits) -> Config {
     Config { engine: Engine::Sat, strategy, backend: backend.clone(), limits, ..Config::default() }
 }
 
-/// If all operators have positive costs, the solution must be proved optimal. Returns `true` if it
-/// is proved optimal.
+/// Checks the cost and the bounds of a solution against the optimum. If all operators have positive
+/// costs, the solution must be proved optimal. Returns `true` if it is proved optimal.
 fn check_optimum(context: &str, (task, best): (&Task, Int), config: &Config) -> bool {
     let solution = optimize(task, config, &mut |_| {});
     let best = metric(task, &best);

@@ -28,6 +28,7 @@ pub(super) struct AvailabilityContext {
 }
 
 impl GroundBase {
+    /// Returns the task with only those operators and designs whose required objects are available.
     /// `available` contains the available objects, in ascending order, for each availability
     /// predicate.
     pub(super) fn masked(&self, available: &[Vec<ObjectId>], limits: &Limits) -> Result<Task, Interrupted> {

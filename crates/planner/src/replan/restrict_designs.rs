@@ -71,7 +71,8 @@ pub(super) fn restrict(
 }
 
 impl SharedTables {
-    /// Returns `None` if a slot has no remaining design.
+    /// Restricts the slots of an operator to the allowed designs. Returns `None` if a slot has no remaining
+    /// design.
     fn operator(
         &mut self,
         task: &Task,
@@ -171,7 +172,7 @@ fn left(task: &Task, operator: &Operator, allowed: &dyn Fn(usize, ObjectId) -> b
     (remaining, uses)
 }
 
-/// Entries for the remaining designs, in row-major order.
+/// Returns the entries of a table for the remaining designs, in row-major order.
 #[expect(clippy::arithmetic_side_effects, reason = "a position in the table, which is in memory")]
 fn rows(table: &Table<Int>, kept: &KeptDesigns, sizes: &[usize]) -> Arc<[Int]> {
     let mut positions = vec![0_usize];

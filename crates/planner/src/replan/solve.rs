@@ -164,7 +164,8 @@ impl Candidate {
     }
 }
 
-/// Returns `None` if the task cannot represent one of the first steps of the query.
+/// Returns the states in which the search can start: the situation itself, or the states after the first steps
+/// of the query. Returns `None` if the task cannot represent one of the first steps.
 fn starts(base: &GroundBase, situation: &ReplanState, query: &Query<'_>) -> Option<Vec<Start>> {
     let sign = |metric: &BigRational| if base.task.objective.maximize { -metric } else { metric.clone() };
     if query.first.is_empty() {

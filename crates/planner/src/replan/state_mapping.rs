@@ -99,7 +99,8 @@ impl Layout {
         !self.usage.is_changed(name) || self.usage.is_function_read(name)
     }
 
-    /// Returns `None` if the task does not support the problem.
+    /// Converts the initial state of a problem to a state of the task. Returns `None` if the task does not
+    /// support the problem.
     pub(super) fn situation(&self, task: &Task, problem: &Problem) -> Option<ReplanState> {
         if frame(problem) != self.frame {
             return None;
@@ -161,7 +162,8 @@ impl Layout {
         Some(())
     }
 
-    /// Returns `None` if the variable already has another fact, or the fact is unreachable.
+    /// Sets a fact in the values of a state. Returns `None` if the variable already has another fact, or the
+    /// fact is unreachable.
     fn set(&self, values: &mut [u32], fact: Fact, is_reached: bool) -> Option<()> {
         let value = &mut values[fact.variable.index()];
         let is_free = *value == self.nothing[fact.variable.index()] || *value == fact.value;
@@ -174,8 +176,8 @@ impl Layout {
         scaled.is_integer().then(|| scaled.to_integer().to_i128()).flatten()
     }
 
-    /// Returns `None` if the step changes facts or values that must not change, or if the task
-    /// cannot represent the new state.
+    /// Returns the state after a step. Returns `None` if the step changes facts or values that must not
+    /// change, or if the task cannot represent the new state.
     pub(super) fn advance(&self, task: &Task, state: &State, step: &Advance) -> Option<State> {
         let mut next = state.clone();
         for atom in &step.deleted {
@@ -213,7 +215,7 @@ impl Layout {
         Some(next)
     }
 
-    /// Letter case is ignored.
+    /// Returns the object with this name, regardless of letter case.
     pub(super) fn object(&self, name: &str) -> Option<ObjectId> {
         self.objects.get(&name.to_ascii_lowercase()).copied()
     }

@@ -131,7 +131,7 @@ fn conjuncts(condition: &Condition) -> Vec<&Atom> {
     }
 }
 
-/// Counts conditions and effects of actions, and axioms.
+/// Counts the occurrences of a predicate in conditions and effects of actions, and in axioms.
 fn occurrences(domain: &Domain, predicate: &Name) -> usize {
     let mut count = Count { predicate, mentions: 0 };
     for action in &domain.actions {

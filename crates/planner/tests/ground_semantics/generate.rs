@@ -135,7 +135,7 @@ impl<'b> Draw<'b> {
         Formula::Fact(predicate, self.terms(PREDICATES[predicate].1, depth))
     }
 
-    /// If `is_constant`, the expression contains only functions that never change.
+    /// Generates an expression. If `is_constant`, it contains only functions that never change.
     fn expression(&mut self, depth: usize, nesting: usize, is_constant: bool, duration: bool) -> Expression {
         let leaf = nesting == 0 || self.chance(50);
         if leaf {

@@ -140,7 +140,8 @@ impl<'a> View<'a> {
         })
     }
 
-    /// Returns `None` if a change is undefined or contradicts another.
+    /// Adds the changes of an effect in the current state to `changes`. Returns `None` if a change is
+    /// undefined or contradicts another.
     fn collect(&self, effect: &Effect, scope: &[usize], changes: &mut Changes) -> Option<()> {
         match effect {
             Effect::And(parts) => parts.iter().try_for_each(|part| self.collect(part, scope, changes))?,
@@ -254,9 +255,9 @@ impl State {
         }
     }
 
-    /// Returns 0 for an instantaneous action, otherwise the value of the first equation, or without
-    /// an equation the stated duration. Bounds at the end are ignored. Returns `None` if the bounds
-    /// do not admit the stated duration, or if the duration is negative or unknown.
+    /// Returns the duration of an action: 0 for an instantaneous action, otherwise the value of the first
+    /// equation, or without an equation the stated duration. Bounds at the end are ignored. Returns `None`
+    /// if the bounds do not admit the stated duration, or if the duration is negative or unknown.
     fn duration(
         &self,
         task: &Task,
@@ -283,9 +284,9 @@ impl State {
         View::new(task, self, None).value(expression, scope)
     }
 
-    /// All effects of a happening read this state. Returns `None` if a condition does not hold, an
-    /// effect is undefined, or parts of the happening interfere with each other or with a
-    /// simultaneous event.
+    /// Returns the state after a happening, all effects of which read this state. Returns `None` if a
+    /// condition does not hold, an effect is undefined, or parts of the happening interfere with each
+    /// other or with a simultaneous event.
     fn happen(
         &self,
         task: &Task,
@@ -329,8 +330,8 @@ impl State {
         Some(after)
     }
 
-    /// The step starts as soon as the previous step has ended. Returns `None` if it cannot be
-    /// executed.
+    /// Returns the state after a step that starts as soon as the previous step has ended. Returns `None`
+    /// if it cannot be executed.
     pub fn after(&self, task: &Task, (action, scope, stated): &Step) -> Option<Self> {
         let action = &task.actions[*action];
         let start = self.time;
@@ -380,7 +381,7 @@ impl State {
         Some(state)
     }
 
-    /// Includes derived atoms.
+    /// Returns all atoms that hold, including derived atoms.
     pub fn all_facts(&self, task: &Task) -> BTreeSet<Atom> {
         let derived = View::new(task, self, None).derived;
         self.facts.iter().cloned().chain(derived).collect()

@@ -216,7 +216,7 @@ fn bound(range: Range, depth: usize) -> String {
 }
 
 impl Formula {
-    /// `depth` is the number of variables bound around the formula.
+    /// Formats a formula as PDDL. `depth` is the number of variables bound around the formula.
     pub fn text(&self, depth: usize) -> String {
         match self {
             Self::Fact(predicate, terms) => applied(PREDICATES[*predicate].0, terms),
@@ -312,7 +312,7 @@ fn ground_text(name: &str, arguments: &[usize]) -> String {
     applied(name, &arguments.iter().map(|object| Term::Object(*object)).collect::<Vec<_>>())
 }
 
-/// As in messages and ground tasks, e.g. `(q o0)`.
+/// Formats an atom as in messages and ground tasks, e.g. `(q o0)`.
 pub fn fact_text((predicate, arguments): &Atom) -> String {
     ground_text(PREDICATES[*predicate].0, arguments)
 }

@@ -47,7 +47,7 @@ fn step_text((action, objects, duration): &Step) -> String {
     format!("(a{action} {}){duration}\n", objects.join(" "))
 }
 
-/// The error is the number of the first inapplicable step (0 for an unsatisfied goal).
+/// Executes a plan. The error is the number of the first inapplicable step (0 for an unsatisfied goal).
 fn interpret(task: &Task, plan: &[Step]) -> Result<State, usize> {
     let mut state = State::initial(task);
     for (number, step) in plan.iter().enumerate() {

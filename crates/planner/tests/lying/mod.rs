@@ -35,7 +35,8 @@ fn fraction(text: &str) -> BigRational {
     text.parse().unwrap_or_else(|_| panic!("{text} is not a fraction"))
 }
 
-/// The second text is the witness (the over-approximation of the reachable states).
+/// Returns the certificate of an example, and the text of its witness (the over-approximation of the
+/// reachable states).
 fn certified(example: &Example) -> (Certificate, String) {
     let (domain, problem) = files(example);
     let task = ground(&domain, &problem, &GroundConfig::default())

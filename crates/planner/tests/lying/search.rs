@@ -32,7 +32,8 @@ pub enum Best {
     NoPlan,
 }
 
-/// Returns `None` if the text is not a valid task or the task is too large.
+/// Computes the best metric of a ground task. Returns `None` if the text is not a valid task or the task is
+/// too large.
 pub fn optimum(text: &str) -> Option<Best> {
     let document: Value = serde_json::from_str(text).ok()?;
     let task = Task(&document);

@@ -123,7 +123,7 @@ impl Effect {
     }
 }
 
-/// Returns `None` if an effect reads an undefined value.
+/// Returns the state after simultaneous effects, or `None` if an effect reads an undefined value.
 fn after(state: State, effects: &[Effect]) -> Option<State> {
     let mut next = state;
     let mut added = Vec::new();
@@ -163,7 +163,8 @@ impl Task {
         self.execute(plan).is_some_and(|state| self.goal.truth(&state) == Some(true))
     }
 
-    /// `None` if there is no plan with at most [`DEPTH`] actions.
+    /// Returns the number of actions of a shortest plan, or `None` if there is no plan with at most
+    /// [`DEPTH`] actions.
     pub(crate) fn shortest(&self) -> Option<usize> {
         let mut layer: Vec<Vec<usize>> = vec![Vec::new()];
         for length in 0..=DEPTH {
@@ -243,7 +244,7 @@ impl Generator {
         }
     }
 
-    /// At most one effect on each number.
+    /// Generates effects, at most one on each number.
     fn effects(&mut self) -> Vec<Effect> {
         let mut changes = Vec::new();
         if self.below(2) == 0 {

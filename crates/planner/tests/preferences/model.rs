@@ -170,7 +170,7 @@ impl Effect {
     }
 }
 
-/// An atom that is added and deleted is true.
+/// Returns the state after simultaneous effects. An atom that is added and deleted is true.
 pub fn after(state: &State, effects: &[Effect], bound: Bound) -> State {
     let mut next = state.clone();
     let mut set = Vec::new();

@@ -17,7 +17,7 @@ impl From<Error> for Stop {
 
 pub type Checked<T> = Result<T, Stop>;
 
-/// `None` reports an exceeded budget of exact arithmetic.
+/// Converts the result of a computation in exact arithmetic. `None` means that its budget is exceeded.
 pub fn within_budget<T>(result: Option<T>) -> Checked<T> {
     result.ok_or(Stop::TooMuchWork)
 }

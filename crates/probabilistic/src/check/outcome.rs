@@ -21,7 +21,7 @@ use crate::solve::Direction;
 pub type Attained = (Outcome, Option<Vec<u32>>);
 
 impl<N: Number> Query<'_, N> {
-    /// Returns `None` if exact arithmetic exceeds its budget.
+    /// Evaluates a property on the explored model. Returns `None` if exact arithmetic exceeds its budget.
     pub fn answer(&self, property: &Property) -> Result<Option<Attained>, Error> {
         match self.outcome(property) {
             Ok(answer) => Ok(Some(answer)),

@@ -91,7 +91,7 @@ pub enum Filter {
     ArgMax,
 }
 
-/// The query of an operator: either for its value, or for the comparison of the value with a bound.
+/// The query of an operator `P`, `R` or `S`: its value (`=?`), or whether its value satisfies a bound.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Question {
     /// The requested optimum: minimum or maximum over all policies. `None` if it is not given: the model is

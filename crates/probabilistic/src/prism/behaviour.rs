@@ -161,7 +161,7 @@ impl<N: Number> Module<N> {
             for (variable, code, place) in &update.assignments {
                 let value = program.assigned(*variable, code, *place, values)?;
                 let edit = program.layout.edit(*variable, value);
-                // Assignments to variables of one word are merged into one edit.
+                // Assignments to variables that are packed into the same word are merged into one edit.
                 match self.edits[begin..].iter_mut().find(|earlier| earlier.joins(&edit)) {
                     Some(earlier) => earlier.join(&edit),
                     None => self.edits.push(edit),

@@ -43,7 +43,8 @@ impl Guard {
         self.remainder.iter().for_each(|part| part.each_variable(visit));
     }
 
-    /// Fails if a conjunct cannot be evaluated.
+    /// Returns `true` if all conjuncts hold. Fails if a conjunct cannot be evaluated, unless an earlier one is
+    /// false.
     pub fn holds(&self, values: &[i64]) -> Result<bool, Fault> {
         for test in &self.tests {
             let value = values[test.variable as usize];

@@ -152,7 +152,8 @@ impl<'a> Builder<'a> {
         Self { task, first, facts, payers, required, given, clauses: FxHashMap::default(), free }
     }
 
-    /// A derived variable may be false at any time, so its falsity is `ALWAYS`.
+    /// Returns the number of a fact in the relaxation. A derived variable may be false at any time, so its
+    /// falsity is `ALWAYS`.
     #[expect(clippy::arithmetic_side_effects, reason = "facts are numbered")]
     fn fact(&self, fact: Fact) -> u32 {
         let variable = fact.variable.index();

@@ -138,8 +138,9 @@ impl Projection {
         states
     }
 
-    /// If the values of the pattern do not determine whether a conditional effect occurs, both
-    /// outcomes are included.
+    /// Returns the abstract states that the effects may produce from the abstract state `source`. If the
+    /// values of the pattern do not determine whether a conditional effect occurs, both outcomes are
+    /// included.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "abstract states are below the number of them, which are in memory"

@@ -98,7 +98,8 @@ impl<N: TaskNumber> Relaxation<N> {
 }
 
 impl<N: TaskNumber> Relaxation<N> {
-    /// Returns `false` for disjunctions, and if the value of a comparison overflows.
+    /// Returns `true` if a fact or a numeric comparison holds in a state. Returns `false` for disjunctions, and if
+    /// the value of a comparison overflows.
     pub(super) fn holds(&self, proposition: Proposition, state: &State<N>) -> bool {
         if let Some(fact) = self.fact_of(proposition) {
             return fact.holds(&state.values);

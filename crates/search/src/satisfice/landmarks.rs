@@ -314,7 +314,7 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
         side
     }
 
-    /// Includes the unconditional effects of the operator of the node.
+    /// Returns the effects of a node, including the unconditional effects of its operator.
     fn all_effects(&self, node: u32) -> Vec<Proposition> {
         let mut effects = self.relaxation.effects.of(node).to_vec();
         let operator = self.relaxation.operators[node as usize];
@@ -351,7 +351,8 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
     }
 }
 
-/// Transitive closure: for each landmark, a bitset of the landmarks ordered after it.
+/// Returns the transitive closure of the orders: for each landmark, a bitset of the landmarks ordered after
+/// it.
 fn closure(count: usize, orders: &FxHashSet<(u32, u32)>) -> Vec<Vec<u64>> {
     let mut reach = vec![vec![0_u64; count.div_ceil(64)]; count];
     for (sooner, later) in orders {

@@ -45,7 +45,7 @@ pub(super) struct SearchContext<'a, N> {
 }
 
 impl<'a, N: TaskNumber> SearchContext<'a, N> {
-    /// Returns `None` if an operator has too many combinations of designs.
+    /// Prepares the data of a task. Returns `None` if an operator has too many combinations of designs.
     pub(super) fn new(context: Context<'a, N>) -> Result<Option<Self>, Interrupted> {
         let Context { task, limits } = context;
         let monotone = is_monotone(task);
@@ -65,7 +65,7 @@ impl<'a, N: TaskNumber> SearchContext<'a, N> {
         Ok(Some(Self { task, relaxation, explorer, status, pairs: None, prices: [None, None], steps, first }))
     }
 
-    /// The h² mutexes change the operator costs, which are computed again.
+    /// Sets the h² mutexes. They change the operator costs, which are computed again.
     pub(super) fn set_pairs(&mut self, pairs: Option<MutexPairs>) {
         self.pairs = pairs;
         self.prices = [None, None];

@@ -397,7 +397,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         self.best.map(|goal| self.plan(goal))
     }
 
-    /// Operators in ascending order. Stubborn sets may remove operators.
+    /// Returns the operators to apply in the current state, in ascending order: those whose propositional
+    /// conditions hold, without those that stubborn sets exclude.
     fn applicable(&mut self) -> Vec<OperatorId> {
         let mut applicable = self.prepared.index.applicable(self.task, &self.state);
         if let Some(choosing) = &mut self.pruning {

@@ -76,8 +76,8 @@ pub fn pareto_optimal_combinations<N: TaskNumber>(
     Ok(Some(front.into_iter().map(|Partial { choice, cost, .. }| (choice, cost)).collect()))
 }
 
-/// Non-dominated combinations for the slots of one group; `None` if there are too many. The other
-/// slots have design 0.
+/// Returns the non-dominated combinations for the slots of one group, or `None` if there are too many. The other slots
+/// have design 0.
 fn own_front<N: TaskNumber>(
     operator: &Operator<N>,
     quantities: &[&Quantity<N>],
@@ -182,7 +182,7 @@ fn best<N: TaskNumber>(
     Ok(front)
 }
 
-/// Groups of slots such that no table and no forbidden combination connects two groups.
+/// Returns groups of slots such that no table and no forbidden combination connects two groups.
 fn independent<N>(operator: &Operator<N>, quantities: &[&Quantity<N>]) -> Vec<Vec<u32>> {
     let tables = quantities.iter().copied().chain([&operator.cost]).flat_map(|quantity| &quantity.tables);
     let joined = tables.map(|table| &table.slots).chain(operator.forbidden.iter().map(|rule| &rule.slots));

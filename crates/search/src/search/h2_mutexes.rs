@@ -129,7 +129,8 @@ pub struct MutexPairs {
 }
 
 impl MutexPairs {
-    /// Returns `None` if there are too many facts, or the work limit is reached in the first round.
+    /// Computes the h² mutexes of a task. Returns `None` if there are too many facts, or the work limit is
+    /// reached in the first round.
     pub(crate) fn new<N: TaskNumber>(task: &Task<N>, limits: &Limits) -> Result<Option<Self>, Interrupted> {
         let mut first = Vec::with_capacity(task.basic);
         let mut variables = Vec::new();

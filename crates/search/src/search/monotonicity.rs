@@ -91,7 +91,8 @@ impl<N: TaskNumber> PolarityAnalysis<'_, N> {
         }
     }
 
-    /// Value 0 of a derived variable means true.
+    /// Adds the directions in which a fact is needed. They are stored for value 0 of its variable, which
+    /// means true if the variable is derived; for another value they are swapped.
     fn fact(&mut self, fact: Fact, polarity: Polarity) {
         let polarity = if fact.value == 0 { polarity } else { polarity.flipped() };
         let current = &mut self.facts[fact.variable.index()];

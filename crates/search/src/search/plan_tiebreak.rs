@@ -83,8 +83,8 @@ struct Merits {
 }
 
 impl Merits {
-    /// If `monotone`, higher values of all numeric variables are never worse; otherwise they must
-    /// be equal.
+    /// Returns `true` if these merits are at least as good as the others in each respect. If `monotone`,
+    /// higher values of all numeric variables are never worse; otherwise they must be equal.
     fn is_no_worse(&self, other: &Self, monotone: bool) -> bool {
         self.cost <= other.cost
             && self.steps <= other.steps
@@ -111,7 +111,7 @@ struct Choice {
     /// Functions used by the operator (as positions in `TieBreakContext::functions`), with their
     /// designs.
     configuration: Vec<(usize, ObjectId)>,
-    /// Also `true` if there is no reference plan.
+    /// Whether the step is kept from the reference plan; also `true` if there is no reference plan.
     is_kept: bool,
 }
 
@@ -121,7 +121,7 @@ type Choices = Option<Vec<Choice>>;
 #[derive(Default)]
 struct Labels {
     all: Vec<Label>,
-    /// By the key of [`Label::write_front_key`].
+    /// Merits of the non-dominated labels, by the key of [`Label::write_front_key`].
     fronts: FxHashMap<Box<[u32]>, Vec<Merits>>,
 }
 
@@ -298,8 +298,8 @@ impl Ties<'_> {
         (steps.len() == self.steps).then_some((steps, changes))
     }
 
-    /// Returns `None` if there are too many combinations, or the computation was interrupted; only
-    /// the former result is cached.
+    /// Returns the combinations of designs of an operator. Returns `None` if there are too many, or if the
+    /// computation was interrupted; only the former result is cached.
     fn choices(&self, operator: OperatorId) -> Option<&[Choice]> {
         let choices = &self.choices.as_ref().unwrap_or(&self.prepared.choices)[operator.index()];
         if choices.get().is_none() {
@@ -487,7 +487,8 @@ impl Ties<'_> {
         self.pulse.borrow_mut().beat().ok()
     }
 
-    /// Returns `None` if the limit on labels or comparisons is reached.
+    /// Stores a label, and removes the merits that it dominates. Returns `None` if the limit on labels or
+    /// comparisons is reached.
     #[expect(clippy::arithmetic_side_effects, reason = "labels are counted up to their limit")]
     fn keep(&self, labels: &mut Labels, label: Label) -> Option<()> {
         let (merits, monotone) = (label.merits(), self.prepared.monotone);

@@ -133,8 +133,8 @@ fn search_within<N: TaskNumber, E: Heuristic<N>>(
     }
 }
 
-/// Stores at most as many states as the threshold `states` (but at least [`LEAST`]) and
-/// `max_states` allow.
+/// Searches greedily for a plan. Stores at most as many states as the threshold `states` (but at least
+/// [`LEAST`]) and `max_states` allow.
 fn greedy_best_first<N: TaskNumber, E: Heuristic<N>>(
     space: &SearchProblem<'_, N, E>,
     initial: &State<N>,

@@ -364,7 +364,8 @@ impl<N: TaskNumber> StateRegistry<N> {
         self.nodes[node as usize].state == NodeStatus::Dominated
     }
 
-    /// Returns `false` if the node was marked before or is dominated.
+    /// Records that the lazy heuristic has been evaluated for a node. Returns `false` if this was recorded
+    /// before or the node is dominated.
     pub(super) fn mark_reevaluated(&mut self, node: u32) -> bool {
         let state = &mut self.nodes[node as usize].state;
         let is_first = *state == NodeStatus::Open;

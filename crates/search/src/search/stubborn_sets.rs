@@ -72,7 +72,8 @@ pub(super) struct StubbornSetPruning {
 }
 
 impl Stubborn {
-    /// Returns `None` if the task has numeric or derived variables.
+    /// Prepares the computation of stubborn sets. Returns `None` if the task has numeric or derived
+    /// variables.
     pub(crate) fn new<N>(task: &Task<N>) -> Option<Self> {
         if !task.axioms.is_empty() || !task.initial.numbers.is_empty() || task.basic < task.variables.len() {
             return None;

@@ -28,7 +28,7 @@ pub struct Orbits {
 }
 
 impl Orbits {
-    /// Returns `None` if no interchangeable objects are found; the number of comparisons is
+    /// Finds interchangeable objects. Returns `None` if none are found; the number of comparisons is
     /// limited.
     pub(crate) fn new(context: Context<'_, Int>) -> Result<Option<Self>, Interrupted> {
         let mut exchanges = Vec::new();

@@ -101,7 +101,7 @@ fn look_up(domain: &mut Domain, span: Span, wanted: Vec<PreferenceInstance>) {
         declare(domain, VIOLATED);
     }
     for ((name, condition), number) in wanted.into_iter().zip(1_u64..) {
-        // The action adds a flag that is false before, because actions without effects would be pruned.
+        // An action whose only effect is a cost can be pruned. So the action also sets a flag that is false before.
         let precondition = all([not(condition), not(holds(VIOLATED))]);
         let effect = Effect::And(vec![violate(&name), Effect::Add(flag(VIOLATED))]);
         let body = ActionBody::Instantaneous { precondition, effect };

@@ -172,14 +172,15 @@ impl<'t> Monitors<'t> {
         name
     }
 
-    /// Calls `make` for each start or end of an action that may change one of the conditions, and adds the result to
-    /// the action. The arguments of `make` are a condition under which the change may occur, and `conditions` regressed
-    /// to the state before the change. If the first argument would be a disjunction, `make` is called for each disjunct
-    /// instead. If start and end may coincide and both may change the conditions, the action also gets the condition
-    /// that its duration is positive.
+    /// Calls `make` for each start or end of an action that may change one of `conditions`, and adds the returned
+    /// preconditions and effects to this start or end. The arguments of `make` are a condition under which the change
+    /// may occur, and `conditions` regressed to the state before the change. If the first argument would be a
+    /// disjunction, `make` is called once for each disjunct. If start and end of an action may coincide and both may
+    /// change the conditions, the action also gets the precondition that its duration is positive.
     ///
-    /// Fails if this condition is not possible (for example in sequential plans), if a condition cannot be regressed,
-    /// or if the conditions contain derived predicates or atoms that timed initial literals change.
+    /// Fails if a positive duration is needed but cannot be required (for example in sequential plans), if a
+    /// condition cannot be regressed, or if the conditions contain derived predicates or atoms that timed initial
+    /// literals change.
     pub(super) fn after_each(
         &mut self,
         conditions: &[&Condition],

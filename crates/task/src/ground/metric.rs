@@ -27,7 +27,8 @@ use pddl::ast::Direction;
 ///
 /// # Errors
 /// A metric is not linear, reads a function without a value, or contains a fluent with state-dependent changes
-/// although `generality` does not allow this. Or the deadline has passed or the run is interrupted.
+/// although `generality` does not allow this. It is also an error if the deadline has passed or the run is
+/// interrupted.
 pub fn attach_costs(task: &mut GroundTask<'_>, generality: &Generality) -> Result<(), Errors> {
     let lifted = task.world.lifted;
     if lifted.metrics.is_empty() {

@@ -21,8 +21,8 @@ pub(super) struct Index<'a, T: TimeNumber = Int> {
     pub(super) marking: FxHashMap<Key, Vec<OperatorId>>,
     setting: Vec<Vec<OperatorId>>,
     changing: FxHashMap<NumericId, Vec<OperatorId>>,
-    /// Atoms and numbers that are read by over-all conditions of the kind of [`Instance::joint`],
-    /// numbered as in [`Happening::writes`], ascending.
+    /// Atoms and numbers read by those over-all conditions that several happenings can maintain jointly
+    /// (see [`Instance::joint`]). Numbered as in [`Happening::writes`], in ascending order.
     pub(super) joint: Vec<u32>,
 }
 

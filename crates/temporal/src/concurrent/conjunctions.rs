@@ -113,9 +113,9 @@ impl Index {
     }
 
     /// Propositions that are needed at the same time as `fact` and that a rule in `deleting` may
-    /// help to achieve. Needed are the conditions of the rules that require `fact`, and the
-    /// conditions for achieving these. Ascending. Empty if the work limit `looks` is used up while
-    /// the needed propositions are collected.
+    /// help to achieve, in ascending order. The needed propositions are the conditions of the rules
+    /// that require `fact`, and the conditions for achieving these. The result is empty if the work
+    /// limit `looks` is used up while the needed propositions are collected.
     fn together(
         &self,
         fact: Proposition,

@@ -35,7 +35,9 @@ impl<T: TimeNumber> Deadline<T> {
         Self { within: within.unwrap_or(T::MAX), is_hard: deadline.is_hard, begins, ends }
     }
 
-    /// `trajectory` contains the states of a plan with their times, ascending.
+    /// Returns `true` if the plan keeps the deadline: in or after each state in which a begin
+    /// condition holds, there is a state with an end condition, at most `within` later.
+    /// `trajectory` contains the states of the plan with their times, in ascending order.
     #[expect(clippy::arithmetic_side_effects, reason = "times are not negative")]
     pub(super) fn is_kept(&self, task: &Task, trajectory: &[(T, State)]) -> bool {
         let holds = |ways: &[OperatorId], state: &State| {

@@ -48,8 +48,8 @@ use crate::concurrent::timed_relaxed_plan::{TimedRelaxation, TimedRelaxedPlan};
 const MAX_ROUNDS: usize = 60;
 /// Upper limit on the number of states that one best-first search evaluates.
 const MAX_ESCAPE: usize = 100;
-/// Upper limit on the number of best-first searches per goal. Orders that need more are dropped, so that
-/// tasks whose goals conflict leave the time to the other searches.
+/// Upper limit on the number of best-first searches per goal. An order that needs more is dropped. Otherwise,
+/// this search would take too much time from the other searches on tasks with conflicting goals.
 const MAX_ESCAPES: usize = 3;
 /// Number of orders after which the search ends if it has found no plan.
 const MAX_FAILURES: usize = 12;
@@ -112,9 +112,10 @@ pub(super) struct GoalOrders<'a, T: TimeNumber = Int> {
 }
 
 impl<'a, T: TimeNumber> GoalOrders<'a, T> {
-    /// Returns `None` if there is no goal fact to order, a goal is unreachable, the metric does not depend on
-    /// the makespan, the states would take too much memory, or a limit is reached. `seed` selects the
-    /// perturbations.
+    /// Prepares the search with three initial orders of the goals: by increasing time, by index, and by
+    /// decreasing time of a timed relaxed plan. `seed` selects the perturbations. Returns `None` if there is
+    /// no goal fact to order, a goal is unreachable, the metric does not depend on the makespan, the states
+    /// would take too much memory, or a limit is reached.
     pub(super) fn new(
         concurrent: &'a TemporalTask<T>,
         expansion: &'a Expansion<'a, T>,
@@ -319,7 +320,7 @@ impl<'a, T: TimeNumber> GoalOrders<'a, T> {
                 Err(Stopped) => return Decoding::Interrupted,
             }
         }
-        // Numeric goals, disjunctions and derived facts come last.
+        // The other parts of the goal (numeric goals, disjunctions and derived facts) are achieved last.
         let (expansion, relaxed) = (self.expansion, self.relaxed);
         let is_reached = |at: &TemporalState<T>| expansion.is_goal(at);
         let goal = Goal { targets: &relaxed.goal, is_reached: &is_reached };

@@ -41,7 +41,8 @@ pub(super) struct RemainingTime<T: TimeNumber = Int> {
 }
 
 impl<T: TimeNumber> Estimate<T> {
-    /// At a limit, the remaining goal variables are omitted, which keeps the estimates lower bounds.
+    /// Computes the least remaining times of each goal variable. At a limit, the remaining goal
+    /// variables are omitted, which keeps the estimates lower bounds.
     pub(super) fn new(concurrent: &TemporalTask<T>, limits: &Limits) -> Self {
         let task = &concurrent.task;
         let goals = task.goal.facts.iter().filter(|fact| fact.variable.index() < task.basic);
@@ -106,7 +107,7 @@ fn path<T: TimeNumber>(concurrent: &TemporalTask<T>, goal: Fact, setting: &[Oper
     Path { variable: variable.index(), left: distances }
 }
 
-/// By variable, in ascending order.
+/// Returns, for each variable, the operators that set it, in ascending order.
 fn setting(task: &Task) -> Vec<Vec<OperatorId>> {
     let mut setting: Vec<Vec<OperatorId>> = vec![Vec::new(); task.variables.len()];
     for (operator, id) in task.operators.iter().zip((0..).map(OperatorId)) {

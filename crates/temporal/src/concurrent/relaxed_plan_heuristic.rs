@@ -64,7 +64,8 @@ impl<'a> RelaxedPlanHeuristic<'a> {
         }
     }
 
-    /// Returns `None` if the goal or the end of a running action is unreachable.
+    /// Returns the cost and the preferred happenings of a relaxed plan from a state. Returns `None` if the
+    /// goal or the end of a running action is unreachable even in the relaxation.
     pub(super) fn guide<T: TimeNumber>(
         &mut self,
         TemporalState { state, clocks, .. }: &TemporalState<T>,

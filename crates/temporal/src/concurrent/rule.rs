@@ -11,7 +11,7 @@ pub(super) type Proposition = u32;
 
 #[derive(Debug, Clone, Default)]
 pub(super) struct Rule {
-    /// Ascending.
+    /// Conditions of the rule, in ascending order.
     pub(super) needs: Vec<Proposition>,
     pub(super) adds: Vec<Proposition>,
     /// Over-all conditions of the action, ascending. Empty except for ends of actions in
@@ -23,7 +23,7 @@ pub(super) struct Rule {
     /// Numeric conditions whose expressions the rule may increase.
     pub(super) raises: Vec<NumericEffect>,
     pub(super) weight: u32,
-    /// `None` for clauses and derived facts.
+    /// Operator from which the rule was made; `None` for clauses and derived facts.
     pub(super) origin: Option<OperatorId>,
 }
 

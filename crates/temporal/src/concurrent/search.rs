@@ -64,7 +64,8 @@ type Priority<T> = (T, T, T, u32, u32, bool);
 pub(super) struct Search<'a, T: TimeNumber = Int> {
     concurrent: &'a TemporalTask<T>,
     estimate: &'a Estimate<T>,
-    /// `None` if its bound for the initial state is no better than that of `estimate`.
+    /// Critical-path heuristic; `None` if its bound for the initial state is no better than that of
+    /// `estimate`.
     critical_path: Option<CriticalPath<'a, T>>,
     /// Lower bounds on costs and resources; `None` if they are not needed or could not be computed.
     bounds: Option<&'a Bounds>,
@@ -301,7 +302,8 @@ impl<'a, T: TimeNumber> Search<'a, T> {
         }
         let depth = origin.map_or(0, |origin| origin.depth);
         if let Some(id) = self.store.add(situation, origin) {
-            // The critical path takes the longest, so it is evaluated only when the node would be expanded.
+            // The critical-path bound is the most expensive one to compute, so it is computed only when the
+            // node would be expanded.
             let is_evaluated = self.critical_path.is_none();
             self.open.push(Reverse((value.0, value.1, remaining.sum, depth, id, is_evaluated)));
         }

@@ -53,9 +53,9 @@ pub(super) struct Split {
     pub(super) lifted: Lifted,
     /// Schemas of the original domain.
     pub(super) schemas: Vec<Schema>,
-    /// By schema of the split task.
+    /// Origin of each schema of the split task.
     pub(super) origins: Vec<Origin>,
-    /// By schema of the split task.
+    /// Design parameters of each schema of the split task.
     pub(super) designs: Vec<Vec<SlotParameter>>,
     pub(super) events: Vec<Event>,
     /// Functions whose values are state-dependent or chosen durations.
@@ -239,7 +239,7 @@ fn timed(lifted: &Lifted, index: u32, event: &Event) -> Schema {
     }
 }
 
-/// `running` is set for predicates that mark running actions.
+/// Adds an auxiliary predicate. `running` is `true` for predicates that mark running actions.
 fn symbol(lifted: &mut Lifted, name: &str, arity: usize, running: bool) -> PredicateId {
     let id = PredicateId(dense(lifted.predicates.len()));
     let name = Name::new(name);

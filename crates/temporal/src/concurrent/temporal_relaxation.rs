@@ -46,7 +46,7 @@ pub(super) struct TemporalRelaxation {
     /// is `None` if it depends on the state.
     pub(super) raises: Vec<Box<[NumericEffect]>>,
     pub(super) weights: Vec<u32>,
-    /// `None` for the rules of clauses and derived facts.
+    /// Operator from which each rule was made; `None` for the rules of clauses and derived facts.
     pub(super) origins: Vec<Option<OperatorId>>,
     pub(super) needing: Lists,
     pub(super) numeric: Vec<Numeric>,

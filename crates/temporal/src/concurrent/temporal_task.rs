@@ -45,7 +45,7 @@ impl ConcurrentTask {
 
 #[cfg(test)]
 impl ConcurrentTask {
-    /// Panics if the times are wide.
+    /// Returns the task with narrow times. Panics if the times are wide.
     pub(super) fn narrow(self) -> TemporalTask {
         let Width::Narrow(task) = self.0 else { panic!("the times are wide") };
         *task
@@ -77,7 +77,7 @@ pub(super) struct TemporalTask<T: TimeNumber = Int> {
     /// Per preference that can be violated: operators of which at least one is applicable in the
     /// final state if the preference is violated. These operators never occur in a plan.
     pub(super) violations: Vec<Vec<OperatorId>>,
-    /// Checked on complete plans.
+    /// Deadlines of trajectory constraints, which are checked on complete plans.
     pub(super) deadlines: Vec<Deadline<T>>,
     /// Whether the search covers every plan with all its possible times, so that exhausting the
     /// search is a proof.

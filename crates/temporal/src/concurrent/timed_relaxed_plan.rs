@@ -30,7 +30,8 @@ use crate::concurrent::time_number::TimeNumber;
 /// A time of the relaxation. Times only guide the search, so larger ones saturate.
 type Time = i64;
 
-/// Durations are rounded down to this number of bits, so that sums of thousands of them fit.
+/// Durations are rounded down so that they have at most this number of bits. Sums of thousands of them then
+/// fit.
 const TIME_BITS: u64 = 48;
 const NEVER: Time = Time::MAX;
 const MAX_REPETITIONS: u32 = 8;

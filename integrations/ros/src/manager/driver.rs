@@ -23,8 +23,7 @@ use crate::node::{Clock, Lifecycle, Node, Severity};
 use crate::perform::Perform;
 use crate::performer::performers;
 
-/// Period of the clock input, of the requests for modes of new servers, and of the manager's own status on
-/// `/diagnostics`.
+/// Period of the tick input, of the search for new mode servers, and of the manager's own status on `/diagnostics`.
 const PERIOD: Duration = Duration::from_secs(1);
 
 /// Limit on the number of inputs that are kept while the manager is inactive. When it is reached, the kept inputs are
@@ -130,7 +129,7 @@ struct Driver {
     settings: Settings,
     /// `true` while the lifecycle state is active. Otherwise, tasks are refused and other inputs wait.
     active: Arc<AtomicBool>,
-    /// In milliseconds.
+    /// Time limit of a call, in milliseconds.
     timeout: Arc<AtomicU64>,
     clock: Arc<Clock>,
     /// Time of `clock` when this driver was created.

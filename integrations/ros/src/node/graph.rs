@@ -132,8 +132,8 @@ pub(crate) struct Writer {
 }
 
 impl Graph {
-    /// Watches discovery until the returned task is dropped. The status of the participant must have no other
-    /// listener.
+    /// Watches discovery until the returned task is dropped. Meanwhile, no other status listener of `participant` may
+    /// be used, because each status event reaches only one listener.
     pub(crate) fn watch(
         participant: &DomainParticipant,
         own_prefix: [u8; 12],

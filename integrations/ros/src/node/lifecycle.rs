@@ -291,8 +291,8 @@ impl Lifecycle {
 
     fn change_state(&self, requested: &Transition) -> bool {
         let from = self.phase();
-        // As in rcl_lifecycle, a label is used if there is no id. The label `shutdown` has a different id in each
-        // state.
+        // A label is used only if the id is 0. In rclcpp_lifecycle, by contrast, a label takes precedence over
+        // the id. The label `shutdown` has a different id in each state.
         let is_requested = |phase_change: &&PhaseChange| {
             phase_change.from == from
                 && if requested.id == 0 {

@@ -118,9 +118,8 @@ impl Node {
         let (graph, watching) = Graph::watch(&participant, prefix, rmw, preemptive);
         let context =
             Context::from_domain_participant(participant.clone()).map_err(|error| failed(&error))?;
-        let node_name = NodeName::new(name.namespace(), name.name()).map_err(|error| {
-            Message::error("N121", format!("`{name}` is not the name of a node: {error}"))
-        })?;
+        let node_name = NodeName::new(name.namespace(), name.name())
+            .map_err(|error| Message::error("N121", format!("`{name}` is not a valid node name: {error}")))?;
         let options = NodeOptions::new().start_parameter_services(false).allow_undeclared_parameters(true);
         let inner = context.new_node(node_name, options).map_err(|error| failed(&error))?;
         let least = match arguments.log_level.as_deref() {
@@ -211,7 +210,7 @@ fn dds_type(package: &str, kind: &str, name: &str) -> String {
 
 fn client_name(full: &str) -> Result<ros2_client::Name, Message> {
     ros2_client::Name::parse(full).map_err(|error| {
-        Message::error("N121", format!("`{full}` is not the name of a topic or service: {error}"))
+        Message::error("N121", format!("`{full}` is not a valid name of a topic, service or action: {error}"))
     })
 }
 

@@ -55,7 +55,7 @@ pub(crate) fn valid_name(kind: &str, name: &str) -> Result<String, String> {
         return Ok(name.to_owned());
     }
     Err(format!(
-        "`{name}` is not the name of a {kind}: use letters, digits and `_` between slashes, and no digit after a slash"
+        "`{name}` is not a valid name of a {kind}: use letters, digits and `_` between slashes, and no digit after a slash"
     ))
 }
 

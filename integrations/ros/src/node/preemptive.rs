@@ -284,8 +284,8 @@ fn empty_heartbeat(Match { reader, writer }: Match, reply_to: SocketAddrV4) -> V
         message.extend(content);
     };
     append(kind::INFO_SRC, &[&[0; 4], &VERSION_AND_VENDOR, &writer[..12]]);
-    // One locator of the kind UDPv4: kind, port, address. The library reads a byte after the list,
-    // also if the flag for a second list is not set; the padding is that byte.
+    // One locator of the kind UDPv4: kind, port, address. The library always reads one more byte after the list, even
+    // if the flag for a second list is not set. The zeros at the end provide this byte.
     let port = u32::from(reply_to.port()).to_le_bytes();
     let number_one = 1_u32.to_le_bytes();
     append(kind::INFO_REPLY, &[&number_one, &number_one, &port, &[0; 12], &reply_to.ip().octets(), &[0; 4]]);

@@ -13,7 +13,7 @@ use ros2_client::dds::ServiceMapping;
 /// The middleware that the other participants have.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
 pub enum Rmw {
-    /// As the vendors of the discovered participants say.
+    /// Determine it from the vendors of the discovered participants.
     #[default]
     Auto,
     /// `rmw_fastrtps_cpp`, the default of ROS 2.

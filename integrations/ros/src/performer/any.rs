@@ -129,7 +129,8 @@ fn pose_value(stamped: PoseStamped, is_stamped: bool) -> Result<Value, String> {
     value.map_err(|error| error.to_string())
 }
 
-/// Sample values with the types of the later values, to check the fields when the settings are read.
+/// Example values that replace the placeholders when the settings are read. They have the same types as the real
+/// values, so that the fields can be checked.
 struct Sample;
 
 impl Values for Sample {

@@ -48,7 +48,7 @@ pub(super) struct Network {
     replaced: BTreeMap<String, Arc<AtomicBool>>,
     diagnosed: Diagnosed,
     events: Arc<Publisher<std_msgs::msg::String>>,
-    /// In milliseconds.
+    /// Period in which the statuses of objectives are published, in milliseconds.
     period: Arc<AtomicU64>,
     active: Arc<AtomicBool>,
     memory: Option<MemoryFile>,

@@ -117,7 +117,7 @@ impl Interface {
     pub fn parse(full_name: &str, text: &str) -> Result<Self, String> {
         let wrong = || {
             format!(
-                "`{full_name}` is not the name of a type: write package, `msg`, `srv` or `action`, and name, as in \
+                "`{full_name}` is not a valid type name: write package, `msg`, `srv` or `action`, and name, as in \
                  `std_msgs/msg/String`"
             )
         };

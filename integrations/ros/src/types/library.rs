@@ -145,7 +145,7 @@ impl Library {
     ) -> Result<(Interface, Vec<Arc<Structure>>, Descriptions), String> {
         let mut resolver = Resolver { library: self, structures: BTreeMap::new(), open: BTreeSet::new() };
         if name.split('/').nth(1) != Some(folder) {
-            return Err(format!("`{name}` is not the name of a type; write `package/{folder}/Name`"));
+            return Err(format!("`{name}` is not a valid type name; write `package/{folder}/Name`"));
         }
         let interface = self.interface(name)?;
         let structures: Vec<_> = interface

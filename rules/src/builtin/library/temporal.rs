@@ -110,7 +110,8 @@ fn comparable(moments: &[Moment]) -> bool {
     moments.windows(2).all(|pair| pair[0].zone_text().is_empty() == pair[1].zone_text().is_empty())
 }
 
-/// `arguments` are two moments and a granularity. Returns `None` for incomparable moments.
+/// Returns the distance of two moments in units of a granularity, the third argument. Returns `None` for incomparable
+/// moments.
 fn difference(arguments: &[&Literal]) -> Option<i64> {
     let [from, to, granularity] = arguments else { return None };
     let (granularity, moments) = (Granularity::from_literal(granularity)?, [moment(from)?, moment(to)?]);

@@ -41,8 +41,8 @@ const CANDIDATE_LIMIT: usize = 500;
 pub struct Group {
     /// Values of the variable: at least two atoms that belong to no other variable.
     pub(crate) atoms: Vec<AtomId>,
-    /// The whole mutex group, a superset of `atoms`: at most one of these atoms is true in every state.
-    /// Effects on the variable rely on this property.
+    /// The whole mutex group, a superset of `atoms`: at most one of its atoms is true in each reachable state. Effects
+    /// on the variable are correct only in states with this property.
     pub(crate) exclusive: Vec<AtomId>,
 }
 

@@ -123,8 +123,9 @@ impl Machine {
         })));
     }
 
-    /// Handles a design that could not be set. The design is retried at the time `again`. If `again` is `None`, it is
-    /// retried once the function replies.
+    /// Handles a design that could not be set: reports it to the loop as failed if `effect` is outstanding. The
+    /// design is reported as realisable again at the time `again` or, if `again` is `None`, once the function
+    /// replies.
     pub(super) fn failed(&mut self, function: &str, effect: Option<u64>, again: Option<Duration>) {
         self.pending.remove(function);
         let Some(effect) = effect else { return };
