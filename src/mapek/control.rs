@@ -16,7 +16,7 @@ use crate::mapek::answer::{Answer, Command, DesignChange, Effect};
 use crate::mapek::ask::Outcome;
 use crate::mapek::beliefs::{Beliefs, Retry};
 use crate::mapek::deadlines::{self, handle_overdue};
-use crate::mapek::digest::digest;
+use crate::mapek::digest::{self, digest};
 use crate::mapek::effects::{objectives, reconfigure, request};
 use crate::mapek::event::{Event, Observation};
 use crate::mapek::execute::execute;
@@ -96,6 +96,7 @@ pub struct Loop {
     agenda: Option<Agenda>,
     /// Number of changes of the planning problem since the start, which identifies the current problem.
     pub(super) question: u64,
+    /// Checksum of the initial mission and the settings.
     digest: String,
     /// Number of names and values that the knowledge base had in addition to those of its documents when it was last
     /// rebuilt; 0 before.
@@ -337,8 +338,15 @@ impl Loop {
         self.beliefs.outstanding().map(again).collect()
     }
 
-    /// Returns the checksum of the initial mission and settings, which identifies them in a journal.
+    /// Returns the checksum of the initial mission, the settings, and the version of the program, which identifies them
+    /// in a journal.
     pub fn digest(&self) -> String {
+        digest::versioned(&self.digest)
+    }
+
+    /// Returns the checksum of the initial mission and the settings. It is usually the same in other versions of the
+    /// program.
+    pub fn inputs_digest(&self) -> String {
         self.digest.clone()
     }
 

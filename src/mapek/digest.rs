@@ -7,16 +7,18 @@ use crate::mapek::event::FORMAT;
 use crate::mapek::settings::{Settings, Unrecorded};
 use crate::mission::Mission;
 
-/// Returns a hash of everything that initial decisions depend on: name, facts, rules, domain, filled problem, bindings,
-/// settings, and the versions of program and format.
+/// Returns the checksum of the inputs and of the versions of program and format, on which initial decisions also depend.
+pub(super) fn versioned(inputs: &str) -> String {
+    checksum(&[env!("CARGO_PKG_VERSION").to_owned(), FORMAT.to_owned(), inputs.to_owned()])
+}
+
+/// Returns the checksum of name, facts, rules, domain, filled problem, bindings and settings.
 pub(super) fn digest(mission: &Mission, settings: &Settings) -> String {
     // A journal that can be resumed is complete. Therefore, the reaction to a failed write does not matter.
     let settings = settings.clone().with_unrecorded(Unrecorded::default());
     let mut problem = mission.problem().clone();
     mission.fill(&mut problem);
     let mut parts = vec![
-        env!("CARGO_PKG_VERSION").to_owned(),
-        FORMAT.to_owned(),
         mission.name.clone(),
         format!("{settings:?}"),
         format!("{:?}", mission.bindings()),

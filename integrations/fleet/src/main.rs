@@ -90,7 +90,7 @@ enum Command {
         #[arg(long, value_name = "DECISION")]
         after: Option<u64>,
     },
-    /// Print the owner and the progress of each partition, and the load of the workers.
+    /// Print the owner of each partition and the load of the workers.
     Status {
         #[command(flatten)]
         server: Server,
@@ -100,8 +100,8 @@ enum Command {
     },
 }
 
-/// Options of a worker: its missions, the number of its threads, the robots that it keeps in memory, its snapshots, and
-/// the address of its metrics.
+/// Options of a worker: its missions, the number of its threads, the robots that it keeps in memory, and the address of
+/// its metrics.
 #[derive(Debug, Args)]
 struct Work {
     /// Read missions from the manifests in this directory. The name of a mission is its file name without `.toml`.

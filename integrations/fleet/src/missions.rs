@@ -90,7 +90,7 @@ fn templates(directory: &Path) -> Result<BTreeMap<String, Template>, Errors> {
         let control = Setup::read(&path).and_then(|setup| Loop::new(setup.mission, setup.settings));
         match control {
             Ok(control) => {
-                let digest = control.digest();
+                let digest = control.inputs_digest();
                 let baseline = Arc::new(Baseline::new(&control));
                 templates.insert(name.to_owned(), Template { control, digest, baseline });
             }

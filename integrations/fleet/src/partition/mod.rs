@@ -34,9 +34,9 @@ use threads::Threads;
 /// Parameters with which a worker runs its partitions.
 #[derive(Debug, Clone, Copy)]
 pub struct Settings {
-    /// Maximum number of loops that search for plans at the same time, for each class of durations
-    /// (up to 25 ms, up to 400 ms, longer). The same number limits further searches on extra
-    /// threads, and loops that work without a search.
+    /// Maximum number of loops that search for plans at the same time, for each class of durations (up to 25 ms, up to
+    /// 400 ms, longer); in the last class one less, but at least one. The same number limits loops that work without a
+    /// search.
     pub threads: usize,
     /// Time for which a decision waits for a plan. If the search takes longer, the reaction to the event is published
     /// without it, and further events are handled in the meantime.

@@ -17,11 +17,13 @@ use tokio::task::JoinError;
 
 /// Maximum durations of the searches of each class but the last one, which has no maximum. The second class is for
 /// short searches on a busy machine.
-const MAX_DURATIONS: [Duration; 2] = [Duration::from_millis(25), Duration::from_millis(400)];
+const MAX_DURATIONS: [Duration; CLASSES - 1] = [Duration::from_millis(25), Duration::from_millis(400)];
+
+const CLASSES: usize = 3;
 
 /// Nice value of the thread of a search in each class. If threads compete, those with a higher value get less processor
 /// time.
-const NICENESS: [i32; MAX_DURATIONS.len() + 1] = [0, 5, 15];
+const NICENESS: [i32; CLASSES] = [0, 5, 15];
 
 /// A search has failed: its thread has panicked or could not be started.
 #[derive(Debug)]
@@ -30,7 +32,7 @@ pub(crate) struct Panicked;
 #[derive(Debug)]
 pub(crate) struct Threads {
     quick: Semaphore,
-    searches: [Semaphore; MAX_DURATIONS.len() + 1],
+    searches: [Semaphore; CLASSES],
     /// Estimated duration of the next search by mission.
     costs: Mutex<BTreeMap<String, Duration>>,
 }
@@ -39,10 +41,8 @@ impl Threads {
     pub(crate) fn new(count: usize) -> Self {
         Self {
             quick: Semaphore::new(count),
-            searches: std::array::from_fn(|class| {
-                let is_last = class == MAX_DURATIONS.len();
-                Semaphore::new(if is_last { 1.max(count - 1) } else { count })
-            }),
+            // Long searches leave one processor to short work.
+            searches: [count, count, 1.max(count - 1)].map(Semaphore::new),
             costs: Mutex::default(),
         }
     }
