@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
-PAGES = [ROOT / "docs/how-to/python.md", ROOT / "integrations/python/README.md"]
+PAGES = [ROOT / "docs/how-to/python.md", ROOT / "docs/how-to/study.md", ROOT / "integrations/python/README.md"]
 BLOCKS = [
     pytest.param(page, block, id=f"{page.name}-{number}")
     for page in PAGES
@@ -21,7 +21,9 @@ BLOCKS = [
 def test_a_block_runs(page, block, tmp_path, monkeypatch):
     if "unified_planning" in block:
         pytest.importorskip("unified_planning", reason="unified-planning is not there")
+    if "dask" in block:
+        pytest.importorskip("dask", reason="Dask is not there")
     monkeypatch.chdir(ROOT)
     file = tmp_path / "block.py"
     file.write_text(block)
-    runpy.run_path(str(file))
+    runpy.run_path(str(file), run_name="__main__")

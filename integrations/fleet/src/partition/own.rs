@@ -37,8 +37,9 @@ pub(super) struct Partition<S> {
 #[derive(Default)]
 #[expect(clippy::struct_excessive_bools, reason = "they are independent of each other")]
 struct Slot {
-    /// State of the robot. `None` while an event is being handled, and if the state is not loaded.
+    /// State of the robot. `None` while the robot is busy, and if the state is not loaded.
     loaded: Option<Loaded>,
+    /// `true` while an event is being handled, or planning is started or concluded.
     is_busy: bool,
     /// `true` if the last decision lacks a plan. Then its event is not discarded, so that a new owner of the partition
     /// searches for the plan.
@@ -206,11 +207,13 @@ impl<S: Store> Partition<S> {
         let subject = self.subject(name);
         let Some(slot) = self.slots.get_mut(name).filter(|slot| !slot.is_busy) else { return };
         let thoughts = slot.thoughts.take();
-        let event = if thoughts.is_none() { slot.waiting.pop_front() } else { None };
-        let later = || slot.later.pop_front().filter(|_| thoughts.is_none());
-        let sequence = event.as_ref().map(|event| event.sequence).or_else(later);
-        if thoughts.is_none() && sequence.is_none() && (!slot.is_pending || slot.search.is_some()) {
-            return;
+        let (mut event, mut sequence) = (None, None);
+        if thoughts.is_none() {
+            event = slot.waiting.pop_front();
+            sequence = event.as_ref().map(|event| event.sequence).or_else(|| slot.later.pop_front());
+            if sequence.is_none() && (!slot.is_pending || slot.search.is_some()) {
+                return;
+            }
         }
         slot.is_busy = true;
         let (is_late, may_search) = (slot.cancelled >= MAX_CANCELLED, slot.search.is_none());

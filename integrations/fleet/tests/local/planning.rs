@@ -5,9 +5,40 @@ use std::time::Duration;
 
 use metaplan_fleet::partition::{Order, Settings, Shared, serve};
 use metaplan_fleet::store::Stream;
+use metaplan_fleet::store::local::Local;
 use tokio::sync::watch;
 
 use super::{all, decisions, missions, open, scripts, tell};
+
+/// Starts an owner of the only partition that does not wait for plans longer than `patience`.
+fn start(store: &Local, patience: u64, settings: Settings) -> tokio::task::JoinHandle<()> {
+    let settings =
+        Settings { patience: Duration::from_millis(patience), look: Duration::from_millis(1), ..settings };
+    let shared = Arc::new(Shared::new(store.clone(), missions(), "owner".to_owned(), settings));
+    tokio::spawn(async move {
+        let (_orders, heard) = watch::channel(Order::Go);
+        serve(shared, 0, heard).await;
+    })
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_single_owner_handles_all_events_of_a_long_queue() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let store = open(folder.path(), 1);
+    let (events, _) = scripts::play("ugv", "kinect_comes_and_goes", 5, 60);
+    assert!(events.len() > 20, "the queue in memory is shorter");
+    let sequences = tell(&store, "r", &events).await;
+    let owner = start(&store, 0, Settings { discard_every: 3, ..Settings::default() });
+    for attempt in 0.. {
+        assert!(attempt < 6000, "events are not handled");
+        if all(&store, Stream::Events).await.is_empty() {
+            break;
+        }
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    owner.abort();
+    scripts::assert_replayed("ugv", &events, &decisions(&store).await["r"], &sequences);
+}
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn reactions_do_not_wait_for_plans_and_each_plan_is_found_by_some_owner() {
@@ -22,16 +53,8 @@ async fn reactions_do_not_wait_for_plans_and_each_plan_is_found_by_some_owner() 
     let mut random = fastrand::Rng::with_seed(5);
     for owner in 0.. {
         assert!(owner < 300, "the owners do not come to an end");
-        let settings = Settings {
-            patience: Duration::from_millis(random.u64(..3)),
-            discard_every: random.usize(1..5),
-            look: Duration::from_millis(1),
-            warm: 3,
-            ..Settings::default()
-        };
-        let shared = Arc::new(Shared::new(store.clone(), missions(), format!("owner-{owner}"), settings));
-        let (_orders, heard) = watch::channel(Order::Go);
-        let task = tokio::spawn(serve(shared, 0, heard));
+        let settings = Settings { discard_every: random.usize(1..5), warm: 3, ..Settings::default() };
+        let task = start(&store, random.u64(..3), settings);
         tokio::time::sleep(Duration::from_millis(random.u64(1..150))).await;
         task.abort();
         // Events are discarded only after their plans are found.
