@@ -400,7 +400,7 @@ impl Loop {
         snapshot
     }
 
-    /// Returns the pending deliberation as JSON; `null` if there is none.
+    /// Returns the pending deliberation as JSON, or `null`.
     pub(super) fn agenda_record(&self) -> Value {
         serde_json::to_value(&self.agenda).unwrap_or_default()
     }

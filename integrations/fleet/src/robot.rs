@@ -23,7 +23,9 @@ pub struct Robot {
     /// Checksum of the version of the robot's mission.
     digest: String,
     /// Time of enrolment in microseconds since 1970.
-    pub(crate) enrolled: u64,
+    enrolled: u64,
+    /// Time between enrolment and the last event that was decided, in microseconds.
+    now: u64,
     /// Ids of decided events.
     ids: Ids,
     /// Requested change to another version of the mission.
@@ -131,7 +133,7 @@ impl Robot {
     pub fn restore(last: Decided) -> Self {
         let State { mission, digest, enrolled, migration, ids, snapshot } = last.state;
         let control = if mission.is_some() { Control::Stored(snapshot) } else { Control::None };
-        Self { mission, event: last.event, digest, enrolled, ids, migration, control }
+        Self { mission, event: last.event, digest, enrolled, now: last.now, ids, migration, control }
     }
 
     /// Returns a robot whose last decision cannot be parsed. It can only be retired.
@@ -243,8 +245,7 @@ impl Robot {
         let Control::Loaded(control, _) = &mut self.control else { return None };
         let late = !control.is_answered_by(&thoughts);
         let answers = control.has_agenda().then(|| control.deliberate_with(thoughts, is_late))??;
-        let now = u64::try_from(control.beliefs().now().as_micros()).unwrap_or(u64::MAX);
-        let decided = Decided { now, planned: true, late, ..empty(self.event) };
+        let decided = Decided { now: self.now, planned: true, late, ..empty(self.event) };
         Some(self.complete(Search { decided, answers, id: None }))
     }
 
@@ -316,7 +317,7 @@ impl Robot {
 
     fn complete(&mut self, search: Search) -> Decided {
         let Search { mut decided, answers, id } = search;
-        self.event = decided.event;
+        (self.event, self.now) = (decided.event, decided.now);
         self.ids.extend(id.as_deref());
         let mut snapshot = Value::Null;
         if let Control::Loaded(control, baseline) = &mut self.control {

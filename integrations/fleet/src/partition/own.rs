@@ -41,8 +41,8 @@ struct Slot {
     loaded: Option<Loaded>,
     /// `true` while an event is being handled, or planning is started or concluded.
     is_busy: bool,
-    /// `true` if the last decision lacks a plan. Then its event is not discarded, so that a new owner of the partition
-    /// searches for the plan.
+    /// `true` if the last decision lacks a plan. Then the last event is not discarded, so that a new owner of the
+    /// partition searches for the plan.
     is_pending: bool,
     /// The search for a plan that is running.
     search: Option<Search>,
@@ -309,13 +309,11 @@ impl<S: Store> Partition<S> {
             }
         }
         slot.loaded = task.loaded;
-        match sequence.filter(|_| !matches!(outcome, Outcome::Faulted(_) | Outcome::Suspended)).or(plan) {
-            Some(last) => {
-                slot.handled = if is_pending { last - 1 } else { last };
-                slot.obsolete += 1;
-                slot.since.get_or_insert_with(Instant::now);
-            }
-            None => {}
+        let event = sequence.filter(|_| !matches!(outcome, Outcome::Faulted(_) | Outcome::Suspended));
+        if let Some(last) = event.or(plan) {
+            slot.handled = slot.handled.max(last);
+            slot.obsolete += 1;
+            slot.since.get_or_insert_with(Instant::now);
         }
         let is_due = slot.obsolete >= self.shared.settings.discard_every;
         self.set_pending(name, is_pending);
@@ -350,7 +348,7 @@ impl<S: Store> Partition<S> {
         self.refuse(Some((self.subject(name), format!("the robot is suspended: {why}"))), "faulted");
     }
 
-    /// Waits for a search for a plan of a robot, besides other work.
+    /// Waits for a search for a plan of a robot while other work continues.
     fn follow_search(&mut self, name: &str, planning: Option<Planning>) {
         let Some(slot) = self.slots.get_mut(name) else { return };
         let Some(Planning { question, stop, result }) = planning else { return };
@@ -409,7 +407,7 @@ impl<S: Store> Partition<S> {
         let subject = self.subject(name);
         let Some(slot) = self.slots.get_mut(name).filter(|slot| !slot.is_discarding) else { return false };
         (slot.obsolete, slot.since, slot.is_discarding) = (0, None, true);
-        let last = slot.handled;
+        let last = slot.handled - u64::from(slot.is_pending);
         self.discard(name, &subject, last);
         true
     }

@@ -97,15 +97,17 @@ impl Task {
                     self.loaded = Some(Loaded { robot, chain });
                     Outcome::Refused(refused)
                 }
-                Ok(Ok(decided)) => match self.publish(shared, decided, robot, chain, event.time).await {
-                    // Another worker has decided, or an unacknowledged attempt has succeeded. The robot is loaded
-                    // again to find out.
-                    Outcome::Outdated => {
-                        pause(attempt).await;
-                        continue;
+                Ok(Ok(decided)) => {
+                    match self.publish(shared, decided, robot, chain, Some(event.time)).await {
+                        // Another worker has decided, or an unacknowledged attempt has succeeded. The robot is loaded
+                        // again to find out.
+                        Outcome::Outdated => {
+                            pause(attempt).await;
+                            continue;
+                        }
+                        outcome => outcome,
                     }
-                    outcome => outcome,
-                },
+                }
             };
             return (outcome, planning);
         }
@@ -155,8 +157,7 @@ impl Task {
             self.loaded = Some(Loaded { robot, chain });
             return Outcome::Outdated;
         };
-        let time = robot.enrolled + decided.now;
-        self.publish(shared, decided, robot, chain, time).await
+        self.publish(shared, decided, robot, chain, None).await
     }
 
     /// Lets the robot decide an event. Returns `None` after a panic.
@@ -236,14 +237,14 @@ impl Task {
 
     /// Appends a decision if the robot's last decision has the sequence number `chain`. Retries until the result is
     /// known, which is [`Outcome::Outdated`] if another decision is the last one. `time` is that of the event in
-    /// microseconds since 1970.
+    /// microseconds since 1970, if the decision is about an event.
     async fn publish<S: Store>(
         &mut self,
         shared: &Shared<S>,
         mut decided: Decided,
         robot: Box<Robot>,
         chain: u64,
-        time: u64,
+        time: Option<u64>,
     ) -> Outcome {
         decided.worker.clone_from(&shared.worker);
         let payload = serde_json::to_vec(&decided).unwrap_or_default();
@@ -252,9 +253,11 @@ impl Task {
         for attempt in 1.. {
             match shared.store.append(Stream::Decisions, message).await {
                 Ok(receipt) => {
-                    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-                    let late = now.saturating_sub(Duration::from_micros(time));
-                    metrics::histogram!("metaplan_fleet_latency_seconds").record(late);
+                    if let Some(time) = time {
+                        let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+                        let late = now.saturating_sub(Duration::from_micros(time));
+                        metrics::histogram!("metaplan_fleet_latency_seconds").record(late);
+                    }
                     self.loaded = Some(Loaded { robot, chain: receipt.sequence });
                     return Outcome::Decided;
                 }

@@ -71,7 +71,7 @@ impl Threads {
             own.store(thread_number(), Ordering::Relaxed);
             set_niceness(&own, class);
             let begun = Instant::now();
-            // Nobody waits any longer if the partition was given back.
+            // The receiver is gone if the partition was given back.
             let _ = send.send((work(), begun.elapsed()));
         };
         // A thread of its own, because a thread cannot raise its priority again.

@@ -4,8 +4,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use metaplan_fleet::partition::{Order, Settings, Shared, serve};
-use metaplan_fleet::store::Stream;
 use metaplan_fleet::store::local::Local;
+use metaplan_fleet::store::{Message, Store as _, Stream};
+use metaplan_fleet::wire::Address;
 use tokio::sync::watch;
 
 use super::{all, decisions, missions, open, scripts, tell};
@@ -28,6 +29,11 @@ async fn a_single_owner_handles_all_events_of_a_long_queue() {
     let (events, _) = scripts::play("ugv", "kinect_comes_and_goes", 5, 60);
     assert!(events.len() > 20, "the queue in memory is shorter");
     let sequences = tell(&store, "r", &events).await;
+    // This event is refused while a plan is missing, and must be discarded, too.
+    tell(&store, "s", &events[..1]).await;
+    let subject = Address::of("s", 1).to_string();
+    let forged = Message { subject: &subject, id: "r:1", after: None, payload: b"{\"event\": \"retire\"}" };
+    store.append(Stream::Events, forged).await.expect("it is our own directory");
     let owner = start(&store, 0, Settings { discard_every: 3, ..Settings::default() });
     for attempt in 0.. {
         assert!(attempt < 6000, "events are not handled");
