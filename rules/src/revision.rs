@@ -144,12 +144,12 @@ impl Engine {
         self.set_program(program)
     }
 
-    /// Changes the stated rows and replaces the rules `old` by `new`, in which representatives replace names.
-    /// Returns the net change of rows. After an error, the engine is in an undefined state.
+    /// Changes the stated rows by `delta`, and replaces the rules `old` by `new`. Both programs contain representatives
+    /// in place of other names. Returns the net change of rows. After an error, the engine is in an undefined state.
     ///
-    /// All unsupported conclusions are deleted before any rule derives new ones. The reason is that only a
+    /// In each stratum, unsupported conclusions are deleted before any rule derives new ones. The reason is that only a
     /// spanning tree of the pairs of an equality class is stored. No pair of the tree may be deleted after
-    /// the other pairs have been derived and dropped.
+    /// the other pairs have been derived and dropped. If the rules cannot be revised, all facts are derived again.
     pub(crate) fn replace_rules(
         &mut self,
         delta: Delta,

@@ -261,9 +261,9 @@ impl Coadaptation {
         .checked()
     }
 
-    /// Returns `true` if the problem declares places and configurations by initial facts of the roles (names of PDDL
-    /// symbols) `configured` or `suits`, which [`Coadaptation::new`] reads. Otherwise the states of the task have to be
-    /// used as places ([`Tasked`](crate::comparison::Tasked)).
+    /// Returns `true` if the problem has initial facts of the predicate `roles.configured` or `roles.suits`, from which
+    /// [`Coadaptation::new`] reads places and configurations. Otherwise the states of the task have to be used as places
+    /// ([`Tasked`](crate::comparison::Tasked)).
     pub fn is_spelt_out(problem: &Problem, roles: &Roles) -> bool {
         let facts = Facts::new(problem);
         [&roles.configured, &roles.suits].iter().any(|role| !facts.of(role).is_empty())

@@ -173,7 +173,7 @@ impl Explorer<'_> {
             let transitions =
                 if self.task.reaches_goal(&state) { Some(Vec::new()) } else { self.task.transitions(&state) };
             let transitions = transitions.ok_or_else(|| {
-                vec![Message::error("M127", "numbers of the task grow too large for a process of its states")]
+                vec![Message::error("M127", "the mission cannot be represented as a decision process: a number in its states grows too large")]
             })?;
             for transition in transitions {
                 self.transition(at, &state, transition);

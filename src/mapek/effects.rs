@@ -112,10 +112,10 @@ pub(super) fn effect(beliefs: &mut Beliefs, action: u64, command: Command, answe
     answers.push(Answer::Effect(effect));
 }
 
-/// Makes the functions of a step, and no others, the objectives of the knowledge base, grounded by the step's designs.
-/// Omits functions with a design on whose availability the problem decides instead of the knowledge base. Without a
-/// step, removes all objectives. Then analyzes the knowledge base. Adds the changes to `answers`, and also an error of
-/// the knowledge base. Does nothing without a knowledge base.
+/// Makes exactly the functions of a step the objectives of the knowledge base, each grounded by the step's design. Omits
+/// a function if the problem, not the knowledge base, decides whether its design is available. Without a step, removes
+/// all objectives. Then analyzes the knowledge base. Adds the changes to `answers`, and also an error of the knowledge
+/// base. Does nothing without a knowledge base.
 pub(super) fn objectives(beliefs: &mut Beliefs, step: Option<&PlannedStep>, answers: &mut Vec<Answer>) {
     let mission = &beliefs.mission;
     let mut objectives_with_designs = step.map_or_else(Vec::new, |step| step.configuration.clone());

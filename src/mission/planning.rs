@@ -115,8 +115,8 @@ pub(crate) fn ground_with(
 /// Returns a planner for problems that differ from `problem` only in their state and availability
 /// of designs. Returns `None` if the mission does not support this.
 pub(crate) fn replanner(mission: &Mission, problem: &Problem, limits: &Limits) -> Option<Replanner> {
-    // This domain is narrowed for planning. Narrowing depends on the facts of a problem, so each problem would need
-    // another domain.
+    // A domain that the knowledge base has completed (PLANTA's form) is narrowed before planning. The narrowed domain
+    // depends on the facts of the problem, so it cannot be used for other problems.
     if mission.completed_predicates().is_some() {
         return None;
     }

@@ -61,7 +61,7 @@ pub struct Disturbance {
     pub set: BTreeMap<String, String>,
 }
 
-/// An attribute that oscillates: `mean + amplitude * sin(2 * pi * (time / period + phase))`.
+/// An attribute that oscillates: `mean + amplitude * sin(2 * pi * (time / period + phase))`, rounded to two decimals.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Signal {

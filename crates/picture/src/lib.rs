@@ -1,9 +1,9 @@
-//! Pictures of plans: timelines, maps, charts and search progress as SVG, and self-contained HTML
-//! pages.
+//! Pictures of plans: timelines, maps, charts and search progress as SVG, self-contained HTML pages, and plans drawn as
+//! text for a terminal.
 //!
-//! The input is data ([`Report`], [`Plan`]), and the output is text. Equal data yields identical
-//! bytes. This crate contains no planning, no PDDL and no knowledge bases, and accesses neither
-//! files nor clock nor network. Names may be hostile; `maud` escapes all of them.
+//! The input is data ([`Report`], [`Plan`]), and the output is text. Equal data yields identical bytes. This crate
+//! contains no planning, no PDDL and no knowledge bases, and accesses neither files nor clock nor network. Names may be
+//! hostile. In SVG and HTML, `maud` escapes all of them. [`Plan::text`] prints them unchanged.
 
 mod chart;
 mod data;

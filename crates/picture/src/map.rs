@@ -83,7 +83,7 @@ pub(crate) fn map(plan: &Plan, map: &Map, palette: &Palette, canvas: Canvas) -> 
     let loops = legs.iter().filter_map(|leg| leg.shape.centre).map(|centre| square(centre, LOOP));
     let arrows = legs.iter().map(|leg| square(leg.shape.arrow, SIDE));
     let mut occupied: Vec<Taken> = dots.chain(loops).chain(arrows).collect();
-    // Step numbers have fewer possible positions than names, so they are placed first.
+    // Each step number must be nearer to its own arrow than to the others, so step numbers are placed before names.
     let numbers: Vec<_> =
         legs.iter().map(|leg| number(leg, &legs, (limits, &lines), &mut occupied)).collect();
     let labels = names(map, &points, &legs, (limits, &lines), &mut occupied);

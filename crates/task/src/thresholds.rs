@@ -32,8 +32,8 @@ pub struct Thresholds {
     /// integers. With a larger unit, or if 128 bits do not suffice, times are wider integers. The maximum does not
     /// apply if the planner chooses durations.
     pub narrow_times: u64,
-    /// Number of nodes in the first turn of the greedy search. The turns of the other searches are
-    /// proportional.
+    /// Number of successors that the greedy temporal search generates in its first turn. Its later turns, and the turns
+    /// of the searches with which it alternates, are multiples of this number.
     pub turn: usize,
     /// Number of sequences (partial plans) that the exhaustive search with chosen durations evaluates before
     /// other searches alternate with it.

@@ -154,7 +154,7 @@ pub enum SubjectKind {
     Mission,
 }
 
-/// A part that a verification leaves out if it is not given.
+/// A part that was not given to the verification, and was therefore not checked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]

@@ -10,7 +10,7 @@ use crate::mapek::filter::attribute::Micros;
 pub(crate) struct ComponentFilter {
     /// Time for which all reports must be failures before a failure is believed.
     pub confirm: Micros,
-    /// Time for which no report may be a failure before a recovery is believed.
+    /// Time during which no failure may be reported before a recovery is believed.
     pub heal: Micros,
 }
 

@@ -340,10 +340,9 @@ impl Moment {
         Ok(cases)
     }
 
-    /// Returns the new values of the numeric fluents. `known` must decide all guards (conditions of
-    /// effects). Each result extends `known` by the assumption that several values assigned to one
-    /// fluent are equal. The result is empty if active effects contradict each other or are
-    /// undefined.
+    /// Returns the changes of the numeric fluents as one or more cases. `known` must decide all guards (conditions of
+    /// effects). If several values are assigned to one fluent, they must be equal; each case extends `known` by this
+    /// assumption. There is no case if active effects contradict each other or are undefined.
     fn numbers(
         &self,
         structure: &Structure,

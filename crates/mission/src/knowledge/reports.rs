@@ -19,8 +19,9 @@ impl Knowledge {
         self.waiting.fault.as_ref()
     }
 
-    /// Applies a report about a component, attribute or design. Returns the change of all facts. If
-    /// inference fails, the report is kept as pending and the returned change is empty.
+    /// Applies a report about a component, attribute or design, together with pending reports. Returns the facts that
+    /// start or cease to hold, including conclusions. If inference fails, the report is kept as pending, and the returned
+    /// change is empty.
     ///
     /// # Errors
     /// There is no such component, attribute or design, or a pending objective has an unknown function or design.

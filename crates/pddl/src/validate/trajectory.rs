@@ -149,9 +149,8 @@ impl<'p> TrajectoryEvaluator<'_, 'p> {
     }
 }
 
-/// Returns `true` if a condition holds in the state that persists at time `from`, and in all later
-/// states whose times satisfy `is_included`. A state that begins at `from` counts as later. `holds`
-/// has one entry per state.
+/// Returns `true` if a condition holds from the time `from` on: in the state that persists at `from`, and in every state
+/// that begins at `from` or later, at a time that satisfies `is_included`. `holds` has one entry per state.
 fn lasts(
     holds: &[bool],
     times: &[&BigRational],

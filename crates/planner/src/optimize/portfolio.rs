@@ -193,8 +193,8 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         let nodes = work.saturating_mul(RELAXATION_WORK_PER_STATE) as u64;
         let limit = self.best.as_ref().map(|plan| plan.cost);
         // A first plan is more important than a better plan, and a better plan is more important than a proof,
-        // unless a proof is within reach. If the satisficing search is unsuccessful, its share becomes smaller,
-        // because A\* may be faster.
+        // unless a proof is within reach. Without a plan, or if A* may soon finish, the share of the satisficing
+        // search is halved after each unsuccessful turn, because A* may be faster.
         let has_hope = self.exact.as_ref().is_some_and(InterleavedSearch::may_finish);
         let (twice, halved) = match limit {
             None => (MAX_BOOST.saturating_sub(self.satisficer_share).max(1), 0),

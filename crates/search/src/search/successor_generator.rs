@@ -53,7 +53,7 @@ impl SuccessorGenerator {
         Self::over(task, OperatorId::all(task.operators.len()))
     }
 
-    /// Builds a generator for a subset of the operators, given in ascending order.
+    /// Builds a generator for a subset of the operators, in any order.
     #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     pub fn over<N>(task: &Task<N>, operators: impl Iterator<Item = OperatorId>) -> Self {
         let required = |id: OperatorId| {

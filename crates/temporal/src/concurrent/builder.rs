@@ -349,8 +349,8 @@ impl<'a> Builder<'a> {
         Ok((happenings, keys.len()))
     }
 
-    /// Reads of an operator when it happens, and reads of its over-all condition. Returns `None` if
-    /// the operator never happens or is a timed initial literal.
+    /// Returns what an operator reads in its happening (start, end or both), and what its over-all condition reads.
+    /// Returns `None` if the operator never happens or is a timed initial literal.
     fn reads(&self, task: &Task, id: OperatorId, role: Role) -> Option<(Reads, Reads)> {
         let operator = &task.operators[id.index()];
         let origin = self.split.origins[operator.schema as usize];

@@ -114,7 +114,7 @@ pub(super) fn compile(
     limits: &Limits,
 ) -> Result<ConcurrentTask, Errors> {
     let to_errors = |error| vec![error];
-    // The loops below check for interruption, so the builder's own computations need no limits.
+    // The builder's methods check the limits of the `Context` that they are given, so the builder itself has none.
     let unlimited = Limits::none();
     let mut builder = Builder::new(split, reached, &unlimited);
     builder.collect(Context::new(&task, limits))?;

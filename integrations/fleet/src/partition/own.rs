@@ -30,6 +30,7 @@ pub(super) struct Partition<S> {
     pending: usize,
     /// Names of robots with the number of the use that is described in [`Slot::used`], in the order of these numbers.
     recent: VecDeque<(u64, String)>,
+    /// Number of finished tasks: handled events, and starts and conclusions of planning.
     clock: u64,
 }
 
@@ -64,7 +65,7 @@ struct Slot {
     obsolete: usize,
     since: Option<Instant>,
     is_discarding: bool,
-    /// Number of events that the partition had handled when the robot was last used.
+    /// Value of [`Partition::clock`] when the robot was last used.
     used: u64,
     /// Estimated duration of the robot's next search, if it has searched before.
     estimate: Option<Duration>,

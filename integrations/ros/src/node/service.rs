@@ -67,8 +67,8 @@ pub enum CallError {
     },
     /// The server exists, but the reply did not arrive in time.
     #[error(
-        "no answer from {service} after {waited} s; it was called with the mapping of {mapping}; `--rmw \
-         {other}` selects the other one"
+        "no answer from {service} after {waited} s; it was called with the service mapping of {mapping}; `--rmw \
+         {other}` selects the other mapping"
     )]
     Silent {
         /// Full name of the service.

@@ -1,4 +1,5 @@
-//! Encoded data in place of a message, for the client library, which knows types at compile time only.
+//! Encoded data in place of a typed message. The client library needs a message type at compile time; [`Raw`] stands in
+//! for message types that are known only at run time.
 
 use std::fmt;
 

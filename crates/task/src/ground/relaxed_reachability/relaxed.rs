@@ -194,7 +194,7 @@ impl<'a> ReachabilityProgramBuilder<'a> {
         Ok(relation)
     }
 
-    /// Returns `true` if the relaxation of the condition may be true for all bindings.
+    /// Returns `true` if the relaxation ignores the condition: [`Self::body`] then adds no atom for it, except types.
     fn may_be_free(&self, formula: &Formula) -> bool {
         match formula {
             Formula::And(parts) => parts.iter().all(|part| self.may_be_free(part)),

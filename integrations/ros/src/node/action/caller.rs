@@ -127,8 +127,8 @@ impl<A: Action + 'static> ActionCaller<A> {
             sent = sent => sent.map_err(|error| unreachable(error.to_string()))?,
             _ = timer => {
                 let text = format!(
-                    "no answer to a goal after {:.1} s; it was sent with the mapping of {mapping}; `--rmw {}` \
-                     selects the other one",
+                    "no answer to a goal after {:.1} s; it was sent with the service mapping of {mapping}; `--rmw {}` \
+                     selects the other mapping",
                     within.as_secs_f64(),
                     mapping.other()
                 );
