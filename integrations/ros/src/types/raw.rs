@@ -1,5 +1,5 @@
-//! Encoded data in place of a typed message. The client library needs a message type at compile time; [`Raw`] stands in
-//! for message types that are known only at run time.
+//! Encoded data in place of a typed message. The client library needs a message type at compile time; [`Raw`] represents
+//! messages whose types are known only at run time.
 
 use std::fmt;
 
