@@ -92,7 +92,7 @@ enum Done {
     /// A search has ended. There are no plans if it has panicked.
     Planned { robot: String, result: Option<(Thoughts, Duration)> },
     /// Handled events of a robot were discarded, or could not be discarded.
-    Discarded { robot: String },
+    Discarded { robot: String, is_done: bool },
 }
 
 /// Maximum number of undecided events that each robot has in memory. Only the sequence numbers of further ones are.
@@ -258,9 +258,14 @@ impl<S: Store> Partition<S> {
                 self.planned(&robot, result);
                 robot
             }
-            Done::Discarded { robot } => {
+            Done::Discarded { robot, is_done } => {
                 if let Some(slot) = self.slots.get_mut(&robot) {
                     slot.is_discarding = false;
+                    if !is_done {
+                        // Another attempt follows.
+                        slot.obsolete += 1;
+                        slot.since.get_or_insert_with(Instant::now);
+                    }
                 }
                 robot
             }
@@ -413,12 +418,12 @@ impl<S: Store> Partition<S> {
         true
     }
 
-    /// Starts to discard events. If that fails, the next owner of the partition discards them.
+    /// Starts to discard events.
     fn discard(&self, robot: &str, subject: &str, last: u64) {
         let (shared, robot, subject) = (Arc::clone(&self.shared), robot.to_owned(), subject.to_owned());
         self.jobs.push(Box::pin(async move {
-            let _ = shared.store.discard(&subject, last).await;
-            Done::Discarded { robot }
+            let is_done = shared.store.discard(&subject, last).await.is_ok();
+            Done::Discarded { robot, is_done }
         }));
     }
 

@@ -13,7 +13,7 @@ use metaplan_fleet::store::{Fault, Message, Receipt, Store, Stored, Stream};
 use metaplan_fleet::wire::Presence;
 use tokio::sync::{Notify, watch};
 
-use super::{assert_same, decided, decisions, open, scripts, shared, tell, work};
+use super::{all, assert_same, decided, decisions, open, scripts, shared, tell, work};
 
 /// A log that stops responding after a number of operations, as if the worker had crashed. The last
 /// operation is executed without an acknowledgement if `carries_out` is set.
@@ -24,13 +24,15 @@ struct Crashing {
     carries_out: bool,
     /// `false` to omit the comparison of decisions with their required predecessors.
     fences: bool,
+    /// Number of attempts to discard events that still fail.
+    failing: Arc<AtomicU64>,
     over: Arc<Notify>,
 }
 
 impl Crashing {
     fn never(inner: Local, fences: bool) -> Self {
         let left = Arc::new(AtomicU64::new(u64::MAX));
-        Self { inner, left, carries_out: false, fences, over: Arc::default() }
+        Self { inner, left, carries_out: false, fences, failing: Arc::default(), over: Arc::default() }
     }
 
     /// Counts an operation, and executes it if the limit is not reached. Otherwise the returned
@@ -83,6 +85,11 @@ impl Store for Crashing {
     }
 
     async fn discard(&self, subject: &str, last: u64) -> Result<(), Fault> {
+        let failing =
+            self.failing.fetch_update(Ordering::SeqCst, Ordering::SeqCst, |left| left.checked_sub(1));
+        if failing.is_ok() {
+            return Err(Fault::Unreachable("no server".to_owned()));
+        }
         self.through(self.inner.discard(subject, last)).await
     }
 
@@ -127,7 +134,8 @@ async fn a_crash_between_any_two_operations_neither_loses_nor_repeats() {
             let left = Arc::new(AtomicU64::new(operations));
             let over = Arc::new(Notify::new());
             let (inner, over_now) = (store.clone(), Arc::clone(&over));
-            let crashing = Crashing { inner, left, carries_out, fences: true, over: over_now };
+            let (fences, failing) = (true, Arc::default());
+            let crashing = Crashing { inner, left, carries_out, fences, failing, over: over_now };
             let (_orders, heard) = watch::channel(Order::Go);
             let task = tokio::spawn(serve(shared(crashing, "first", settings), 0, heard));
             let crashed = tokio::select! {
@@ -230,6 +238,29 @@ async fn owners_that_are_gone_at_any_time_leave_what_is_needed() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn events_are_discarded_after_failed_attempts() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let store = open(folder.path(), 1);
+    let (events, _) = scripts::play("ugv", "kinect_at_wp2", 3, 7);
+    tell(&store, "r", &events).await;
+    let crashing = Crashing::never(store.clone(), true);
+    crashing.failing.store(5, Ordering::SeqCst);
+    let (look, discard_within) = (Duration::from_millis(1), Duration::from_millis(10));
+    let settings = Settings { look, discard_within, ..Settings::default() };
+    let (_orders, heard) = watch::channel(Order::Go);
+    let owner = tokio::spawn(serve(shared(crashing, "first", settings), 0, heard));
+    for attempt in 0.. {
+        assert!(attempt < 3000, "events are not discarded");
+        if all(&store, Stream::Events).await.is_empty() {
+            break;
+        }
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    owner.abort();
+    assert_eq!(decisions(&store).await["r"].len(), events.len());
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_drain_does_not_wait_for_jobs_without_end() {
     let (events, answers) = scripts::play("ugv", "kinect_at_wp2", 3, 7);
     let settings = Settings { drain: Duration::from_millis(100), ..Settings::default() };
@@ -239,7 +270,8 @@ async fn a_drain_does_not_wait_for_jobs_without_end() {
         let sequences = tell(&store, "r", &events).await;
         let left = Arc::new(AtomicU64::new(operations));
         let (inner, over) = (store.clone(), Arc::<Notify>::default());
-        let crashing = Crashing { inner, left, carries_out: true, fences: true, over: Arc::clone(&over) };
+        let (carries_out, fences, failing) = (true, true, Arc::default());
+        let crashing = Crashing { inner, left, carries_out, fences, failing, over: Arc::clone(&over) };
         let (orders, heard) = watch::channel(Order::Go);
         let task = tokio::spawn(serve(shared(crashing, "first", settings), 0, heard));
         over.notified().await;
