@@ -520,7 +520,7 @@ mod tests {
             (r#"[{ node = "/a" }]"#, "either a `state` or `parameters`"),
             (r#"[{ node = "/a", state = "on" }]"#, "unknown variant"),
             (r#"[{ node = "/a", state = "active", service = "/b" }]"#, "exactly one of"),
-            (r#"[{ node = "/1", state = "active" }]"#, "not the name of a node"),
+            (r#"[{ node = "/1", state = "active" }]"#, "not a valid name of a node"),
             (r#"[{ node = "/a", parameters = {} }]"#, "`parameters` is empty"),
             (r#"[{ node = "/a", parameters = { p = [1, "x"] } }]"#, "the parameter `p`"),
             (r#"[{ node = "/a", parameters = { p = { q = 1 } } }]"#, "the parameter `p`"),
@@ -566,7 +566,7 @@ mod tests {
             ("timeout = 0", "greater than 0"),
             ("timeout = nan", "greater than 0"),
             (r#"verify = [{ topic = "/a", state = "active" }]"#, "either a `node`"),
-            (r#"verify = [{ topic = "a b" }]"#, "not the name of a topic"),
+            (r#"verify = [{ topic = "a b" }]"#, "not a valid name of a topic"),
             (r#"verify = [{ topic = "/a", type = "std_msgs/msg/Bool" }]"#, "belong together"),
             (
                 r#"verify = [{ topic = "/a", type = "std_msgs/msg/Bool", expect = { date = true } }]"#,

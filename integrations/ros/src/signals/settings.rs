@@ -369,7 +369,7 @@ mod tests {
             ("node = \"/a\"".to_owned(), "either a `component` or an `attribute`"),
             ("node = \"/a\"\nattribute = \"q\"".to_owned(), "has no number"),
             ("node = \"/a\"\ncomponent = \"c\"\nat_least = 1".to_owned(), "belong to a `topic`"),
-            ("node = \"/a b\"\ncomponent = \"c\"".to_owned(), "not the name of a node"),
+            ("node = \"/a b\"\ncomponent = \"c\"".to_owned(), "not a valid name of a node"),
             (format!("{field}component = \"c\""), "works always"),
             (format!("{field}attribute = \"q\"\nequals = 1"), "belong to a `component`"),
             (format!("{field}attribute = \"q\"\nstale = \"keep\""), "needs the `period`"),

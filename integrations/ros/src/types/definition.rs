@@ -292,9 +292,9 @@ mod tests {
     #[test]
     fn wrong_definitions_are_rejected() {
         for (name, text, part) in [
-            ("p/msg", "", "not the name of a type"),
-            ("p/masg/M", "", "not the name of a type"),
-            ("p-q/msg/M", "", "not the name of a type"),
+            ("p/msg", "", "not a valid type name"),
+            ("p/masg/M", "", "not a valid type name"),
+            ("p-q/msg/M", "", "not a valid type name"),
             ("p/srv/S", "int32 a", "1 instead of 2 parts"),
             ("p/srv/S", "---\n---", "more parts"),
             ("p/msg/M", "\nint32", "line 2: `int32` is neither"),
