@@ -116,9 +116,10 @@ impl<'a> Planner<'a> {
     /// one objective.
     ///
     /// # Errors
-    /// Returns all unsupported constructs with their source locations, or an error if a limit is reached
-    /// during grounding. It is not an error if a plan is not proved optimal or no plan is found: see
-    /// [`Solution::status`].
+    /// Returns unsupported constructs with their source locations (of each action schema at least the first
+    /// one), or an error if a number of the metric has no initial value, a limit is reached during grounding, or
+    /// a task with several objectives overflows machine integers. It is not an error if a plan is not proved
+    /// optimal or no plan is found: see [`Solution::status`].
     pub fn plan(mut self) -> Result<Solution, Errors> {
         match ground(self.domain, self.problem, &self.grounding) {
             Ok(task) => {
@@ -138,7 +139,7 @@ impl<'a> Planner<'a> {
     }
 
     /// Computes the Pareto front of the first two objectives within the limits, with one plan for each pair
-    /// of values.
+    /// of values. At least two objectives must have been set.
     ///
     /// # Errors
     /// See [`Planner::plan`]. Tasks that overflow machine integers are also an error.

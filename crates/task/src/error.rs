@@ -38,18 +38,18 @@ pub enum Error {
         /// Source location.
         place: Place,
     },
-    /// A numeric fluent that is read but has no initial value.
+    /// A numeric fluent that is read or changed but has no initial value.
     #[error("`{name}` has no initial value; state it in `:init`")]
     NoValue {
         /// Name of the function.
         name: String,
-        /// Source location of the reading expression.
+        /// Source location of the expression or effect that contains the fluent.
         place: Place,
     },
     /// An undeclared name, which `pddl::check` would have rejected.
     #[error("unknown {kind} `{name}`")]
     Unknown {
-        /// `predicate`, `function`, `object`, `type` or `variable`.
+        /// `predicate`, `function`, `object` or `variable`.
         kind: &'static str,
         /// The undeclared name.
         name: String,
@@ -76,7 +76,8 @@ pub enum Error {
     /// The deadline passed or the run was interrupted before grounding was complete.
     #[error("a limit was reached while grounding")]
     Interrupted,
-    /// A rule of the relaxed reachability program that the Datalog engine rejects.
+    /// An action or axiom with too many variables for relaxed reachability, or a rule of its program that the
+    /// Datalog engine rejects.
     #[error("grounding: {0}")]
     Rules(String),
 }

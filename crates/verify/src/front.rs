@@ -98,8 +98,8 @@ pub fn member_directory(directory: &Path, position: usize) -> PathBuf {
     directory.join((position + 1).to_string())
 }
 
-/// Checks the certificates of the front in `directory`, whose domain is the text `domain`. Returns a part `point` for
-/// each point, and the part `front` for the remaining conditions. Stops at the first failed part.
+/// Checks the certificates of the front in `directory`, whose domain has the text `domain_text`. Returns a part
+/// `point` for each point, and the part `front` for the remaining conditions. Stops at the first failed part.
 pub(crate) fn check(
     directory: &Path,
     front: &Front,

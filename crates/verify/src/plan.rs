@@ -13,8 +13,8 @@ use crate::measure::measure;
 /// summary and the metric value. The validation is aborted when `stop` returns `true`.
 ///
 /// # Errors
-/// The plan is malformed, cannot be executed, or has a metric other than claimed; or the validation
-/// was aborted.
+/// The plan is malformed, cannot be executed, or has no metric or one other than claimed; or the
+/// validation was aborted.
 pub fn plan(
     domain: &Domain,
     problem: &Problem,

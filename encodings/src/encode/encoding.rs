@@ -33,8 +33,8 @@ pub struct PlanConstraints<'a> {
     pub cost: Option<CostLimit<'a>>,
     /// Number and order of the operators within a step.
     pub semantics: StepSemantics,
-    /// Maximum number of clauses, which is checked after each part of the encoding; beyond it, no encoding is
-    /// created.
+    /// Maximum number of clauses; beyond it, no encoding is created. It is checked between parts of the encoding,
+    /// but not after all of them, so an encoding may have more clauses.
     pub max_clauses: usize,
 }
 

@@ -110,7 +110,8 @@ pub enum VariableMeaning {
     Later { variable: u32, rounds: u32, step: u32 },
     /// A bit of a number, or of an intermediate result.
     Bit { bit: u32 },
-    /// Selector that excludes known plans while it is assumed.
+    /// Selector of clauses that hold while it is assumed: they exclude known plans, or require a difference from
+    /// a known plan.
     Others,
     /// At least a certain number of the literals of a core are true (variable of a totalizer of the
     /// core-guided search).

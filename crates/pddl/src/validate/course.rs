@@ -68,7 +68,7 @@ pub struct NumberBound {
 ///
 /// # Errors
 /// Returns a violation if a step is not an action of the domain, or if its effects are undefined or
-/// conflict. Also if its duration is missing or violates a constraint at start.
+/// conflict. Also if its duration is missing, negative or undefined, or violates a constraint at start.
 pub fn course(domain: &Domain, problem: &Problem, plan: &PlanText) -> Result<Course, Box<Violation>> {
     let world = World::new(domain, problem, &|| false);
     let texts = plan.steps.iter().zip(1..);

@@ -43,7 +43,8 @@ pub struct ExactTask(pub Task<Rational>);
 /// faster and supports more kinds of proofs.
 ///
 /// # Errors
-/// Returns all unsupported constructs with their source locations, or an error if a limit is reached.
+/// Returns unsupported constructs with their source locations (of each action schema at least the first one), or an
+/// error if a number of the metric has no initial value or a limit is reached.
 pub fn ground_exact(domain: &Domain, problem: &Problem, config: &GroundConfig) -> Result<ExactTask, Errors> {
     ground_for(domain, problem, config, &Generality::default()).map(ExactTask)
 }

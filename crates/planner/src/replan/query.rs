@@ -70,8 +70,8 @@ pub enum ReplanOutcome {
     /// The problem differs from the grounded problem in more than state and availability, or the
     /// task cannot represent one of the first steps.
     Misfit,
-    /// No result: a limit was reached before a plan was found, the search stored its maximum number of
-    /// states, or the search does not support the task.
+    /// No result: the time limit was reached or planning was interrupted before a plan was known, a search
+    /// reached its limit on states or memory, or the search does not support the task.
     Unknown,
 }
 

@@ -71,7 +71,8 @@ use vocabulary::world::World;
 ///
 /// # Errors
 /// Returns unsupported constructs with their source locations (of each action schema at least the first one), or an
-/// error if numbers overflow, the deadline passes or the run is interrupted.
+/// error if a number of the metric has no initial value, numbers overflow, the deadline passes or the run is
+/// interrupted.
 pub fn ground(domain: &Domain, problem: &Problem, config: &GroundConfig) -> Result<Task, Errors> {
     let measures_ends = config.objectives.len() <= 1;
     ground_for(domain, problem, config, &Generality { measures_ends, ..Generality::default() })

@@ -51,7 +51,8 @@ pub struct Lifted {
     pub functions: Vec<Function>,
     pub schemas: Vec<Schema>,
     pub axioms: Vec<Axiom>,
-    /// Initial facts in file order, without duplicates.
+    /// Initial facts without duplicates: those of the file in its order, then those of timed literals at or
+    /// before time 0 and of auxiliary predicates.
     pub(crate) facts: Vec<(PredicateId, Arguments)>,
     pub(crate) values: Vec<(FunctionId, Arguments, Rational)>,
     /// Timed initial literals in chronological order.
@@ -63,8 +64,8 @@ pub struct Lifted {
     pub metrics: Vec<Metric>,
 }
 
-/// A predicate. It is a fluent if an action or timed event changes it, or if it is derived from fluents or
-/// cannot be evaluated in advance; otherwise it is static.
+/// A predicate. It is a fluent if an action or timed event changes it, if it is derived from fluents or cannot be
+/// evaluated in advance, or if it represents time; otherwise it is static.
 #[derive(Debug, Clone)]
 pub struct Predicate {
     pub name: Name,
@@ -76,7 +77,8 @@ pub struct Predicate {
     pub running: bool,
 }
 
-/// A numeric function. It is a fluent if an action changes it; otherwise it is static.
+/// A numeric function. It is a fluent if an action changes it, or if it is auxiliary (times and chosen durations);
+/// otherwise it is static.
 #[derive(Debug, Clone)]
 pub struct Function {
     pub name: Name,

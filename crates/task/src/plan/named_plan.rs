@@ -134,8 +134,8 @@ pub struct Step {
     pub configuration: Vec<(String, String)>,
     /// Functions whose design differs from the design in the previous step that uses the function.
     pub reconfigured: Vec<String>,
-    /// Start time for sequential execution, in the domain's time unit. Between actions there are gaps only
-    /// where the plan waits for timed initial literals.
+    /// Start time in the domain's time unit. In a sequential plan, there are gaps between actions only where the
+    /// plan waits for timed initial literals.
     pub start: Exact,
     /// Duration in the domain's time unit; 0 for an instantaneous action.
     pub duration: Exact,

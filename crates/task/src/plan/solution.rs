@@ -57,7 +57,8 @@ pub struct Improvement {
     pub cost: Exact,
     /// Bound on the metric: no plan has a better value.
     pub lower_bound: Exact,
-    /// Number of steps of the current SAT formula, or of the plan if a search reports the progress.
+    /// Number of steps of the current SAT formula, or of the plan if a search reports the progress. For a concurrent
+    /// plan, the number of its happenings or, if durations are chosen, of its actions.
     pub horizon: usize,
 }
 
@@ -154,7 +155,7 @@ pub struct Solution {
     pub status: Status,
     /// The best plan found, if any.
     pub plan: Option<Plan>,
-    /// The best plan over ground operators, if any.
+    /// The best plan over ground operators. `None` without a plan, and for tasks in rationals and concurrent tasks.
     pub ground: Option<GroundPlan>,
     /// Bound on the metric: no plan has a better value. `None` if the metric may be unbounded or no bound is
     /// known.

@@ -62,7 +62,8 @@ pub struct Condition<N = Int> {
 /// A finite-domain variable. It has exactly one of its values in every state.
 #[derive(Debug, Clone)]
 pub struct Variable {
-    /// Name of each value: a ground atom, or `none of these` for the last value.
+    /// Name of each value: a ground atom, `condition NUMBER` for an auxiliary atom, or `none of these` for the last
+    /// value.
     pub values: Vec<String>,
 }
 

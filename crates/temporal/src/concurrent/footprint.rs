@@ -76,7 +76,7 @@ impl<'a> Footprints<'a> {
     }
 
     /// Returns the write set of the effects for a binding of the parameters, including conditional effects
-    /// that may apply. Effects on undefined numbers are ignored.
+    /// that may apply. Effects whose conditions are undefined are ignored.
     ///
     /// # Errors
     /// Fails if an effect cannot be evaluated, for example because a number has no initial value, or if the

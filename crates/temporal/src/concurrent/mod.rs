@@ -86,8 +86,8 @@ const PRECISION: Int = 1_000_000;
 /// actions. Interfering happenings are at least `separation` apart, in the domain's time unit.
 ///
 /// # Errors
-/// Fails if a construct is unsupported (with its place), `separation` is not positive, a number overflows, or
-/// a limit is reached.
+/// Fails if a construct is unsupported (with its place), `separation` is not positive, a number of the metric has
+/// no initial value, a number overflows, or a limit is reached.
 pub fn ground_concurrent(
     domain: &Domain,
     problem: &Problem,

@@ -240,7 +240,7 @@ impl<'a, T: TimeNumber> Search<'a, T> {
     }
 
     /// Expands a node with the given lower bound on the metric. Returns the work: the number of
-    /// successors, plus 1, plus one unit per [`COMPARED`] comparisons of nodes.
+    /// candidate happenings, plus 1, plus one unit per [`COMPARED`] comparisons of nodes.
     ///
     /// # Errors
     /// [`Interrupted`] if a limit was reached before the last successor. A node can have tens of

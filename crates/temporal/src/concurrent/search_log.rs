@@ -41,8 +41,8 @@ impl<'r, T: TimeNumber> Record<'r, T> {
         self.report_lower_bound(root);
     }
 
-    /// Records a better plan with the integer metric `value` and `horizon` happenings, found by
-    /// `part`, and a lower bound.
+    /// Records a better plan with the integer metric `value` and `horizon` happenings (actions, if
+    /// durations are chosen), found by `part`, and a lower bound.
     pub(super) fn improve(&mut self, value: &Rational, horizon: usize, lower: Rational, part: PlannerPart) {
         self.statistics.found_by = Some(part);
         self.cost = Some(value.clone());

@@ -3,8 +3,8 @@
 //!
 //! The lifted task becomes a Datalog program \[1\]. A schema with slots has an auxiliary relation for each slot. The
 //! columns of this relation are the other parameters in the conditions on the slot; its rows are the objects for which
-//! *some* design is suitable. The relation of applicable instances has no columns for designs, so its size is
-//! independent of their number.
+//! *some* design is suitable. The relation of applicable instances has no columns for slots, so its size is
+//! independent of the number of their designs.
 //!
 //! The rules of static derived predicates are part of the program, with stratified negation and without
 //! relaxation. Derived fluents are relaxed like all other fluents.

@@ -6,9 +6,11 @@ use crate::limits::Interrupted;
 /// Reason why a condition or expression cannot be evaluated.
 #[derive(Debug)]
 pub enum Failure {
-    /// A fluent has no value, a divisor is zero, or a condition is false.
+    /// The expression has no value, or the action instance is never applicable: for example, a function has no value,
+    /// a divisor is zero, a condition is false, or effects conflict.
     Undefined,
-    /// The expression or condition is not supported, or the deadline has passed or the run was interrupted.
+    /// The task cannot be grounded: for example, a construct is not supported, a fluent has no initial value, or a
+    /// limit is reached.
     Error(Error),
 }
 

@@ -44,8 +44,9 @@ pub(super) struct RunningAction {
     /// Value of the number that holds the duration of this run, if the instance has such a number.
     /// Other runs of the instance may have other values.
     number: Option<Affine>,
-    /// Time of the last happening that wrote an atom or number in the joint over-all condition of
-    /// the instance (see [`Instance::joint`]). `None` if the instance has no joint condition.
+    /// Time of the start, or of the last later happening that wrote an atom or number in the joint
+    /// over-all condition of the instance (see [`Instance::joint`]). `None` if the instance has no
+    /// joint condition.
     last: Option<Affine>,
 }
 
@@ -151,8 +152,8 @@ impl Course {
     }
 
     /// Returns the partial plan after a happening. `run` identifies the run if the happening is an
-    /// end. Returns `None` if the happening is not applicable, or if no times and durations satisfy
-    /// the constraints.
+    /// end. Returns `None` if the happening is not applicable, if no times and durations satisfy the
+    /// constraints, or if the cost overflows.
     pub(super) fn after(
         &self,
         concurrent: &TemporalTask,
