@@ -206,8 +206,8 @@ impl Error {
     }
 }
 
-/// A problem that does not prevent the use of a knowledge base: a statement that was not read or was
-/// read in another way than it is written, or a questionable part of the model.
+/// A problem that does not prevent the use of a knowledge base: for example a statement that was not read or was
+/// read in another way than it is written, an import that was not followed, or a questionable part of the model.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 #[non_exhaustive]
 pub enum Warning {

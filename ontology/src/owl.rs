@@ -281,7 +281,8 @@ pub struct Ontology {
     pub annotation_annotations: Vec<(Iri, Annotation, Annotation)>,
     /// Rules in document order.
     pub rules: Vec<Rule>,
-    /// Statements that were not read, or were read in another way than they are written.
+    /// Warnings of the reader: statements that were not read or were read in another way than they are written,
+    /// documents with one ontology IRI, and imports that were not followed.
     pub warnings: Vec<Warning>,
 }
 

@@ -43,7 +43,8 @@ pub struct Change {
     pub delta: Delta,
     /// The new rules; `None` if they do not change.
     pub program: Option<Program>,
-    /// Warnings about statements that are not read, not used in full, or retracted without being stated.
+    /// Warnings about statements that are not read, not used in full, or retracted without being stated, and about
+    /// imports of the documents, which are not followed.
     pub warnings: Vec<Warning>,
 }
 

@@ -173,7 +173,8 @@ impl Engine {
         if let Some(equality) = &mut self.equality {
             *equality = Arc::new(equality.without_facts(&self.program));
             self.store = Store::default();
-            // The same derivation succeeded within the budget before, so it cannot fail without a budget.
+            // The previous rules and facts were accepted before, so that their evaluation can only fail by a limit. Here,
+            // there is none.
             let _ = self.build(facts);
         } else {
             for relation in &mut self.store.relations {

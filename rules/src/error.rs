@@ -125,7 +125,7 @@ pub enum Error {
     BuiltInArity {
         /// The rule.
         rule: RuleIdentity,
-        /// Local name of the built-in.
+        /// Local name of the built-in, or IRI of a custom built-in.
         built_in: &'static str,
         /// Number of arguments.
         count: usize,
@@ -148,12 +148,12 @@ pub enum Error {
         /// The negated predicate.
         predicate: String,
     },
-    /// An atom with more arguments than the engine supports.
+    /// An atom with more arguments, or an aggregate with more variables, than the engine supports.
     #[error("R207 rule {rule}: {count} arguments, at most 32 are supported")]
     Arity {
         /// The rule.
         rule: RuleIdentity,
-        /// Number of arguments.
+        /// Number of arguments; for an aggregate, number of the variables within it.
         count: usize,
     },
     /// An aggregate through recursion.

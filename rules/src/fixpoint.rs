@@ -260,7 +260,8 @@ impl Round<'_> {
 
     /// Applies a step of a plan to a block, and returns the matches that pass, extended by their new
     /// bindings. A join with too many results defers the remaining matches of the block. Returns `None` if
-    /// the plan has no such step, or if the budget is exhausted.
+    /// the plan has no such step, or if the budget does not cover the block; no match if the budget is exhausted
+    /// within the step.
     fn extend_block(&self, plan: PlanId, step: u32, block: Vec<Symbol>) -> Option<Vec<Symbol>> {
         let (id, number) = (plan, step);
         let plan = &self.plans[id as usize];

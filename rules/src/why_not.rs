@@ -74,7 +74,7 @@ pub enum Obstacle {
         /// number.
         gap: Option<BigRational>,
     },
-    /// Two terms are equal but must differ, or differ but must be equal.
+    /// Two terms must differ, but are equal or not known to differ; or they must be equal, but differ.
     Equality {
         /// First term.
         left: Symbol,

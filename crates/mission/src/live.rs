@@ -207,7 +207,7 @@ impl Mission {
     }
 
     /// Returns the object names of the designs that solve a function, including unavailable
-    /// designs.
+    /// designs and designs that only the problem has. Empty without a knowledge base.
     pub fn designs_of(&self, function: &str) -> Vec<String> {
         let Some(knowledge) = &self.knowledge else { return Vec::new() };
         let solves = |design: &&FunctionDesign| design.solves.iter().any(|solved| solved.name == function);

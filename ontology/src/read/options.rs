@@ -10,7 +10,7 @@ use crate::owl::{EntityKind, Iri};
 pub struct ReadOptions {
     /// Paths of OASIS XML catalogs.
     pub catalogs: Vec<PathBuf>,
-    /// Directories to search for imports, with their subdirectories.
+    /// Directories to search for imports, with four levels of subdirectories.
     pub directories: Vec<PathBuf>,
     /// If `true`, an unresolved import is a warning instead of an error.
     pub allow_missing_imports: bool,

@@ -8,7 +8,7 @@ use crate::literal::Literal;
 
 impl BuiltIn {
     /// Returns the built-in with an IRI of `swrlb`, or of any version of the libraries `swrlm` and `temporal`
-    /// of `SWRLTab`; `None` for other IRIs.
+    /// of `SWRLTab`; `None` for other IRIs, and for a name that these libraries do not have.
     pub fn from_iri(iri: &str) -> Option<Self> {
         match iri.strip_prefix(SWRLB) {
             Some(local) => Self::from_name(local),
@@ -74,8 +74,8 @@ impl BuiltIn {
     }
 
     /// Returns the regular expression of the built-in and the reason why it cannot be used. Returns `None` if
-    /// the expression is valid or not constant, and for built-ins without one. Constant flags are checked,
-    /// too. `argument` returns the argument at a position if it is constant.
+    /// the expression is valid (even if it exceeds the size limit) or not constant, and for built-ins without one.
+    /// Constant flags are checked, too. `argument` returns the argument at a position if it is constant.
     pub(crate) fn bad_pattern<'l>(
         self,
         argument: &impl Fn(usize) -> Option<&'l Literal>,

@@ -5,8 +5,8 @@ use super::signature::{BuiltIn, SWRLB};
 
 impl BuiltIn {
     /// Returns the name of the built-in that is most similar to `iri`, among the built-ins of the same
-    /// library; `None` if no name is similar enough (see [`diagnostics::nearest`]). The result is the local
-    /// name of a SWRL built-in, or the IRI of another built-in.
+    /// library; `None` if no name is similar enough (see [`diagnostics::nearest`]), or if the IRI belongs to no
+    /// library. The result is the local name of a SWRL built-in, or the IRI of another built-in.
     pub fn similar(iri: &str) -> Option<&'static str> {
         let candidates: Vec<&'static str> = if iri.starts_with(SWRLB) {
             Self::ALL

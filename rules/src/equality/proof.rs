@@ -262,7 +262,7 @@ impl<'a> Builder<'a> {
     }
 
     /// Explains a fact by the rule recorded for `row`, i.e. for the fact with each name replaced by the
-    /// representative of its equality class. `None` if no rule is recorded.
+    /// representative of its equality class. `None` if the row is not stored, or if no rule is recorded.
     fn derived(&mut self, fact: &Fact, row: &Fact) -> Option<Reason> {
         let engine = self.engine;
         let relation = engine.store.get(engine.store.find(row.predicate, row.arguments.len())?);

@@ -62,7 +62,7 @@ pub fn parse_rules_as(
 
 /// Parses several rule texts about one ontology; `texts` contains pairs of source name and text. A relation in a body
 /// that no rule of any text derives has to be a class or a property. An atom of such a relation that can be neither
-/// (because it has three arguments, or a literal as its first one) is an unknown built-in.
+/// (because it has no or more than two arguments, or a literal as its first one) is an unknown built-in.
 ///
 /// # Errors
 /// Returns the errors of [`parse_rules_as`] for each text. Without errors, returns R104 for unknown
@@ -119,7 +119,8 @@ struct Parser<'a> {
     prefixes: Prefixes,
     syntax: &'a Syntax,
     variables: Vec<Box<str>>,
-    /// Relation atoms that can be neither class nor property atoms, because of their arguments.
+    /// Atoms that can be neither class nor property atoms, because of their arguments. Built-ins and head atoms are
+    /// included; `unknown` removes them.
     foreign: Vec<ForeignAtom>,
     errors: Vec<Error>,
 }

@@ -174,7 +174,8 @@ impl Knowledge {
         &self.warnings
     }
 
-    /// Returns the classes, properties and individuals that occur in the documents.
+    /// Returns the entities of the documents: those that are declared, and those whose kind follows from their use.
+    /// An individual without a declaration is not included.
     pub fn entities(&self) -> &[(EntityKind, Iri)] {
         &self.entities
     }
@@ -189,12 +190,13 @@ impl Knowledge {
         &self.sources
     }
 
-    /// Returns the names of the documents: file paths, including imported files.
+    /// Returns the names of the documents: file paths, including imported files, and the IRIs of imported embedded
+    /// knowledge bases. Documents of [`Knowledge::revise`] are not included.
     pub fn documents(&self) -> &[String] {
         &self.documents
     }
 
-    /// Number of rules in documents and rule files, without axioms.
+    /// Number of rules in documents and rule files, without axioms. [`Knowledge::revise`] does not change it.
     pub fn rule_count(&self) -> usize {
         self.rule_count
     }
@@ -389,8 +391,8 @@ impl Knowledge {
         }
     }
 
-    /// Resets the knowledge to the documents and applies the differences. Everything else that was added since is
-    /// discarded, e.g. interned names of former measured values.
+    /// Resets the knowledge to the documents and applies the differences. Everything else that was added to the engine
+    /// since is discarded, e.g. interned names of former measured values. Pending reports remain.
     ///
     /// # Errors
     /// Inference exceeds its limits; the knowledge is then unchanged.

@@ -30,7 +30,7 @@ pub enum Part {
 pub struct Statements {
     /// Current assertions that are not in the documents.
     pub added: Vec<Statement>,
-    /// Assertions of the documents that no longer hold.
+    /// Assertions of the documents that are no longer asserted.
     pub removed: Vec<Statement>,
 }
 

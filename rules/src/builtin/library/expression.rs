@@ -5,7 +5,7 @@
 //! multiplication (`2x`, `3(a + b)`).
 
 /// Maximum nesting depth of brackets, calls, signs and powers, which limits the recursion depth of the
-/// parser.
+/// parser. A bracket or a call counts twice, because its content starts with an optional sign.
 const MAX_DEPTH: usize = 200;
 
 pub(super) fn value(text: &str, variables: &[(&str, f64)]) -> Option<f64> {

@@ -111,7 +111,7 @@ fn comparable(moments: &[Moment]) -> bool {
 }
 
 /// Returns the distance of two moments in units of a granularity, the third argument. Returns `None` for incomparable
-/// moments.
+/// moments, for other arguments, and if the number of a granule exceeds the range of `i64`.
 fn difference(arguments: &[&Literal]) -> Option<i64> {
     let [from, to, granularity] = arguments else { return None };
     let (granularity, moments) = (Granularity::from_literal(granularity)?, [moment(from)?, moment(to)?]);
