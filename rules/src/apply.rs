@@ -173,8 +173,8 @@ impl Engine {
         if let Some(equality) = &mut self.equality {
             *equality = Arc::new(equality.without_facts(&self.program));
             self.store = Store::default();
-            // The previous rules and facts were accepted before, so that their evaluation can only fail by a limit. Here,
-            // there is none.
+            // The previous rules and facts were accepted before, so their evaluation can fail only by a limit. No limit
+            // applies here.
             let _ = self.build(facts);
         } else {
             for relation in &mut self.store.relations {
