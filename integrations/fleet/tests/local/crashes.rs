@@ -13,7 +13,7 @@ use metaplan_fleet::store::{Fault, Message, Receipt, Store, Stored, Stream};
 use metaplan_fleet::wire::Presence;
 use tokio::sync::{Notify, watch};
 
-use super::{all, assert_same, decided, decisions, open, scripts, shared, tell, work};
+use super::{assert_same, decided, decisions, has_no_events, open, scripts, shared, tell, work};
 
 /// A log that stops responding after a number of operations, as if the worker had crashed. The last
 /// operation is executed without an acknowledgement if `carries_out` is set.
@@ -251,7 +251,7 @@ async fn events_are_discarded_after_failed_attempts() {
     let owner = tokio::spawn(serve(shared(crashing, "first", settings), 0, heard));
     for attempt in 0.. {
         assert!(attempt < 3000, "events are not discarded");
-        if all(&store, Stream::Events).await.is_empty() {
+        if has_no_events(&store).await {
             break;
         }
         tokio::time::sleep(Duration::from_millis(10)).await;

@@ -72,6 +72,16 @@ async fn all<S: Store>(store: &S, stream: Stream) -> Vec<Stored> {
     messages
 }
 
+/// Returns `true` if there are no events. Unlike [`all`], it does not wait for events that are discarded meanwhile.
+async fn has_no_events<S: Store>(store: &S) -> bool {
+    for partition in 0..store.partitions() {
+        if store.end(Stream::Events, partition).await.expect("it can be read") > 0 {
+            return false;
+        }
+    }
+    true
+}
+
 async fn decisions<S: Store>(store: &S) -> BTreeMap<String, Vec<Decided>> {
     let mut decisions: BTreeMap<String, Vec<Decided>> = BTreeMap::new();
     for message in all(store, Stream::Decisions).await {

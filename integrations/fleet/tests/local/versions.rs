@@ -18,7 +18,7 @@ use metaplan_fleet::worker;
 use tempfile::TempDir;
 use tokio::sync::watch;
 
-use super::{PATIENT, all, assert_same, decided, decisions, open, scripts, tell};
+use super::{PATIENT, all, assert_same, decided, decisions, has_no_events, open, scripts, tell};
 
 /// Directories with two versions of the mission `ugv`: the original, and one with a setting.
 struct Versions(TempDir);
@@ -291,9 +291,7 @@ async fn only_ids_are_kept_of_retired_robots() {
             count += tell(&store, robot, &[ENROL, TICK, RETIRE].map(str::to_owned)).await.len();
         }
         decided(&store, count).await;
-        while shared.counts.robots.load(Ordering::Relaxed) > 0
-            || !all(&store, Stream::Events).await.is_empty()
-        {
+        while shared.counts.robots.load(Ordering::Relaxed) > 0 || !has_no_events(&store).await {
             tokio::time::sleep(Duration::from_millis(10)).await;
         }
         worker.stop().await;
