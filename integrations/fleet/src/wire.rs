@@ -63,6 +63,7 @@ impl fmt::Display for Address {
 /// Decision about an event and the state of the robot after it, as stored in the stream of decisions. The last
 /// decision about a robot is all that a worker needs to continue.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[expect(clippy::struct_excessive_bools, reason = "they are independent fields of a message")]
 pub struct Decided {
     /// Data format of the message, equal to [`FORMAT`].
     pub format: String,
