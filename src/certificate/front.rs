@@ -26,8 +26,9 @@ fn wrong(reason: &str) -> Message {
 /// and `points` are all points of the front, sorted by the first of the `objectives`.
 ///
 /// # Errors
-/// Both objectives depend on the total time; one of the certificates that the front needs cannot be written, or would
-/// be rejected (M120); the knowledge base cannot be read again; or the directory cannot be written (M109).
+/// Both objectives depend on the total time; the front has no points or too many; one of the certificates that the
+/// front needs cannot be written, or would be rejected (M120); the knowledge base cannot be read again; or the
+/// directory cannot be written (M109).
 pub fn write_front(
     directory: &Path,
     (mission, problem): (&Mission, &Problem),

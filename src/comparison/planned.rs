@@ -17,7 +17,9 @@ use crate::message::Errors;
 /// A plan from a state of the process, and the effort of computing the plan.
 #[derive(Debug, Clone, Default)]
 pub struct Planned {
-    /// Actions of the plan. `None` if there is no plan, or if the process has no such actions.
+    /// Actions of the plan. `None` if there is no plan, or if a step of the plan has no action of the process in its
+    /// state ([`Tasked`](crate::comparison::Tasked)). If the problem declares places and configurations, such steps are
+    /// omitted.
     pub actions: Option<Vec<Action>>,
     /// Number of variables of the largest formula.
     pub variables: u64,

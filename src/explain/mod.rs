@@ -109,10 +109,10 @@ pub fn design(mission: &Mission, name: &str, limits: &Limits) -> Result<DesignEx
 }
 
 impl Availability {
-    /// Extends the explanation of the availability by plans: the best plan now, the best plan with
-    /// the design as the only one for its functions, and the best plan without it. Then the best
-    /// plans after each set of alterations in [`Availability::ways`], and after each single
-    /// alteration. `hear` is called with a short description of the next plan or plans before they
+    /// Extends the explanation of the availability by plans, in this order: the best plan now, the
+    /// best plans after each set of alterations in [`Availability::ways`], the best plan with the
+    /// design as the only one for its functions, the best plan without it, and the best plans after
+    /// each single alteration. `hear` is called with a short description of the next plan or plans before they
     /// are searched for.
     ///
     /// # Errors

@@ -85,8 +85,8 @@ impl<R: Read> Replay<R> {
     /// Returns the next event line, or `None` at the end of the file.
     ///
     /// # Errors
-    /// The source cannot be read, is not an MCAP file, is damaged, or contains no event lines and
-    /// no diagnostics.
+    /// The source cannot be read, is not an MCAP file, or is damaged; or a complete file has
+    /// neither a channel for event lines nor one for diagnostics.
     pub fn next_line(&mut self) -> io::Result<Option<Replayed>> {
         loop {
             if let Some(line) = self.lines.pop_front() {

@@ -22,7 +22,8 @@ const MAX_MESSAGE_CHARACTERS: usize = 2000;
 /// duration counts towards the time limit of the run.
 ///
 /// # Errors
-/// The program cannot be executed, or the generator of its files cannot be executed or fails.
+/// The program cannot be executed, the generator of its files cannot be executed or fails, or the
+/// system provides no temporary directory or no exit status.
 pub fn perform(
     program: &Path,
     study: &Study,

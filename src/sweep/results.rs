@@ -60,8 +60,8 @@ impl Results {
     /// and removes an incomplete last line.
     ///
     /// # Errors
-    /// The file cannot be created or read, it exists and `resume` is `false`, another process writes it, it
-    /// belongs to another study, or a complete line is damaged.
+    /// The file cannot be created, read or written, another process writes it, it contains a complete line
+    /// and `resume` is `false`, it belongs to another study or shard, or a complete line is damaged.
     pub fn open(directory: &Path, study: &Study, shard: Shard, resume: bool) -> Result<Self, Message> {
         let path = directory.join(format!("shard-{:04}-of-{:04}.jsonl", shard.index, shard.of));
         let failed = |error: io::Error| wrong(&path, &error.to_string());

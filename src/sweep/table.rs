@@ -44,13 +44,15 @@ pub struct Group {
     pub common: Common,
     /// Number of rows in the group.
     pub count: usize,
-    /// Statistics of each column of numbers or truth values over the rows.
+    /// Statistics of each column of numbers or truth values over the rows, except varied keys, the exit
+    /// status, and columns that are empty in the group.
     pub samples: Vec<(String, Sample)>,
 }
 
 impl Table {
     /// Builds the table. `rows` is the JSON pointer to an object, or a list of objects, in each answer; each
-    /// object becomes a row. A run whose answer has nothing there gives one row without fields of an answer.
+    /// object becomes a row. A run whose answer has nothing there gives one row without fields of an answer;
+    /// an empty list gives no row.
     /// With `measured`, includes the fields that depend on the machine, such as times.
     pub fn new(lines: &[Line], rows: &str, measured: bool) -> Self {
         let mut rows_of_lines: Vec<(&Line, Map<String, Value>)> = Vec::new();
