@@ -11,7 +11,7 @@ use futures::stream::{BoxStream, FuturesUnordered, StreamExt as _};
 use metaplan::mapek::Thoughts;
 use tokio::sync::watch;
 
-use super::task::{Loaded, Outcome, Planning, Stop, Task};
+use super::task::{Loaded, Outcome, PANICKED, Planning, Stop, Task};
 use super::{Order, Shared, pause, persist};
 use crate::robot::{Refused, is_retirement};
 use crate::store::{Fault, Store, Stored, Stream};
@@ -367,7 +367,7 @@ impl<S: Store> Partition<S> {
         let Some(slot) = self.slots.get_mut(name) else { return };
         let is_cancelled = slot.search.take().is_none_or(|search| search.is_cancelled);
         match result {
-            None => self.suspend(name, "its loop has panicked"),
+            None => self.suspend(name, PANICKED),
             Some(_) if is_cancelled => slot.cancelled += 1,
             Some((thoughts, estimate)) => {
                 (slot.estimate, slot.thoughts) = (Some(estimate), Some(thoughts));

@@ -9,9 +9,13 @@ use futures::future::{BoxFuture, FutureExt as _};
 use metaplan::mapek::{Thinker, Thoughts};
 
 use super::{Shared, pause, persist};
+use crate::missions::Missions;
 use crate::robot::{Begun, Faulted, Refused, Robot};
 use crate::store::{Fault, Message, Store, Stored, Stream};
 use crate::wire::Decided;
+
+/// Reason why a robot is suspended after a panic.
+pub(super) const PANICKED: &str = "its loop has panicked";
 
 /// State of a robot after its last decision, which has the sequence number `chain`; 0 without a decision.
 pub(super) struct Loaded {
@@ -88,7 +92,7 @@ impl Task {
             }
             let begun = Instant::now();
             let Some((robot, decided, planning)) = self.decide(shared, robot, event, may_search).await else {
-                return (Outcome::Faulted("its loop has panicked".to_owned()), None);
+                return (Outcome::Faulted(PANICKED.to_owned()), None);
             };
             metrics::histogram!("metaplan_fleet_decision_seconds").record(begun.elapsed());
             let outcome = match decided {
@@ -116,14 +120,9 @@ impl Task {
 
     /// Starts a search if the last decision lacks a plan.
     pub(super) async fn start_planning<S: Store>(&mut self, shared: &Arc<Shared<S>>) -> Handled {
-        let Loaded { mut robot, chain } = self.load(shared).await;
-        let own = Arc::clone(shared);
-        let prepare = move || {
-            let thinker = robot.thinker(&own.missions);
-            (robot, thinker)
-        };
-        let Ok((robot, thinker)) = shared.threads.quick(prepare).await else {
-            return (Outcome::Faulted("its loop has panicked".to_owned()), None);
+        let Loaded { robot, chain } = self.load(shared).await;
+        let Some((robot, thinker)) = with_robot(shared, robot, Robot::thinker).await else {
+            return (Outcome::Faulted(PANICKED.to_owned()), None);
         };
         match thinker {
             Err(Faulted(why)) => (Outcome::Faulted(why), None),
@@ -142,16 +141,10 @@ impl Task {
         thoughts: Thoughts,
         is_late: bool,
     ) -> Outcome {
-        let Some(Loaded { mut robot, chain }) = self.loaded.take() else { return Outcome::Outdated };
-        let own = Arc::clone(shared);
-        let conclude = move || {
-            let begun = Instant::now();
-            let decided = robot.plan(thoughts, is_late);
-            count(&own, begun.elapsed());
-            (robot, decided)
-        };
-        let Ok((robot, decided)) = shared.threads.quick(conclude).await else {
-            return Outcome::Faulted("its loop has panicked".to_owned());
+        let Some(Loaded { robot, chain }) = self.loaded.take() else { return Outcome::Outdated };
+        let conclude = move |robot: &mut Robot, _: &Missions| robot.plan(thoughts, is_late);
+        let Some((robot, decided)) = with_robot(shared, robot, conclude).await else {
+            return Outcome::Faulted(PANICKED.to_owned());
         };
         let Some(decided) = decided else {
             self.loaded = Some(Loaded { robot, chain });
@@ -164,22 +157,20 @@ impl Task {
     async fn decide<S: Store>(
         &mut self,
         shared: &Arc<Shared<S>>,
-        mut robot: Box<Robot>,
+        robot: Box<Robot>,
         event: &Stored,
         may_search: bool,
     ) -> Option<(Box<Robot>, Result<Result<Decided, Refused>, Faulted>, Option<Planning>)> {
-        let (own, event) = (Arc::clone(shared), event.clone());
-        let first = move || {
-            let begun = Instant::now();
-            let outcome = robot.begin(&event, &own.missions);
+        let event = event.clone();
+        let begin = move |robot: &mut Robot, missions: &Missions| {
+            let outcome = robot.begin(&event, missions);
             let thinker = match &outcome {
-                Ok(Begun::Search(_)) if may_search => robot.thinker(&own.missions).ok().flatten(),
+                Ok(Begun::Search(_)) if may_search => robot.thinker(missions).ok().flatten(),
                 _ => None,
             };
-            count(&own, begun.elapsed());
-            (robot, outcome, thinker)
+            (outcome, thinker)
         };
-        let (mut robot, outcome, thinker) = shared.threads.quick(first).await.ok()?;
+        let (robot, (outcome, thinker)) = with_robot(shared, robot, begin).await?;
         let search = match outcome {
             Err(faulted) => return Some((robot, Err(faulted), None)),
             Ok(Begun::Decided(decided)) => return Some((robot, Ok(Ok(decided)), None)),
@@ -194,14 +185,8 @@ impl Task {
             let (plans, estimate) = result?;
             (thoughts, self.estimate, planning) = (Some(plans), Some(estimate), None);
         }
-        let own = Arc::clone(shared);
-        let second = move || {
-            let begun = Instant::now();
-            let decided = robot.finish(search, thoughts);
-            count(&own, begun.elapsed());
-            (robot, decided)
-        };
-        let (robot, decided) = shared.threads.quick(second).await.ok()?;
+        let finish = move |robot: &mut Robot, _: &Missions| robot.finish(search, thoughts);
+        let (robot, decided) = with_robot(shared, robot, finish).await?;
         Some((robot, Ok(Ok(decided)), planning))
     }
 
@@ -276,6 +261,22 @@ impl Task {
         }
         Outcome::Outdated
     }
+}
+
+/// Runs work without a search on a robot, on a thread for such work. Returns `None` after a panic.
+async fn with_robot<S: Store, T: Send + 'static>(
+    shared: &Arc<Shared<S>>,
+    mut robot: Box<Robot>,
+    work: impl FnOnce(&mut Robot, &Missions) -> T + Send + 'static,
+) -> Option<(Box<Robot>, T)> {
+    let own = Arc::clone(shared);
+    let timed = move || {
+        let begun = Instant::now();
+        let result = work(&mut robot, &own.missions);
+        count(&own, begun.elapsed());
+        (robot, result)
+    };
+    shared.threads.quick(timed).await.ok()
 }
 
 fn count<S>(shared: &Shared<S>, duration: Duration) {

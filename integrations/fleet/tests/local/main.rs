@@ -82,6 +82,17 @@ async fn has_no_events<S: Store>(store: &S) -> bool {
     true
 }
 
+/// Waits until all events are handled, their plans are found, and the events are discarded.
+async fn settle<S: Store>(store: &S) {
+    for _ in 0..12_000 {
+        if has_no_events(store).await {
+            return;
+        }
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+    panic!("events are not handled");
+}
+
 async fn decisions<S: Store>(store: &S) -> BTreeMap<String, Vec<Decided>> {
     let mut decisions: BTreeMap<String, Vec<Decided>> = BTreeMap::new();
     for message in all(store, Stream::Decisions).await {

@@ -9,7 +9,7 @@ use metaplan_fleet::store::{Message, Store as _, Stream};
 use metaplan_fleet::wire::Address;
 use tokio::sync::watch;
 
-use super::{decisions, has_no_events, missions, open, scripts, tell};
+use super::{decisions, has_no_events, missions, open, scripts, settle, tell};
 
 /// Starts an owner of the only partition that does not wait for plans longer than `patience`.
 fn start(store: &Local, patience: u64, settings: Settings) -> tokio::task::JoinHandle<()> {
@@ -47,17 +47,6 @@ async fn a_single_owner_handles_all_events_of_a_long_queue() {
     assert!(compared > 2, "{compared} plans were compared");
 }
 
-/// Waits until all events are handled, their plans are found, and the events are discarded.
-async fn settle(store: &Local) {
-    for _ in 0..12_000 {
-        if has_no_events(store).await {
-            return;
-        }
-        tokio::time::sleep(Duration::from_millis(5)).await;
-    }
-    panic!("events are not handled");
-}
-
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn reactions_do_not_wait_for_plans_and_each_plan_is_found_by_some_owner() {
     let folder = tempfile::tempdir().expect("a directory");
@@ -73,7 +62,7 @@ async fn reactions_do_not_wait_for_plans_and_each_plan_is_found_by_some_owner() 
         assert!(owner < 300, "the owners do not come to an end");
         let settings = Settings { discard_every: random.usize(1..5), warm: 3, ..Settings::default() };
         let task = start(&store, random.u64(..3), settings);
-        // Later owners live longer, so that a slow machine comes to an end, too.
+        // Later owners live longer, so that the loop also ends on a slow machine.
         tokio::time::sleep(Duration::from_millis(random.u64(1..150) + owner)).await;
         task.abort();
         // Events are discarded only after their plans are found.
