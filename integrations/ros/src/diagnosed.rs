@@ -36,7 +36,7 @@ impl fmt::Debug for Diagnosed {
 pub(crate) struct Sources {
     pub(crate) rules: Vec<DiagnosticRule>,
     pub(crate) signals: Vec<Signal>,
-    /// Greatest time between two reports of equal values, by attribute (see [`repeats`]).
+    /// Time after which an equal value is reported again, by attribute (see [`repeats`]).
     pub(crate) repeats: BTreeMap<String, Duration>,
 }
 

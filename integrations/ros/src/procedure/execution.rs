@@ -357,7 +357,7 @@ impl Run<'_> {
                 execute(words, deadline).await
             }
         };
-        // A refused operation has changed nothing, so its undo is dropped. The undo of parameters is kept, because
+        // A refused operation counts as without effect, so its undo is dropped. The undo of parameters is kept, because
         // they may have been accepted with other values. Without an answer, the effect is unknown, and the undo is
         // kept.
         if matches!(outcome, Err(Failure::Refused(_))) {

@@ -30,8 +30,8 @@ pub(crate) struct Procedure {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Step {
     pub(crate) operation: Operation,
-    /// Operation that is executed if a later step or a condition fails. State transitions and parameters need none, and
-    /// a message needs one only if there was no earlier message.
+    /// Operation that is executed if a later step or a condition fails, or if the step gets no answer. State
+    /// transitions and parameters need none, and a message needs one only if there was no earlier message.
     pub(crate) undo: Option<Operation>,
 }
 
