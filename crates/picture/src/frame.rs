@@ -65,7 +65,7 @@ pub(crate) struct NamePlace {
     pub(crate) room: f64,
 }
 
-/// Ranges of the axes. Plans that are shown side by side share one `Span`.
+/// Ranges of the axes. Plans that are shown side by side share one `Span` if their axes are of the same kind.
 pub(crate) struct Span {
     steps: usize,
     until: f64,

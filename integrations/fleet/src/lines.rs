@@ -215,8 +215,8 @@ async fn write_decisions<S: Store>(
 }
 
 /// Runs a fleet in a directory: events from standard input, decisions to standard output. Ends when
-/// `stop` becomes true, or when the input has ended and either all events are decided or the output
-/// is closed. `after` is as in [`follow`].
+/// `stop` becomes true, or when the input has ended and either all events are decided (except those of
+/// suspended robots) or the output is closed. `after` is as in [`follow`].
 pub(crate) async fn up(
     shared: Arc<Shared<Local>>,
     after: Option<u64>,
@@ -256,7 +256,7 @@ pub(crate) async fn up(
     fed
 }
 
-/// Returns `true` if all stored events are decided or refused, and all decisions are written.
+/// Returns `true` if all stored events are decided, refused, or of a suspended robot, and all decisions are written.
 async fn is_done(shared: &Shared<Local>, written: &Mutex<BTreeMap<u32, u64>>) -> Result<bool, Message> {
     let store = &shared.store;
     for partition in 0..store.partitions() {

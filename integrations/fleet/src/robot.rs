@@ -1,6 +1,6 @@
 //! State of a single robot, which turns an event into a decision. It has no network and takes the time from the
-//! events. So equal events at equal times lead to equal decisions, except for plans whose search was ended by a time
-//! limit.
+//! events. So equal events at equal times lead to equal decisions of [`Robot::decide`], except for plans whose search
+//! was ended by a time limit. Other decisions also depend on which plans were found before an event.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -56,7 +56,7 @@ pub enum Refused {
     Mission,
     /// The event requests a migration at an unknown point.
     SafePoint,
-    /// The message id contains the name of another robot.
+    /// The message id does not begin with the robot's name and a colon.
     Forged,
     /// The subject's partition is not the partition of the robot.
     Misplaced,

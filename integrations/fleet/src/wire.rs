@@ -180,8 +180,7 @@ pub struct Presence {
     pub waiting: u64,
     /// Number of events that were decided since the worker's start.
     pub decided: u64,
-    /// Number of refused events, stopped robots and unreadable stored messages since the worker's
-    /// start.
+    /// Number of refused events and suspensions of robots since the worker's start.
     pub refused: u64,
     /// Proportion of the threads' time that loops used since the last status, from 0 to 1.
     pub load: f64,

@@ -1,5 +1,5 @@
-//! Checks properties of a model. By default, small models are solved in exact rationals, larger ones
-//! in doubles with guaranteed bounds.
+//! Checks properties of a model. By default, small models are solved in exact rationals as long as this is cheap, and
+//! other models in doubles with guaranteed bounds.
 
 mod answer;
 mod ask;

@@ -98,11 +98,11 @@ pub struct Counts {
     pub partitions: AtomicU64,
     /// Number of events that were decided.
     pub decided: AtomicU64,
-    /// Number of refused events, stopped robots and unreadable stored messages.
+    /// Number of refused events and suspensions of robots.
     pub refused: AtomicU64,
     /// Total working time of loops in microseconds.
     pub busy: AtomicU64,
-    /// For each partition: sequence number up to which all events are decided or refused.
+    /// For each partition: sequence number up to which all events are decided, refused, or of a suspended robot.
     pub reached: Mutex<BTreeMap<u32, u64>>,
 }
 

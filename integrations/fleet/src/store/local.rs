@@ -65,7 +65,7 @@ impl Local {
     /// each robot are kept. The status of a worker expires unless it is published again within `lease`.
     ///
     /// # Errors
-    /// The directory cannot be used, or another process uses it.
+    /// The directory cannot be used, was created by another version, or is used by another process.
     pub fn open(
         directory: &Path,
         partitions: u32,

@@ -58,8 +58,8 @@ pub struct Stored {
 pub struct Message<'a> {
     /// Subject without the prefixes of fleet and stream: `PARTITION.ROBOT`.
     pub subject: &'a str,
-    /// Message id. A further message with the same id is not stored (with NATS: for ten minutes). An
-    /// empty id is not compared.
+    /// Message id. A further message with the same id is not stored (with NATS: for ten minutes; in a directory: while
+    /// the first one is stored). An empty id is not compared.
     pub id: &'a str,
     /// For a conditional append: the sequence number that the last message of the subject must
     /// have. 0 requires that the subject has no message.

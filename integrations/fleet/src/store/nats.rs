@@ -88,7 +88,7 @@ fn failed(error: impl std::fmt::Display) -> Fault {
 }
 
 enum OpenError {
-    /// A stream with this name exists and was created by another program.
+    /// A stream with this name exists and is not one of a fleet of this version.
     ForeignStream(String),
     Store(Fault),
 }
