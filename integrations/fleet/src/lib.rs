@@ -33,15 +33,18 @@
 //! let mut robot = Sender::new(store.clone(), "ugv-1", "");
 //! let event = robot.send(r#"{"event": "enrol", "mission": "ugv"}"#).await?;
 //! let subject = robot.address().to_string();
-//! let message = loop {
-//!     match store.last(Stream::Decisions, &subject).await? {
-//!         Some(message) => break message,
-//!         None => tokio::time::sleep(Duration::from_millis(10)).await,
+//! // A search that takes longer than `Settings::patience` has a decision of its own, which follows that of the event.
+//! let decided = loop {
+//!     if let Some(message) = store.last(Stream::Decisions, &subject).await? {
+//!         let decided = Decided::parse(&message.payload).ok_or("no decision")?;
+//!         if !decided.planning {
+//!             break decided;
+//!         }
 //!     }
+//!     tokio::time::sleep(Duration::from_millis(10)).await;
 //! };
-//! let decided = Decided::parse(&message.payload).ok_or("no decision")?;
-//! assert_eq!((decided.event, decided.enrolled.as_deref()), (event, Some("ugv")));
-//! assert_eq!(decided.answers[1]["answer"], "plan_found");
+//! assert_eq!(decided.event, event);
+//! assert!(decided.answers.iter().any(|answer| answer["answer"] == "plan_found"));
 //! stop.send_replace(true);
 //! worker.await?;
 //! # Ok(())
