@@ -28,7 +28,7 @@ const INTERVAL: Duration = Duration::from_millis(10);
 /// Time that is added to 1.1 times the time limit (see [`Deadline`]).
 const GRACE: Duration = Duration::from_millis(150);
 
-/// The option `--time-limit` of commands that have nothing to show before their end, and of those that show what they have.
+/// The option `--time-limit`. At the limit, a command with partial results shows them; others end without an answer.
 #[derive(Debug, Clone, Args)]
 pub(super) struct TimeLimit {
     /// Stop after this many seconds with the results so far, or without an answer if there are no

@@ -10,12 +10,12 @@
 
 use std::collections::VecDeque;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 use std::time::{Duration, Instant};
 
 use crate::journal::Journal;
-use crate::mapek::{Answer, Clock as _, Loop, Observation, SystemClock, Thoughts};
+use crate::mapek::{Answer, Clock as _, Loop, Observation, ParallelSearch, SystemClock, Thoughts};
 use crate::message::Message;
 
 use crate::cli::common::{Common, Failure};
@@ -26,10 +26,6 @@ use crate::cli::run_outlet::{Outlet, is_over, unwritten, warn_if_unrecorded};
 /// waiting inputs.
 pub(super) const MAX_WAITING: usize = 1024;
 
-/// Maximum number of consecutive cancelled searches. The next search runs to its end; otherwise
-/// input that changes all the time would prevent every plan.
-const MAX_STOPPED: u32 = 3;
-
 pub(super) const MIN_PAUSE: Duration = Duration::from_millis(1);
 
 /// Input of a session: a line with the time at which it was read, plans from another thread, the end of the lines, or
@@ -39,12 +35,6 @@ pub(super) enum Input {
     Thoughts(Thoughts),
     End,
     Failed(Message),
-}
-
-struct PlanSearch {
-    question: u64,
-    stop: Arc<AtomicBool>,
-    is_stopped: bool,
 }
 
 #[derive(PartialEq, Eq)]
@@ -67,8 +57,7 @@ pub(super) struct Session<'a> {
     line: Arc<AtomicU64>,
     /// Number of the last line and the time at which it was read, until the line is acknowledged.
     open: Option<(u64, Instant)>,
-    thinking: Option<PlanSearch>,
-    stopped: u32,
+    search: ParallelSearch,
     /// `true` if a line had a time of its own. Time then advances with lines only.
     has_times: bool,
 }
@@ -92,8 +81,7 @@ impl<'a> Session<'a> {
             begun,
             line,
             open: None,
-            thinking: None,
-            stopped: 0,
+            search: ParallelSearch::default(),
             has_times: false,
         }
     }
@@ -135,13 +123,13 @@ impl<'a> Session<'a> {
                     Flow::GoesOn
                 }
                 Some(Input::Failed(message)) => return Err(message.into()),
-                None if self.control.has_agenda() && self.thinking.is_none() => self.deliberate(&sender)?,
-                None if is_ended && self.thinking.is_none() => {
+                None if self.control.has_agenda() && !self.search.is_running() => self.deliberate(&sender)?,
+                None if is_ended && !self.search.is_running() => {
                     self.close()?;
                     return Ok(());
                 }
                 None => {
-                    if self.thinking.is_none() {
+                    if !self.search.is_running() {
                         flow = self.close()?;
                     }
                     let pause = self.pause();
@@ -212,13 +200,13 @@ impl<'a> Session<'a> {
             }
         };
         self.open = Some((self.control.beliefs().lines(), read));
-        self.stop_thinking();
+        self.search.update(Some(self.control.question()));
         // A reaction with effects is written at once. A reaction without effects is joined with the deliberation, so
         // that one decision is written instead of two.
         let is_safe = answers.iter().all(|answer| answer.effect().is_none());
         if is_last
             && is_safe
-            && self.thinking.is_none()
+            && !self.search.is_running()
             && self.control.has_agenda()
             && let Some(more) = self.control.deliberate_at_once()
         {
@@ -248,7 +236,7 @@ impl<'a> Session<'a> {
                 .observe(&mut self.control, Observation::TIMER, now)
                 .map_err(|error| unwritten(&error))?,
         };
-        self.stop_thinking();
+        self.search.update(Some(self.control.question()));
         if let Some(journal) = &mut self.journal {
             journal.reacted(&mut self.control, &mut answers).map_err(|error| unwritten(&error))?;
         }
@@ -271,7 +259,7 @@ impl<'a> Session<'a> {
         inputs: &Receiver<Input>,
         waiting: &mut VecDeque<Input>,
     ) -> Result<Flow, Failure> {
-        if self.thinking.is_none() {
+        if !self.search.is_running() {
             return self.deliberate(sender);
         }
         // The result of the search is handled before the lines that wait for it.
@@ -286,18 +274,6 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Cancels the search for plans if the planning problem has changed, unless [`MAX_STOPPED`] searches in a row were
-    /// cancelled.
-    fn stop_thinking(&mut self) {
-        let Some(thinking) = &mut self.thinking else { return };
-        // A search for an unchanged problem stays useful.
-        if thinking.question != self.control.question() && !thinking.is_stopped && self.stopped < MAX_STOPPED
-        {
-            thinking.is_stopped = true;
-            thinking.stop.store(true, Ordering::Relaxed);
-        }
-    }
-
     /// Deliberates at once if no search is necessary, and otherwise starts a search on another
     /// thread.
     fn deliberate(&mut self, sender: &SyncSender<Input>) -> Result<Flow, Failure> {
@@ -306,8 +282,7 @@ impl<'a> Session<'a> {
             return self.say(&answers);
         }
         let thinker = self.control.thinker();
-        let (question, stop) = (self.control.question(), thinker.stop());
-        self.thinking = Some(PlanSearch { question, stop, is_stopped: false });
+        self.search.begin(thinker.handle());
         let sender = sender.clone();
         std::thread::spawn(move || {
             // The receiver is closed if the run has ended.
@@ -317,24 +292,22 @@ impl<'a> Session<'a> {
     }
 
     /// Deliberates with the result of another thread. A result for an outdated problem is discarded and the search is
-    /// repeated, except after [`MAX_STOPPED`] cancelled searches in a row.
+    /// repeated, except after several cancelled searches in a row ([`ParallelSearch`]).
     fn conclude(&mut self, thoughts: Thoughts) -> Result<Flow, Failure> {
-        let was_stopped = self.thinking.take().is_some_and(|search| search.is_stopped);
-        let is_late = self.stopped >= MAX_STOPPED;
-        if let Some(mut answers) = self.control.deliberate_with(thoughts, is_late) {
-            self.stopped = 0;
-            self.decided(&mut answers)?;
-            self.say(&answers)
-        } else {
-            self.stopped = if was_stopped { self.stopped + 1 } else { 0 };
-            Ok(Flow::GoesOn)
+        let is_late = self.search.accepts_late_plans();
+        if self.search.end() {
+            return Ok(Flow::GoesOn);
         }
+        let Some(mut answers) = self.control.deliberate_with(thoughts, is_late) else {
+            return Ok(Flow::GoesOn);
+        };
+        self.search.reset();
+        self.decided(&mut answers)?;
+        self.say(&answers)
     }
 
     fn recorded(&mut self, line: &Line, read: Instant) -> Result<Flow, Failure> {
-        if let Some(thinking) = self.thinking.take() {
-            thinking.stop.store(true, Ordering::Relaxed);
-        }
+        self.search.interrupt();
         if self.control.has_agenda() {
             let mut answers = self.control.deliberate();
             self.decided(&mut answers)?;

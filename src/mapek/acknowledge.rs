@@ -1,10 +1,10 @@
 //! Determines the believed design of each function from acknowledgements and failures of reconfigurations.
 //!
-//! The event `acknowledged` refers to a reconfiguration by its number. Unless another design is observed or a failure
-//! is reported later, the function is believed to have the design of its last acknowledged reconfiguration. Messages
-//! can cross, be duplicated or arrive out of order: of two acknowledged reconfigurations of one function, the one
-//! requested later counts. A reconfiguration that a later one has superseded can still be acknowledged; until then its
-//! design is not believed.
+//! The event `acknowledged` refers to a reconfiguration by its number. The function is then believed to have the design
+//! of its last acknowledged reconfiguration, until another design is observed or a failure is reported. If another
+//! design was observed while the reconfiguration was pending, the design is unknown. Messages can cross, be duplicated
+//! or arrive out of order: of two acknowledged reconfigurations of one function, the one requested later counts. A
+//! reconfiguration that a later one has superseded can still be acknowledged; until then its design is not believed.
 //!
 //! A report that an action has started, progressed or succeeded implies that the request of the action has arrived.
 //! Some robots never acknowledge an effect by its number. For such a robot, the report also implies that the

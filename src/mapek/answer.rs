@@ -141,7 +141,8 @@ pub enum OverdueOutcome {
     Failed,
     /// The action is cancelled.
     Cancelled,
-    /// No reaction: the robot may never send this report.
+    /// No reaction yet. Either this is the first missed deadline, and the next one cancels the action, or the robot
+    /// possibly does not send such reports at all.
     Waiting,
 }
 

@@ -69,5 +69,5 @@ pub(crate) use resume::resume;
 pub(crate) use sequence::Numbers;
 pub use settings::{AdaptationSection, SafeReaction, Settings, Unrecorded};
 pub use step::PlannedStep;
-pub use think::{Thinker, Thoughts};
+pub use think::{ParallelSearch, SearchHandle, Thinker, Thoughts};
 pub use watch::{Planning, Watch};

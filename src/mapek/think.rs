@@ -6,7 +6,7 @@
 //! longer reported as optimal. Late plans can be used, too, if they fit the situation.
 
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use planner::Limits;
 
@@ -33,9 +33,9 @@ pub struct Thoughts {
 }
 
 impl Thinker {
-    /// Returns the flag that interrupts planning once it is set to `true`.
-    pub fn stop(&self) -> Arc<AtomicBool> {
-        self.limits.interrupt()
+    /// Returns a handle to the search that [`Self::think`] will run.
+    pub fn handle(&self) -> SearchHandle {
+        SearchHandle { question: self.control.question, stop: self.limits.interrupt(), is_cancelled: false }
     }
 
     /// Computes the plans for the pending decisions of the copied loop. [`Loop::deliberate_with`] applies them to the
@@ -45,6 +45,82 @@ impl Thinker {
         self.control.deliberate();
         let answers = self.control.planner.question_log.take().unwrap_or_default();
         Thoughts { question: self.control.question, answers, is_stopped: self.limits.reached() }
+    }
+}
+
+/// A search for plans on another thread. Dropping the handle interrupts the search.
+#[derive(Debug)]
+pub struct SearchHandle {
+    question: u64,
+    stop: Arc<AtomicBool>,
+    is_cancelled: bool,
+}
+
+impl Drop for SearchHandle {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+    }
+}
+
+/// The search for plans that runs in parallel to a loop, and the policy for cancelling it.
+///
+/// A search is cancelled when the planning problem has changed. After a few consecutive cancelled searches, the next one
+/// runs to its end, because otherwise observations that change the problem all the time would prevent every plan.
+#[derive(Debug, Default)]
+pub struct ParallelSearch {
+    running: Option<SearchHandle>,
+    /// Number of consecutive cancelled searches.
+    cancelled: u32,
+}
+
+/// Maximum number of consecutive cancelled searches.
+const MAX_CANCELLED: u32 = 3;
+
+impl ParallelSearch {
+    /// Registers a search that begins. An earlier search that is still registered is interrupted.
+    pub fn begin(&mut self, search: SearchHandle) {
+        self.running = Some(search);
+    }
+
+    /// Returns `true` from the start of a search to [`Self::end`].
+    pub fn is_running(&self) -> bool {
+        self.running.is_some()
+    }
+
+    /// Cancels the search if `question`, the number of the current planning problem, is not the one it solves, unless too
+    /// many searches in a row were cancelled. Without a current problem, always cancels it.
+    pub fn update(&mut self, question: Option<u64>) {
+        let Some(running) = &mut self.running else { return };
+        let is_outdated =
+            question.is_none_or(|question| question != running.question && self.cancelled < MAX_CANCELLED);
+        if is_outdated {
+            running.is_cancelled = true;
+            running.stop.store(true, Ordering::Relaxed);
+        }
+    }
+
+    /// Registers the end of the search. Returns `true` if it was cancelled or [interrupted](Self::interrupt), so that its
+    /// plans cannot be used.
+    pub fn end(&mut self) -> bool {
+        let Some(running) = self.running.take() else { return true };
+        self.cancelled += u32::from(running.is_cancelled);
+        running.is_cancelled
+    }
+
+    /// Returns `true` if plans for an outdated problem should be used if they fit the current situation, because too many
+    /// searches in a row were cancelled.
+    pub fn accepts_late_plans(&self) -> bool {
+        self.cancelled >= MAX_CANCELLED
+    }
+
+    /// Registers that the loop has a plan, or needs none: later searches can be cancelled again.
+    pub fn reset(&mut self) {
+        self.cancelled = 0;
+    }
+
+    /// Interrupts the search. Its result must be ignored, which [`Self::end`] also says.
+    pub fn interrupt(&mut self) {
+        self.running = None;
     }
 }
 

@@ -152,7 +152,10 @@ impl Planned<'_> {
             Ground::Integers(task) => certificate::Ground::Integers(task),
             Ground::Exact(task) => certificate::Ground::Exact(task),
             Ground::Concurrent { .. } => {
-                return Err(Message::error("M107", "plans whose actions overlap have no certificate"));
+                return Err(Message::error(
+                    "M107",
+                    "results of concurrent planning, in which actions may overlap, have no certificate",
+                ));
             }
         };
         let mut problem = self.problem.clone();

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use cpu_time::ThreadTime;
-use metaplan::mapek::{Answer, Command, Loop, Observation, SafeReaction, Settings};
+use metaplan::mapek::{Answer, Command, Loop, Observation, ParallelSearch, SafeReaction, Settings};
 use metaplan::setup::Setup;
 
 use crate::common::{control, feed};
@@ -92,6 +92,30 @@ fn plans_of_another_thread_are_adopted_unless_outdated() {
         let answers = answers.unwrap_or_else(|| ugv.deliberate());
         assert!(kinds(&answers).contains(&"plan_found".to_owned()), "{line}: {answers:?}");
     }
+}
+
+#[test]
+fn no_more_than_three_searches_in_a_row_are_cancelled() {
+    let mut ugv = with(|settings| settings);
+    react(&mut ugv, &status("c_kinect", "FALSE"));
+    let mut search = ParallelSearch::default();
+    for round in 0..4 {
+        search.begin(ugv.thinker().handle());
+        search.update(Some(ugv.question()));
+        react(&mut ugv, &format!(r#"{{"event":"goal_changed","goal":"(robot_at wp{})"}}"#, 2 + round));
+        search.update(Some(ugv.question()));
+        assert_eq!(search.accepts_late_plans(), round == 3);
+        assert_eq!(search.end(), round < 3, "round {round}");
+    }
+    search.begin(ugv.thinker().handle());
+    search.update(None);
+    assert!(search.end(), "a search for nothing is always cancelled");
+    search.reset();
+    assert!(!search.accepts_late_plans());
+    search.begin(ugv.thinker().handle());
+    search.interrupt();
+    assert!(!search.is_running() && search.end(), "its plans are not used");
+    assert!(!search.accepts_late_plans());
 }
 
 #[test]
@@ -230,7 +254,7 @@ fn the_safe_effect_comes_within_five_milliseconds() {
     let ferry = Setup::read(&root.join("tests/program/ferry/mission.toml")).expect("the mission is read");
     let ferry = Loop::new(ferry.mission, ferry.settings.with_time_limit(None)).expect("a loop");
     let thinker = ferry.thinker();
-    let stop = thinker.stop();
+    let handle = thinker.handle();
     let search = std::thread::spawn(move || thinker.think());
     let mut late = Vec::new();
     for (mission, count) in [("camara_like", 1_000), ("ugv", 1_000), ("uuv", 1_000)] {
@@ -268,6 +292,6 @@ fn the_safe_effect_comes_within_five_milliseconds() {
     }
     assert!(late.is_empty(), "{late:?}");
     assert!(!search.is_finished(), "the search has never ended");
-    stop.store(true, std::sync::atomic::Ordering::Relaxed);
+    drop(handle);
     search.join().expect("it stops");
 }

@@ -222,7 +222,7 @@ pub enum Kind {
     Plan,
     /// A command to the robot, or an objective that no design can serve.
     Effect,
-    /// An input that was refused or repeated.
+    /// An input that was refused, outdated or repeated, a missed deadline, or an error.
     Refusal,
 }
 

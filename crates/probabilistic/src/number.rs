@@ -167,8 +167,8 @@ impl Number for BigRational {
     }
 }
 
-/// Converts a probability or a reward of the model to the number type of the solver. Returns `None`
-/// if the value is so small or large that a double could underflow or overflow in later products.
+/// Converts a probability or a reward of the model to the number type of the solver. For doubles, returns `None` if the
+/// value is so small or large that later products could underflow or overflow.
 pub(crate) fn rounded<N: Number>(value: &BigRational) -> Option<N> {
     let number = N::from_rational(value);
     let magnitude = number.to_f64().abs();

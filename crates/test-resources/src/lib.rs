@@ -7,7 +7,7 @@
 //! | environment variable | meaning |
 //! |---|---|
 //! | `METAPLAN_DATA` | Directory of the test data. A relative path begins at the root of the project. By default, each file is looked up in `$XDG_CACHE_HOME/metaplan/data`, to which `data/fetch.py` downloads public files, and then in `../shared`. |
-//! | `METAPLAN_REQUIRE` | Names of resources ([`Resource::name`]), separated by commas. A test that lacks one of them fails. `.ci/resources` prints the names of all resources of a machine. |
+//! | `METAPLAN_REQUIRE` | Names of resources ([`Resource::name`]), separated by commas. A test that lacks one of them fails. `.ci/resources` prints the names of the resources that it detects on a machine. |
 //! | `METAPLAN_SKIPPED` | File to which a test that lacks any other resource appends a line: name of the resource, test, and detail, separated by tabs. `.ci/count` counts these lines. |
 //!
 //! A test that lacks a resource that is not required prints `skipped: needs NAME: DETAIL`. The caller then

@@ -1,4 +1,4 @@
-//! Checks the parts of the certificate of a single plan.
+//! Checks the parts of a certificate that is not of a Pareto front: a plan is optimal, or there is no plan.
 
 use std::fs;
 use std::io::BufReader;

@@ -174,8 +174,8 @@ impl Mission {
         Self { setup: RwLock::new(self.read()) }
     }
 
-    /// Returns a checksum of everything that planning depends on: knowledge base, rules, domain,
-    /// problem and settings.
+    /// Returns a checksum of everything that planning depends on: the mission with its files, the
+    /// settings, and the version of Metaplan.
     fn digest(&self, py: Python<'_>) -> PyResult<String> {
         let setup = self.read();
         let control = py.detach(|| Loop::new(setup.mission.clone(), setup.settings.clone()));

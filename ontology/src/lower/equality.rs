@@ -41,9 +41,9 @@ pub(crate) fn lower(axioms: &[AnnotatedAxiom], context: &mut Context) -> bool {
 }
 
 /// Adds rule eq-rep of OWL 2 RL for classes and properties that are individuals, too: names that become equal
-/// have the same members. For names that are stated to be equal, the lowering of `SameIndividual` also adds
-/// rules without a condition. If a kind has more than [`MAX_PUNNED_NAMES`] such names, adds a warning
-/// instead.
+/// have the same members. If more than [`MAX_PUNNED_NAMES`] names of a kind are individuals, too, adds a
+/// warning instead. In any case, the lowering of `SameIndividual` adds rules without a condition for names
+/// that are stated to be equal.
 fn entities(context: &mut Context) {
     let identity = RuleIdentity { source: AXIOM_SOURCE.into(), label: Some("eq-rep".into()), position: 0 };
     let mut variables = Variables::default();

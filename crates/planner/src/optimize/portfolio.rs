@@ -394,7 +394,7 @@ mod tests {
         let check = |bounds: &[Int], lower, cost, expected| {
             assert_eq!(bound_reaches(bounds, lower, cost), expected, "{bounds:?} {lower} {cost}");
         };
-        // No forecast after fewer rounds.
+        // After at most `FORECAST_ROUNDS` rounds there is no forecast, and the result is `true`.
         check(&[], 1, 100, true);
         check(&[1, 1, 1], 1, 100, true);
         check(&[10, 12, 14, 16], 16, 22, true);

@@ -132,7 +132,7 @@ pub(super) fn compile(
     })
 }
 
-/// Parts of a temporal task that do not depend on the number type of times.
+/// Parts of a temporal task that do not depend on the type that represents times.
 struct Parts<'p> {
     task: Task,
     split: &'p Split,

@@ -8,10 +8,10 @@ use std::time::{Duration, Instant};
 
 use futures::future::BoxFuture;
 use futures::stream::{BoxStream, FuturesUnordered, StreamExt as _};
-use metaplan::mapek::Thoughts;
+use metaplan::mapek::{ParallelSearch, Thoughts};
 use tokio::sync::watch;
 
-use super::task::{Loaded, Outcome, PANICKED, Planning, Stop, Task};
+use super::task::{Loaded, Outcome, PANICKED, Planning, Task};
 use super::{Order, Shared, pause, persist};
 use crate::robot::{Refused, is_retirement};
 use crate::store::{Fault, Store, Stored, Stream};
@@ -45,12 +45,10 @@ struct Slot {
     /// `true` if the last decision lacks a plan. Then the last event is not discarded, so that a new owner of the
     /// partition searches for the plan.
     is_pending: bool,
-    /// The search for a plan that is running.
-    search: Option<Search>,
+    /// The search for a plan that continues after the decision.
+    search: ParallelSearch,
     /// Plans that were found.
     thoughts: Option<Thoughts>,
-    /// Number of consecutive cancelled searches.
-    cancelled: u32,
     /// `true` if the robot is included in the number of loaded robots.
     is_counted: bool,
     waiting: VecDeque<Stored>,
@@ -71,17 +69,10 @@ struct Slot {
     estimate: Option<Duration>,
 }
 
-struct Search {
-    /// [Number](crate::robot::Robot::question) of the planning problem.
-    question: u64,
-    stop: Stop,
-    is_cancelled: bool,
-}
-
 impl Slot {
     fn is_idle(&self) -> bool {
         let is_working = self.is_busy || self.is_discarding || self.is_suspended;
-        let is_planning = self.is_pending || self.search.is_some() || self.thoughts.is_some();
+        let is_planning = self.is_pending || self.search.is_running() || self.thoughts.is_some();
         !is_working && !is_planning && self.waiting.is_empty() && self.later.is_empty()
     }
 }
@@ -97,10 +88,6 @@ enum Done {
 
 /// Maximum number of undecided events that each robot has in memory. Only the sequence numbers of further ones are.
 const MAX_QUEUE: usize = 16;
-
-/// Maximum number of consecutive cancelled searches of a robot. The next search runs to its end; otherwise events that
-/// change the planning problem all the time would prevent every plan.
-const MAX_CANCELLED: u32 = 3;
 
 impl<S: Store> Partition<S> {
     pub(super) fn new(shared: Arc<Shared<S>>, number: u32) -> Self {
@@ -134,7 +121,7 @@ impl<S: Store> Partition<S> {
             if is_draining {
                 let since = drained.get_or_insert_with(Instant::now);
                 // The next owner plans.
-                self.slots.values_mut().for_each(|slot| slot.search = None);
+                self.slots.values_mut().for_each(|slot| slot.search.interrupt());
                 let is_late = since.elapsed() >= self.shared.settings.drain;
                 if is_late || self.jobs.is_empty() && !self.discard_all(true) {
                     return;
@@ -212,12 +199,12 @@ impl<S: Store> Partition<S> {
         if thoughts.is_none() {
             event = slot.waiting.pop_front();
             sequence = event.as_ref().map(|event| event.sequence).or_else(|| slot.later.pop_front());
-            if sequence.is_none() && (!slot.is_pending || slot.search.is_some()) {
+            if sequence.is_none() && (!slot.is_pending || slot.search.is_running()) {
                 return;
             }
         }
         slot.is_busy = true;
-        let (is_late, may_search) = (slot.cancelled >= MAX_CANCELLED, slot.search.is_none());
+        let (is_late, may_search) = (slot.search.accepts_late_plans(), !slot.search.is_running());
         let loaded = slot.loaded.take();
         let mut task = Task { name: name.to_owned(), subject, loaded, estimate: slot.estimate };
         let (shared, is_suspended) = (Arc::clone(&self.shared), slot.is_suspended);
@@ -306,13 +293,7 @@ impl<S: Store> Partition<S> {
         let is_pending = robot.map_or(slot.is_pending, |robot| robot.is_pending());
         let plan = robot.filter(|_| is_decided).map(|robot| robot.event);
         if let Some(robot) = robot {
-            let is_outdated = |search: &Search| {
-                !is_pending || search.question != robot.question() && slot.cancelled < MAX_CANCELLED
-            };
-            if let Some(search) = slot.search.as_mut().filter(|search| is_outdated(search)) {
-                search.stop.set();
-                search.is_cancelled = true;
-            }
+            slot.search.update(is_pending.then(|| robot.question()));
         }
         slot.loaded = task.loaded;
         let event = sequence.filter(|_| !matches!(outcome, Outcome::Faulted(_) | Outcome::Suspended));
@@ -342,7 +323,9 @@ impl<S: Store> Partition<S> {
         let Some(slot) = self.slots.get_mut(name) else { return };
         self.pending = self.pending + usize::from(is_pending) - usize::from(slot.is_pending);
         slot.is_pending = is_pending;
-        slot.cancelled = if is_pending { slot.cancelled } else { 0 };
+        if !is_pending {
+            slot.search.reset();
+        }
     }
 
     fn suspend(&mut self, name: &str, why: &str) {
@@ -357,18 +340,18 @@ impl<S: Store> Partition<S> {
     /// Waits for a search for a plan of a robot while other work continues.
     fn follow_search(&mut self, name: &str, planning: Option<Planning>) {
         let Some(slot) = self.slots.get_mut(name) else { return };
-        let Some(Planning { question, stop, result }) = planning else { return };
-        slot.search = Some(Search { question, stop, is_cancelled: false });
+        let Some(Planning { search, result }) = planning else { return };
+        slot.search.begin(search);
         let robot = name.to_owned();
         self.jobs.push(Box::pin(async move { Done::Planned { robot, result: result.await } }));
     }
 
     fn planned(&mut self, name: &str, result: Option<(Thoughts, Duration)>) {
         let Some(slot) = self.slots.get_mut(name) else { return };
-        let is_cancelled = slot.search.take().is_none_or(|search| search.is_cancelled);
+        let is_cancelled = slot.search.end();
         match result {
             None => self.suspend(name, PANICKED),
-            Some(_) if is_cancelled => slot.cancelled += 1,
+            Some(_) if is_cancelled => {}
             Some((thoughts, estimate)) => {
                 (slot.estimate, slot.thoughts) = (Some(estimate), Some(thoughts));
             }

@@ -2,11 +2,11 @@
 //! and appends the decision if the robot's last decision is still the expected one.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use futures::future::{BoxFuture, FutureExt as _};
-use metaplan::mapek::{Thinker, Thoughts};
+use metaplan::mapek::{SearchHandle, Thinker, Thoughts};
 
 use super::{Shared, pause, persist};
 use crate::missions::Missions;
@@ -46,26 +46,9 @@ pub(super) enum Outcome {
 
 /// A search for a plan that continues after the decision.
 pub(super) struct Planning {
-    /// [Number](Robot::question) of the planning problem.
-    pub(super) question: u64,
-    pub(super) stop: Stop,
+    pub(super) search: SearchHandle,
     /// The plans and the new estimate of the duration of a search. `None` if the search has panicked.
     pub(super) result: BoxFuture<'static, Option<(Thoughts, Duration)>>,
-}
-
-/// Flag that interrupts a search. It is set when this value is dropped.
-pub(super) struct Stop(Arc<AtomicBool>);
-
-impl Stop {
-    pub(super) fn set(&self) {
-        self.0.store(true, Ordering::Relaxed);
-    }
-}
-
-impl Drop for Stop {
-    fn drop(&mut self) {
-        self.set();
-    }
 }
 
 /// Result of an event: the outcome, and the search for a plan that continues.
@@ -193,8 +176,7 @@ impl Task {
     fn planning<S: Store>(&self, shared: &Arc<Shared<S>>, robot: &Robot, thinker: Thinker) -> Planning {
         let (shared, estimate) = (Arc::clone(shared), self.estimate);
         let mission = robot.mission.clone().unwrap_or_default();
-        let (question, stop) = (robot.question(), Stop(thinker.stop()));
-        let own = Arc::clone(&shared);
+        let (search, own) = (thinker.handle(), Arc::clone(&shared));
         let think = move || {
             let begun = Instant::now();
             let thoughts = thinker.think();
@@ -202,7 +184,7 @@ impl Task {
             thoughts
         };
         let result = async move { shared.threads.search(&mission, estimate, think).await.ok() };
-        Planning { question, stop, result: result.boxed() }
+        Planning { search, result: result.boxed() }
     }
 
     /// Takes the robot from memory, or loads it from its last decision.

@@ -10,8 +10,8 @@ use metaplan::message::Message;
 use crate::manager::machine::io::{Output, State};
 use crate::manager::machine::{Action, Deferred, Machine, call, unwritten};
 
-/// Time to wait for new diagnostics after a restart. Modes that are found earlier would be
-/// evaluated with old data.
+/// Time to wait for new diagnostics after a restart, before the modes found at the start are evaluated. Without the wait,
+/// they would be evaluated with old diagnostics.
 const DIAGNOSTICS_WAIT: Duration = Duration::from_secs(3);
 
 impl Machine {
