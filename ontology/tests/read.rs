@@ -369,6 +369,25 @@ fn our_tomasys_is_found_without_any_file() {
     assert_eq!(ontology.sources[1].name, "http://metacontrol.org/tomasys");
 }
 
+/// IRIs contain some characters of paths only in percent-encoded form.
+#[test]
+fn imports_in_directories_with_any_name_are_found() {
+    let outside = directory(&[("c.ttl", &importing("http://e/c", &[]))]);
+    let inside = outside.path().join("my robots, 100% [ü] #1");
+    std::fs::create_dir(&inside).expect("a directory");
+    let files = [
+        ("a.ttl", importing("http://e/a", &["b d.ttl", "../c.ttl"])),
+        ("b d.ttl", importing("http://e/b", &[])),
+    ];
+    for (name, text) in &files {
+        std::fs::write(inside.join(name), text.replace("b d.ttl", "b%20d.ttl")).expect("a file");
+    }
+    let ontology = read_files(&[inside.join("a.ttl")], &ReadOptions::default()).expect("readable");
+    let names: Vec<&str> =
+        ontology.sources.iter().map(|source| source.name.rsplit(['/', '\\']).next().unwrap()).collect();
+    assert_eq!(names, ["a.ttl", "b d.ttl", "c.ttl"]);
+}
+
 #[test]
 fn cyclic_and_repeated_imports_terminate() {
     let (a, b) =

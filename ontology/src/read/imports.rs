@@ -20,6 +20,8 @@ use std::cell::OnceCell;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use percent_encoding::{AsciiSet, CONTROLS, percent_decode_str, utf8_percent_encode};
+
 use super::document;
 use super::options::ReadOptions;
 use crate::error::{Error, Errors};
@@ -80,7 +82,7 @@ impl Resolver {
         importer: Option<&Path>,
         documents: &[Document],
     ) -> Result<Option<Resolution>, Error> {
-        if let Some(path) = import.strip_prefix("file://").map(PathBuf::from).filter(|path| path.is_file()) {
+        if let Some(path) = file_of_iri(import).filter(|path| path.is_file()) {
             return Ok(Some(Resolution::File(path)));
         }
         if is_loaded(import, documents) {
@@ -118,6 +120,40 @@ impl Resolver {
         self.files
             .get_or_init(|| self.directories.iter().flat_map(|root| candidates(root, MAX_DEPTH)).collect())
     }
+}
+
+/// Characters that a path can contain, but the path of an IRI cannot.
+const ENCODED: &AsciiSet = &CONTROLS
+    .add(b' ')
+    .add(b'"')
+    .add(b'#')
+    .add(b'%')
+    .add(b'<')
+    .add(b'>')
+    .add(b'?')
+    .add(b'[')
+    .add(b'\\')
+    .add(b']')
+    .add(b'^')
+    .add(b'`')
+    .add(b'{')
+    .add(b'|')
+    .add(b'}');
+
+/// Returns the `file:` IRI of an absolute path.
+pub(crate) fn iri_of_file(path: &Path) -> String {
+    let path = path.to_string_lossy();
+    // On Windows, canonical paths have the form `\\?\C:\kb\robot.ttl`; the IRI is `file:///C:/kb/robot.ttl`.
+    let path =
+        if cfg!(windows) { path.trim_start_matches(r"\\?\").replace('\\', "/") } else { path.into_owned() };
+    let root = if path.starts_with('/') { "" } else { "/" };
+    format!("file://{root}{}", utf8_percent_encode(&path, ENCODED))
+}
+
+fn file_of_iri(iri: &str) -> Option<PathBuf> {
+    let path = percent_decode_str(iri.strip_prefix("file://")?).decode_utf8().ok()?;
+    let drive = if cfg!(windows) { path.strip_prefix('/') } else { None };
+    Some(PathBuf::from(drive.unwrap_or(&path)))
 }
 
 fn embedded(import: &str) -> Option<Resolution> {

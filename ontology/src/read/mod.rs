@@ -218,8 +218,7 @@ fn load(
             (file.display().to_string(), text, Some(path))
         }
     };
-    let base =
-        path.as_ref().map_or_else(|| "file:///".to_owned(), |path| format!("file://{}", path.display()));
+    let base = path.as_deref().map_or_else(|| "file:///".to_owned(), imports::iri_of_file);
     // Reject other syntaxes before decoding: this mode is for untrusted documents.
     if options.closed {
         document::require_ntriples(&text, &name)?;

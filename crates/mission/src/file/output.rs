@@ -110,7 +110,8 @@ impl Pending {
     pub fn commit(self) -> io::Result<()> {
         let Some((temporary, target, existing)) = self.0 else { return Ok(()) };
         // The content must reach the disk before the rename, or a crash could leave an empty file.
-        File::open(&temporary)?.sync_all()?;
+        // Windows flushes only files that are open for writing.
+        OpenOptions::new().read(true).write(cfg!(windows)).open(&temporary)?.sync_all()?;
         match existing {
             Some(InPlace { old, is_certain: true }) => overwrite(old, &temporary),
             Some(InPlace { old, is_certain: false }) => match temporary.persist(target) {
@@ -163,11 +164,12 @@ fn directory(path: &Path) -> &Path {
 }
 
 fn temporary(path: &Path) -> io::Result<NamedTempFile> {
-    let mut temporary = tempfile::Builder::new();
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".metaplan-");
     // Temporary files are private by default. The umask of the process still applies to this mode.
     #[cfg(unix)]
-    temporary.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    temporary.tempfile_in(directory(path))
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.tempfile_in(directory(path))
 }
 
 /// A new directory whose files are being written and that is not yet visible at its final path.
