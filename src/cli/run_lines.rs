@@ -107,7 +107,11 @@ fn stdin_is_file() -> bool {
         let copy = io::stdin().as_fd().try_clone_to_owned();
         copy.is_ok_and(|copy| File::from(copy).metadata().is_ok_and(|data| data.is_file()))
     }
-    #[cfg(not(unix))]
+    #[cfg(windows)]
+    {
+        winapi_util::file::typ(io::stdin()).is_ok_and(|kind| kind.is_disk())
+    }
+    #[cfg(not(any(unix, windows)))]
     {
         false
     }

@@ -60,8 +60,9 @@ pub fn run(arguments: &Arguments, common: &Common, read: &Read<'_>) -> Result<Ex
 }
 
 fn sweep(arguments: &Arguments, study: &Study, guard: Guard, common: &Common) -> Result<Exit, Failure> {
-    let program = std::env::current_exe()
-        .map_err(|error| Message::error("M152", format!("the program's own file is unknown: {error}")))?;
+    let program = std::env::current_exe().map_err(|error| {
+        Message::error("M152", format!("the path of the running program cannot be determined: {error}"))
+    })?;
     let mut results = Results::open(&arguments.output, study, arguments.shard, arguments.resume)?;
     let limits = guard.plan();
     let progress = Progress::new("sweeping", common);

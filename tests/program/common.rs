@@ -113,7 +113,12 @@ pub fn outcome(program: &Path, directory: &Path, arguments: &[&str], input: &str
         .spawn()
         .expect("the program starts");
     let output = child.wait_with_output().expect("the program ends");
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
+    let text = |bytes: Vec<u8>| {
+        let text = String::from_utf8(bytes).expect("UTF-8");
+        // Messages and tables name files with the separator of the platform; JSON escapes characters with it.
+        let is_json = text.starts_with(['{', '[']);
+        if cfg!(windows) && !is_json { text.replace('\\', "/") } else { text }
+    };
     Outcome {
         status: output.status.code().unwrap_or(-1),
         stdout: text(output.stdout),

@@ -94,6 +94,7 @@ fn nothing_is_overwritten() {
 }
 
 #[test]
+#[cfg(unix)]
 fn directory_names_become_mission_names() {
     let directory = tempfile::tempdir().expect("a directory");
     let name = "robot \"7\" of the 2nd \u{e9}tage";

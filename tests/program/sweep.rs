@@ -120,6 +120,7 @@ fn results_of_different_studies_are_not_mixed() {
 }
 
 #[test]
+#[cfg(unix)]
 fn runs_end_at_their_time_limit_and_files_are_generated() {
     let folder = tempfile::tempdir().expect("a directory");
     let study = folder.path().join("study.toml");
@@ -145,6 +146,7 @@ fn runs_end_at_their_time_limit_and_files_are_generated() {
 }
 
 #[test]
+#[cfg(unix)]
 fn the_time_limit_of_a_run_ends_its_sat_solver() {
     let folder = tempfile::tempdir().expect("a directory");
     let (study, pid) = (folder.path().join("study.toml"), folder.path().join("pid"));

@@ -172,7 +172,7 @@ fn temporary(path: &Path) -> io::Result<NamedTempFile> {
     builder.tempfile_in(directory(path))
 }
 
-/// A new directory whose files are being written and that is not yet visible at its final path.
+/// A directory whose files are written to a temporary directory first. [`Self::commit`] moves them to the final path.
 #[derive(Debug)]
 #[must_use = "the directory has its files once it is committed"]
 pub struct PendingDirectory {

@@ -36,7 +36,7 @@ pub const STATE_LIMIT: usize = 400_000;
 const LEAST: usize = 100;
 /// Number of work units that correspond to one stored state in the budgets of alternating searches.
 const WORK_PER_STATE: u64 = 2_500;
-/// Number of work units of a search after which a lagging search is abandoned.
+/// Budget of a round of the alternating searches, in work units, from which on a lagging search is abandoned.
 const ABANDON_WORK: u64 = 100_000_000_000;
 
 /// Searches for an optimal plan. All operators must have non-negative costs. Ends without a proof if memory

@@ -16,8 +16,9 @@ type Range = Option<(Rational, Rational)>;
 /// whose duration is always 0 is converted instead.
 ///
 /// # Errors
-/// Returns an error for each schema with a variable duration of which the planner takes the shortest admissible value,
-/// if this value may be 0 or less. The conditions for duration 0 differ from those for slightly longer durations.
+/// Returns an error for each schema with a variable duration for which the planner takes the shortest admissible value,
+/// if this value may be 0 or less. Such a schema is refused because the conditions for duration 0 differ from those for
+/// slightly longer durations.
 pub fn split(lifted: &mut Lifted) -> Result<(), Errors> {
     let mut ranges: FxHashMap<FunctionId, (Rational, Rational)> = FxHashMap::default();
     for (function, _, value) in &lifted.values {

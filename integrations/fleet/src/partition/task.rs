@@ -34,7 +34,7 @@ pub(super) struct Task {
 
 pub(super) enum Outcome {
     Decided,
-    /// The event had been decided before.
+    /// Nothing was decided: the event had been decided before, or there was no event and only a search was started.
     Known,
     Refused(Refused),
     Faulted(String),

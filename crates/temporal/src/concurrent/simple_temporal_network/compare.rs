@@ -5,8 +5,8 @@ use crate::concurrent::time::TimeExpression;
 use crate::concurrent::time_number::TimeNumber;
 
 impl<T: TimeNumber> SimpleTemporalNetwork<T> {
-    /// Appends to `out` the part that must be equal for two networks to be compared: the running actions, and
-    /// the time point at which further happenings must take place, if there is one.
+    /// Appends to `out` the part that must be equal for two networks to be compared: the running actions and,
+    /// while an over-all condition is violated, the time point that the next happenings share.
     pub(in crate::concurrent) fn signature(&self, out: &mut Vec<u32>) {
         for open in &self.opens {
             out.extend([open.instance, open.float]);
