@@ -39,7 +39,8 @@ pub struct Settings {
     /// search.
     pub threads: usize,
     /// Time for which a decision waits for a plan. If the search takes longer, the reaction to the event is published
-    /// without it, and further events are handled in the meantime.
+    /// without it, and further events are handled in the meantime. Zero: no decision about an event contains a plan
+    /// that had to be searched for.
     pub patience: Duration,
     /// Maximum number of robots in memory. Others are loaded from their last decision when they have events. Robots
     /// that are handling events may exceed this number.

@@ -162,8 +162,11 @@ impl Task {
         };
         let mut planning = thinker.map(|thinker| self.planning(shared, &robot, thinker));
         let mut thoughts = None;
+        let patience = shared.settings.patience;
         if let Some(Planning { result, .. }) = &mut planning
-            && let Ok(result) = tokio::time::timeout(shared.settings.patience, result).await
+            // `timeout` with zero would accept the result of a search that ends within its first millisecond.
+            && !patience.is_zero()
+            && let Ok(result) = tokio::time::timeout(patience, result).await
         {
             let (plans, estimate) = result?;
             (thoughts, self.estimate, planning) = (Some(plans), Some(estimate), None);

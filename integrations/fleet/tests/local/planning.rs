@@ -26,16 +26,17 @@ fn start(store: &Local, patience: u64, settings: Settings) -> tokio::task::JoinH
 async fn a_single_owner_handles_all_events_of_a_long_queue() {
     let folder = tempfile::tempdir().expect("a directory");
     let store = open(folder.path(), 1);
-    let (events, _) = scripts::play("ugv", "kinect_comes_and_goes", 5, 60);
-    assert!(events.len() > 20, "the queue in memory is shorter");
+    let (events, _) = scripts::play("ugv", "kinect_comes_and_goes", 5, 90);
+    let (waiting, queued) = events.split_at(60);
+    assert!(queued.len() > 20, "the queue in memory is shorter");
     let owner = start(&store, 0, Settings { discard_every: 1, ..Settings::default() });
     // Events that wait for the plans of earlier ones, and then events that do not.
     let mut sequences = Vec::new();
-    for event in &events[..20] {
+    for event in waiting {
         sequences.extend(tell(&store, "r", std::slice::from_ref(event)).await);
         settle(&store).await;
     }
-    sequences.extend(tell(&store, "r", &events[20..]).await);
+    sequences.extend(tell(&store, "r", queued).await);
     // This event is refused while a plan is missing, and must be discarded, too.
     tell(&store, "s", &events[..1]).await;
     let subject = Address::of("s", 1).to_string();
@@ -43,8 +44,14 @@ async fn a_single_owner_handles_all_events_of_a_long_queue() {
     store.append(Stream::Events, forged).await.expect("it is our own directory");
     settle(&store).await;
     owner.abort();
-    let compared = scripts::assert_replayed("ugv", &events, &decisions(&store).await["r"], &sequences);
+    let made = &decisions(&store).await["r"];
+    let compared = scripts::assert_replayed("ugv", &events, made, &sequences);
     assert!(compared > 2, "{compared} plans were compared");
+    let is_effect = |answer: &serde_json::Value| answer.get("effect").is_some();
+    assert!(
+        made.iter().any(|decision| decision.planning && decision.answers.iter().any(is_effect)),
+        "safe effects come before the plan"
+    );
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -74,12 +81,6 @@ async fn reactions_do_not_wait_for_plans_and_each_plan_is_found_by_some_owner() 
     for (robot, mission, sequences, events) in &scripts {
         scripts::assert_replayed(mission, events, &made[robot], sequences);
     }
-    let made: Vec<_> = made.values().flatten().collect();
-    // On a slow machine, more events precede each plan, so that there are fewer plans.
-    assert!(made.iter().any(|own| own.planned), "plans come later");
-    let is_effect = |answer: &serde_json::Value| answer.get("effect").is_some();
-    assert!(
-        made.iter().any(|own| own.planning && own.answers.iter().any(is_effect)),
-        "safe reactions come first"
-    );
+    // How many plans there are, and which effects precede them, depends on the machine's speed.
+    assert!(made.values().flatten().any(|decision| decision.planned), "plans come later");
 }
