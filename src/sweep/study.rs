@@ -285,9 +285,14 @@ impl Study {
         let mut samples = vec![(vec!["command".into()], self.planned(0))];
         let mut stride = 1;
         for (key, values) in self.keys.iter().rev() {
-            let is_list = matches!(self.sections.vary.get(key), Some(Variation::List(_)));
+            let variation = self.sections.vary.get(key);
+            let is_list = matches!(variation, Some(Variation::List(_)));
             let first = if is_list { 1 } else { values.len().saturating_sub(1).max(1) };
-            let path = |index: usize| vec!["vary".into(), key.as_str().into(), index.into()];
+            let path = |index: usize| match variation {
+                Some(Variation::List(_)) => vec!["vary".into(), key.as_str().into(), index.into()],
+                Some(Variation::Range(_)) => vec!["vary".into(), key.as_str().into()],
+                None => vec!["pairs".into()],
+            };
             samples.extend((first..values.len()).map(|index| (path(index), self.planned(index * stride))));
             stride *= values.len();
         }
@@ -417,8 +422,9 @@ fn values(variation: &Variation) -> Result<Vec<Value>, String> {
             return Err(format!("has a step of {step}; it should be above 0"));
         }
         Variation::Range(Range { from, to, step }) => {
-            let count = to.checked_sub(*from).map_or(0, |span| span / step);
-            if count as usize >= MAX_RUNS {
+            // The difference of two 64-bit numbers can exceed 64 bits.
+            let intervals = (i128::from(*to) - i128::from(*from)) / i128::from(*step);
+            if intervals >= MAX_RUNS as i128 {
                 return Err(format!("has more than {MAX_RUNS} values"));
             }
             (*from..=*to).step_by(*step as usize).map(|value| json!(value)).collect()
@@ -497,6 +503,12 @@ mod tests {
             "command = []\nrows = 'x'\ntime_limit = 0\n[vary]\na = []\nb = {from = 1, to = 2, step = 0}\n";
         let errors = study(text).expect_err("it is wrong");
         assert_eq!(errors.iter().count(), 5, "{errors}");
+        let wide =
+            format!("b = {{from = {}, to = {}, step = 3}}\nc = {{from = 3, to = 1}}\n", i64::MIN, i64::MAX);
+        let errors =
+            study(&format!("command = ['plan']\n[vary]\n{wide}")).expect_err("it is wrong").to_string();
+        assert!(errors.contains("`vary.b` has more than 10000000 values"), "{errors}");
+        assert!(errors.contains("`vary.c` has no value"), "{errors}");
         let errors = study("command = ['plan', '{x}']").expect_err("x is not varied");
         assert!(errors.to_string().contains("{x}"), "{errors}");
         assert!(

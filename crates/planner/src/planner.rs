@@ -12,7 +12,7 @@ use task::limits::Limits;
 use task::plan::solution::{Improvement, Solution};
 
 use crate::exact::{ground_exact, optimize_exact};
-use crate::optimize::{Config, Front, lexicographic, pareto};
+use crate::optimize::{Config, lexicographic};
 
 /// Planning ends if the callback returns `Break`.
 type Report<'a> = dyn FnMut(&Improvement) -> ControlFlow<()> + 'a;
@@ -136,17 +136,6 @@ impl<'a> Planner<'a> {
             }
             Err(errors) => Err(errors),
         }
-    }
-
-    /// Computes the Pareto front of the first two objectives within the limits, with one plan for each pair
-    /// of values. At least two objectives must have been set.
-    ///
-    /// # Errors
-    /// See [`Planner::plan`]. Tasks that overflow machine integers are also an error.
-    pub fn pareto(mut self) -> Result<Front, Errors> {
-        let task = ground(self.domain, self.problem, &self.grounding)?;
-        let (config, mut hear) = (self.config.clone(), self.hear());
-        Ok(pareto(&task, &config, &mut hear))
     }
 
     /// Returns a function that passes each improvement to the callback, and sets the interrupt flag if the callback

@@ -12,7 +12,7 @@ use num_traits::{One, Signed, ToPrimitive, Zero};
 
 /// Largest accepted absolute value of an exponent in a lexical form. It prevents hostile input such as
 /// `1e999999999` from filling the memory.
-const MAX_EXPONENT: i64 = 1000;
+const MAX_EXPONENT: u64 = 1000;
 /// Largest scale (number of fractional digits) of the small representation. `10^18` is the largest power of
 /// ten within 64 bits.
 const SMALL_SCALE: u32 = 18;
@@ -53,7 +53,7 @@ impl Decimal {
         };
         let (whole, fraction) = digits.split_once('.').unwrap_or((digits, ""));
         let text = format!("{whole}{fraction}");
-        if text.is_empty() || !text.bytes().all(|b| b.is_ascii_digit()) || exponent.abs() > MAX_EXPONENT {
+        if text.is_empty() || !text.bytes().all(|b| b.is_ascii_digit()) || exponent.unsigned_abs() > MAX_EXPONENT {
             return None;
         }
         let magnitude: BigInt = text.parse().ok()?;
@@ -225,6 +225,14 @@ pub(crate) fn ten_to(exponent: u32) -> BigInt {
 #[cfg(test)]
 mod tests {
     use super::{BigInt, BigRational, DIVISION_DIGITS, Decimal, power_of_ten};
+
+    #[test]
+    fn huge_exponents_are_refused() {
+        for exponent in [i64::MIN, -1001, 1001, i64::MAX] {
+            assert_eq!(Decimal::parse(&format!("1e{exponent}")), None);
+        }
+        assert!(Decimal::parse("1e-1000").is_some() && Decimal::parse("1e1000").is_some());
+    }
 
     #[test]
     fn short_conversion_equals_general_conversion() {

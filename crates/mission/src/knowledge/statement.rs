@@ -1,7 +1,7 @@
 //! Assertions that refer to entities by name instead of interned symbol, for snapshots and
 //! certificates.
 
-use rules::{Engine, Fact, Literal, Symbols, Value};
+use rules::{Engine, Fact, Literal, Symbol, Symbols, Value};
 use serde::{Deserialize, Serialize};
 
 /// An assertion with names and literals instead of interned symbols.
@@ -20,8 +20,31 @@ pub struct Statement {
 pub enum Part {
     /// An individual.
     Name(String),
-    /// A literal: its lexical form and the IRI of its datatype.
+    /// A literal: its lexical form and the IRI of its datatype. Text with a language tag has the form `text@tag` and
+    /// the datatype `rdf:PlainLiteral`.
     Literal(String, String),
+}
+
+impl Part {
+    fn of(symbols: &Symbols, symbol: Symbol) -> Self {
+        match symbols.value(symbol) {
+            Value::Name(name) => Self::Name(name.to_string()),
+            Value::Literal(Literal::Language { text, tag }) => {
+                let datatype = "http://www.w3.org/1999/02/22-rdf-syntax-ns#PlainLiteral";
+                Self::Literal(format!("{text}@{tag}"), datatype.to_owned())
+            }
+            Value::Literal(literal) => Self::Literal(literal.lexical(), literal.datatype().to_owned()),
+        }
+    }
+
+    fn intern(&self, symbols: &mut Symbols) -> Symbol {
+        match self {
+            Self::Name(name) => symbols.name(name),
+            Self::Literal(lexical, datatype) => {
+                symbols.literal(Literal::parse(lexical, Some(datatype), None))
+            }
+        }
+    }
 }
 
 /// Differences between the current assertions and the assertions of the documents.
@@ -37,28 +60,44 @@ pub struct Statements {
 impl Statement {
     pub(super) fn of(engine: &Engine, fact: &Fact) -> Self {
         let symbols = engine.symbols();
-        let part = |symbol| match symbols.value(symbol) {
-            Value::Name(name) => Part::Name(name.to_string()),
-            Value::Literal(literal) => Part::Literal(literal.lexical(), literal.datatype().to_owned()),
-        };
         Self {
             predicate: symbols.value(fact.predicate).as_name().unwrap_or_default().to_owned(),
-            arguments: fact.arguments.iter().map(|argument| part(*argument)).collect(),
+            arguments: fact.arguments.iter().map(|argument| Part::of(symbols, *argument)).collect(),
         }
     }
 
     pub(super) fn intern(&self, symbols: &mut Symbols) -> Fact {
         let predicate = symbols.name(&self.predicate);
-        let arguments: Vec<_> = self
-            .arguments
-            .iter()
-            .map(|part| match part {
-                Part::Name(name) => symbols.name(name),
-                Part::Literal(lexical, datatype) => {
-                    symbols.literal(Literal::parse(lexical, Some(datatype), None))
-                }
-            })
-            .collect();
+        let arguments: Vec<_> = self.arguments.iter().map(|argument| argument.intern(symbols)).collect();
         Fact::new(predicate, arguments)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_stand_for_the_same_values() {
+        let mut symbols = Symbols::default();
+        let xsd = |local: &str| format!("http://www.w3.org/2001/XMLSchema#{local}");
+        let mut values = vec![symbols.name("http://example.org/a")];
+        for (lexical, datatype, language) in [
+            ("a@b@", None, Some("en-GB")),
+            ("a@en", None, None),
+            ("", None, Some("de")),
+            ("007", Some(xsd("integer")), None),
+            ("1.50", Some(xsd("decimal")), None),
+            ("1e400", Some(xsd("double")), None),
+            ("seven", Some(xsd("integer")), None),
+            ("2026-02-29", Some(xsd("date")), None),
+            ("x", Some("http://example.org/datatype".to_owned()), None),
+        ] {
+            values.push(symbols.literal(Literal::parse(lexical, datatype.as_deref(), language)));
+        }
+        for value in values {
+            let part = Part::of(&symbols, value);
+            assert_eq!(part.intern(&mut symbols), value, "{part:?}");
+        }
     }
 }

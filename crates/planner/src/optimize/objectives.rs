@@ -73,7 +73,10 @@ pub fn lexicographic(task: &Task, config: &Config, report: &mut dyn FnMut(Improv
 }
 
 /// Enumerates the Pareto front of the first two objectives until it is complete or a limit is reached. For
-/// each pair of values, only one plan is returned. The task must have at least two objectives.
+/// each pair of values, only one plan is returned.
+///
+/// # Panics
+/// The task has fewer than two objectives.
 ///
 /// ```
 /// use metaplan_planner::pddl::{ast::Direction, read_objective};

@@ -174,7 +174,7 @@ fn solve_or_panic(Request { domain, problem, joint }: Request<'_>, manner: &Mann
     }
     let durative = |body: &ActionBody| matches!(body, ActionBody::Durative { .. });
     let is_durative = mission.domain().actions.iter().any(|action| durative(&action.body));
-    let task = FilledMission { mission: &mission, problem: &problem, manner };
+    let task = FilledMission { mission: &mission, problem: &problem, manner, start };
     let mut overlapping = None;
     if manner.overlap.unwrap_or(is_durative && mission.knowledge().is_none()) {
         let limits = Limits::none().with_time(manner.time_limit.mul_f64(OVERLAPPING_SHARE));
@@ -182,7 +182,7 @@ fn solve_or_panic(Request { domain, problem, joint }: Request<'_>, manner: &Mann
     }
     let (solution, other_plans) = match overlapping {
         Some(solution) => (solution, Vec::new()),
-        None => task.sequence(Limits::none().with_time(manner.time_limit.saturating_sub(start.elapsed())))?,
+        None => task.sequence(task.remaining())?,
     };
     let plan = solution.plan.as_ref().ok_or_else(|| task.reason(&solution))?;
     let written = |plan: &Plan| plan_lines(&mission.written(plan.clone()));
@@ -201,9 +201,15 @@ struct FilledMission<'a> {
     mission: &'a Mission,
     problem: &'a Problem,
     manner: &'a Manner,
+    start: Instant,
 }
 
 impl FilledMission<'_> {
+    /// Returns the remaining time as a limit.
+    fn remaining(&self) -> Limits {
+        Limits::none().with_time(self.manner.time_limit.saturating_sub(self.start.elapsed()))
+    }
+
     /// Computes a plan with overlapping actions, or a proof that no plan exists. Returns `None` if
     /// neither is found in time or the task has unsupported features.
     fn overlapping(&self, limits: &Limits) -> Result<Option<Solution>, NoPlan> {
@@ -279,8 +285,7 @@ impl FilledMission<'_> {
     fn reason(&self, solution: &Solution) -> NoPlan {
         let mut text = solution.verdict();
         if solution.status == Status::Unsolvable && self.mission.knowledge().is_some() {
-            let limits = Limits::none().with_time(self.manner.time_limit);
-            let config = Config::default().with_limits(limits);
+            let config = Config::default().with_limits(self.remaining());
             let blocking = blocking(self.mission, self.problem, &config);
             let explanation = blocking.as_ref().map(ToString::to_string);
             text.extend(explanation.map(|explanation| format!("; {explanation}")));

@@ -357,13 +357,14 @@ impl Run<'_> {
                 execute(words, deadline).await
             }
         };
-        // A refused operation counts as without effect, so its undo is dropped. The undo of parameters is kept, because
-        // they may have been accepted with other values. Without an answer, the effect is unknown, and the undo is
-        // kept.
+        // A refused operation counts as without effect, so its undo is dropped. There are two exceptions: parameters may
+        // have been accepted with other values, and a program can fail after a part of its effect. Without an answer,
+        // the effect is unknown, and the undo is kept.
         if matches!(outcome, Err(Failure::Refused(_))) {
-            let is_kept = |undo: &Undo| matches!(undo, Undo::Operation(Operation::Parameters { .. }));
             let undone = undos.split_off(count);
-            undos.extend(undone.into_iter().filter(is_kept));
+            if matches!(operation, Operation::Parameters { .. } | Operation::Command(_)) {
+                undos.extend(undone.into_iter().filter(|undo| matches!(undo, Undo::Operation(_))));
+            }
         }
         outcome
     }

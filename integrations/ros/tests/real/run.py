@@ -327,22 +327,23 @@ def restarted() -> None:
 
 
 def commands() -> None:
-    """A command is a step if the command line allows it; its failure is undone."""
+    """A command is a step if the command line allows it; its failure is undone, also if it has had a part of its effect."""
     with tempfile.TemporaryDirectory() as directory:
-        made = pathlib.Path(directory) / "started"
+        made, part = pathlib.Path(directory) / "started", pathlib.Path(directory) / "part"
         command = f'{{ command = ["mkdir", "{made}"], undo = {{ command = ["rmdir", "{made}"] }} }}'
+        fails = f'{{ command = ["mkdir", "{part}", "{made}"], undo = {{ command = ["rmdir", "{part}"] }} }}'
         failing = STEPS.replace(
             'steps = [{ node = "/controller", parameters = { max_speed = 1,',
-            f'steps = [{command}, {{ command = ["false"] }}, {{ node = "/controller", parameters = {{ max_speed = 1,',
+            f'steps = [{command}, {fails}, {{ node = "/controller", parameters = {{ max_speed = 1,',
         )
         scout = Scout()
         with scout.managed(failing, "--allow-commands"):
             scout.until("the slow design is used", lambda: scout.equipment.get_parameter("max_speed").value == 0.25)
             scout.until("the failure is reported", lambda: scout.count("steps_failed") == 1)
-            check(made.exists(), False, "the directory after the rollback")
+            check((made.exists(), part.exists()), (False, False), "directories after the rollback")
             failed = [event["because"] for event in scout.events if event["answer"] == "steps_failed"]
-            check(["`false` has ended with" in because for because in failed], [True], "reasons of failures")
-        succeeding = failing.replace('{ command = ["false"] }, ', "")
+            check(["`mkdir" in because and "has ended with" in because for because in failed], [True], "reasons of failures")
+        succeeding = failing.replace(f"{fails}, ", "")
         scout = Scout()
         with scout.managed(succeeding, "--allow-commands"):
             scout.until("the fast design is used", lambda: scout.equipment.get_parameter("max_speed").value == 1.0)
