@@ -13,7 +13,7 @@ use std::cell::RefCell;
 use std::hash::{BuildHasherDefault, Hash, Hasher};
 use std::sync::Arc;
 
-use rustc_hash::FxHasher;
+use rustc_hash::{FxHashMap, FxHasher};
 use smallvec::{SmallVec, smallvec};
 
 use crate::aggregate::Function;
@@ -313,7 +313,7 @@ impl Round<'_> {
             }
             Step::Aggregate { matches, function, index, group, result, binds } => {
                 let group = Group { relation: self.store.get(*matches), index: *index, key: group };
-                self.aggregate(block, width, *function, &group, (*result, *binds))
+                self.aggregate(block, width, *function, &group, (*result, *binds, plan.rule))
             }
             Step::Equate { variable, source } => {
                 let mut block = block;
@@ -376,36 +376,42 @@ impl Round<'_> {
 
     /// Computes an aggregate for each match, and binds its result (if `binds`) or keeps only the matches with
     /// an equal result. Drops the matches for which the aggregate has no value. While retracting, the
-    /// aggregate ranges over the rows before the update.
+    /// aggregate ranges over the rows before the update. Returns no match if the evaluation has to stop.
     fn aggregate(
         &self,
         mut block: Vec<Symbol>,
         width: usize,
         function: Function,
         group: &Group,
-        (result, binds): (Source, bool),
+        (result, binds, rule): (Source, bool, u32),
     ) -> Vec<Symbol> {
         let skip = if self.retracting { state::FREE | state::NEW } else { HIDDEN };
         let visible = |row: &Row| group.relation.state(*row) & skip == 0;
-        let (mut end, mut last) = (0, None::<(Arguments, Option<Symbol>)>);
+        let mut end = 0;
+        // Matches often share a group.
+        let mut cache: FxHashMap<Arguments, Option<Symbol>> = FxHashMap::default();
         for start in (0..block.len()).step_by(width) {
             let bound = &mut block[start..start + width];
-            // Adjacent matches often share a group, so the last result is cached.
             let key: Arguments = group.key.iter().map(|&source| resolve(source, bound)).collect();
-            let cached = last.as_ref().filter(|(other, _)| *other == key).map(|&(_, value)| value);
-            let value = cached.unwrap_or_else(|| {
+            let mut visited = 0;
+            let value = *cache.entry(key).or_insert_with_key(|key| {
                 let mut symbols = self.symbols.borrow_mut();
-                let rows = |row| group.relation.row(row);
+                let rows = |row| {
+                    visited += 1;
+                    group.relation.row(row)
+                };
                 let value = match group.index {
                     Some(index) => {
-                        let members = group.relation.lookup(index, &key).filter(visible);
+                        let members = group.relation.lookup(index, key).filter(visible);
                         function.evaluate(members.map(rows), &symbols)
                     }
                     None => function.evaluate(group.relation.scan().filter(visible).map(rows), &symbols),
                 };
                 value.map(|value| intern(&mut symbols, value))
             });
-            last = Some((key, value));
+            if !self.budget.spend(visited, rule) {
+                return Vec::new();
+            }
             let Some(value) = value else { continue };
             match result {
                 Source::Variable(number) if binds => bound[usize::from(number)] = value,

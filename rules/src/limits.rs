@@ -19,6 +19,10 @@ const STEPS_PER_NEW_VALUE: u64 = 25_000;
 /// that doubles a number creates longer and longer values.
 const BYTES_PER_CHARGE: u64 = 8;
 
+/// Maximum size of a computed value. A chain of rules that concatenate long texts would exceed the memory before the
+/// budget ends it.
+const MAX_VALUE_BYTES: u64 = 1 << 24;
+
 const MAX_SHOWN_CHARACTERS: usize = 40;
 
 /// Number of visited rows and charged steps between two calls of the interrupt function.
@@ -29,7 +33,7 @@ const ROWS_PER_INTERRUPT_CHECK: u64 = 1 << 14;
 pub struct Limits {
     /// Number of steps that one update may take. Roughly, a step extends one partial match of a rule's body. A value
     /// that a recursive rule computes for the first time costs 25,000 steps, and 25,000 more for every 8 bytes of its
-    /// digits or text.
+    /// digits or text. Other computed values cost a step for every 8 bytes. A value of more than 16 MiB exhausts the budget.
     pub steps: u64,
     /// Function that can stop an update. It is called after about every 16,000 visited rows and charged
     /// steps.
@@ -100,15 +104,20 @@ impl Budget {
         self.visit(steps, rule)
     }
 
-    /// Charges a value that a rule has computed for the first time, if rules may use their own conclusions
-    /// ([`Budget::recursive`]). Returns `false` if evaluation has to stop.
+    /// Charges a value that a rule has computed for the first time. Returns `false` if evaluation has to stop, which is
+    /// also the case if the value is longer than [`MAX_VALUE_BYTES`].
     pub fn spend_on_value(&self, value: Option<&Literal>, rule: u32) -> bool {
-        // Without recursion, a rule computes a bounded number of values.
-        if !self.recursive.get() {
-            return true;
-        }
         let size = value.map_or(0, Literal::size);
-        let may_continue = self.spend(STEPS_PER_NEW_VALUE.saturating_mul(1 + size / BYTES_PER_CHARGE), rule);
+        // Without recursion, a rule computes a bounded number of values, but they can be long.
+        let steps = if self.recursive.get() {
+            STEPS_PER_NEW_VALUE.saturating_mul(1 + size / BYTES_PER_CHARGE)
+        } else {
+            size / BYTES_PER_CHARGE
+        };
+        if size > MAX_VALUE_BYTES {
+            self.stop(Stop::Exhausted, rule);
+        }
+        let may_continue = self.spend(steps, rule);
         if !may_continue && self.value.borrow().is_none() {
             self.value.replace(value.map(abbreviated));
         }

@@ -152,7 +152,7 @@ impl JournalFiles {
 /// no `end` record, because a crash has prevented it, this record is assumed, and `after` must have no records yet.
 pub(super) fn follows(before: &Segment, after: &Segment) -> bool {
     if before.is_closed() {
-        return before.end == End::Whole && before.after == after.before;
+        return matches!(before.end, End::Whole | End::Unbroken) && before.after == after.before;
     }
     after.records.is_empty() && closing(&before.after, before.number).1 == after.before
 }

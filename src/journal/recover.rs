@@ -1,6 +1,7 @@
 //! Restores a loop from a journal: selects the usable segments, replays their records, and repairs the ends of segments
 //! after a crash.
 
+use std::collections::BTreeSet;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Seek as _, Write as _};
 use std::path::Path;
@@ -34,14 +35,15 @@ pub(super) fn usable<'a>(
     warnings: &mut Vec<Message>,
 ) -> Result<(u64, Vec<&'a Segment>), String> {
     let mut problems = Vec::new();
-    let last = contents.segments.keys().chain(contents.snapshots.keys()).max().copied().unwrap_or(0);
-    let first = contents.segments.keys().chain(contents.snapshots.keys()).min().copied().unwrap_or(0);
-    for from in (first..=last).rev() {
+    // Only existing files are looked at: a foreign file with a huge number must not cost time and memory.
+    let numbers: BTreeSet<u64> = contents.segments.keys().chain(contents.snapshots.keys()).copied().collect();
+    let first = numbers.first().copied().unwrap_or(0);
+    for &from in numbers.iter().rev() {
         let start = if from == 0 { Ok(()) } else { contents.start(from).map(|_| ()) };
         match start.and_then(|()| contents.chain(from)) {
             Ok(segments) => {
                 // Older segments and snapshots are not needed, so their damage is only a warning.
-                let older = (first..from).filter(|&number| number > 0);
+                let older = numbers.range(..from).copied().filter(|&number| number > 0);
                 problems.extend(older.filter_map(|number| contents.start(number).err()));
                 problems.extend(contents.chain(first).err());
                 problems.sort();

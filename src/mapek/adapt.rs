@@ -302,6 +302,7 @@ impl Adaptation<'_> {
         let question = Question {
             mission: &self.beliefs.mission,
             problem: &problem,
+            goal: self.beliefs.goal(),
             running,
             old: old.as_deref(),
             stay_close: self.settings.stay_close,

@@ -25,6 +25,8 @@ pub(crate) struct Outcome {
 pub(crate) struct Question<'a> {
     pub mission: &'a Mission,
     pub problem: &'a Problem,
+    /// The text of the goal; `None` for the goal of the mission.
+    pub goal: Option<&'a str>,
     /// The action under way, if every plan must begin with its remainder.
     pub running: Option<&'a Running>,
     /// Remaining steps of the current plan; `None` without a plan, or if the action under way is treated as cancelled.

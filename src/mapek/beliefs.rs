@@ -70,6 +70,8 @@ pub(super) struct Running {
     pub(super) step: PlannedStep,
     /// Completed share of the action, from 0 to 1.
     pub(super) progress: BigRational,
+    /// Increases of functions by the progress so far (negative for decreases), by the text of the function.
+    pub(super) applied: BTreeMap<String, BigRational>,
     pub(super) cancelling: bool,
     pub(super) suspended: bool,
     /// Whether the action is suspended only until planning has finished.

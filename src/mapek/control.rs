@@ -42,15 +42,20 @@ const MAX_GROWTH: usize = 1024;
 /// is later. A line with a later time is refused.
 const MAX_TIME_STEP: Duration = Duration::from_secs(1_000_000);
 
+const NANOSECONDS_PER_MICROSECOND: u32 = 1000;
+
 /// Returns the time at which a line is handled. `previous` is the time of the previous line, `now` the time of the
 /// clock, and `own` the time that the line states. The time of the clock is used if the line states none. If the stated
 /// time is too late (see [`MAX_TIME_STEP`]), it is ignored, and an error is returned, too. The returned time is never
-/// before `previous`.
+/// before `previous`. It is in whole microseconds, as in snapshots, so that a restored loop decides in the same way.
 pub(crate) fn time_of_line(
     previous: Duration,
     now: Duration,
     own: Option<Duration>,
 ) -> (Duration, Option<Answer>) {
+    let microseconds =
+        |time: Duration| Duration::new(time.as_secs(), time.subsec_micros() * NANOSECONDS_PER_MICROSECOND);
+    let (previous, now, own) = (microseconds(previous), microseconds(now), own.map(microseconds));
     let latest = previous.max(now).saturating_add(MAX_TIME_STEP);
     match own {
         Some(time) if time > latest => {
@@ -222,12 +227,9 @@ impl Loop {
             self.abandon(effect, &mut changes);
         }
         answers.append(&mut changes.filtered);
-        if changes.goal {
-            self.planner.memo.clear();
-        }
         // A refused line does not use up its number, so that a corrected line can have it.
         if understood || changes.any() {
-            if let Some(sequence) = observation.sequence {
+            if let Some(sequence) = observation.sequence.filter(|_| understood) {
                 self.beliefs.numbers.insert(sequence);
             }
             // Before the analysis, the knowledge base must contain the observed design as the one in use (function
@@ -431,9 +433,6 @@ impl Loop {
         for event in observation.events.iter().flatten() {
             // Refused events change nothing.
             let _ = self.monitor.apply(&mut self.beliefs, event, &mut changes);
-        }
-        if changes.goal {
-            self.planner.memo.clear();
         }
         if changes.base == Base::Watched {
             analyze(&mut self.beliefs, &mut Vec::new());

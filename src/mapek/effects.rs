@@ -1,6 +1,6 @@
 //! Creates effects for the managed system, and updates the objectives and groundings of the knowledge base.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::mapek::analyze::{analyze, report_contradictions};
 use crate::mapek::answer::{Answer, Command, Effect};
@@ -24,6 +24,7 @@ pub(super) fn request(beliefs: &mut Beliefs, step: PlannedStep, answers: &mut Ve
         sent_configuration: step.configuration.clone(),
         step,
         progress: num_rational::BigRational::from_integer(0.into()),
+        applied: BTreeMap::new(),
         cancelling: false,
         suspended: false,
         provisional: false,

@@ -5,7 +5,7 @@
 //!
 //! \[1\] Bozhinoski et al., MROS: Runtime Adaptation For Robot Control Architectures, Advanced Robotics 36, 2022.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::time::Duration;
 
 use num_rational::BigRational;
@@ -393,7 +393,7 @@ fn diagnostics(fields: &Map<String, Value>) -> Result<Vec<Result<Event, Refusal>
         let values = entry.get("values").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
         // SUAVE's thruster monitor reports each status twice, in the vocabularies of MROS and of PLANTA: the first
         // value of each key counts.
-        let mut keys: Vec<&str> = Vec::new();
+        let mut keys: HashSet<&str> = HashSet::new();
         for pair in values {
             let part = |name: &str| pair.get(name).and_then(Value::as_str).map(str::trim);
             let (Some(key), Some(value)) = (part("key"), part("value")) else {
@@ -403,10 +403,9 @@ fn diagnostics(fields: &Map<String, Value>) -> Result<Vec<Result<Event, Refusal>
                 )));
                 continue;
             };
-            if keys.contains(&key) {
+            if !keys.insert(key) {
                 continue;
             }
-            keys.push(key);
             match message {
                 "QA status" => events.push(measured(key, value)),
                 "Component status" => events.push(component(key, value)),

@@ -1,5 +1,6 @@
 //! Parsers for the fields of a JSON line, with messages for missing, wrong and repeated fields.
 
+use std::collections::HashSet;
 use std::time::Duration;
 
 use num_rational::BigRational;
@@ -25,8 +26,8 @@ impl Refusal {
 /// Returns the first repeated key of an object. Nested objects are not checked.
 pub(super) fn doubled_key(text: &str) -> Option<String> {
     let Keys(keys) = serde_json::from_str(text).ok()?;
-    let doubled = keys.iter().enumerate().find(|(index, key)| keys[..*index].contains(key));
-    doubled.map(|(_, key)| key.clone())
+    let mut seen = HashSet::new();
+    keys.iter().find(|key| !seen.insert(*key)).cloned()
 }
 
 struct Keys(Vec<String>);

@@ -18,11 +18,12 @@ const CAPACITY: usize = 16;
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Memo(VecDeque<(StoredQuestion, Outcome)>);
 
-/// Copy of a planning problem: all inputs of a search except the domain and the metric, which are constant. The goal is
-/// not compared, because a new goal clears the cache.
+/// Copy of a planning problem: all inputs of a search except the domain and the metric, which are constant.
 #[derive(Debug, Clone)]
 pub(crate) struct StoredQuestion {
     problem: Problem,
+    /// The text of the goal; `None` for the goal of the mission.
+    goal: Option<String>,
     running: Option<Running>,
     /// The current plan, if the choice between optimal plans depends on it.
     old: Option<Vec<PlannedStep>>,
@@ -53,7 +54,12 @@ impl Memo {
 impl StoredQuestion {
     pub(super) fn new(question: &Question<'_>) -> Self {
         let old = question.old.filter(|_| question.stay_close).map(<[_]>::to_vec);
-        Self { problem: question.problem.clone(), running: question.running.cloned(), old }
+        Self {
+            problem: question.problem.clone(),
+            goal: question.goal.map(ToOwned::to_owned),
+            running: question.running.cloned(),
+            old,
+        }
     }
 
     pub(super) fn has_same_action(&self, question: &Question<'_>) -> bool {
@@ -65,6 +71,7 @@ impl StoredQuestion {
         let objects = |problem: &Problem| problem.objects.len();
         left.init.len() == right.init.len()
             && objects(left) == objects(right)
+            && self.goal.as_deref() == question.goal
             && self.running.as_ref().map(relevant_part) == question.running.map(relevant_part)
             && self.old.as_deref() == question.old.filter(|_| question.stay_close)
             && left.init.iter().zip(&right.init).all(|(left, right)| are_equal(left, right))

@@ -1,6 +1,7 @@
 //! Monitor (of MAPE-K): applies events reported by the managed system to the beliefs.
 
 use std::collections::{BTreeSet, HashMap, HashSet};
+use std::sync::Arc;
 
 use num_rational::BigRational;
 use ontology::vocab::local_name;
@@ -283,9 +284,9 @@ impl BeliefUpdate<'_> {
         self.beliefs.confirm_request(request);
         // Completes the remaining increases and decreases. The report of success counts even if conditions are
         // violated.
-        self.progress(&BigRational::from_integer(1.into()))?;
+        let advance = self.progress(&BigRational::from_integer(1.into()))?;
         let running = self.end(action)?;
-        if let Some(mut advance) = self.advance(&running.step) {
+        if let Some(mut advance) = advance {
             // Increases and decreases were applied with the progress.
             advance.values.retain(|change| change.assigned);
             let mut init = self.beliefs.mission.problem().init.clone();
@@ -320,27 +321,38 @@ impl BeliefUpdate<'_> {
     }
 
     /// Sets the progress of the action under way, and applies the share of its increases and decreases since the
-    /// previous progress.
-    fn progress(&mut self, fraction: &BigRational) -> Result<(), Refusal> {
-        let Some(running) = &mut self.beliefs.running else { return Ok(()) };
+    /// previous progress. Returns the effects of the whole action.
+    fn progress(&mut self, fraction: &BigRational) -> Result<Option<Advance>, Refusal> {
+        let advance = self.advance();
+        let Some(running) = &mut self.beliefs.running else { return Ok(None) };
         let increment = fraction - &running.progress;
         running.progress.clone_from(fraction);
-        let step = running.step.clone();
-        let Some(advance) = self.advance(&step) else { return Ok(()) };
-        for change in advance.values.into_iter().filter(|change| !change.assigned) {
-            let name = change.text.trim_matches(['(', ')']).to_owned();
-            if let (Some(now), Some(before)) = (self.beliefs.mission.value(&name), change.before) {
-                let value = number::rounded(&(now + (change.after - before) * &increment));
-                self.set(&name, &number::decimal(&value))?;
+        for change in advance.iter().flat_map(|advance| &advance.values).filter(|change| !change.assigned) {
+            let name = change.text.trim_matches(['(', ')']);
+            if let (Some(now), Some(before)) = (self.beliefs.mission.value(name), &change.before) {
+                let value = number::rounded(&(&now + (&change.after - before) * &increment));
+                self.set(name, &number::decimal(&value))?;
+                if let Some(running) = &mut self.beliefs.running {
+                    *running.applied.entry(name.to_owned()).or_default() += value - now;
+                }
             }
         }
-        Ok(())
+        Ok(advance)
     }
 
-    /// Returns the effects of a complete execution of `step`, regardless of its conditions.
-    fn advance(&self, step: &PlannedStep) -> Option<Advance> {
-        let mission = &self.beliefs.mission;
-        advance(mission.domain(), &self.beliefs.filled(), &step.to_plan_step(), true).ok()
+    /// Returns the effects of a complete execution of the action under way, regardless of its conditions. They are those
+    /// in the state before the action: without the increases and decreases by its progress.
+    fn advance(&self) -> Option<Advance> {
+        let (mission, running) = (&self.beliefs.mission, self.beliefs.running.as_ref()?);
+        let mut problem = self.beliefs.filled();
+        if !running.applied.is_empty() {
+            let mut before = Arc::unwrap_or_clone(problem);
+            for (name, change) in &running.applied {
+                Mission::add_to_value(&mut before, name, &-change);
+            }
+            problem = Arc::new(before);
+        }
+        advance(mission.domain(), &problem, &running.step.to_plan_step(), true).ok()
     }
 
     fn fact(&mut self, name: &str, value: &str) -> Result<(), Refusal> {

@@ -75,6 +75,10 @@ impl Planner {
             self.memo.store(question, &outcome);
         } else {
             outcome.proved = false;
+            if outcome.steps.is_none() {
+                "no plan was found for an earlier situation".clone_into(&mut outcome.because);
+                outcome.blocking.clear();
+            }
         }
         Some(outcome)
     }

@@ -75,6 +75,7 @@ fn other_designs(beliefs: &Beliefs, running: &Running) -> Option<PlannedStep> {
     let question = Question {
         mission: &beliefs.mission,
         problem: &problem,
+        goal: beliefs.goal(),
         running: Some(running),
         old: None,
         stay_close: false,

@@ -89,6 +89,11 @@ pub(super) fn fields(beliefs: &Beliefs) -> Map<String, Value> {
             running.started,
             running.resumed,
             running.sent_configuration,
+            running
+                .applied
+                .iter()
+                .map(|(function, change)| json!([function, change.to_string()]))
+                .collect::<Vec<_>>(),
         ])
     });
     let fields = json!({
@@ -221,6 +226,8 @@ fn microseconds(time: Duration) -> u64 {
 }
 
 fn running_from_record(record: &Value) -> Option<Running> {
+    let applied =
+        |entry: &Value| Some((entry.get(0)?.as_str()?.to_owned(), entry.get(1)?.as_str()?.parse().ok()?));
     Some(Running {
         action: record.get(0)?.as_u64()?,
         step: PlannedStep::from_record(record.get(1)?)?,
@@ -235,6 +242,7 @@ fn running_from_record(record: &Value) -> Option<Running> {
         started: record.get(10)?.as_bool()?,
         resumed: record.get(11)?.as_bool()?,
         sent_configuration: configuration_from_record(record.get(12)?)?,
+        applied: record.get(13)?.as_array()?.iter().map(applied).collect::<Option<_>>()?,
     })
 }
 

@@ -112,6 +112,18 @@ impl Mission {
         })
     }
 
+    /// Adds a number to the value that a problem states for a numeric function, given as `name arguments`. Does nothing
+    /// if it states none.
+    pub fn add_to_value(problem: &mut Problem, name: &str, change: &BigRational) {
+        let words: Vec<&str> = name.split_whitespace().collect();
+        for element in &mut problem.init {
+            match element {
+                InitialElement::Value(atom, value, _) if is_named(atom, &words) => *value += change,
+                _ => {}
+            }
+        }
+    }
+
     /// Returns `true` if the problem decides on the availability of a design, because the knowledge
     /// base has neither the design nor a function that the design solves.
     pub fn decides_on(&self, design: &str) -> bool {

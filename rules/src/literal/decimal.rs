@@ -52,8 +52,16 @@ impl Decimal {
             _ => (false, mantissa),
         };
         let (whole, fraction) = digits.split_once('.').unwrap_or((digits, ""));
+        let fraction = match fraction.trim_end_matches('0') {
+            // Without any digit, the form is invalid.
+            "" if whole.is_empty() => fraction,
+            significant => significant,
+        };
         let text = format!("{whole}{fraction}");
-        if text.is_empty() || !text.bytes().all(|b| b.is_ascii_digit()) || exponent.unsigned_abs() > MAX_EXPONENT {
+        if text.is_empty()
+            || !text.bytes().all(|b| b.is_ascii_digit())
+            || exponent.unsigned_abs() > MAX_EXPONENT
+        {
             return None;
         }
         let magnitude: BigInt = text.parse().ok()?;
@@ -80,11 +88,9 @@ impl Decimal {
             unscaled = small.into();
             return Self(Repr::Large { unscaled: Box::new(unscaled), scale });
         }
-        let ten = BigInt::from(10);
-        while scale > 0 && (&unscaled % &ten).is_zero() {
-            unscaled /= &ten;
-            scale -= 1;
-        }
+        let zeros;
+        (unscaled, zeros) = divide_out(unscaled, 10, scale);
+        scale -= zeros;
         match unscaled.to_i64() {
             Some(small) if scale <= SMALL_SCALE => Self(Repr::Small { unscaled: small, scale }),
             _ => Self(Repr::Large { unscaled: Box::new(unscaled), scale }),
@@ -118,6 +124,15 @@ impl Decimal {
         }
         let scaled = value * BigRational::from_integer(power_of_ten(DIVISION_DIGITS));
         Self::new(scaled.round().to_integer(), DIVISION_DIGITS)
+    }
+
+    /// Converts a rational number exactly. Returns `None` if its decimal expansion is infinite.
+    pub(super) fn exact(value: &BigRational) -> Option<Self> {
+        let (denominator, twos) = divide_out(value.denom().clone(), 2, u32::MAX);
+        let (denominator, fives) = divide_out(denominator, 5, u32::MAX);
+        let scale = twos.max(fives);
+        let factor = BigInt::from(2).pow(scale - twos) * BigInt::from(5).pow(scale - fives);
+        denominator.is_one().then(|| Self::new(value.numer() * factor, scale))
     }
 
     /// Converts a rational number exactly if it fits into the small representation: 64 bits and at most 18
@@ -171,6 +186,27 @@ fn strip_zeros(mut unscaled: i64, mut scale: u32) -> (i64, u32) {
         scale -= 1;
     }
     (unscaled, scale)
+}
+
+/// Divides a number other than 0 by `base` as often as it is divisible, but at most `most` times. Returns the quotient and
+/// the number of divisions. Divides by large powers of the base, because one division per factor takes quadratic time.
+fn divide_out(mut value: BigInt, base: u32, most: u32) -> (BigInt, u32) {
+    let mut count = 0;
+    let mut powers = vec![BigInt::from(base)];
+    while powers.len() < 32
+        && 1 << powers.len() <= most
+        && powers.last().is_some_and(|power| (&value % power).is_zero())
+    {
+        powers.extend(powers.last().map(|power| power * power));
+    }
+    for (exponent, power) in powers.iter().enumerate().rev() {
+        let factors = 1 << exponent;
+        if most - count >= factors && (&value % power).is_zero() {
+            value /= power;
+            count += factors;
+        }
+    }
+    (value, count)
 }
 
 fn power_of_ten(exponent: u32) -> BigInt {

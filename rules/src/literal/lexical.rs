@@ -107,8 +107,8 @@ fn parse_float<F: std::str::FromStr>(lexical: &str) -> Option<F> {
     normal.parse().ok()
 }
 
-/// Parses an `owl:rational`: an integer, or `numerator / denominator`. The result is a decimal if 34 fractional
-/// digits suffice, and otherwise a [`Literal::Opaque`] in lowest terms.
+/// Parses an `owl:rational`: an integer, or `numerator / denominator`. The result is a decimal if the decimal expansion is
+/// finite, and otherwise a [`Literal::Opaque`] in lowest terms.
 fn parse_rational(lexical: &str) -> Parsed {
     let text = lexical.trim_matches([' ', '\t', '\n', '\r']);
     let (numerator, denominator) = text.split_once('/').unwrap_or((text, "1"));
@@ -121,11 +121,8 @@ fn parse_rational(lexical: &str) -> Parsed {
         return Parsed::IllTyped;
     }
     let exact = BigRational::new(numerator, denominator);
-    let decimal = Decimal::from_rational(&exact);
-    Parsed::Value(if decimal.to_rational() == exact {
-        Literal::Decimal(decimal)
-    } else {
+    Parsed::Value(Decimal::exact(&exact).map(Literal::Decimal).unwrap_or_else(|| {
         let lexical = format!("{}/{}", exact.numer(), exact.denom());
         Literal::Opaque { lexical: lexical.into(), datatype: OWL_RATIONAL.into() }
-    })
+    }))
 }

@@ -15,6 +15,9 @@ use num_bigint::BigInt;
 use num_traits::Zero;
 
 const DAY: i64 = 86_400;
+
+/// Distance of a calculated moment from 1970 in days, about a billion years, at which arithmetic is far from overflow.
+const MAX_DAYS: u64 = 366_000_000_000;
 /// Largest offset of a time zone from UTC, in seconds.
 const ZONE_LIMIT: i64 = 14 * 3600;
 
@@ -98,7 +101,7 @@ impl Moment {
         let date = (1..=date).rev().find(fits)?;
         let shift = days_from_civil(year, month, date) - day;
         let seconds = add(&add_seconds(&local, shift.checked_mul(DAY)?), &duration.seconds);
-        let (day, _) = split_seconds(&seconds)?;
+        let (day, _) = split_seconds(&seconds).filter(|(day, _)| day.unsigned_abs() <= MAX_DAYS)?;
         let seconds = match self.kind {
             MomentKind::DateTime => seconds,
             MomentKind::Date => Decimal::from(day * DAY),

@@ -101,8 +101,18 @@ fn parse(
     let errors = faults.into_iter().map(|fault| fault_at(source, fault)).collect();
     let source: Arc<str> = source.into();
     let (variables, foreign, prefixes) = (Vec::new(), Vec::new(), prefixes.clone());
-    let mut parser =
-        Parser { tokens, cursor: 0, source, symbols, prefixes, syntax, variables, foreign, errors };
+    let mut parser = Parser {
+        tokens,
+        cursor: 0,
+        source,
+        symbols,
+        prefixes,
+        syntax,
+        variables,
+        foreign,
+        errors,
+        aggregate_depth: 0,
+    };
     let program = parser.program();
     if parser.errors.is_empty() { Ok((program, parser.foreign)) } else { Err(parser.errors.into()) }
 }
@@ -110,6 +120,8 @@ fn parse(
 fn fault_at(source: &str, fault: Fault) -> Error {
     Error::Syntax { file: source.to_string(), line: fault.line, column: fault.column, message: fault.message }
 }
+
+const MAX_AGGREGATE_DEPTH: u8 = 2;
 
 struct Parser<'a> {
     tokens: Vec<Spanned>,
@@ -123,6 +135,8 @@ struct Parser<'a> {
     /// included; `unknown` removes them.
     foreign: Vec<ForeignAtom>,
     errors: Vec<Error>,
+    /// Number of aggregates that are being parsed.
+    aggregate_depth: u8,
 }
 
 /// Result of a parsing function. After an error, the rest of the rule is skipped.
@@ -334,7 +348,14 @@ impl Parser<'_> {
             }
             None => Aggregate::Count,
         };
-        let body = self.atoms()?;
+        // The check of the rules reports an aggregate within an aggregate. Here, the recursion is bounded.
+        if self.aggregate_depth >= MAX_AGGREGATE_DEPTH {
+            return Err(self.error("atoms that are no aggregates"));
+        }
+        self.aggregate_depth += 1;
+        let body = self.atoms();
+        self.aggregate_depth -= 1;
+        let body = body?;
         self.expect(&Token::CloseBrace, "`^`, `,` or `}`")?;
         self.refuse_in_swrl("an aggregate", place)?;
         Ok(Atom::Aggregate { aggregate, result, body })

@@ -140,6 +140,7 @@ impl Tally {
         let question = Question {
             mission: &control.beliefs.mission,
             problem: &problem,
+            goal: control.beliefs.goal(),
             running,
             old: None,
             stay_close: false,

@@ -116,7 +116,7 @@ fn difference(arguments: &[&Literal]) -> Option<i64> {
     let [from, to, granularity] = arguments else { return None };
     let (granularity, moments) = (Granularity::from_literal(granularity)?, [moment(from)?, moment(to)?]);
     let [from, to] = [granularity.granule(&moments[0])?, granularity.granule(&moments[1])?];
-    comparable(&moments).then(|| (to - from).abs())
+    if comparable(&moments) { to.checked_sub(from)?.checked_abs() } else { None }
 }
 
 struct DurationFunction;
@@ -243,6 +243,10 @@ fn contains(a: Period, b: Period) -> bool {
     b.0 >= a.0 && b.1 <= a.1
 }
 
+fn meets(a: Period, b: Period) -> bool {
+    b.0.checked_sub(a.1) == Some(1)
+}
+
 fn overlaps(a: Period, b: Period) -> bool {
     a.0 <= b.0 && a.1 <= b.1 && a.1 >= b.0
 }
@@ -274,8 +278,8 @@ static ALLEN_RELATIONS: &[AllenRelation] = table!(AllenRelation {
     "equals" false => relation: |a, b| a == b,
     "before" false => relation: |a, b| a.1 < b.0,
     "after" false => relation: |a, b| a.0 > b.1,
-    "meets" false => relation: |a, b| a.1 + 1 == b.0,
-    "metBy" false => relation: |a, b| b.1 + 1 == a.0,
+    "meets" false => relation: meets,
+    "metBy" false => relation: |a, b| meets(b, a),
     "overlaps" false => relation: overlaps,
     "overlappedBy" false => relation: |a, b| overlaps(b, a),
     "contains" false => relation: contains,
@@ -288,8 +292,8 @@ static ALLEN_RELATIONS: &[AllenRelation] = table!(AllenRelation {
     "notEquals" true => relation: |a, b| a == b,
     "notBefore" true => relation: |a, b| a.1 < b.0,
     "notAfter" true => relation: |a, b| a.0 > b.1,
-    "notMeets" true => relation: |a, b| a.1 + 1 == b.0,
-    "notMetBy" true => relation: |a, b| b.1 + 1 == a.0,
+    "notMeets" true => relation: meets,
+    "notMetBy" true => relation: |a, b| meets(b, a),
     "notOverlaps" true => relation: overlaps,
     "notOverlappedBy" true => relation: |a, b| overlaps(b, a),
     "notContains" true => relation: contains,
