@@ -5,7 +5,10 @@ use rustc_hash::FxHashMap;
 
 use crate::faithful::verdict::Cause;
 use crate::faithful::world::World;
-use pddl::ast::{Action, ActionBody, Atom, Condition, Name, Term};
+use num_traits::Signed as _;
+use pddl::ast::{
+    Action, ActionBody, Arithmetic, Atom, Comparison, Condition, ConditionTime, Expression, Name, Term,
+};
 
 pub(super) const INSTANCE_LIMIT: usize = 400_000;
 /// Upper limit on the total number of arguments of all instances, which then take 256 MB.
@@ -24,9 +27,18 @@ pub(super) fn of(
     let mut atoms = Vec::new();
     match &action.body {
         ActionBody::Instantaneous { precondition, .. } => conjuncts(precondition, &mut atoms),
-        ActionBody::Durative { conditions, .. } => {
-            for (_, condition) in conditions {
-                conjuncts(condition, &mut atoms);
+        ActionBody::Durative { duration, conditions, .. } => {
+            // Conditions over all do not apply to an instance with the duration 0.
+            let is_positive = duration.iter().any(|constraint| {
+                matches!(
+                    constraint.operator,
+                    Comparison::Equal | Comparison::GreaterOrEqual | Comparison::Greater
+                ) && is_positive(world, &constraint.expression)
+            });
+            for (time, condition) in conditions {
+                if is_positive || *time != ConditionTime::OverAll {
+                    conjuncts(condition, &mut atoms);
+                }
             }
         }
     }
@@ -81,6 +93,21 @@ pub(super) fn of(
     instances.sort_unstable();
     instances.dedup();
     Ok(instances)
+}
+
+/// Returns `true` if the value of an expression is certainly above 0, whatever its parameters are.
+fn is_positive(world: &World<'_>, expression: &Expression) -> bool {
+    match expression {
+        Expression::Number(number, _) => number.is_positive(),
+        Expression::Fluent(atom) => world.symbol(&atom.predicate.name).is_ok_and(|symbol| {
+            let mut values = world.initial_values().filter(|(key, _)| key.0 == symbol);
+            !world.changes(symbol) && values.all(|(_, value)| value.is_positive())
+        }),
+        Expression::Operation(Arithmetic::Add | Arithmetic::Multiply | Arithmetic::Divide, parts, _) => {
+            parts.iter().all(|part| is_positive(world, part))
+        }
+        _ => false,
+    }
 }
 
 pub(super) fn conjuncts<'c>(condition: &'c Condition, atoms: &mut Vec<&'c Atom>) {

@@ -59,7 +59,8 @@ impl Names {
             for (value, text) in (0..).zip(atoms) {
                 let key = world.written(text);
                 let is_derived = |key: &Key| world.rules(key.0).is_some();
-                if is_basic && key.as_ref().is_none_or(is_derived) {
+                let changes = |key: &Key| world.changes(key.0) && !is_derived(key);
+                if is_basic && !key.as_ref().is_some_and(changes) {
                     return form(format!("{text} is not an atom of the files that actions can change"));
                 }
                 let key = key.filter(|key| is_basic || is_derived(key));

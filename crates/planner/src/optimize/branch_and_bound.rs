@@ -187,7 +187,8 @@ impl Progress<'_> {
 enum End {
     /// All nodes are expanded, except those that cannot lead to a plan better than the best one.
     Exhausted,
-    /// A limit was reached, or nodes were dropped because their numbers overflow.
+    /// A limit was reached, or nodes were dropped because their numbers overflow, or because they are beyond the horizon
+    /// and may lead to a better plan.
     Stopped,
 }
 
@@ -233,6 +234,8 @@ struct Search<'a> {
     best: Option<(Int, GroundPlan)>,
     /// Lower bound on the cost of plans through nodes that were dropped because numbers overflow.
     left_out: Option<Int>,
+    /// Lower bound on the cost of plans through nodes beyond the horizon.
+    beyond: Option<Int>,
     bytes: usize,
 }
 
@@ -256,6 +259,7 @@ impl<'a> Search<'a> {
             open: BinaryHeap::new(),
             best: None,
             left_out: None,
+            beyond: None,
             bytes: 0,
         };
         match costs.measured(&task.initial) {
@@ -265,11 +269,11 @@ impl<'a> Search<'a> {
         search
     }
 
-    /// Lower bound on the cost of every plan. `None` if no bound is known or no plan exists.
+    /// Lower bound on the cost of every plan, of any length. `None` if no bound is known or no plan exists.
     fn lower(&self) -> Option<Int> {
         let open = self.open.peek().map(|Reverse(priority)| priority.0);
         let best = self.best.as_ref().map(|(total, _)| *total);
-        let lower = open.into_iter().chain(self.left_out).chain(best).min();
+        let lower = open.into_iter().chain(self.left_out).chain(self.beyond).chain(best).min();
         lower.filter(|lower| *lower > Int::MIN)
     }
 
@@ -279,7 +283,9 @@ impl<'a> Search<'a> {
         let mut pulse = limits.pulse();
         for _ in 0..max_nodes {
             let Some(Reverse(priority)) = self.open.pop() else {
-                return Some(if self.left_out.is_some() { End::Stopped } else { End::Exhausted });
+                let is_longer_better = self.beyond.is_some_and(|bound| self.is_better(bound));
+                let is_complete = self.left_out.is_none() && !is_longer_better;
+                return Some(if is_complete { End::Exhausted } else { End::Stopped });
             };
             let (bound, _, Reverse(id)) = priority;
             if self.nodes[id as usize].is_dominated || !self.is_better(bound) {
@@ -328,7 +334,11 @@ impl<'a> Search<'a> {
         let bound = total.saturating_add(estimate);
         let parent = origin.as_ref().map(|(parent, _)| &self.nodes[*parent as usize]);
         let steps = parent.map_or(0, |parent| parent.steps.saturating_add(1));
-        if !self.is_better(bound) || self.exceeds_horizon(steps) {
+        if !self.is_better(bound) {
+            return;
+        }
+        if self.exceeds_horizon(steps) {
+            self.beyond = Some(self.beyond.map_or(bound, |other| other.min(bound)));
             return;
         }
         let id = dense(self.nodes.len());

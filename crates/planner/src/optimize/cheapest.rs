@@ -49,7 +49,7 @@ pub fn optimize(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement
     // The search considered only the part of the metric that operator costs represent.
     (solution.lower_bound, solution.unbounded) = (None, None);
     solution.statistics.history.clear();
-    if solution.status == Status::Optimal {
+    if matches!(solution.status, Status::Optimal | Status::Feasible) {
         (solution.status, solution.proof, solution.horizon) = (Status::Feasible, None, 0);
     }
     solution

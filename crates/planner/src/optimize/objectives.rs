@@ -162,13 +162,20 @@ fn in_order(
         let proved = solution.status == Status::Optimal && spent.is_some();
         best = Some(match best {
             None => solution,
-            Some(first) => Solution {
-                status: if proved { first.status } else { Status::Feasible },
-                proof: first.proof.filter(|_| proved),
-                plan: solution.plan,
-                ground: solution.ground,
-                ..first
-            },
+            Some(mut first) => {
+                let (statistics, later) = (&mut first.statistics, solution.statistics);
+                // An unchecked claim of an external solver about any objective must be visible in the proof.
+                let proof = if later.unchecked.is_some() { solution.proof } else { first.proof };
+                statistics.unchecked = statistics.unchecked.take().or(later.unchecked);
+                statistics.contradiction = statistics.contradiction.take().or(later.contradiction);
+                Solution {
+                    status: if proved { first.status } else { Status::Feasible },
+                    proof: proof.filter(|_| proved),
+                    plan: solution.plan,
+                    ground: solution.ground,
+                    ..first
+                }
+            }
         });
         if !proved {
             break;

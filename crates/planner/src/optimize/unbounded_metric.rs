@@ -45,6 +45,7 @@ pub(super) fn shortest_then_best(original: Run<'_>) -> Solution {
     let config = Config { horizon: Some(steps), ..original.config.clone() };
     let mut run = Run::new(&shifted, &config, &mut silent);
     run.statistics = original.statistics;
+    run.statistics.unchecked.clone_from(&shortest.statistics.unchecked);
     let Ok(bounds) = Bounds::new(run.context()) else {
         return unknown(shortest);
     };
