@@ -198,8 +198,13 @@ impl<'a, N: Number> Pareto<'a, N> {
         }
         let secondary = usize::from(first == 0);
         let (second, _) = self.solve(&unit(secondary), Some(&optimal_choices))?;
-        let policy = second.policy.iter().zip(&best.policy).map(|(s, b)| if *s == NONE { *b } else { *s });
-        self.point(policy.collect()).map(Some)
+        // Where the second probability is 0, the second policy may be any that preserves the first value, for example one
+        // that waits for ever and never attains it.
+        let is_free = |state: usize| {
+            second.policy[state] == NONE || !self.has_costs && second.values[state].is_zero()
+        };
+        let choice = |state: usize| if is_free(state) { best.policy[state] } else { second.policy[state] };
+        self.point((0..best.policy.len()).map(choice).collect()).map(Some)
     }
 
     /// Returns the vertices of the Pareto front, ordered by increasing first loss. Only the choices in

@@ -389,3 +389,36 @@ fn named_properties_are_expanded() {
         assert_eq!(result, expected, "{name}");
     }
 }
+
+/// Values by hand: the first command waits, `a` leads to the first target, and `b` to each target or to neither.
+#[test]
+fn fronts_of_probabilities_do_not_wait_for_ever() {
+    let model = "mdp module m s:[0..3] init 0;
+        [wait] s=0 -> (s'=0); [a] s=0 -> (s'=1); [b] s=0 -> 0.5:(s'=2) + 0.5:(s'=3); [c] s>0 -> true;
+        endmodule";
+    for exactness in [Exactness::Always, Exactness::Never] {
+        let front = outcome(model, "multi(Pmax=? [ F s=1 ], Pmax=? [ F s=2 ])", exactness);
+        let Outcome::Front(points) = front else { panic!("{front:?}") };
+        let upper = |answer: &Answer| answer.quantity().expect("finite").upper;
+        let points: Vec<Vec<f64>> = points.iter().map(|point| point.iter().map(upper).collect()).collect();
+        let expected = [[1.0, 0.0], [0.0, 0.5]];
+        assert!(
+            points.len() == 2 && expected.iter().all(|point| points.iter().any(|other| other == point)),
+            "{points:?}"
+        );
+        let bounded = outcome(model, "multi(Pmax=? [ F s=1 ], P>=0.1 [ F s=2 ])", exactness);
+        assert!(matches!(bounded, Outcome::Constrained { .. }), "{bounded:?}");
+    }
+}
+
+/// An improvement of a policy travels one state in a round, so that there are more than a thousand rounds.
+#[test]
+fn exact_policy_iteration_ends_at_the_optimum() {
+    let model = "mdp module m s:[0..1200] init 0;
+        [exit] s<1200 -> (s'=1200); [back] s>0 & s<1200 -> (s'=s-1); [fwd] s<1199 -> (s'=s+1);
+        endmodule
+        rewards \"c\" [exit] s>0 : 1000000; [back] true : 1; [fwd] true : 1; endrewards";
+    let answer = outcome(model, "filter(max, R{\"c\"}min=? [ F s=1200 ], true)", Exactness::Always);
+    let Outcome::Value(Answer::Finite(quantity)) = answer else { panic!("{answer:?}") };
+    assert_eq!(quantity.exact.map(|exact| exact.to_string()).as_deref(), Some("1199"));
+}

@@ -272,7 +272,8 @@ async fn run(command: Command) -> Result<(), Errors> {
         }
         Command::Send { server, session } => {
             let store = server.open(10).await.map_err(|message| vec![message])?;
-            let session = session.unwrap_or_else(|| format!("{:016x}.", fastrand::u64(..)));
+            // The separator keeps sessions that end with a digit apart from the numbers of their messages.
+            let session = format!("{}.", session.unwrap_or_else(|| format!("{:016x}", fastrand::u64(..))));
             lines::send(store, &session).await.map_err(|message| vec![message])?;
         }
         Command::Follow { server, robot, after } => {

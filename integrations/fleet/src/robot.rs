@@ -253,7 +253,8 @@ impl Robot {
     pub fn is_pending(&self) -> bool {
         match &self.control {
             Control::Loaded(control, _) => control.has_agenda(),
-            Control::Stored(snapshot) => snapshot.get("agenda").is_some_and(Value::is_object),
+            // A missing field is that of a loop before its start, whose first plan is pending.
+            Control::Stored(snapshot) => snapshot.get("agenda").is_none_or(Value::is_object),
             Control::None | Control::Unreadable => false,
         }
     }

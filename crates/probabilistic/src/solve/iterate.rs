@@ -12,8 +12,9 @@ use crate::solve::quotient::Quotient;
 use crate::solve::users::{Users, owners};
 use crate::solve::work::Work;
 
-/// Upper limit on the number of rounds of policy iteration. If it is reached, the last policy may not be
-/// optimal. In doubles, its error is bounded afterwards.
+/// Upper limit on the number of rounds of policy iteration in doubles. If it is reached, the last policy may not be
+/// optimal; its error is bounded afterwards. In exact arithmetic, the budget is the only limit, because the result counts
+/// as optimal.
 const MAX_ROUNDS: usize = 1000;
 /// Least and greatest number of sweeps that improve the policy before its chain is solved again. Only for large
 /// components in doubles; otherwise there is one sweep.
@@ -25,7 +26,7 @@ const SWEEP_SPEED: u64 = 4;
 const SWEEP_MIN_BLOCKS: usize = 200;
 
 /// A policy with the value of each block (merged end component). No row clearly improves the
-/// policy, unless [`MAX_ROUNDS`] was reached.
+/// policy, unless [`MAX_ROUNDS`] was reached in doubles.
 pub struct Iterated<N> {
     pub policy: Vec<u32>,
     pub values: Vec<N>,
@@ -47,7 +48,8 @@ pub fn iterate<N: Number>(
     let mut touched = work.touched();
     let Solved { mut values, mut relative } = chain(quotient, &policy, work)?;
     let large = !N::EXACT && quotient.blocks() >= SWEEP_MIN_BLOCKS;
-    for _ in 0..MAX_ROUNDS {
+    let rounds = if N::EXACT { usize::MAX } else { MAX_ROUNDS };
+    for _ in 0..rounds {
         let mut improved = false;
         // The sweeps may take about as long as the last elimination. Without fill-in, elimination is fast, so
         // there are few sweeps.

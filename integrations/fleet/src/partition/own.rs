@@ -296,7 +296,9 @@ impl<S: Store> Partition<S> {
             slot.search.update(is_pending.then(|| robot.question()));
         }
         slot.loaded = task.loaded;
-        let event = sequence.filter(|_| !matches!(outcome, Outcome::Faulted(_) | Outcome::Suspended));
+        // The events of a suspended robot stay in the log, also those before a refused retirement.
+        let is_stuck = slot.is_suspended || matches!(outcome, Outcome::Faulted(_) | Outcome::Suspended);
+        let event = sequence.filter(|_| !is_stuck);
         if let Some(last) = event.or(plan) {
             slot.handled = slot.handled.max(last);
             slot.obsolete += 1;
