@@ -200,9 +200,8 @@ impl<'a, N: Number> Pareto<'a, N> {
         let (second, _) = self.solve(&unit(secondary), Some(&optimal_choices))?;
         // Where the second probability is 0, the second policy may be any that preserves the first value, for example one
         // that waits for ever and never attains it.
-        let is_free = |state: usize| {
-            second.policy[state] == NONE || !self.has_costs && second.values[state].is_zero()
-        };
+        let is_free =
+            |state: usize| second.policy[state] == NONE || !self.has_costs && second.values[state].is_zero();
         let choice = |state: usize| if is_free(state) { best.policy[state] } else { second.policy[state] };
         self.point((0..best.policy.len()).map(choice).collect()).map(Some)
     }

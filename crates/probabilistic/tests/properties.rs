@@ -402,8 +402,11 @@ fn fronts_of_probabilities_do_not_wait_for_ever() {
         let upper = |answer: &Answer| answer.quantity().expect("finite").upper;
         let points: Vec<Vec<f64>> = points.iter().map(|point| point.iter().map(upper).collect()).collect();
         let expected = [[1.0, 0.0], [0.0, 0.5]];
+        let is_close =
+            |left: &[f64], right: &[f64]| left.iter().zip(right).all(|(l, r)| (l - r).abs() < 1e-9);
         assert!(
-            points.len() == 2 && expected.iter().all(|point| points.iter().any(|other| other == point)),
+            points.len() == 2
+                && expected.iter().all(|point| points.iter().any(|other| is_close(other, point))),
             "{points:?}"
         );
         let bounded = outcome(model, "multi(Pmax=? [ F s=1 ], P>=0.1 [ F s=2 ])", exactness);
