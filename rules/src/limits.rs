@@ -29,10 +29,10 @@ const ROWS_PER_INTERRUPT_CHECK: u64 = 1 << 14;
 pub struct Limits {
     /// Number of steps that one update may take. Roughly, a step extends one partial match of a rule's body. A value
     /// that a recursive rule computes for the first time costs 25,000 steps, and 25,000 more for every 8 bytes of its
-    /// digits or text.
+    /// digits or text. The size of other values, and the rows that an aggregate visits, cost nothing.
     pub steps: u64,
     /// Function that can stop an update. It is called after about every 16,000 visited rows and charged
-    /// steps.
+    /// steps. The rows that an aggregate visits do not count.
     pub interrupt: Option<Interrupt>,
 }
 
@@ -103,7 +103,7 @@ impl Budget {
     /// Charges a value that a rule has computed for the first time, if rules may use their own conclusions
     /// ([`Budget::recursive`]). Returns `false` if evaluation has to stop.
     pub fn spend_on_value(&self, value: Option<&Literal>, rule: u32) -> bool {
-        // Without recursion, a rule computes a bounded number of values.
+        // Without recursion, a rule computes a bounded number of values. Their size is neither bounded nor charged.
         if !self.recursive.get() {
             return true;
         }

@@ -108,7 +108,8 @@ fn parse_float<F: std::str::FromStr>(lexical: &str) -> Option<F> {
 }
 
 /// Parses an `owl:rational`: an integer, or `numerator / denominator`. The result is a decimal if 34 fractional
-/// digits suffice, and otherwise a [`Literal::Opaque`] in lowest terms.
+/// digits suffice, and otherwise a [`Literal::Opaque`] in lowest terms. The latter counts as different from every
+/// decimal, also from an equal one with more digits.
 fn parse_rational(lexical: &str) -> Parsed {
     let text = lexical.trim_matches([' ', '\t', '\n', '\r']);
     let (numerator, denominator) = text.split_once('/').unwrap_or((text, "1"));
