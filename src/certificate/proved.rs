@@ -95,7 +95,7 @@ impl ProvedChecker {
     /// as soon as `stop` returns `true`.
     ///
     /// # Errors
-    /// M145: a program cannot be started, or a temporary file cannot be written.
+    /// M145: a program cannot be run, or a temporary file cannot be written or read.
     pub fn compare(
         &self,
         directory: &Path,

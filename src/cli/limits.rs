@@ -7,8 +7,9 @@
 //! ends the program at once.
 //!
 //! The loops of the planner, of the validator and of the later stages poll the limits. If a loop
-//! does not, the separate thread ends the program about a tenth of the limit later, unless an
-//! answer is being written.
+//! does not, the separate thread ends the program about a tenth of the limit later, unless the
+//! output of an answer or file has begun. At a time limit, the thread also waits until the
+//! processor time of the program exceeds the limit by as much.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -117,7 +118,8 @@ fn nothing_to_show() -> Message {
 }
 
 /// The time limit plus a tenth and [`GRACE`], and the memory limit plus a tenth. A program that reaches one of them
-/// after it has read its input is ended, unless it has begun to write an answer.
+/// after it has read its input is ended, unless it has begun to write an answer. The first limit applies to both the
+/// elapsed time and the processor time.
 struct Deadline {
     started: Instant,
     time: Option<Duration>,

@@ -218,7 +218,8 @@ impl Explorer<'_> {
             hit: value(&self.roles.hit).unwrap_or_else(BigRational::zero),
         };
         let by = self.arcs.entry((from, to)).or_default();
-        // Of two equivalent actions, the faster one is kept.
+        // Of several actions with the same next place and configuration, the fastest is kept, whatever its energy and
+        // risks are.
         if by.get(&configuration).is_none_or(|slower| traversal.time < slower.time) {
             by.insert(configuration, traversal);
         }

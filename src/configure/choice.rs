@@ -96,7 +96,7 @@ pub enum Verdict {
     /// The design is not better than the chosen one: it misses more requirements, or equally many without more utility.
     Less,
     /// The design is usable and preferred to the chosen one, if any, but conflicts with the choices for other
-    /// objectives. The reason is a sentence.
+    /// objectives, or a limit was reached before it was considered. The reason is a sentence.
     Together(String),
 }
 
@@ -321,7 +321,8 @@ impl Whole<'_> {
                 );
             }
         }
-        "other functions would need designs with a lower total utility, or would have no design".to_owned()
+        // Without a conflict, the best choice would have this design.
+        "a limit was reached before a choice with this design was found".to_owned()
     }
 
     fn reasons(&self, design: &str, rejection: &Rejection) -> Vec<String> {

@@ -310,7 +310,7 @@ impl Journal {
         self.write(|journal| {
             journal.decide(&decision)?;
             journal.keep::<C>(answers)?;
-            // A snapshot cannot store a pending deliberation.
+            // Snapshots are written only between deliberations.
             if journal.observations >= journal.policy.snapshot_every && !control.has_agenda() {
                 journal.checkpoint(control)?;
             }

@@ -68,7 +68,8 @@ pub enum Answer {
     Effect(Effect),
     /// An effect was not acknowledged, or no report of an action has arrived, before the deadline.
     Overdue {
-        /// Number of the overdue effect; `None` if an action is overdue.
+        /// Number of the overdue effect. For an overdue action: its unacknowledged request or cancellation, or
+        /// `None` if its request has arrived.
         effect: Option<u64>,
         /// Number of the action.
         action: u64,

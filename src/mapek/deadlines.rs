@@ -1,6 +1,7 @@
 //! Deadlines for unacknowledged effects and for actions without reports.
 //!
-//! Deadlines are checked at each timer and each line, including ticks, unless the whole line is refused.
+//! Deadlines are checked at each timer and each line, including ticks and lines with refused events, but not at lines
+//! that are refused for their `seq` or `time`.
 //! Acknowledgements have deadlines only after the robot has first acknowledged an effect by its number. An overdue
 //! action is cancelled only if the robot has sent messages of the missing kind before: progress of this action, the
 //! start or progress of some action, or an acknowledgement. Every robot is expected to report the end of a cancelled
@@ -174,7 +175,8 @@ fn check_action(beliefs: &mut Beliefs, settings: &Settings, answers: &mut Vec<An
 }
 
 /// Returns the seconds since the last report of an action if its deadline has passed, and sets the next deadline;
-/// `None` otherwise. The intervals grow exponentially, so that a robot that never reports causes few messages.
+/// `None` otherwise. The deadlines are 1, 2, 3, 5, 9, 17, … times the allowed silence after the last report, so that
+/// a robot that never reports causes few messages.
 fn passed_deadline(running: &mut Running, now: Duration, settings: &Settings) -> Option<u64> {
     let time_since_report = now.saturating_sub(running.last_report);
     if time_since_report < next_deadline_after(running, settings) {

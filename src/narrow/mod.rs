@@ -42,9 +42,10 @@ pub(crate) fn narrowed<'t>(
     }
 }
 
-/// Computes a smaller domain and problem. Changes only derived predicates in `completed`, which come from the knowledge
-/// base, and those whose axioms mention only such predicates and bind all their variables. Other predicates, e.g. of
-/// maps and tasks, may have large extensions, so grounding handles them.
+/// Computes a smaller domain and problem. Changes only derived predicates in `completed`, and those whose axioms
+/// mention only such predicates and bind all their variables. `completed` contains the predicates of the knowledge
+/// base; the domain can have axioms of its own for them. Other predicates, e.g. of maps and tasks, may have large
+/// extensions, so grounding handles them.
 fn narrow(domain: &Domain, problem: &Problem, completed: &HashSet<Name>) -> (Domain, Problem) {
     let mentioned = Mentioned::by_domain(domain).and_problem(problem);
     let facts: BTreeSet<Fact> = problem

@@ -126,7 +126,8 @@ pub struct Study {
     /// Directory of the study's file, which is the working directory of the runs.
     pub directory: PathBuf,
     /// Checksum of the study's command, generator, time limit and values, of the files whose paths are words of
-    /// the command, and of the program's version.
+    /// the command, and of the program's version. It does not cover the files that these files name, such as the
+    /// knowledge base of a mission, nor files whose paths contain a placeholder.
     pub digest: String,
     /// Varied keys with their values. The value of the last key changes from each run to the next.
     keys: Vec<(String, Vec<Value>)>,

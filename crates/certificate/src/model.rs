@@ -25,7 +25,8 @@ pub struct Model {
     pub variables: Vec<Vec<String>>,
     /// Number of basic variables, which come first; all later variables are derived.
     pub basic: usize,
-    /// The initial value of each variable, as an index into its values.
+    /// The initial value of each variable, as an index into its values. [`crate::check()`] ignores the values of
+    /// derived variables, because they follow from the rules.
     pub values: Vec<u32>,
     /// The initial value of each number (numeric variable), scaled by `number_scale`.
     pub numbers: Vec<Integer>,

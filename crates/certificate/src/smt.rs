@@ -16,8 +16,8 @@ use crate::integer::Integer;
 use crate::model::{Condition, Fact, Linear, Literal, Model, Operator, Quantity};
 
 /// Returns the verification conditions for a claim, as SMT-LIB text. The claim is interpreted as in
-/// [`crate::check`]. Returns `None` for tasks with derived variables, because their least fixpoints have no
-/// compact encoding.
+/// [`crate::check`]. Returns `None` for tasks with rules of derived variables, because their least fixpoints have
+/// no compact encoding.
 ///
 /// # Errors
 /// A document is malformed, or the claim is not integral in the units of the task.

@@ -137,8 +137,9 @@ impl Diagnostic {
     }
 }
 
-/// Limit on the number of diagnostics of one file. One more diagnostic is still stored; if there are several more,
-/// the message P119 with their number is stored instead. A file in another language would produce very many.
+/// Limit on the number of diagnostics of one pass (parsing or checking) over one file. One more diagnostic is still
+/// stored; if there are several more, the message P119 with their number is stored instead. A file in another
+/// language would produce very many.
 const MAX_DIAGNOSTICS: usize = 200;
 
 #[derive(Debug)]
@@ -209,8 +210,8 @@ impl<'s> Sink<'s> {
     }
 
     /// Returns the collected diagnostics, sorted by position and without successive duplicates. If
-    /// some were only counted, an error P119 with the number of missing diagnostics replaces the
-    /// last stored one.
+    /// some were only counted, P119 with the number of missing diagnostics replaces the last stored
+    /// one. P119 is an error even if all diagnostics are warnings.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(crate) fn finish(mut self) -> Vec<Diagnostic> {
         if let (Some(last), true) = (self.diagnostics.get_mut(MAX_DIAGNOSTICS), self.beyond_limit > 0) {

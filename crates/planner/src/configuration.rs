@@ -53,7 +53,8 @@ pub struct Assignment {
     pub designs: Vec<Option<usize>>,
     /// Sum of the utilities of the selected designs.
     pub utility: BigRational,
-    /// `true` if the assignment is proved optimal; `false` if a limit was reached first.
+    /// `true` if the assignment is proved optimal, or if it is proved that none respects the budgets; `false` if a
+    /// limit was reached first.
     pub optimal: bool,
 }
 

@@ -101,9 +101,11 @@ impl<'a> Planner<'a> {
         self
     }
 
-    /// Calls `report` for better plans, and if the SAT solver raises the lower bound. If `report` returns `Break`,
-    /// planning ends with the best known plan. `report` is not called if the task is solved in exact rationals (see
-    /// [`Planner::plan`]), if actions can reduce the cost, or if only a part of the metric is minimised.
+    /// Calls `report` for better plans, for a plan that a search proves cheapest, and if the SAT solver raises the
+    /// lower bound. With several objectives, there is one search for each objective, and costs and bounds are those
+    /// under its objective. If `report` returns `Break`, the flag [`Limits::interrupt`] is set, and planning ends with
+    /// the best known plan. `report` is not called if the task is solved in exact rationals (see [`Planner::plan`]),
+    /// if actions can reduce the cost, or if only a part of the metric is minimised.
     #[must_use]
     pub fn on_improvement(mut self, report: impl FnMut(&Improvement) -> ControlFlow<()> + 'a) -> Self {
         self.report = Box::new(report);

@@ -124,9 +124,8 @@ impl<'a> Verifier<'a> {
     /// # Errors
     /// M121 if the certificate cannot be read or its task or argument is malformed. Also M121 if it is
     /// the certificate of a front, or its task has derived variables: there are no verification
-    /// conditions for these. For an
-    /// optimality claim, also M121 if the task is not faithful to the PDDL files, the plan is not
-    /// as claimed, or a limit is reached.
+    /// conditions for these. For an optimality claim, also M121 if the task is not faithful to the PDDL
+    /// files, the plan is not as claimed, or a limit is reached.
     pub fn conditions(&self) -> Result<String, Errors> {
         conditions(self.directory, &|| self.is_over()).map_err(Errors::from)
     }

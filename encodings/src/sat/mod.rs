@@ -74,8 +74,8 @@ impl Backend {
         "cadical",
     ];
 
-    /// Starts a solver that stops at the deadline, at an interruption, or after more than `budget` conflicts.
-    /// An external program with a conflict budget gets a time limit instead.
+    /// Starts a solver that stops at the deadline, at an interruption, or after more than `budget` conflicts in
+    /// all calls together. An external program with a conflict budget gets a time limit for each call instead.
     pub fn start(&self, limits: &Limits, budget: u64) -> Box<dyn Solver> {
         match self {
             Self::Varisat => Box::new(varisat::Varisat::new(limits, budget)),

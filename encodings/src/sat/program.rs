@@ -2,10 +2,10 @@
 //!
 //! Two answer formats are accepted: that of the SAT competitions (`s SATISFIABLE`, and the
 //! assignment in lines `v …`), and that of `MiniSat`'s result file (`SAT`, and the assignment on
-//! the next line). The process is killed when a limit is reached. Programs have no portable option
-//! for a conflict budget, so a time limit replaces the budget. Each call starts a new process that
-//! receives the assumptions as clauses. So learnt clauses are lost, and the core always contains
-//! all assumptions.
+//! the next line). The process is killed when a limit is reached, but not other processes that it has
+//! started. Programs have no portable option for a conflict budget, so a time limit replaces the
+//! budget. Each call starts a new process that receives the assumptions as clauses. So learnt clauses
+//! are lost, and the core always contains all assumptions.
 //!
 //! \[1\] DIMACS challenge: Satisfiability, suggested format, 1993.
 
@@ -149,9 +149,9 @@ impl Program {
     }
 }
 
-/// Waits for the end of a program that has closed its output. Returns `false` if the deadline or an
-/// interruption comes first. A SAT solver exits with status 10, 20 or 0; after any other status the output
-/// may be incomplete, so the result is an error.
+/// Waits for the end of a program that has closed its output. Returns `false` if a limit, or the time that
+/// replaces the conflict budget, is reached first. A SAT solver exits with status 10, 20 or 0; after any
+/// other status the output may be incomplete, so the result is an error.
 fn has_ended(child: &mut Child, is_over: &dyn Fn() -> bool) -> Result<bool, String> {
     while !is_over() {
         match child.try_wait().map_err(|error| format!("its exit status is unknown: {error}"))? {

@@ -271,7 +271,8 @@ impl Robot {
         Ok(Some(self.load(missions)?.thinker()))
     }
 
-    /// Returns the [number](Loop::question) of the current planning problem; 0 if the loop is not loaded.
+    /// Returns the [number](Loop::question) of the current planning problem; 0 if the loop is not loaded. A restored
+    /// loop counts from 0 again.
     pub fn question(&self) -> u64 {
         if let Control::Loaded(control, _) = &self.control { control.question() } else { 0 }
     }

@@ -80,8 +80,8 @@ pub struct Decided {
     /// `true` if with this event the robot has changed to another version of its mission.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub migrated: bool,
-    /// `true` if the decision contains only the reaction to the event, because the search for a plan takes longer. A
-    /// decision with `planned` follows.
+    /// `true` if the decision contains only the reaction to the event, because the search for a plan takes longer. The
+    /// plan follows in a decision with `planned`, or in the decision about a later event.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub planning: bool,
     /// `true` if the decision completes earlier decisions, the last of which was about this event.
@@ -176,7 +176,7 @@ pub struct Presence {
     pub partitions: u32,
     /// Number of robots in memory.
     pub robots: u64,
-    /// Number of events that are read but not decided.
+    /// Number of events that are read but neither decided nor refused, without those of suspended robots.
     pub waiting: u64,
     /// Number of events that were decided since the worker's start.
     pub decided: u64,

@@ -55,7 +55,7 @@ pub async fn run<S: Store>(shared: Arc<Shared<S>>, mut stop: watch::Receiver<boo
 
 impl<S: Store> Worker<S> {
     /// Publishes the worker's status. Then starts the partitions that the worker owns, and ends all others; if it is
-    /// `draining`, it owns none. Changes nothing if the log cannot be read.
+    /// `draining`, it owns none. Neither starts nor ends partitions if the statuses cannot be read.
     async fn round(&mut self, draining: bool) {
         self.shared.health.begin_round(draining);
         let presence = self.present(draining).await;

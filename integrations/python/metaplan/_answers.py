@@ -159,9 +159,9 @@ class Plan(Answer):
         self.statistics: dict[str, Any] = answer["statistics"]
         """Counters and times of the search."""
         self.verdict: str = planned.verdict if planned else self.status
-        """The status and its proof in a sentence."""
+        """The status and its proof in a sentence; for a point of a front, the status only."""
         self.text: str | None = planned.text if planned else None
-        """The plan with one step on each line, as validators read it; ``None`` without a plan."""
+        """The plan as validators read it, a step on each line; ``None`` without a plan and for a point of a front."""
         self.warnings: list[Message] = messages_of(planned.warnings) if planned else []
         """Warnings about the mission's files."""
         self._alternatives = [
@@ -215,7 +215,7 @@ class Plan(Answer):
         )
 
     def svg(self) -> str | None:
-        """Returns the plan as a timeline in SVG; ``None`` without a plan."""
+        """Returns the plan as a timeline in SVG; ``None`` without a plan, and for a point of a front."""
         if self._svg is None and self._planned:
             self._svg = self._planned.svg()
         return self._svg

@@ -249,11 +249,13 @@ class Mission:
         :param confirm: let the SAT solver confirm what is proved without it, however long that takes
         :param time_limit: in seconds; the best plan until then is returned, as it is after Ctrl-C
         :param memory_limit: in megabytes, for the states that searches store
-        :param certificate: a directory that does not exist yet; :func:`metaplan.verify` checks what is written there
+        :param certificate: a directory that does not exist yet; :func:`metaplan.verify` checks what is written there. A
+            result without a proof that a certificate can express, for example at a limit, is an error; the plan is then
+            not returned
         :param on_improvement: called with cost, lower bound, gap (0 to 1) and number of steps of each better plan; planning ends when it
             returns ``False``
         :raises metaplan.Error: if the mission cannot be planned for
-        :raises KeyboardInterrupt: after Ctrl-C, if there is no plan yet, or with ``pareto``
+        :raises KeyboardInterrupt: after Ctrl-C, if there is no plan yet or no certificate for it, or with ``pareto``
         """
         separation = None
         if concurrent is not False:
@@ -316,6 +318,9 @@ class Mission:
 
     def validate(self, plan: Plan | File, *, concurrent: bool = False, tolerance: float | str | Decimal = "0.001") -> Verdict:
         """Executes a plan by the definition of PDDL: a :class:`Plan`, its text, a path, or a ``metaplan-plan/1`` document.
+
+        A string is a path unless it is empty, begins with ``(``, ``{`` or ``;``, or has a colon. A
+        :class:`pathlib.Path` is always a path.
 
         :param concurrent: actions may overlap
         :param tolerance: maximum difference of times from the exact ones, in the domain's time unit

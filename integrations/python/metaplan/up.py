@@ -285,7 +285,10 @@ class MetaplanEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin):
 
     @staticmethod
     def ensures(anytime_guarantee: AnytimeGuarantee) -> bool:
-        """Returns ``True`` for increasing quality: each plan is better than the one before."""
+        """Returns ``True`` for increasing quality: each intermediate plan is better than the one before.
+
+        The final plan may be equal to the last one.
+        """
         return bool(anytime_guarantee == AnytimeGuarantee.INCREASING_QUALITY)
 
     @staticmethod

@@ -3,8 +3,8 @@
 //!
 //! This crate makes no decisions. The interpreter lock is released during work. While planning,
 //! explaining and verifying, signals are checked every 20 ms, and Ctrl-C sets the interrupt flag of
-//! the work. Other functions (such as `reason`, `check`, `compare` and the loop) handle signals only
-//! at their end.
+//! the work. Python handles signals in its main thread only, so work in another thread is not interrupted.
+//! Other functions (such as `reason`, `check`, `compare` and the loop) handle signals only at their end.
 
 mod ask;
 mod failure;

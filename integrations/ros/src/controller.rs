@@ -138,7 +138,7 @@ impl Controller {
         Ok(())
     }
 
-    /// Plans for PlanSys2's current problem. Without a plan, publishes or logs the reason and returns `None`.
+    /// Plans for PlanSys2's current problem. Without a plan, logs the reason and returns `None`.
     async fn find(&self) -> Option<Found> {
         match self.request_problem().await {
             Ok((domain, problem)) => self.plan(domain, problem).await.ok(),

@@ -189,7 +189,8 @@ fn note(diagnostic: &mut Diagnostic, status: DiagnosticStatus) {
     }
 }
 
-/// Returns the text of the settings. Every table is a comment, and is valid without `# `.
+/// Returns the text of the settings. Every table is a comment, and is valid without `# ` if the names of functions and
+/// designs are bare keys of TOML.
 fn settings(robot: &Robot, names: &Names) -> String {
     let mut text = String::from(
         "# Settings of Metaplan for the robot that was observed. Remove `# ` before the lines that you need, and fill in the\n\

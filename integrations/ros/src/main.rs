@@ -24,7 +24,8 @@ use metaplan_ros::{controller, discover, manager, planner, reasoner};
 #[derive(Debug, Parser)]
 #[command(version)]
 struct Arguments {
-    /// Read the manifest of the mission. Optional for the planner, which otherwise plans with the received domain alone.
+    /// Read the manifest of the mission. Optional for the planner, which otherwise plans with the received domain
+    /// alone, and for the discovery, which otherwise writes placeholders.
     #[arg(long, value_name = "FILE", required_if_eq_any = [("role", "manager"), ("role", "reasoner"), ("role", "controller")])]
     mission: Option<PathBuf>,
     /// Set the role of this node.
@@ -33,7 +34,8 @@ struct Arguments {
     /// Read the mapping between mission and robot from this file. [default: `ros.toml` in the directory of the manifest, if it exists]
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
-    /// Write events and decisions to a journal in this directory before acting on them, and resume from it after a crash.
+    /// Write events and decisions to a journal in this directory before acting on them, and resume from it after a
+    /// crash. For the manager and the reasoner only. A reasoner stores only its objectives and the latest reports.
     #[arg(long, value_name = "DIR")]
     journal: Option<PathBuf>,
     /// Set how long `--as discover` observes the robot, in seconds.
@@ -69,7 +71,7 @@ enum Role {
 
 fn seconds(text: &str) -> Result<f64, String> {
     let time = text.parse().ok().filter(|seconds| (f64::MIN_POSITIVE..=86_400.0).contains(seconds));
-    time.ok_or_else(|| "a number of seconds from 0 to 86400 is expected".to_owned())
+    time.ok_or_else(|| "a number of seconds greater than 0, and at most 86400, is expected".to_owned())
 }
 
 impl Role {
@@ -126,7 +128,7 @@ fn start() -> Result<(), Errors> {
     let Arguments { role, mission, settings, journal, executor, allow_commands, seconds, output, .. } =
         arguments;
     if journal.is_some() && matches!(role, Role::Planner | Role::Controller | Role::Discover) {
-        let text = "`--journal` is for a manager and a reasoner: a planner has no persistent state";
+        let text = "`--journal` is for a manager and a reasoner: the other roles have no persistent state";
         return Err(vec![Message::error("N100", text)].into());
     }
     if output.is_some() && role != Role::Discover {

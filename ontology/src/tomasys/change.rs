@@ -176,7 +176,7 @@ fn groundings(facts: Facts, kind: Symbol) -> Vec<Symbol> {
 }
 
 /// Builds the update after which `value` is the only asserted value of a property of `subject`. Without
-/// `value`, the update removes all asserted values.
+/// `value`, the update removes all asserted values. Values that are asserted of an equal name are not removed.
 pub fn replace(engine: &Engine, property: Symbol, subject: Symbol, value: Option<Symbol>) -> Delta {
     let pattern = [Some(subject), None];
     let rows = engine.matching(property, &pattern);

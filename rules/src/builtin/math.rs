@@ -10,7 +10,8 @@ use super::signature::BuiltIn;
 use crate::literal::{Decimal, Literal, ten_to};
 
 /// Maximum absolute exponent of an exact power, and maximum number of digits for rounding decimals. A power
-/// with a larger exponent has no result. A larger number of digits counts as the maximum.
+/// with a larger exponent has no result. A larger number of digits counts as the maximum, or has no result if it
+/// exceeds `i32`.
 const MAX_EXPONENT: u32 = 1000;
 
 enum Numbers {

@@ -26,7 +26,8 @@ impl Literal {
     }
 
     /// Returns `true` if two literals certainly have different values. Returns `false` if they are equal,
-    /// or if that is undecided.
+    /// or if that is undecided. Exception: a rational number with more than 34 fractional digits differs from every
+    /// decimal, even from an equal one.
     pub fn differs(&self, other: &Self) -> bool {
         if self == other {
             return false;

@@ -82,7 +82,8 @@ impl Moment {
     /// Returns the moment plus a duration, with the same time zone; the calculation is in local time. Months are
     /// added first; a day that does not exist in the new month becomes its last day. Then seconds are added. A time
     /// of day wraps around at midnight. A date is rounded down to whole days. Returns `None` if months are added to a
-    /// time of day, or if the result is out of range.
+    /// time of day, or if the years after the months or the local seconds of the result are out of range. The year of
+    /// the result can be outside the range of parsed moments, because seconds are added without that test.
     pub(crate) fn later(&self, duration: &Duration) -> Option<Self> {
         let local = self.local();
         let (day, _) = split_day(&local);
@@ -442,7 +443,8 @@ fn split_day(seconds: &Decimal) -> (i64, String) {
     split_seconds(seconds).unwrap_or_default()
 }
 
-/// Splits seconds like [`split_day`]. Returns `None` if the whole seconds exceed `i64`, which no moment has.
+/// Splits seconds like [`split_day`]. Returns `None` if the whole seconds exceed `i64`. No parsed moment has so many
+/// seconds, but the sum of a moment and a duration can have them in UTC.
 fn split_seconds(seconds: &Decimal) -> Option<(i64, String)> {
     let (unscaled, scale) = seconds.parts();
     let unit = ten_to(scale);

@@ -20,11 +20,12 @@ impl Knowledge {
     }
 
     /// Applies a report about a component, attribute or design, together with pending reports. Returns the facts that
-    /// start or cease to hold, including conclusions. If inference fails, the report is kept as pending, and the returned
-    /// change is empty.
+    /// start or cease to hold, including conclusions. If inference fails, the report is kept as pending, and the
+    /// returned change is empty.
     ///
     /// # Errors
-    /// There is no such component, attribute or design, or a pending objective has an unknown function or design.
+    /// There is no such component, attribute or design. Also if a pending objective has an unknown function or design;
+    /// the report is applied nevertheless.
     pub fn take(&mut self, name: &str, report: RobotReport) -> Result<Delta, Message> {
         let component = self.component(name);
         let name = if matches!(report, RobotReport::Component(_)) { component.as_str() } else { name };

@@ -139,7 +139,7 @@ impl Parser<'_> {
         self.has_unknown_section = true;
         let help = match nearest(&keyword, SECTIONS) {
             Some(suggestion) => format!("did you mean `{suggestion}`?"),
-            None => "known sections are those of PDDL 2.1".to_owned(),
+            None => "known sections are those of PDDL 3".to_owned(),
         };
         let message = format!("a {kind} has no section `{keyword}`");
         self.sink.error("P109", list_start(section), message).help(help);

@@ -32,7 +32,8 @@ pub struct Advance {
     pub values: Vec<ValueChange>,
     /// Duration of the step, in the domain's time unit.
     pub duration: BigRational,
-    /// Metric value if the plan ended with the step; `None` without a metric or if the value is undefined.
+    /// Metric value if the plan ended with the step. `None` without a metric or if the value is undefined; a metric
+    /// that counts violated preferences is always undefined here.
     pub metric: Option<BigRational>,
 }
 
@@ -168,7 +169,8 @@ fn is_same(left: &Atom, right: &Atom) -> bool {
 }
 
 /// Returns the metric value if the plan ended in the initial state of the problem after `total_time`, in the
-/// domain's time unit. `None` without a metric or if the value is undefined.
+/// domain's time unit. `None` without a metric or if the value is undefined; a metric that counts violated preferences
+/// is always undefined here.
 pub fn metric_after(domain: &Domain, problem: &Problem, total_time: &BigRational) -> Option<BigRational> {
     let reduced = relevant(domain, problem, &[], None);
     let world = World::new(domain, reduced.as_ref().unwrap_or(problem), &|| false);

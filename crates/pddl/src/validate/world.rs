@@ -51,8 +51,8 @@ pub(super) struct State {
 }
 
 impl<'p> World<'p> {
-    /// Interns the names and builds the indices. Once `stop` returns `true`, loops end early with meaningless
-    /// results.
+    /// Interns the names and builds the indices, without calling `stop`. Once `stop` returns `true`, loops that use
+    /// the world end early with meaningless results.
     pub(super) fn new(domain: &'p Domain, problem: &'p Problem, stop: &'p dyn Fn() -> bool) -> Self {
         let mut world = Self {
             budget: Budget::new(stop),

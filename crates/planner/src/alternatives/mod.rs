@@ -29,8 +29,8 @@ pub use choices::{Alternatives, Forced};
 
 /// Searches for at most `most` cheapest plans other than the plan of an optimal solution. Graph search lists
 /// plans with fewer steps first; SAT search has no particular order. At a limit, returns the plans that were
-/// found before. Returns `None` if the solution is not optimal or has no ground plan, or if operator costs are only
-/// a part of the metric.
+/// found before. Further objectives of the task are ignored. Returns `None` if the solution is not optimal or has no
+/// ground plan, or if operator costs are only a part of the metric.
 pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Config) -> Option<Alternatives> {
     let is_whole = task.objective.rest.is_empty();
     let first = solution.ground.as_ref().filter(|_| solution.status == Status::Optimal && is_whole)?;

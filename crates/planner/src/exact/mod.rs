@@ -290,8 +290,9 @@ impl Heuristic<Rational> for RoundedBounds {
     }
 }
 
-/// Returns a scaling factor for costs. The factor is the least common denominator if the scaled costs have at most
-/// `COST_BITS` bits. Otherwise, it is a power of two for which the greatest cost has about `COST_BITS` bits.
+/// Returns a scaling factor for costs. The factor is the least common denominator if this denominator and the scaled
+/// costs have at most `COST_BITS` bits. Otherwise, it is a common denominator of only the first costs, or a power of
+/// two for which the greatest cost has about `COST_BITS` bits.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "numbers have fewer than 2^63 bits, and the greater length is what the smaller one is taken from"

@@ -10,9 +10,9 @@ use crate::optimize::optimizer_run::Run;
 use crate::optimize::solve::solve;
 use crate::optimize::unbounded_metric::shortest_then_best;
 
-/// Finds a cheapest plan of a task, or the best plan known at a limit. Calls `report` for better plans, and if
-/// the SAT solver raises the lower bound. If actions can reduce the cost, the result is instead a plan with the
-/// fewest steps, and the cheapest of these; `report` is then not called.
+/// Finds a cheapest plan of a task, or the best plan known at a limit. Calls `report` for better plans, for a plan
+/// that a search proves cheapest, and if the SAT solver raises the lower bound. If actions can reduce the cost, the
+/// result is instead a plan with the fewest steps, and the cheapest of these; `report` is then not called.
 ///
 /// Fluents of the metric with state-dependent changes may be unsupported, e.g. if an action may improve the metric.
 /// Then only the remaining part of the metric is minimised, the result has no lower bound, and `report` is not called.

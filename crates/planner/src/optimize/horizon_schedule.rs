@@ -65,8 +65,8 @@ impl HorizonSchedule {
                 // A plan whose cost overflows cannot be used. Other plans are not tried.
                 (Answer::Satisfiable, None) => return FirstPlanOutcome::Over,
                 (Answer::Interrupted, None) => {
-                    // With an unlimited budget, an interruption means that the numbers are too large for a
-                    // formula.
+                    // With an unlimited budget, an interruption means that the formula cannot be built, or that an
+                    // external solver failed.
                     if run.config.limits.reached() || allowance.conflicts == u64::MAX {
                         return FirstPlanOutcome::Over;
                     }

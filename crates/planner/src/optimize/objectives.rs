@@ -23,7 +23,8 @@ use crate::optimize::config::Config;
 /// plan, or the result of a query that did not finish.
 #[derive(Debug, Clone)]
 pub struct Point {
-    /// The solution with its plan. The cost of the plan is its cost under the first objective.
+    /// The solution with its plan. The cost of the plan is its cost under the first objective. Lower bound, proof and
+    /// statistics are those of the search for the first objective.
     pub solution: Solution,
     /// Value of the plan under each objective; empty if there is no plan.
     pub values: Vec<Exact>,
@@ -43,7 +44,8 @@ pub struct Front {
 
 /// Finds a lexicographically optimal plan: optimal under the first objective, among these plans optimal under
 /// the second objective, and so on. Also returns its values under all objectives, which are empty if there is
-/// no plan. At a limit, returns the best known plan, if there is one, with the status `Feasible`.
+/// no plan. At a limit, returns the best known plan, if there is one, with the status `Feasible`. There is one search
+/// for each objective; `report` receives its costs and bounds under this objective.
 ///
 /// ```
 /// use metaplan_planner::pddl::{ast::Direction, read_objective};
@@ -73,7 +75,7 @@ pub fn lexicographic(task: &Task, config: &Config, report: &mut dyn FnMut(Improv
 }
 
 /// Enumerates the Pareto front of the first two objectives until it is complete or a limit is reached. For
-/// each pair of values, only one plan is returned.
+/// each pair of values, only one plan is returned. `report` is called as by [`lexicographic`], for each point anew.
 ///
 /// # Panics
 /// The task has fewer than two objectives.

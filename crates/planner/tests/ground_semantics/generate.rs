@@ -388,7 +388,8 @@ impl<'b> Draw<'b> {
                 (Number::new(this.below(12) as i128, 2), this.atom(&basic), this.chance(50))
             });
             timed.sort_by_key(|(time, ..)| *time);
-            // The language does not define which of two opposite literals at the same time takes effect.
+            // Each time has at most one literal. (PDDL does not define which of two opposite literals at the same time
+            // takes effect; `definition.md` does.)
             timed.dedup_by_key(|(time, ..)| *time);
         }
         Task {

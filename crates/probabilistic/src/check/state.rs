@@ -302,8 +302,9 @@ pub fn compare(op: BinaryOp, order: std::cmp::Ordering) -> bool {
 }
 
 /// Combines two vectors state by state with an arithmetic operator. The resulting errors include the errors of
-/// the operands and the rounding of the operation. Fails for a division by zero. Infinite operands are
-/// permitted only in sums, as the first operand of a difference, and as a divisor.
+/// the operands and the rounding of the operation. Fails for a division by zero in any state, also in one whose
+/// value is not asked for. Infinite operands are permitted only in sums, as the first operand of a difference, and
+/// as a divisor.
 fn joined<N: Number>(op: BinaryOp, left: &Vector<N>, right: &Vector<N>, at: &Expr) -> Checked<Vector<N>> {
     let fault = |text: &str| Stop::Wrong(property_error("Q303", at.place, text));
     let mut vector = Vector::exactly(Vec::with_capacity(left.values.len()), Span::Any);

@@ -35,8 +35,8 @@ pub struct Problem<'a, N> {
     pub terminal_values: Option<&'a [N]>,
     /// States in which a path ends as a failure. Their value is 0 without rewards, and infinite with rewards.
     pub blocked: Option<&'a FixedBitSet>,
-    /// The allowed choices; `None` allows all choices. Each nonterminal state needs an allowed
-    /// choice.
+    /// The allowed choices; `None` allows all choices. In a nonterminal state without an allowed choice, a path
+    /// ends as a failure, as in a blocked state.
     pub allowed: Option<&'a FixedBitSet>,
 }
 

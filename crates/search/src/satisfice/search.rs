@@ -153,7 +153,8 @@ impl<N: TaskNumber> Search<N> {
         search
     }
 
-    /// Returns the approximate memory use of states, landmarks and open lists, in 64-bit words.
+    /// Returns the approximate memory use of states, landmarks, novelty and the steps in the open lists, in
+    /// 64-bit words. Nodes, hash tables and the entries of the open lists are not counted.
     pub(super) fn size(&self) -> usize {
         let states = self.store.size().saturating_add(self.reached.len());
         states.saturating_add(self.open.size()).saturating_add(self.novelty.size())

@@ -16,8 +16,8 @@ use crate::satisfice::landmarks::Landmarks;
 use crate::search::design_combinations::pareto_optimal_combinations;
 use crate::search::{MutexPairs, SearchStatistics, is_monotone};
 
-/// Divisor of the memory limit in bytes. A search ends if it needs more 64-bit words than the quotient, i.e.
-/// more than half of the available memory.
+/// Divisor of the memory limit in bytes. A search ends if `Search::size` exceeds the quotient, i.e. if what is
+/// counted there takes more than half of the available memory.
 pub(super) const MEMORY_SHARE: usize = 16;
 /// Work units charged for generating a successor and looking it up in the store.
 pub(super) const GENERATION_COST: u64 = 200;

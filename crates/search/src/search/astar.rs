@@ -113,7 +113,8 @@ pub struct AStar<'a, N, E> {
     /// Work units without those of the lazy heuristic.
     own_work: u64,
     sharing: usize,
-    /// Lower bound on the cost of every plan; `None` before the first expansion. Meaningless in greedy search.
+    /// Lower bound on the cost of every plan; `None` before the first expansion. Not a bound in greedy search,
+    /// or if `states_dropped` is `true`.
     bound: Option<N>,
     is_interrupted: bool,
     pub(super) patience: OutOfMemoryPolicy,
@@ -225,8 +226,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
             if self.store.is_dominated(id) {
                 continue;
             }
-            // Keys are popped in ascending order, so the first node that cannot improve the incumbent ends
-            // the search.
+            // No open node has a smaller key, so the first node that cannot improve the incumbent ends the
+            // search.
             let (total, least, _) = &key;
             if self.can_stop_at(total, *least) {
                 return Some(self.outcome_when_exhausted());

@@ -43,7 +43,8 @@ struct PolarityAnalysis<'a, N> {
     changed: bool,
 }
 
-/// Returns the polarity of each numeric variable of a task.
+/// Returns the polarity of each numeric variable of a task. Only conditions, effects and the goal count; a
+/// metric that reads numeric variables is ignored.
 pub fn directions<N: TaskNumber>(task: &Task<N>) -> Vec<Polarity> {
     let numbers = vec![Polarity::default(); task.initial.numbers.len()];
     let facts = vec![Polarity::default(); task.variables.len()];

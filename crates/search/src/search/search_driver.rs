@@ -212,8 +212,9 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
     /// `STATE_LIMIT`, the LM-cut search gets a quarter of the work. In all other cases, a search
     /// gets half if it lags behind or is forecast to run out of memory.
     ///
-    /// Returns `None` if the searches are not finished. `SearchOutcome::Unknown(None)` also means that no
-    /// plan is cheaper than the cost set by `set_upper_bound`.
+    /// Returns `None` if the searches are not finished. `SearchOutcome::Unknown(None)` alone proves nothing. It
+    /// is also returned if a search reaches the cost set by `set_upper_bound`; the proof is then the lower
+    /// bound that `hear` has received.
     pub fn run(&mut self, max_states: usize, hear: ProgressCallback<'_, N>) -> Option<SearchOutcome<N>> {
         if !self.has_begun {
             let outcome = self.searches[0].run_until_states(max_states, hear);

@@ -1,9 +1,9 @@
 //! Duration constraints of durative actions, in particular variable durations.
 //!
 //! In sequential execution without timed events, a variable duration takes its lower bound, or its upper bound
-//! if the metric rewards time. There must be exactly one such bound, and no effect may depend on the duration.
-//! Other variable durations are errors. If actions may overlap, the planner chooses a duration when the action
-//! starts.
+//! if the metric rewards time. There must be exactly one such bound, which is not strict, and no condition or
+//! effect may depend on the duration. Other variable durations are errors. If actions may overlap, the planner
+//! chooses a duration when the action starts.
 
 use crate::error::{File, Place};
 use crate::lifted::{Expression, Formula, Function, FunctionId, Metric, Rational, Term};

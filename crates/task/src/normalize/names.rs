@@ -14,8 +14,8 @@ use pddl::ast::{self, Identifier, Name, Span, TypeExpression, TypedName};
 pub(super) enum Duration {
     Instantaneous,
     Fixed(Expression),
-    /// The duration is variable, and the planner takes its shortest or longest value. Effects must not depend
-    /// on it.
+    /// The duration is variable, and the planner takes its shortest or longest value. Conditions and effects must
+    /// not depend on it.
     Open,
 }
 

@@ -1,9 +1,10 @@
 //! Makespan heuristic: lower bound on the remaining time, for each goal variable separately.
 //!
-//! A variable changes its values one after another. A change reads the variable, so it takes place
-//! at least a separation after the previous change. An action that requires a value from its start
-//! to its end takes its duration. The bound is the length of a shortest path to the goal value,
-//! counted from the time of the last change.
+//! A variable changes its values one after another. A change that requires the old value reads the
+//! variable, so it takes place at least a separation after the previous change; other changes can
+//! follow at once. An action that requires a value from its start to its end takes its duration. The
+//! bound is the length of a shortest path to the goal value, counted from the time of the last
+//! change.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

@@ -41,7 +41,7 @@ pub(super) struct TimedRelaxedPlan {
     /// Time at which the last target holds.
     pub(super) finish: i64,
     /// Starts, actions without duration, and timed initial literals, sorted by the latest time at which they
-    /// must happen. A happening occurs once for each of its repetitions.
+    /// must happen. A happening occurs once for each of its repetitions, at most `MAX_REPETITIONS` times.
     pub(super) happenings: Vec<OperatorId>,
 }
 

@@ -34,9 +34,9 @@ use threads::Threads;
 /// Parameters with which a worker runs its partitions.
 #[derive(Debug, Clone, Copy)]
 pub struct Settings {
-    /// Maximum number of loops that search for plans at the same time, for each class of durations (up to 25 ms, up to
-    /// 400 ms, longer); in the last class one less, but at least one. The same number limits loops that work without a
-    /// search.
+    /// Number of places for searches, for each class of durations (up to 25 ms, up to 400 ms, longer); in the last
+    /// class one less, but at least one. A search that exceeds the duration of its class gives up its place and
+    /// continues, so more searches can run. The same number limits loops that work without a search.
     pub threads: usize,
     /// Time for which a decision waits for a plan. If the search takes longer, the reaction to the event is published
     /// without it, and further events are handled in the meantime. Zero: no decision about an event contains a plan
@@ -93,7 +93,7 @@ pub struct Shared<S> {
 pub struct Counts {
     /// Number of robots in memory.
     pub robots: AtomicU64,
-    /// Number of events that are read but not decided.
+    /// Number of events that are read but neither decided nor refused, without those of suspended robots.
     pub waiting: AtomicU64,
     /// Number of partitions that are running.
     pub partitions: AtomicU64,

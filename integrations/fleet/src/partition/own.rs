@@ -54,7 +54,7 @@ struct Slot {
     waiting: VecDeque<Stored>,
     /// Sequence numbers of the events after those in `waiting`. They are read again when it is their turn.
     later: VecDeque<u64>,
-    /// `true` if the robot cannot continue. Its events stay in the log, except that one can retire the robot.
+    /// `true` if the robot cannot continue. Its events stay in the log, and only a retirement is handled.
     is_suspended: bool,
     /// Sequence number of the last event that was decided or refused.
     handled: u64,
@@ -80,7 +80,7 @@ impl Slot {
 enum Done {
     /// An event was handled, or, without a sequence number, planning was started or concluded.
     Handled { task: Task, sequence: Option<u64>, outcome: Outcome, planning: Option<Planning> },
-    /// A search has ended. There are no plans if it has panicked.
+    /// A search has ended. There are no plans if it has panicked, or if its thread could not be started.
     Planned { robot: String, result: Option<(Thoughts, Duration)> },
     /// Handled events of a robot were discarded, or could not be discarded.
     Discarded { robot: String, is_done: bool },
@@ -360,8 +360,8 @@ impl<S: Store> Partition<S> {
         }
     }
 
-    /// Unloads idle robots, the least recently used ones first, while the worker has more loaded robots than its
-    /// limit.
+    /// Unloads idle robots of this partition, the least recently used ones first, while the worker has more loaded
+    /// robots than its limit.
     fn unload(&mut self) {
         while self.shared.counts.robots.load(Ordering::Relaxed) > self.shared.settings.warm as u64 {
             let Some((used, name)) = self.recent.pop_front() else { return };

@@ -14,7 +14,7 @@ use crate::robot::{Begun, Faulted, Refused, Robot};
 use crate::store::{Fault, Message, Store, Stored, Stream};
 use crate::wire::Decided;
 
-/// Reason why a robot is suspended after a panic.
+/// Reason why a robot is suspended after a panic, and if the thread of a search cannot be started.
 pub(super) const PANICKED: &str = "its loop has panicked";
 
 /// State of a robot after its last decision, which has the sequence number `chain`; 0 without a decision.
@@ -47,7 +47,8 @@ pub(super) enum Outcome {
 /// A search for a plan that continues after the decision.
 pub(super) struct Planning {
     pub(super) search: SearchHandle,
-    /// The plans and the new estimate of the duration of a search. `None` if the search has panicked.
+    /// The plans and the new estimate of the duration of a search. `None` if the search has panicked or could not be
+    /// started.
     pub(super) result: BoxFuture<'static, Option<(Thoughts, Duration)>>,
 }
 

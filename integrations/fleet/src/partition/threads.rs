@@ -1,11 +1,11 @@
 //! Threads for the loops of robots, so that long searches do not delay short work.
 //!
-//! Work without a search has threads of its own. Searches have a pool of threads for each class of durations (a
-//! multilevel feedback queue): a search begins in the class of the robot's last searches, or, for a robot that has
-//! not searched, in the class of the last searches for its mission. A search that exceeds the maximum duration of its
-//! class leaves its place to another one, and continues. Afterwards its robot and its mission have a higher class, so this
-//! happens rarely. The operating system shares the processors among the threads; those of the longer classes have a
-//! lower priority.
+//! Work without a search has threads of its own. Each search has a thread, which starts when a place in its class of
+//! durations is free (a multilevel feedback queue). A search begins in the class of the robot's last searches, or,
+//! for a robot that has not searched, in the class of the last searches for its mission. A search that exceeds the
+//! maximum duration of its class gives up its place and continues, so there can be more searches than places.
+//! Afterwards its robot and its mission have a higher class, so this happens rarely. The operating system shares the
+//! processors among the threads; those of the longer classes have a lower priority.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicI32, Ordering};

@@ -4,8 +4,8 @@
 //!
 //! Ignored by default, because it needs `nats-server` (2.11 or newer), given by `NATS_SERVER` or
 //! found in the search path. Further variables: `SCHEDULES` (20), `SEED` (1), `ROBOTS` (1000),
-//! `EVENTS` per robot (100), sent within `SECONDS` (20). The seed determines the faults, but their
-//! timing depends on the machine.
+//! `EVENTS` per robot (100; 20 in `figures`), sent within about `SECONDS` (20). The seed determines the faults,
+//! but their timing depends on the machine.
 
 #![expect(clippy::print_stdout, reason = "what was done to whom is said while it is done")]
 

@@ -56,7 +56,7 @@ async fn tell<S: Store>(store: &S, robot: &str, events: &[String]) -> Vec<u64> {
     sequences
 }
 
-/// Returns the messages of a stream in a log with a single partition, or those of all partitions.
+/// Returns the messages of a stream, one partition after another.
 async fn all<S: Store>(store: &S, stream: Stream) -> Vec<Stored> {
     let mut messages = Vec::new();
     for partition in 0..store.partitions() {

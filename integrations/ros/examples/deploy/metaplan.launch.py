@@ -19,7 +19,7 @@ ARGUMENTS = (
     ("role", "manager", "manager, reasoner, planner or controller"),
     ("mission", "", "a mission's manifest; the planner can do without"),
     ("settings", "", "how the mission meets the robot; ros.toml beside the mission if empty"),
-    ("journal", "", "a directory for the manager's journal; none if empty"),
+    ("journal", "", "a directory for the journal of a manager or reasoner; none if empty"),
     ("rmw", "auto", "auto, fastrtps or cyclonedds: how services are mapped"),
     ("namespace", "", "of the node"),
     ("params_file", str(Path(__file__).with_name("metaplan.yaml")), "parameters; none if empty"),

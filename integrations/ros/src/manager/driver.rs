@@ -143,7 +143,8 @@ impl Driver {
     /// the designs and passes the current modes of the functions to the state machine. Returns
     /// early if `stop` is set.
     ///
-    /// Requests to start or end a task wait for at most [`TASK_WAIT`]; a start is then refused.
+    /// Requests to start or end a task wait for at most [`TASK_WAIT`]. A start is then refused. An end then takes
+    /// effect, and gets its reply, only when the functions are present.
     fn wait_for_functions(
         &mut self,
         sender: &Sender<Input>,

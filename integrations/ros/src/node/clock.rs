@@ -10,7 +10,7 @@ use crate::interfaces::builtin_interfaces::msg::Time;
 use crate::interfaces::rosgraph_msgs::msg::Clock as ClockMessage;
 use crate::node::{Node, Severity, qos};
 
-/// Time from the subscription to `/clock` until a warning is logged if no message has arrived.
+/// Time from the first subscription to `/clock` until a warning is logged if no message has arrived.
 const CLOCK_WAIT: Duration = Duration::from_secs(5);
 
 #[derive(Debug)]
@@ -125,7 +125,7 @@ impl Node {
                 state.is_simulated && state.simulated.is_none()
             };
             if is_missing {
-                let text = "use_sim_time is true, but /clock has no publisher: time does not advance";
+                let text = "use_sim_time is true, but no message has arrived on /clock: time does not advance";
                 node.log(Severity::Warn, text);
             }
         });

@@ -164,8 +164,8 @@ impl Offer {
         }
     }
 
-    /// Reports the progress and the end of the action to the executor. The end is not reported
-    /// after a cancellation.
+    /// Reports the progress and the end of the action to the executor, also after its request to cancel the action.
+    /// Only the end [`End::Canceled`] is not reported.
     async fn report_progress(&self, running: &Running) {
         loop {
             let progress = running.next().await;

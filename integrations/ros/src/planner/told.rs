@@ -1,5 +1,5 @@
-//! Publication of planning results: in the log, and as JSON on the topic `~/plan`. The JSON
-//! contains the designs, for which PlanSys2's plans have no field.
+//! Publication of planning results: plans and reasons for their absence in the log, and plans as JSON on the topic
+//! `~/plan`. The JSON contains the designs, for which PlanSys2's plans have no field.
 
 use std::sync::Arc;
 

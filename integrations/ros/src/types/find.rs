@@ -1,4 +1,4 @@
-//! Reading of single fields from data in CDR, little endian. Data in big endian are not supported.
+//! Reading of single fields from data in CDR, little endian. Data in big endian are not recognised and are misread.
 //!
 //! Fields before the requested one are skipped without decoding them, because they may contain a large map or image.
 

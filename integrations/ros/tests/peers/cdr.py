@@ -92,7 +92,7 @@ def compare(rust: Rust, name: str, variant: str | None, types: Any) -> list[str]
 
 
 def rubbish(rust: Rust, name: str, variant: str | None, types: Any) -> list[str]:
-    """Every shortened text of a value has to be refused or read, never to end the program."""
+    """Shortened octets of a value, and huge lengths, have to be refused or read, never to end the program."""
     octets = codec.encode(name, value_of((codec.NAME, name), types, random.Random(name), True), types)
     for length in sorted({4, 5, len(octets) // 2, max(len(octets) - 1, 4)}):
         rust.ask(type=name, cdr=octets[:length].hex(), **({"variant": variant} if variant else {}))

@@ -1,8 +1,8 @@
 """Simulated SUAVE: the mission node, system_modes' mode manager, the monitors and, for a reasoner, MROS's bridges.
 
-Plays a stream of stimuli at full speed: the next one is sent when the robot has settled after the last one. With
-`--role manager` the system under test owns `/task/request` and calls `/<function>/change_mode`; with `--role reasoner`
-it serves `/mros/objective` and calls `/mros/request_configuration`. Prints a summary as JSON at the end.
+Plays a stream of stimuli at full speed: the next one is sent when the robot has settled after the last one. In the role
+`manager` the system under test serves `/task/request` and calls `/<function>/change_mode`; in the role `reasoner` it
+serves `/mros/objective` and calls `/mros/request_configuration`.
 """
 
 from __future__ import annotations

@@ -187,7 +187,7 @@ class Scout:
 
     @contextlib.contextmanager
     def managed(self, settings: str = STEPS, *arguments: str) -> Iterator[tempfile._TemporaryFileWrapper]:
-        """Starts the nodes and the manager, and waits until the first move runs; yields the log."""
+        """Starts the nodes and the manager, and yields the log. Does not wait until the manager is ready."""
         with tempfile.NamedTemporaryFile("w", suffix=".toml") as file:
             file.write(settings)
             file.flush()

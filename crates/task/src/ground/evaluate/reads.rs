@@ -71,7 +71,6 @@ impl Reads {
             }
             Formula::Exists(bound, body) | Formula::ForAll(bound, body) => {
                 let outer = self.scope.len();
-                // An inner quantifier may reuse a variable, so the scope is a stack.
                 self.scope.extend(bound.iter().cloned());
                 self.condition(lifted, body, binding);
                 self.scope.truncate(outer);

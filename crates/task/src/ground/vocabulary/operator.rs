@@ -25,8 +25,8 @@ pub struct GroundOperator {
     pub(crate) condition: GroundCondition,
     pub(crate) adds: Vec<AtomId>,
     pub(crate) deletes: Vec<AtomId>,
-    /// Conditional effects, which apply after `adds` and `deletes`. The changes of one entry are
-    /// simultaneous; additions take precedence over deletions.
+    /// Conditional effects, which apply after `adds` and `deletes`: first the deletions of all entries, then their
+    /// additions.
     pub(crate) conditional: Vec<GroundConditional>,
     pub(crate) numeric_effects: Numbers,
     pub(crate) costs: Vec<Quantity<Rational>>,

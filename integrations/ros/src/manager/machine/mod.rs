@@ -310,7 +310,8 @@ impl Machine {
                     _ => self.queue(&Event::Cancelled { action: effect.action }),
                 }
             }
-            // Functions keep their modes, and nodes keep the results of their work.
+            // Suspension and resumption of an action. They are not passed to the performer: the action goes on, and
+            // functions keep their modes.
             _ => self.acknowledge(effect.number),
         }
     }

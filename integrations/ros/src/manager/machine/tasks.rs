@@ -1,5 +1,5 @@
-//! Requests to start and end tasks, and the replies. A task ends if a client cancels it, if its goal is reached, or
-//! if the autopilot leaves its mode.
+//! Requests to start and end tasks, and the replies. A task ends if a client cancels it or requests another task, if
+//! its goal is reached, or if the autopilot leaves its mode.
 
 use metaplan::mapek::Event;
 use metaplan::message::did_you_mean;

@@ -4,9 +4,11 @@
 //
 //   W id topic type depth transient_local        a writer          w id cdr             publishes
 //   R id topic type depth transient_local        a reader          d id cdr             came in (output)
-//   Q id service-request-topic type reader-id    request writer    q id token cdr       requests; S token sequence (output)
-//   (replies come as) a reader-id sequence cdr                     r id identity cdr    replies to an identity
-//   (requests come as) d id cdr identity                           m id count           endpoints matched, on change (output)
+//   R id topic type depth transient_local 1      a reader of replies    a id identity cdr    a reply came in (output)
+//   q id reader-id token cdr                     requests, by a writer and the reader of its replies
+//   S token reader-guid writer-guid sequence     the request was written (output)
+//   (requests come as) d id cdr identity                           r id identity cdr    replies to an identity
+//   m id count                                                     endpoints matched, on change (output)
 //   g hex                                                          the participant's GUID (output, first)
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
