@@ -24,8 +24,8 @@ pub struct Sender<S> {
 }
 
 impl<S: Store> Sender<S> {
-    /// Creates a sender for a robot. `session` becomes a part of the message ids. It should not end with a digit: the
-    /// event 11 of session `1` and the event 1 of session `11` have the same id.
+    /// Creates a sender for a robot. `session` becomes a part of the message ids. It should not end with a digit: without
+    /// a separator, the event 11 of session `1` and the event 1 of session `11` have the same id.
     ///
     /// If a second sender has the same session, it must send the same events in the same order. It
     /// then creates the same message ids. So no event is decided twice, and none is stored twice

@@ -26,8 +26,7 @@ impl Literal {
     }
 
     /// Returns `true` if two literals certainly have different values. Returns `false` if they are equal,
-    /// or if that is undecided. Exception: a rational number with more than 34 fractional digits differs from every
-    /// decimal, even from an equal one.
+    /// or if that is undecided.
     pub fn differs(&self, other: &Self) -> bool {
         if self == other {
             return false;

@@ -82,8 +82,7 @@ impl Moment {
     /// Returns the moment plus a duration, with the same time zone; the calculation is in local time. Months are
     /// added first; a day that does not exist in the new month becomes its last day. Then seconds are added. A time
     /// of day wraps around at midnight. A date is rounded down to whole days. Returns `None` if months are added to a
-    /// time of day, or if the years after the months or the local seconds of the result are out of range. The year of
-    /// the result can be outside the range of parsed moments, because seconds are added without that test.
+    /// time of day, or if the result is about a billion years from 1970 or farther.
     pub(crate) fn later(&self, duration: &Duration) -> Option<Self> {
         let local = self.local();
         let (day, _) = split_day(&local);
