@@ -125,7 +125,8 @@ impl Node {
                 state.is_simulated && state.simulated.is_none()
             };
             if is_missing {
-                let text = "use_sim_time is true, but no message has arrived on /clock: time does not advance";
+                let text =
+                    "use_sim_time is true, but no message has arrived on /clock: time does not advance";
                 node.log(Severity::Warn, text);
             }
         });
