@@ -246,7 +246,8 @@ impl Machine {
 
     /// Reports designs as realisable again once their retry delay is over. Forgets granted modes
     /// once their period is over; if another mode was reported in the meantime, requests the
-    /// current mode of the function. In the state EXECUTE, also passes a due tick to the loop.
+    /// current mode of the function. In the states EXECUTE and DEGRADED, also passes a due tick to the loop: filters
+    /// hold the report of a component that works again until a later line, and equal statuses are no lines.
     pub(super) fn tick(&mut self) -> String {
         let now = self.now;
         let mut back = Vec::new();
@@ -268,7 +269,7 @@ impl Machine {
             !is_over
         });
         let is_due = self.control.due().is_some_and(|due| due <= self.now);
-        if is_due && self.state == State::Execute {
+        if is_due && matches!(self.state, State::Execute | State::Degraded) {
             self.queue(&Event::Tick);
         }
         "time has passed".to_owned()

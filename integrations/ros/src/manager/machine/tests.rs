@@ -20,7 +20,11 @@ struct Robot {
 }
 
 fn control() -> (Loop, Settings) {
-    let mission = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/suave/suave.toml");
+    control_of("suave/suave.toml")
+}
+
+fn control_of(example: &str) -> (Loop, Settings) {
+    let mission = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples").join(example);
     let setup = Setup::read(&mission).expect("the mission is read");
     let settings = Settings::read(None, &mission).expect("settings");
     (Loop::new(setup.mission, setup.settings).expect("it can be planned for"), settings)
@@ -350,6 +354,29 @@ fn a_restart_repeats_no_fulfilled_request() {
     let text = format!("{report:?}");
     assert!(text.contains("WAIT_GRAPH -> IDLE: every function answers"), "{text}");
     assert!(text.contains("IDLE -> PLAN -> RECONFIGURE: the task search_pipeline is requested"), "{text}");
+}
+
+#[test]
+fn a_degraded_robot_goes_on_when_a_component_has_healed() {
+    let (control, settings) = control_of("nav2/mission.toml");
+    let mut robot = Robot::with(control, settings, None, |_| "fd_unground");
+    let report = |component: &str, status: &str| {
+        Input::Line(format!(
+            r#"{{"event":"component_status","component":"{component}","status":"{status}"}}"#
+        ))
+    };
+    for component in ["c_lidar", "c_camera"] {
+        robot.handle(report(component, "FALSE"));
+        let pending: Vec<Output> = robot.machine.pending.values().cloned().map(Output::Change).collect();
+        robot.obey(pending);
+    }
+    assert_eq!(robot.machine.state(), State::Degraded);
+    robot.handle(report("c_lidar", "TRUE"));
+    assert_eq!(robot.machine.state(), State::Degraded, "the report must last");
+    robot.now += Duration::from_secs(3);
+    let outputs = robot.handle(Input::Tick);
+    robot.obey(outputs);
+    assert_eq!(robot.machine.state(), State::Execute);
 }
 
 /// Creates a machine whose spiral has steps for its designs, but none for the time when it is not needed.
