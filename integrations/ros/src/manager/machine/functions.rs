@@ -46,7 +46,13 @@ impl Machine {
         let requested = self.pending.get(function).map(|change| &change.mode);
         let has = requested.or_else(|| self.modes.get(function));
         if has.is_some_and(|has| *has != mode) {
+            let replaced = self.pending.get(function).and_then(|change| change.effect);
             self.change(function.to_owned(), mode, None);
+            // The loop would request the design again after its deadline, although no one needs it any more.
+            if let Some(effect) = replaced {
+                self.acknowledge(effect);
+                self.queue(&Event::Observed { function: function.to_owned(), design: None });
+            }
         }
     }
 

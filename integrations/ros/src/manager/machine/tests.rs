@@ -379,6 +379,25 @@ fn a_degraded_robot_goes_on_when_a_component_has_healed() {
     assert_eq!(robot.machine.state(), State::Execute);
 }
 
+#[test]
+fn a_mode_whose_task_has_ended_is_not_requested_again() {
+    let mut robot = Robot::new(None);
+    let outputs = robot.request("search_pipeline");
+    let path = outputs
+        .iter()
+        .find(|output| matches!(output, Output::Change(change) if change.function == PATH))
+        .expect("a change");
+    robot.answer(path, Outcome::Done);
+    // The motion has not answered yet.
+    let outputs = robot.handle(Input::Cancel(8, "search_pipeline".to_owned()));
+    assert_eq!(changes(&outputs), [(PATH, "fd_unground"), (MOTION, "fd_unground")]);
+    robot.obey(outputs);
+    assert_eq!(robot.machine.control().beliefs().outstanding().count(), 0);
+    robot.now += Duration::from_secs(30);
+    assert_eq!(changes(&robot.measure("water_visibility", "3.4")), []);
+    assert_eq!(robot.machine.state(), State::Idle);
+}
+
 /// Creates a machine whose spiral has steps for its designs, but none for the time when it is not needed.
 fn with_steps() -> Robot {
     let mission = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/suave/suave.toml");
