@@ -63,6 +63,7 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
         (function, designs)
     });
     settings.check_steps(&designs.collect(), options.allow_commands)?;
+    settings.check_mission(&mission)?;
     for warning in mission.warnings() {
         node.log(Severity::Warn, warning.text().trim_end());
     }
