@@ -33,6 +33,8 @@ struct Action {
     call: Call,
     effect: u64,
     begun: bool,
+    /// `true` for an action of the previous run until it is performed again.
+    is_lost: bool,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -169,6 +171,7 @@ impl Machine {
             self.catch_up();
             self.settle()?;
         }
+        self.repeat_action();
         self.begin();
         self.settle()?;
         self.enter(&because)?;
@@ -299,8 +302,13 @@ impl Machine {
                 for function in &idle {
                     self.unground(function);
                 }
-                self.action =
-                    Some(Action { number: effect.action, call, effect: effect.number, begun: false });
+                self.action = Some(Action {
+                    number: effect.action,
+                    call,
+                    effect: effect.number,
+                    begun: false,
+                    is_lost: false,
+                });
             }
             Command::Cancel { .. } => {
                 self.acknowledge(effect.number);

@@ -42,20 +42,35 @@ impl Robot {
     }
 
     fn with(
-        mut control: Loop,
+        control: Loop,
         settings: Settings,
         journal: Option<&Path>,
         mode: impl Fn(&str) -> &'static str,
     ) -> Self {
+        let mut robot = Self::waiting(control, settings, journal);
+        robot.ready(mode);
+        robot
+    }
+
+    /// Creates a machine that waits for its functions.
+    fn waiting(mut control: Loop, settings: Settings, journal: Option<&Path>) -> Self {
         let journal =
             journal.map(|path| Journal::open(path, Policy::default(), &mut control).expect("a journal").0);
-        let machine = Machine::new(control, journal, settings);
-        let modes =
-            machine.functions().iter().map(|name| (name.clone(), Some(mode(name).to_owned()))).collect();
-        let mut robot = Self { machine, now: Duration::ZERO };
+        let robot = Self { machine: Machine::new(control, journal, settings), now: Duration::ZERO };
         assert_eq!(robot.machine.state(), State::WaitGraph);
-        robot.handle(Input::Ready(modes));
         robot
+    }
+
+    fn ready(&mut self, mode: impl Fn(&str) -> &'static str) -> Vec<Output> {
+        let functions = self.machine.functions().iter();
+        let modes = functions.map(|name| (name.clone(), Some(mode(name).to_owned()))).collect();
+        self.handle(Input::Ready(modes))
+    }
+
+    /// Creates a machine that waits for its functions after a restart during the task of another one.
+    fn restarted(journal: &Path) -> Self {
+        let (control, settings) = control();
+        Self::waiting(control, settings, Some(journal))
     }
 
     /// Handles an input and returns the outputs other than events and plans.
@@ -356,6 +371,15 @@ fn a_restart_repeats_no_fulfilled_request() {
     assert!(text.contains("IDLE -> PLAN -> RECONFIGURE: the task search_pipeline is requested"), "{text}");
 }
 
+/// Mode of a function while the pipeline is searched.
+fn searching(function: &str) -> &'static str {
+    match function {
+        PATH => "fd_spiral_high",
+        MOTION => "fd_all_thrusters",
+        _ => "fd_unground",
+    }
+}
+
 #[test]
 fn a_degraded_robot_goes_on_when_a_component_has_healed() {
     let (control, settings) = control_of("nav2/mission.toml");
@@ -396,6 +420,43 @@ fn a_mode_whose_task_has_ended_is_not_requested_again() {
     robot.now += Duration::from_secs(30);
     assert_eq!(changes(&robot.measure("water_visibility", "3.4")), []);
     assert_eq!(robot.machine.state(), State::Idle);
+}
+
+#[test]
+fn a_task_that_is_cancelled_before_the_functions_are_found_is_not_carried_out() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let mut robot = Robot::new(Some(directory.path()));
+    let outputs = robot.request("search_pipeline");
+    robot.obey(outputs);
+    drop(robot);
+    let mut robot = Robot::restarted(directory.path());
+    assert_eq!(robot.handle(Input::Cancel(8, "search_pipeline".to_owned())), []);
+    let outputs = robot.ready(searching);
+    assert_eq!(performed(&outputs), Vec::<&str>::new());
+    assert_eq!(changes(&outputs), [(PATH, "fd_unground"), (MOTION, "fd_unground")]);
+    let outputs = robot.obey(outputs);
+    assert!(outputs.contains(&Output::Reply(8, true)), "{outputs:?}");
+    robot.now += Duration::from_secs(4);
+    robot.handle(Input::Tick);
+    let configuration = robot.machine.control().beliefs().configuration();
+    assert!(configuration.get(PATH).is_none() && configuration.get(MOTION).is_none(), "{configuration:?}");
+}
+
+#[test]
+fn an_action_that_was_being_cancelled_is_not_repeated_after_a_restart() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let mut robot = Robot::new(Some(directory.path()));
+    let outputs = robot.request("search_pipeline");
+    robot.obey(outputs);
+    let outputs = robot.measure("battery_level", "0.2");
+    assert!(outputs.iter().any(|output| matches!(output, Output::Stop(_))), "{outputs:?}");
+    // The program ends before the performer has reported the end.
+    drop(robot);
+    let mut robot = Robot::restarted(directory.path());
+    let mut outputs = robot.ready(searching);
+    robot.now += Duration::from_secs(4);
+    outputs.extend(robot.handle(Input::Tick));
+    assert_eq!(performed(&robot.obey(outputs)), ["recharge"]);
 }
 
 /// Creates a machine whose spiral has steps for its designs, but none for the time when it is not needed.
