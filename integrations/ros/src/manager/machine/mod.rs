@@ -35,6 +35,8 @@ struct Action {
     begun: bool,
     /// `true` for an action of the previous run until it is performed again.
     is_lost: bool,
+    /// `true` once the performer was asked to end the action because the loop has suspended it.
+    is_stopped: bool,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -174,6 +176,7 @@ impl Machine {
         self.repeat_action();
         self.begin();
         self.settle()?;
+        self.stop_suspended();
         self.enter(&because)?;
         Ok(std::mem::take(&mut self.outputs))
     }
@@ -308,6 +311,7 @@ impl Machine {
                     effect: effect.number,
                     begun: false,
                     is_lost: false,
+                    is_stopped: false,
                 });
             }
             Command::Cancel { .. } => {
@@ -318,7 +322,7 @@ impl Machine {
                     _ => self.queue(&Event::Cancelled { action: effect.action }),
                 }
             }
-            // Functions keep their modes, and nodes keep the results of their work.
+            // An action is begun or stopped once all answers are handled.
             _ => self.acknowledge(effect.number),
         }
     }

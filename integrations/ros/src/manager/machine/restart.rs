@@ -70,7 +70,7 @@ impl Machine {
         let effect = self.control.beliefs().outstanding().find(is_waiting).map(|effect| effect.number);
         let begun = effect.is_none();
         let effect = effect.unwrap_or_default();
-        self.action = Some(Action { number, call, effect, begun, is_lost: true });
+        self.action = Some(Action { number, call, effect, begun, is_lost: true, is_stopped: false });
     }
 
     /// Performs the begun action of the previous run again, unless a line that was queued in the meantime has ended it,

@@ -404,6 +404,20 @@ fn a_degraded_robot_goes_on_when_a_component_has_healed() {
 }
 
 #[test]
+fn an_action_that_is_suspended_is_stopped() {
+    let mut robot = Robot::new(None);
+    let outputs = robot.request("search_pipeline");
+    robot.obey(outputs);
+    let outputs = robot.measure("water_visibility", "1");
+    assert_eq!(outputs.iter().filter(|output| matches!(output, Output::Stop(1))).count(), 1, "{outputs:?}");
+    assert_eq!(robot.measure("water_visibility", "0.9"), [], "it is stopped once");
+    robot.handle(Input::Performed(1, Ended::Cancelled));
+    assert_eq!(robot.machine.state(), State::Degraded);
+    let outputs = robot.measure("water_visibility", "4");
+    assert_eq!(performed(&robot.obey(outputs)), ["search_pipeline"]);
+}
+
+#[test]
 fn a_mode_whose_task_has_ended_is_not_requested_again() {
     let mut robot = Robot::new(None);
     let outputs = robot.request("search_pipeline");
