@@ -93,6 +93,43 @@ fn a_design_that_is_refused_is_replaced_and_tried_again() {
 }
 
 #[test]
+fn a_design_required_during_a_cancellation_does_not_replace_it() {
+    for outcome in [Outcome::Done, Outcome::Refused] {
+        let (mut keeping, goal) = (keeping(), GoalId::new_random());
+        keeping.pursue(goal, &wanted(PATH));
+        let first = requested_modes(&mut keeping);
+        keeping.answered(&first[0], Outcome::Done, NOW);
+        keeping.cancel(goal);
+        let end = requested_modes(&mut keeping);
+        assert_eq!(modes(&end), ["fd_unground"]);
+        assert_eq!(see(&mut keeping, "2.3"), []);
+        let is_done = outcome == Outcome::Done;
+        keeping.answered(&end[0], outcome, NOW);
+        let outputs = keeping.outputs();
+        assert!(outputs.contains(&Output::Cancelled(goal, is_done)), "{outputs:?}");
+        let is_medium = |output: &Output| matches!(output, Output::Configure(wanted) if wanted.mode == "fd_spiral_medium");
+        assert_eq!(outputs.iter().any(is_medium), !is_done, "{outputs:?}");
+    }
+}
+
+#[test]
+fn a_function_keeps_its_design_until_its_last_objective_ends() {
+    let (mut keeping, goals) = (keeping(), [GoalId::new_random(), GoalId::new_random()]);
+    for goal in goals {
+        keeping.pursue(goal, &wanted(PATH));
+        for requested in requested_modes(&mut keeping) {
+            keeping.answered(&requested, Outcome::Done, NOW);
+        }
+    }
+    keeping.cancel(goals[0]);
+    let outputs = keeping.outputs();
+    assert!(outputs.contains(&Output::Cancelled(goals[0], true)), "{outputs:?}");
+    assert!(!outputs.iter().any(|output| matches!(output, Output::Configure(_))), "{outputs:?}");
+    keeping.cancel(goals[1]);
+    assert_eq!(modes(&requested_modes(&mut keeping)), ["fd_unground"]);
+}
+
+#[test]
 fn a_restart_repeats_no_fulfilled_request() {
     let directory = tempfile::tempdir().expect("a directory");
     let mut file = MemoryFile::open(directory.path()).expect("a directory");
