@@ -156,12 +156,17 @@ impl Keeping {
     pub(super) fn pursue(&mut self, goal: GoalId, wanted: &QoS) {
         self.count += 1;
         let requested = wanted.objective_id.trim();
-        let is_taken = self.goals.values().any(|pursued| pursued.objective == requested);
-        let objective = if requested.is_empty() || is_taken {
-            format!("obj_{}_{}", wanted.objective_type, self.count)
-        } else {
-            requested.to_owned()
-        };
+        let is_taken = |name: &str| self.goals.values().any(|pursued| pursued.objective == name);
+        let counted = |count: u64| format!("obj_{}_{count}", wanted.objective_type);
+        let mut objective = requested.to_owned();
+        if objective.is_empty() || is_taken(&objective) {
+            objective = counted(self.count);
+        }
+        // After a restart, the count begins again, and restored goals have names of the previous run.
+        while is_taken(&objective) {
+            self.count += 1;
+            objective = counted(self.count);
+        }
         let requirements: Vec<String> = wanted
             .qos
             .iter()

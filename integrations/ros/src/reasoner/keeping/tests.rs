@@ -1,6 +1,6 @@
 //! Tests of the reasoner without a robot: expected outputs after sequences of inputs.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::time::Duration;
 
@@ -127,6 +127,24 @@ fn a_function_keeps_its_design_until_its_last_objective_ends() {
     assert!(!outputs.iter().any(|output| matches!(output, Output::Configure(_))), "{outputs:?}");
     keeping.cancel(goals[1]);
     assert_eq!(modes(&requested_modes(&mut keeping)), ["fd_unground"]);
+}
+
+#[test]
+fn automatic_names_differ_from_those_before_a_restart() {
+    let goals = [GoalId::new_random(), GoalId::new_random(), GoalId::new_random()];
+    let mut before = keeping();
+    before.pursue(goals[0], &wanted(PATH));
+    before.pursue(goals[1], &wanted(PATH));
+    before.cancel(goals[0]);
+    let mut after = keeping();
+    after.remember(before.memory(), &goals[1..2], &BTreeMap::new());
+    after.pursue(goals[2], &wanted(PATH));
+    let remembered = after.memory().goals;
+    let names: BTreeSet<String> = remembered.into_iter().map(|goal| goal.wanted.objective_id).collect();
+    assert_eq!(
+        names,
+        ["obj_f_generate_search_path_2", "obj_f_generate_search_path_3"].map(str::to_owned).into()
+    );
 }
 
 #[test]
