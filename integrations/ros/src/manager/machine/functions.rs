@@ -96,7 +96,9 @@ impl Machine {
                 let wait = INITIAL_PROBE_DELAY
                     .saturating_mul(1 << failures.missed_replies.min(6))
                     .min(MAX_PROBE_DELAY);
-                self.outputs.push(Output::Probe(function.clone(), wait));
+                if !std::mem::replace(&mut failures.is_probed, true) {
+                    self.outputs.push(Output::Probe(function.clone(), wait));
+                }
                 self.failed(&function, effect, None);
                 because
             }
@@ -236,6 +238,7 @@ impl Machine {
             self.outputs.push(Output::Probe(function.to_owned(), wait.min(SILENT_RETRY_DELAY)));
             return format!("{function} does not answer");
         }
+        failures.is_probed = false;
         let back: Vec<String> = failures
             .designs
             .iter()

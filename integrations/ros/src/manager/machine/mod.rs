@@ -45,6 +45,8 @@ struct CallFailures {
     designs: BTreeMap<String, Option<Duration>>,
     /// Number of consecutive calls without a reply.
     missed_replies: u32,
+    /// `true` from the first probe until the function replies. Another timeout then needs no further probe.
+    is_probed: bool,
 }
 
 /// Work after a restart that must wait until the state of the robot is known.

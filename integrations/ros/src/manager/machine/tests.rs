@@ -226,6 +226,23 @@ fn a_function_without_reply_is_called_twice_and_again_once_it_replies() {
 }
 
 #[test]
+fn a_silent_function_has_one_outstanding_probe() {
+    let mut robot = Robot::new(None);
+    let outputs = robot.request("search_pipeline");
+    robot.obey(outputs);
+    let mut probes = 0;
+    for visibility in ["1.3", "2.3"] {
+        let mut outputs = robot.measure("water_visibility", visibility);
+        for _ in 0..2 {
+            let call = outputs.iter().find(|output| matches!(output, Output::Change(_))).expect("a call");
+            outputs = robot.answer(&call.clone(), Outcome::Failed("no answer".to_owned()));
+            probes += outputs.iter().filter(|output| matches!(output, Output::Probe(..))).count();
+        }
+    }
+    assert_eq!(probes, 1);
+}
+
+#[test]
 fn a_late_mode_report_is_accepted() {
     let mut robot = Robot::new(None);
     let outputs = robot.request("search_pipeline");
