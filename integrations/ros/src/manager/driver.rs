@@ -158,9 +158,10 @@ impl Driver {
                 next_diagnostic = Instant::now() + PERIOD;
                 self.diagnose();
             }
-            let missing = smol::block_on(self.robot.wait(SEARCH_TIME));
+            let mut missing = smol::block_on(self.robot.wait(SEARCH_TIME));
+            let is_there = missing.is_empty();
             // The writer of diagnostics may start later: it is reported as missing, but not waited for.
-            let is_there = missing.iter().all(|text| text.contains("/diagnostics"));
+            missing.extend(self.robot.missing_writer());
             while let Ok(input) = inputs.try_recv() {
                 // Clients of tasks wait for a reply, so their requests are kept with the time of arrival.
                 match input {

@@ -141,7 +141,7 @@ impl Robot {
     }
 
     /// Waits until every function has its servers, or the time is up. Returns descriptions of the missing
-    /// servers, and of a missing writer of diagnostics.
+    /// servers.
     pub(super) async fn wait(&self, within: Duration) -> Vec<String> {
         let missing = self.functions.iter().map(|(name, function)| async move {
             match &function.means {
@@ -151,12 +151,12 @@ impl Robot {
                 Means::Steps => self.procedures.missing(name, within).await,
             }
         });
-        let mut missing: Vec<String> =
-            futures::future::join_all(missing).await.into_iter().flatten().collect();
-        if !self.node.is_written("/diagnostics") {
-            missing.push("/diagnostics has no publisher".to_owned());
-        }
-        missing
+        futures::future::join_all(missing).await.into_iter().flatten().collect()
+    }
+
+    /// Returns a description if diagnostics have no writer.
+    pub(super) fn missing_writer(&self) -> Option<String> {
+        (!self.node.is_written("/diagnostics")).then(|| "/diagnostics has no publisher".to_owned())
     }
 
     /// Returns the mode of each function, if it is known. Missing replies are logged and published as events,
