@@ -69,8 +69,8 @@ pub const CODES: &[[&str; 4]] = &[
     ],
     [
         "N133",
-        "Steps of designs do not fit the mission.",
-        "A table `[functions.F.designs.D]` of the settings names no design of the function, or a design has no steps.",
+        "Functions or designs of the settings do not fit the mission.",
+        "A table `[functions.F]` of the settings names no function, or one of its designs does not exist or has no steps.",
         "Correct the name, or add the steps.",
     ],
     [

@@ -187,7 +187,7 @@ impl Controller {
         let used: BTreeSet<String> =
             found.configuration.iter().flatten().map(|(_, design)| design.to_lowercase()).collect();
         let running = self.executes.start(plan);
-        let (mut lost, mut stopped) = (Vec::new(), false);
+        let (mut lost, mut stopped, mut next_look) = (Vec::new(), false, Instant::now());
         loop {
             let progress = async { Some(running.next().await) };
             let look = async {
@@ -204,17 +204,21 @@ impl Controller {
                 Some(Progress::Ended(End::Canceled)) => {
                     return Outcome::Failed("another client has cancelled the plan".to_owned());
                 }
-                None if !stopped && stop.load(Ordering::Relaxed) => {
-                    stopped = true;
+                None => {}
+            }
+            // Feedback may be more frequent than the looks.
+            if stopped || Instant::now() < next_look {
+                continue;
+            }
+            next_look = Instant::now() + POLL_INTERVAL;
+            if stop.load(Ordering::Relaxed) {
+                stopped = true;
+                running.cancel();
+            } else if lost.is_empty() {
+                lost = used.intersection(&self.joint.unavailable()).cloned().collect();
+                if !lost.is_empty() {
                     running.cancel();
                 }
-                None if lost.is_empty() => {
-                    lost = used.difference(&self.joint.available()).cloned().collect();
-                    if !lost.is_empty() {
-                        running.cancel();
-                    }
-                }
-                None => {}
             }
         }
     }

@@ -63,6 +63,7 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
         (function, designs)
     });
     settings.check_steps(&designs.collect(), options.allow_commands)?;
+    settings.check_mission(&mission)?;
     for warning in mission.warnings() {
         node.log(Severity::Warn, warning.text().trim_end());
     }
@@ -158,9 +159,10 @@ impl Driver {
                 next_diagnostic = Instant::now() + PERIOD;
                 self.diagnose();
             }
-            let missing = smol::block_on(self.robot.wait(SEARCH_TIME));
+            let mut missing = smol::block_on(self.robot.wait(SEARCH_TIME));
+            let is_there = missing.is_empty();
             // The writer of diagnostics may start later: it is reported as missing, but not waited for.
-            let is_there = missing.iter().all(|text| text.contains("/diagnostics"));
+            missing.extend(self.robot.missing_writer());
             while let Ok(input) = inputs.try_recv() {
                 // Clients of tasks wait for a reply, so their requests are kept with the time of arrival.
                 match input {
@@ -234,7 +236,7 @@ impl Driver {
         while !stop.load(Ordering::Relaxed) {
             let wait = next.saturating_duration_since(Instant::now()).min(Duration::from_millis(100));
             if !self.active.load(Ordering::Relaxed) {
-                self.wait_for_activation(inputs)?;
+                self.wait_for_activation(inputs, stop)?;
                 continue;
             }
             match inputs.recv_timeout(wait) {
@@ -258,16 +260,20 @@ impl Driver {
     }
 
     /// While the node is inactive, refuses requests to start or end a task, and keeps other inputs. The kept inputs are
-    /// handled when the node is active, or when there are [`MAX_DELAYED_INPUTS`].
-    fn wait_for_activation(&mut self, inputs: &Receiver<Input>) -> Result<(), Message> {
-        let mut delayed = Vec::new();
-        while !self.active.load(Ordering::Relaxed) && delayed.len() < MAX_DELAYED_INPUTS {
-            match inputs.recv_timeout(Duration::from_millis(50)) {
-                Ok(Input::Request(number, _) | Input::Cancel(number, _)) => self.robot.reply(number, false),
-                Ok(input) => delayed.push(input),
-                Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => break,
+    /// handled when the node is active, or when there are [`MAX_DELAYED_INPUTS`]. Returns early if `stop` is set.
+    fn wait_for_activation(&mut self, inputs: &Receiver<Input>, stop: &AtomicBool) -> Result<(), Message> {
+        let mut next_diagnostic = Instant::now();
+        let delayed = delayed_inputs(inputs, &self.active, stop, |refused| {
+            if let Some(number) = refused {
+                self.robot.reply(number, false);
             }
+            if Instant::now() >= next_diagnostic {
+                next_diagnostic = Instant::now() + PERIOD;
+                self.diagnose();
+            }
+        });
+        if stop.load(Ordering::Relaxed) {
+            return Ok(());
         }
         delayed.into_iter().try_for_each(|input| self.handle(input))
     }
@@ -317,5 +323,53 @@ impl Driver {
             values.push(("action", step.summary()));
         }
         self.robot.diagnose(level, &state.to_string(), values);
+    }
+}
+
+/// Returns the inputs that arrive until the node is active, `stop` is set, or there are [`MAX_DELAYED_INPUTS`].
+/// Calls `idle` at least every 50 ms, with the number of a request that must be refused, if there is one.
+fn delayed_inputs(
+    inputs: &Receiver<Input>,
+    active: &AtomicBool,
+    stop: &AtomicBool,
+    mut idle: impl FnMut(Option<u64>),
+) -> Vec<Input> {
+    let mut delayed = Vec::new();
+    let is_waiting = || !active.load(Ordering::Relaxed) && !stop.load(Ordering::Relaxed);
+    while is_waiting() && delayed.len() < MAX_DELAYED_INPUTS {
+        match inputs.recv_timeout(Duration::from_millis(50)) {
+            Ok(Input::Request(number, _) | Input::Cancel(number, _)) => idle(Some(number)),
+            Ok(input) => {
+                delayed.push(input);
+                idle(None);
+            }
+            Err(RecvTimeoutError::Timeout) => idle(None),
+            Err(RecvTimeoutError::Disconnected) => break,
+        }
+    }
+    delayed
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicBool, Ordering};
+    use std::sync::mpsc;
+
+    use super::delayed_inputs;
+    use crate::manager::machine::Input;
+
+    #[test]
+    fn an_inactive_manager_can_be_stopped() {
+        let (sender, inputs) = mpsc::channel();
+        for input in [Input::Tick, Input::Request(7, "search_pipeline".to_owned())] {
+            sender.send(input).expect("a receiver");
+        }
+        let (active, stop, mut refused) = (AtomicBool::new(false), AtomicBool::new(false), Vec::new());
+        let delayed = delayed_inputs(&inputs, &active, &stop, |number| {
+            refused.extend(number);
+            stop.store(number.is_none() && !refused.is_empty(), Ordering::Relaxed);
+        });
+        assert_eq!(refused, [7]);
+        assert!(matches!(delayed[..], [Input::Tick]), "{delayed:?}");
     }
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::Sender;
 use std::sync::{Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use metaplan::message::Message;
 use serde_json::{Value, json};
@@ -38,6 +38,9 @@ const OBSERVATION_DELAY: Duration = Duration::from_millis(500);
 /// Number of mode requests to a new server, one per period: the first ones may be lost before it
 /// has discovered this node.
 const MAX_MODE_REQUESTS: u32 = 3;
+
+/// Minimum time between two reports of the same progress.
+const REPEAT_PERIOD: Duration = Duration::from_secs(1);
 
 #[derive(Clone)]
 enum Means {
@@ -138,7 +141,7 @@ impl Robot {
     }
 
     /// Waits until every function has its servers, or the time is up. Returns descriptions of the missing
-    /// servers, and of a missing writer of diagnostics.
+    /// servers.
     pub(super) async fn wait(&self, within: Duration) -> Vec<String> {
         let missing = self.functions.iter().map(|(name, function)| async move {
             match &function.means {
@@ -148,12 +151,12 @@ impl Robot {
                 Means::Steps => self.procedures.missing(name, within).await,
             }
         });
-        let mut missing: Vec<String> =
-            futures::future::join_all(missing).await.into_iter().flatten().collect();
-        if !self.node.is_written("/diagnostics") {
-            missing.push("/diagnostics has no publisher".to_owned());
-        }
-        missing
+        futures::future::join_all(missing).await.into_iter().flatten().collect()
+    }
+
+    /// Returns a description if diagnostics have no writer.
+    pub(super) fn missing_writer(&self) -> Option<String> {
+        (!self.node.is_written("/diagnostics")).then(|| "/diagnostics has no publisher".to_owned())
     }
 
     /// Returns the mode of each function, if it is known. Missing replies are logged and published as events,
@@ -363,12 +366,13 @@ impl Robot {
         let running = performer.start(call);
         let (events, inputs) = (running.clone(), self.inputs.clone());
         let task = smol::spawn(async move {
+            let mut reports = Reports::default();
             loop {
                 let input = match events.next().await {
-                    Progress::Feedback { completion: Some(done), .. } => {
-                        Input::Progress(number, f64::from(done))
+                    Progress::Feedback { completion, .. } => {
+                        let Some(fraction) = reports.fraction(completion, Instant::now()) else { continue };
+                        Input::Progress(number, fraction)
                     }
-                    Progress::Feedback { completion: None, .. } => continue,
                     Progress::Ended(end) => {
                         let ended = match end {
                             End::Succeeded => Ended::Succeeded,
@@ -414,6 +418,27 @@ impl Robot {
         let mut array = DiagnosticArray { status: vec![status], ..DiagnosticArray::default() };
         array.header.stamp = self.node.clock().stamp();
         self.diagnostics.publish(array);
+    }
+}
+
+/// Reports of an action's progress.
+#[derive(Debug, Default)]
+struct Reports {
+    /// The last known share, with the time of its last report.
+    last: Option<(f64, Instant)>,
+}
+
+impl Reports {
+    /// Returns the completed share that feedback reports. Feedback without a share repeats the last known one, at most
+    /// once per [`REPEAT_PERIOD`]: it shows that the action goes on, which the loop would otherwise cancel for silence.
+    fn fraction(&mut self, completion: Option<f32>, now: Instant) -> Option<f64> {
+        let repeated = || {
+            let (last, since) = self.last?;
+            (now.saturating_duration_since(since) >= REPEAT_PERIOD).then_some(last)
+        };
+        let fraction = completion.map(f64::from).or_else(repeated)?;
+        self.last = Some((fraction, now));
+        Some(fraction)
     }
 }
 
@@ -495,4 +520,24 @@ fn serve_tasks(node: &Arc<Node>, inputs: &Sender<Input>, replies: &Replies) -> R
         })?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::{Duration, Instant};
+
+    use super::Reports;
+
+    #[test]
+    fn feedback_without_a_share_repeats_the_last_one() {
+        let (mut reports, start) = (Reports::default(), Instant::now());
+        let mut at =
+            |millis: u64, completion| reports.fraction(completion, start + Duration::from_millis(millis));
+        assert_eq!(at(0, None), None, "no share is known");
+        assert_eq!(at(100, Some(0.5)), Some(0.5));
+        assert_eq!(at(200, None), None);
+        assert_eq!(at(1100, None), Some(0.5));
+        assert_eq!(at(1200, None), None);
+        assert_eq!(at(1300, Some(0.75)), Some(0.75));
+    }
 }

@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use metaplan::message::{Errors, Message, did_you_mean};
+use metaplan::mission::Mission;
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 use toml::Spanned;
 
 use crate::diagnostic_rules::DiagnosticRule;
@@ -57,6 +59,22 @@ struct DefinitionsOnly {
     types: BTreeMap<Spanned<String>, Definition>,
 }
 
+/// Names and texts that are checked against the mission, with their positions.
+#[derive(Debug, Default, Deserialize)]
+struct Located {
+    #[serde(default)]
+    tasks: BTreeMap<String, LocatedTask>,
+    #[serde(default)]
+    actions: BTreeMap<Spanned<String>, IgnoredAny>,
+}
+
+#[derive(Debug, Deserialize)]
+struct LocatedTask {
+    goal: Spanned<String>,
+    #[serde(default)]
+    facts: BTreeMap<Spanned<String>, toml::Value>,
+}
+
 #[derive(Debug, Clone, Default)]
 struct Source {
     name: String,
@@ -78,6 +96,11 @@ pub struct TaskSettings {
     /// Facts and values that are set when the task begins, as with `--set`.
     #[serde(default)]
     pub facts: BTreeMap<String, toml::Value>,
+}
+
+/// Returns the value of a fact as the text of an event.
+pub(super) fn fact_value(value: &toml::Value) -> String {
+    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
 
 /// Autopilot, whose mode shows whether the robot executes commands.
@@ -107,7 +130,7 @@ struct FunctionSettings {
     unground: Option<String>,
     /// Modes of designs, by design. The default is the name of the design.
     #[serde(default)]
-    modes: BTreeMap<String, String>,
+    modes: BTreeMap<Spanned<String>, String>,
     /// Steps, by design. If there are any, `system_modes` is not used.
     #[serde(default)]
     designs: BTreeMap<Spanned<String>, Procedure>,
@@ -190,23 +213,68 @@ impl Settings {
         if errors.is_empty() { Ok(()) } else { Err(errors.into()) }
     }
 
-    /// Checks the steps in the settings against the mission. `designs` are the mission's designs, by function.
+    /// Checks the goals and facts of tasks and the names of actions against the mission. A task with a wrong goal would
+    /// never end, and an action of the plan whose table has another name would succeed at once.
     ///
     /// # Errors
-    /// A function or a design does not exist, a design has no steps, a function has both steps and names for
-    /// `system_modes`, or a command is not allowed.
+    /// Reports all tasks and actions that do not fit the mission.
+    pub(crate) fn check_mission(&self, mission: &Mission) -> Result<(), Errors> {
+        // The same text was parsed before.
+        let Located { tasks, actions } = toml::from_str(&self.source.text).unwrap_or_default();
+        let mut errors = Vec::new();
+        for (task, LocatedTask { goal, facts }) in &tasks {
+            if let Err(messages) = mission.goal(goal.get_ref()) {
+                let reasons: Vec<&str> = messages.iter().map(|message| message.message.as_str()).collect();
+                let text = format!("the goal of the task {task} is wrong: {}", reasons.join("; "));
+                errors.push(self.source.error("N130", goal, text));
+            }
+            for (fact, value) in facts {
+                let mut copy = mission.clone();
+                let set = copy.set_in_problem(fact.get_ref(), &fact_value(value)).map_err(Errors::from);
+                if let Err(messages) = set.and_then(|_| copy.filled()) {
+                    let reasons: Vec<&str> =
+                        messages.iter().map(|message| message.message.as_str()).collect();
+                    let text = format!("a fact of the task {task} is wrong: {}", reasons.join("; "));
+                    errors.push(self.source.error("N130", fact, text));
+                }
+            }
+        }
+        let known: Vec<String> =
+            mission.domain().actions.iter().map(|action| action.identifier.name.to_string()).collect();
+        for action in actions.keys() {
+            let name = action.get_ref();
+            if !known.iter().any(|known| known.eq_ignore_ascii_case(name)) {
+                let suggestion = did_you_mean(name, known.iter().map(String::as_str));
+                let text = format!("the domain has no action `{name}`{suggestion}");
+                errors.push(
+                    self.source
+                        .error("N130", action, text)
+                        .with_help("use the name of an action of the domain"),
+                );
+            }
+        }
+        if errors.is_empty() { Ok(()) } else { Err(errors.into()) }
+    }
+
+    /// Checks the functions in the settings and their steps against the mission. `designs` are the mission's designs, by function.
+    ///
+    /// # Errors
+    /// A function or a design does not exist, a design of a function with steps has none, a function has both steps and
+    /// names for `system_modes`, or a command is not allowed.
     pub(crate) fn check_steps(
         &self,
         designs: &BTreeMap<String, Vec<String>>,
         are_commands_allowed: bool,
     ) -> Result<(), Errors> {
         let mut errors = Vec::new();
-        for (function, settings) in self.functions.0.iter().filter(|(_, settings)| settings.has_steps()) {
+        for (function, settings) in &self.functions.0 {
             let mut error = |code, key, text: String, help: &str| {
                 errors.push(self.source.error(code, key, text).with_help(help));
             };
             let name = function.get_ref();
-            if settings.system.is_some() || settings.node.is_some() || !settings.modes.is_empty() {
+            let has_names =
+                settings.system.is_some() || settings.node.is_some() || !settings.modes.is_empty();
+            if settings.has_steps() && has_names {
                 error(
                     "N133",
                     function,
@@ -220,6 +288,14 @@ impl Settings {
                 error("N133", function, text, "use the name of a function of the knowledge base");
                 continue;
             };
+            for design in settings.modes.keys().filter(|design| !known.contains(design.get_ref())) {
+                let suggestion = did_you_mean(design.get_ref(), known.iter().map(String::as_str));
+                let text = format!("the function {name} has no design `{}`{suggestion}", design.get_ref());
+                error("N133", design, text, &format!("its designs are {}", known.join(", ")));
+            }
+            if !settings.has_steps() {
+                continue;
+            }
             let unground = settings.unground.as_deref().unwrap_or(UNGROUND);
             for (design, procedure) in &settings.designs {
                 let written = design.get_ref();
@@ -327,6 +403,7 @@ mod tests {
     use std::path::Path;
 
     use metaplan::message::Message;
+    use metaplan::setup::Setup;
 
     use super::Settings;
 
@@ -398,6 +475,14 @@ mod tests {
                 ["ros.toml:1:12", "names for `system_modes`", "remove `system`"],
             ),
             (
+                "[functions.f_gu]\nsystem = \"go\"\n".to_owned(),
+                ["ros.toml:1:12", "no function `f_gu`; did you mean `f_go`?", "knowledge base"],
+            ),
+            (
+                "[functions.f_go.modes]\nfd_slw = \"slow\"\n".to_owned(),
+                ["ros.toml:2:1", "no design `fd_slw`; did you mean `fd_slow`?", "its designs are"],
+            ),
+            (
                 format!("{fast}{}", table("fd_slow", r#"{ command = ["x"] }"#)),
                 ["N134", "ros.toml:3:25", "--allow-commands"],
             ),
@@ -416,5 +501,37 @@ mod tests {
             }
         }
         assert_eq!(wrong(&format!("{fast}{}", table("fd_slow", r#"{ command = ["x"] }"#)), true), "");
+    }
+
+    #[test]
+    fn tasks_and_actions_that_do_not_fit_have_source_locations() {
+        let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/suave/suave.toml");
+        let mission = Setup::read(&manifest).expect("the mission is read").mission;
+        let example = Settings::read(None, &manifest).expect("settings");
+        assert!(example.check_mission(&mission).is_ok());
+        let directory = tempfile::tempdir().expect("a directory");
+        let file = directory.path().join("ros.toml");
+        for (text, parts) in [
+            (
+                "[tasks.a]\ngoal = \"(pipline_found pl1)\"\n",
+                ["ros.toml:2:8", "the goal of the task a is wrong"],
+            ),
+            (
+                "[tasks.a]\ngoal = \"(and)\"\nfacts = { \"pipline_found pl1\" = true }\n",
+                ["ros.toml:3:11", "a fact of the task a is wrong"],
+            ),
+            (
+                "[actions.rechrge]\nby = \"actions_hub\"\n",
+                ["ros.toml:1:10", "no action `rechrge`; did you mean `recharge`?"],
+            ),
+        ] {
+            std::fs::write(&file, text).expect("written");
+            let settings = Settings::read(Some(&file), &manifest).expect("settings");
+            let errors = settings.check_mission(&mission).expect_err("it does not fit");
+            let message: String = errors.iter().map(Message::text).collect();
+            for part in ["N130"].iter().chain(&parts) {
+                assert!(message.contains(part), "{part} is not in: {message}");
+            }
+        }
     }
 }

@@ -29,10 +29,21 @@ impl Joint {
 
     /// Returns the names of the currently available designs, in lower case.
     pub(crate) fn available(&self) -> BTreeSet<String> {
+        self.designs(true)
+    }
+
+    /// Returns the names of the currently unavailable designs of the knowledge base, in lower case. The availability of
+    /// designs that only the problem has does not change.
+    pub(crate) fn unavailable(&self) -> BTreeSet<String> {
+        self.designs(false)
+    }
+
+    fn designs(&self, are_available: bool) -> BTreeSet<String> {
         let mission = self.lock();
         let designs = mission.knowledge().map(|knowledge| knowledge.view().function_designs());
-        let available = designs.unwrap_or_default().into_iter().filter(|design| design.available);
-        available.map(|design| design.individual.name.to_lowercase()).collect()
+        let designs = designs.unwrap_or_default().into_iter();
+        let selected = designs.filter(|design| design.available == are_available);
+        selected.map(|design| design.individual.name.to_lowercase()).collect()
     }
 
     /// Locks the mission and applies the pending diagnostics to it.

@@ -83,6 +83,9 @@ pub(crate) enum Condition {
     },
 }
 
+/// Maximum timeout. A time too far ahead cannot be represented as an instant.
+const MAX_TIMEOUT: Duration = Duration::from_secs(86_400);
+
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ProcedureEntry {
@@ -111,8 +114,9 @@ impl TryFrom<ProcedureEntry> for Procedure {
 }
 
 fn positive_seconds(seconds: f64) -> Result<Duration, &'static str> {
-    let duration = Duration::try_from_secs_f64(seconds).ok().filter(|duration| !duration.is_zero());
-    duration.ok_or("`timeout` must be a number of seconds greater than 0")
+    let is_valid = |duration: &Duration| !duration.is_zero() && *duration <= MAX_TIMEOUT;
+    let duration = Duration::try_from_secs_f64(seconds).ok().filter(is_valid);
+    duration.ok_or("`timeout` must be a number of seconds greater than 0 and at most 86400 (a day)")
 }
 
 #[derive(Debug, Deserialize)]
@@ -565,6 +569,7 @@ mod tests {
         for (rest, part) in [
             ("timeout = 0", "greater than 0"),
             ("timeout = nan", "greater than 0"),
+            ("timeout = 1e19", "at most 86400"),
             (r#"verify = [{ topic = "/a", state = "active" }]"#, "either a `node`"),
             (r#"verify = [{ topic = "a b" }]"#, "not a valid name of a topic"),
             (r#"verify = [{ topic = "/a", type = "std_msgs/msg/Bool" }]"#, "belong together"),

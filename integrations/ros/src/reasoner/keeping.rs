@@ -65,6 +65,9 @@ pub(super) struct Keeping {
     goals: BTreeMap<GoalId, Pursued>,
     /// Requested modes without a reply, by function. The second value is the design, or `None` for the unground mode.
     pending: BTreeMap<String, (Wanted, Option<String>)>,
+    /// Modes and designs that the keeper requires of functions whose goals are all being cancelled, by function. They
+    /// are requested if the cancellation is rejected.
+    withheld: BTreeMap<String, (Wanted, String)>,
     /// Failed designs with the time of the next attempt and the number of missing replies.
     failed: BTreeMap<String, (Duration, u32)>,
     measured: BTreeMap<String, String>,
@@ -82,6 +85,7 @@ impl Keeping {
             functions,
             goals: BTreeMap::new(),
             pending: BTreeMap::new(),
+            withheld: BTreeMap::new(),
             failed: BTreeMap::new(),
             measured: BTreeMap::new(),
             reports: BTreeMap::new(),
@@ -152,12 +156,17 @@ impl Keeping {
     pub(super) fn pursue(&mut self, goal: GoalId, wanted: &QoS) {
         self.count += 1;
         let requested = wanted.objective_id.trim();
-        let is_taken = self.goals.values().any(|pursued| pursued.objective == requested);
-        let objective = if requested.is_empty() || is_taken {
-            format!("obj_{}_{}", wanted.objective_type, self.count)
-        } else {
-            requested.to_owned()
-        };
+        let is_taken = |name: &str| self.goals.values().any(|pursued| pursued.objective == name);
+        let counted = |count: u64| format!("obj_{}_{count}", wanted.objective_type);
+        let mut objective = requested.to_owned();
+        if objective.is_empty() || is_taken(&objective) {
+            objective = counted(self.count);
+        }
+        // After a restart, the count begins again, and restored goals have names of the previous run.
+        while is_taken(&objective) {
+            self.count += 1;
+            objective = counted(self.count);
+        }
         let requirements: Vec<String> = wanted
             .qos
             .iter()
@@ -184,8 +193,8 @@ impl Keeping {
     }
 
     /// Cancels a goal: requests the unground mode of its function, and ends the goal when the mode
-    /// is set. If this fails, the cancellation is rejected. Without such a mode, the goal ends at
-    /// once. The cancellation of an unknown goal is rejected.
+    /// is set. If this fails, the cancellation is rejected. Without such a mode, or if another goal needs the function,
+    /// the goal ends at once. The cancellation of an unknown goal is rejected.
     pub(super) fn cancel(&mut self, goal: GoalId) {
         let Some(pursued) = self.goals.get_mut(&goal) else {
             self.outputs.push(Output::Cancelled(goal, false));
@@ -193,10 +202,28 @@ impl Keeping {
         };
         pursued.cancelling = true;
         let function = pursued.function.clone();
-        match self.functions.unground(&function).map(str::to_owned) {
+        let is_needed = self.goals.values().any(|other| other.function == function && !other.cancelling);
+        match self.functions.unground(&function).filter(|_| !is_needed).map(str::to_owned) {
             Some(mode) => self.request_mode(Wanted { function, mode, effect: None }, None),
             // The function keeps its design.
             None => self.end(goal),
+        }
+    }
+
+    /// Requests the mode of a design, unless all goals of its function are being cancelled: the request would replace
+    /// that of the unground mode, whose reply ends the goals. If only some are being cancelled, they end at once.
+    fn require(&mut self, wanted: Wanted, design: String) {
+        let of_function = self.goals.iter().filter(|(_, pursued)| pursued.function == wanted.function);
+        let (ending, others): (Vec<_>, Vec<_>) = of_function.partition(|(_, pursued)| pursued.cancelling);
+        let is_needed = ending.is_empty() || !others.is_empty();
+        let ending: Vec<GoalId> = ending.into_iter().map(|(goal, _)| *goal).collect();
+        if !is_needed {
+            self.withheld.insert(wanted.function.clone(), (wanted, design));
+            return;
+        }
+        self.request_mode(wanted, Some(design));
+        for goal in ending {
+            self.end(goal);
         }
     }
 
@@ -241,7 +268,7 @@ impl Keeping {
                         continue;
                     }
                     let mode = self.functions.mode(&function, &to).to_owned();
-                    self.request_mode(Wanted { function, mode, effect: Some(effect) }, Some(to));
+                    self.require(Wanted { function, mode, effect: Some(effect) }, to);
                 }
                 KeeperAnswer::Service(Service::Unserved { objective, because, .. }) => {
                     let text = format!("no design serves {objective} now: {}", because.join("; "));
@@ -269,6 +296,7 @@ impl Keeping {
         match (outcome, design) {
             (Outcome::Done, Some(design)) => self.has(&wanted.function, &design, wanted.effect),
             (Outcome::Done, None) => {
+                self.withheld.remove(&wanted.function);
                 for goal in goals {
                     self.end(goal);
                 }
@@ -281,6 +309,9 @@ impl Keeping {
                         pursued.cancelling = false;
                         self.outputs.push(Output::Cancelled(goal, false));
                     }
+                }
+                if let Some((wanted, design)) = self.withheld.remove(&wanted.function) {
+                    self.request_mode(wanted, Some(design));
                 }
             }
         }

@@ -8,7 +8,7 @@ use std::time::Duration;
 use metaplan::message::{Errors, Message};
 use ros2_client::action::GoalId;
 use serde_json::Value;
-use smol::Task;
+use smol::{Task, Timer};
 
 use crate::diagnosed::{Diagnosed, Sources};
 use crate::interfaces::mros2_msgs::action::{ControlQos, ControlQosFeedback, ControlQosResult};
@@ -27,6 +27,9 @@ use crate::reasoner::memory::{MemoryFile, Remembered};
 const CHANGE_TIMEOUT: Duration = Duration::from_secs(5);
 
 const MODE_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// Pause between attempts to connect to the bridge in advance.
+const RETRY_PAUSE: Duration = Duration::from_secs(1);
 
 enum Input {
     Wanted(Offer, QoS),
@@ -92,7 +95,11 @@ impl Network {
         let bridge = Arc::new(node.caller::<MetacontrolFD>("/mros/request_configuration"));
         let client = Arc::clone(&bridge);
         // Connects in advance, so that the first call need not wait for discovery.
-        smol::spawn(async move { while client.ready(CHANGE_TIMEOUT).await.is_err() {} }).detach();
+        smol::spawn(until_ok(move || {
+            let client = Arc::clone(&client);
+            async move { client.ready(CHANGE_TIMEOUT).await }
+        }))
+        .detach();
         let events = Arc::new(node.publisher("~/events", depth(100)).map_err(to_errors)?);
         let publisher = Arc::clone(&events);
         let report =
@@ -277,5 +284,28 @@ impl Network {
             let _ = sender.send(Input::Answered(wanted, outcome));
         })
         .detach();
+    }
+}
+
+/// Repeats an attempt until it succeeds. An attempt can fail without waiting, for example if the server has another
+/// type; without a pause between the attempts, no other task of the executor's thread would run.
+async fn until_ok<F: Future<Output = Result<(), CallError>>>(attempt: impl Fn() -> F) {
+    while attempt().await.is_err() {
+        Timer::after(RETRY_PAUSE).await;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{CallError, until_ok};
+
+    #[test]
+    fn failing_attempts_leave_time_for_other_tasks() {
+        let attempt = || async {
+            let (service, complaint) = ("/mros/request_configuration".to_owned(), "another type".to_owned());
+            Err(CallError::Unfit { service, complaint })
+        };
+        let first_poll = smol::block_on(smol::future::poll_once(Box::pin(until_ok(attempt))));
+        assert_eq!(first_poll, None, "it waits");
     }
 }

@@ -20,6 +20,9 @@ use crate::signals::settings::{Condition, Signal, Source, Target, number};
 /// Period of checks whether nodes exist and topics are silent.
 const CHECK_PERIOD: Duration = Duration::from_millis(250);
 
+/// Minimum period of checks for skipped messages.
+const MIN_SKIPPED_PERIOD: Duration = Duration::from_millis(10);
+
 /// Time after the start during which nodes and topics that were never seen do not count as missing: DDS may
 /// not have discovered them yet.
 const DISCOVERY_TIME: Duration = Duration::from_secs(3);
@@ -42,21 +45,23 @@ pub(crate) fn watch(node: &Arc<Node>, signals: &[Signal], report: &Report) -> Re
                 let clock = node.clock();
                 let started = clock.elapsed();
                 let last = Arc::new(Mutex::new(None));
-                let (noted, field, every) = (Arc::clone(&last), field.clone(), *every);
+                let (noted, field) = (Arc::clone(&last), field.clone());
                 let of_message = reporter.clone();
-                let mut reported: Option<Duration> = None;
                 let structure = Arc::clone(&kind.structure);
-                let take = move |message: Vec<u8>, _| {
-                    let now = clock.elapsed();
-                    *noted.lock().unwrap_or_else(PoisonError::into_inner) = Some(now);
-                    // Messages between two reports are not read.
-                    if reported.is_some_and(|reported| now.saturating_sub(reported) < every) {
-                        return;
-                    }
-                    reported = Some(now);
+                let read = Arc::new(move |message: Vec<u8>| {
                     // Data of another definition measure nothing; their type hash has been reported.
                     if let Ok(Some(value)) = structure.find(&field, &message, 0) {
                         of_message.value(&value);
+                    }
+                });
+                let samples = Arc::new(Mutex::new(Samples { every: *every, reported: None, skipped: None }));
+                tasks.extend(watch_skipped(node.clock(), &samples, Arc::clone(&read)));
+                let take = move |message: Vec<u8>, _| {
+                    let now = clock.elapsed();
+                    *noted.lock().unwrap_or_else(PoisonError::into_inner) = Some(now);
+                    let mut samples = samples.lock().unwrap_or_else(PoisonError::into_inner);
+                    if let Some(message) = samples.next(message, now) {
+                        read(message);
                     }
                 };
                 node.subscribe_when_published(topic, kind, take)?;
@@ -69,6 +74,53 @@ pub(crate) fn watch(node: &Arc<Node>, signals: &[Signal], report: &Report) -> Re
         }
     }
     Ok(tasks)
+}
+
+/// Messages of a topic, of which at most one per `every` is read. Of the others, only the last one is kept, so that the
+/// last value of a topic is never lost.
+#[derive(Debug)]
+struct Samples {
+    every: Duration,
+    reported: Option<Duration>,
+    skipped: Option<Vec<u8>>,
+}
+
+impl Samples {
+    /// Returns the message if it must be read now.
+    fn next(&mut self, message: Vec<u8>, now: Duration) -> Option<Vec<u8>> {
+        self.skipped = Some(message);
+        self.due(now)
+    }
+
+    /// Returns the last skipped message once `every` has passed since the last report.
+    fn due(&mut self, now: Duration) -> Option<Vec<u8>> {
+        if self.reported.is_some_and(|reported| now.saturating_sub(reported) < self.every) {
+            return None;
+        }
+        let message = self.skipped.take()?;
+        self.reported = Some(now);
+        Some(message)
+    }
+}
+
+/// Reads the last message of a topic if it was skipped. Does nothing if no message is skipped.
+fn watch_skipped(
+    clock: Arc<Clock>,
+    samples: &Arc<Mutex<Samples>>,
+    read: Arc<impl Fn(Vec<u8>) + Send + Sync + 'static>,
+) -> Option<Task<()>> {
+    let samples = Arc::clone(samples);
+    let every = samples.lock().unwrap_or_else(PoisonError::into_inner).every;
+    let period = every.clamp(MIN_SKIPPED_PERIOD, CHECK_PERIOD);
+    (!every.is_zero()).then(|| {
+        repeat(period, move || {
+            // The lock is held while the message is read, so that a newer one is not reported before it.
+            let mut samples = samples.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some(message) = samples.due(clock.elapsed()) {
+                read(message);
+            }
+        })
+    })
 }
 
 fn repeat(period: Duration, mut work: impl FnMut() + Send + 'static) -> Task<()> {
@@ -239,4 +291,25 @@ fn watch_state(
             Timer::after(CHECK_PERIOD).await;
         }
     }))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::Samples;
+
+    #[test]
+    fn the_last_message_is_read_even_if_it_follows_a_report_at_once() {
+        let every = Duration::from_millis(100);
+        let mut samples = Samples { every, reported: None, skipped: None };
+        let at = Duration::from_millis;
+        assert_eq!(samples.next(vec![1], at(0)), Some(vec![1]));
+        assert_eq!(samples.next(vec![2], at(40)), None);
+        assert_eq!(samples.next(vec![3], at(50)), None);
+        assert_eq!(samples.due(at(90)), None);
+        assert_eq!(samples.due(at(100)), Some(vec![3]));
+        assert_eq!(samples.due(at(300)), None, "it is read once");
+        assert_eq!(samples.next(vec![4], at(310)), Some(vec![4]));
+    }
 }

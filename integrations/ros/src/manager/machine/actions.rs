@@ -29,6 +29,17 @@ impl Machine {
         self.lines.push_back(Event::Started { action: number }.to_json().to_string());
     }
 
+    /// Ends the action under way if the loop has suspended it. Performers cannot pause, and an action that goes on
+    /// would move the robot without its designs. The performer reports the action as cancelled.
+    pub(super) fn stop_suspended(&mut self) {
+        let is_suspended = self.control.beliefs().suspended();
+        if let Some(action) = self.action.as_mut().filter(|action| is_suspended && action.begun)
+            && !std::mem::replace(&mut action.is_stopped, true)
+        {
+            self.outputs.push(Output::Stop(action.number));
+        }
+    }
+
     pub(super) fn performed(&mut self, number: u64, ended: &Ended) -> String {
         if self.control.beliefs().running().is_none_or(|(running, _)| running != number) {
             return format!("action {number} has ended before");

@@ -46,7 +46,13 @@ impl Machine {
         let requested = self.pending.get(function).map(|change| &change.mode);
         let has = requested.or_else(|| self.modes.get(function));
         if has.is_some_and(|has| *has != mode) {
+            let replaced = self.pending.get(function).and_then(|change| change.effect);
             self.change(function.to_owned(), mode, None);
+            // The loop would request the design again after its deadline, although no one needs it any more.
+            if let Some(effect) = replaced {
+                self.acknowledge(effect);
+                self.queue(&Event::Observed { function: function.to_owned(), design: None });
+            }
         }
     }
 
@@ -90,7 +96,9 @@ impl Machine {
                 let wait = INITIAL_PROBE_DELAY
                     .saturating_mul(1 << failures.missed_replies.min(6))
                     .min(MAX_PROBE_DELAY);
-                self.outputs.push(Output::Probe(function.clone(), wait));
+                if !std::mem::replace(&mut failures.is_probed, true) {
+                    self.outputs.push(Output::Probe(function.clone(), wait));
+                }
                 self.failed(&function, effect, None);
                 because
             }
@@ -230,6 +238,7 @@ impl Machine {
             self.outputs.push(Output::Probe(function.to_owned(), wait.min(SILENT_RETRY_DELAY)));
             return format!("{function} does not answer");
         }
+        failures.is_probed = false;
         let back: Vec<String> = failures
             .designs
             .iter()
@@ -246,7 +255,8 @@ impl Machine {
 
     /// Reports designs as realisable again once their retry delay is over. Forgets granted modes
     /// once their period is over; if another mode was reported in the meantime, requests the
-    /// current mode of the function. In the state EXECUTE, also passes a due tick to the loop.
+    /// current mode of the function. In the states EXECUTE and DEGRADED, also passes a due tick to the loop: filters
+    /// hold the report of a component that works again until a later line, and equal statuses are no lines.
     pub(super) fn tick(&mut self) -> String {
         let now = self.now;
         let mut back = Vec::new();
@@ -268,7 +278,7 @@ impl Machine {
             !is_over
         });
         let is_due = self.control.due().is_some_and(|due| due <= self.now);
-        if is_due && self.state == State::Execute {
+        if is_due && matches!(self.state, State::Execute | State::Degraded) {
             self.queue(&Event::Tick);
         }
         "time has passed".to_owned()

@@ -33,6 +33,10 @@ struct Action {
     call: Call,
     effect: u64,
     begun: bool,
+    /// `true` for an action of the previous run until it is performed again.
+    is_lost: bool,
+    /// `true` once the performer was asked to end the action because the loop has suspended it.
+    is_stopped: bool,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -41,6 +45,8 @@ struct CallFailures {
     designs: BTreeMap<String, Option<Duration>>,
     /// Number of consecutive calls without a reply.
     missed_replies: u32,
+    /// `true` from the first probe until the function replies. Another timeout then needs no further probe.
+    is_probed: bool,
 }
 
 /// Work after a restart that must wait until the state of the robot is known.
@@ -169,8 +175,10 @@ impl Machine {
             self.catch_up();
             self.settle()?;
         }
+        self.repeat_action();
         self.begin();
         self.settle()?;
+        self.stop_suspended();
         self.enter(&because)?;
         Ok(std::mem::take(&mut self.outputs))
     }
@@ -299,8 +307,14 @@ impl Machine {
                 for function in &idle {
                     self.unground(function);
                 }
-                self.action =
-                    Some(Action { number: effect.action, call, effect: effect.number, begun: false });
+                self.action = Some(Action {
+                    number: effect.action,
+                    call,
+                    effect: effect.number,
+                    begun: false,
+                    is_lost: false,
+                    is_stopped: false,
+                });
             }
             Command::Cancel { .. } => {
                 self.acknowledge(effect.number);
@@ -310,8 +324,7 @@ impl Machine {
                     _ => self.queue(&Event::Cancelled { action: effect.action }),
                 }
             }
-            // Suspension and resumption of an action. They are not passed to the performer: the action goes on, and
-            // functions keep their modes.
+            // An action is begun or stopped once all answers are handled.
             _ => self.acknowledge(effect.number),
         }
     }

@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use metaplan::mapek::{Command, Effect};
+use metaplan::mapek::{Command, Effect, Event};
 use metaplan::message::Message;
 
 use crate::manager::machine::io::{Output, State};
@@ -56,24 +56,40 @@ impl Machine {
         self.handle_answers(answers);
         self.deferred = None;
         for (function, mode) in modes {
-            if !self.pending.contains_key(&function) {
+            // A mode that was requested in the meantime is newer.
+            if !self.pending.contains_key(&function) && self.modes.get(&function) == Some(&mode) {
                 self.observe(&function, &mode);
             }
         }
     }
 
-    pub(super) fn restore_action(&mut self) {
+    fn restore_action(&mut self) {
         let Some((number, step)) = self.control.beliefs().running() else { return };
         let call = call(step);
         let is_waiting = |effect: &&Effect| matches!(effect.command, Command::Request { .. });
         let effect = self.control.beliefs().outstanding().find(is_waiting).map(|effect| effect.number);
-        // An action that had begun is started again, because the performer may have lost it. For an action that ends
-        // with a message on a topic, this has no disadvantage.
-        self.action =
-            Some(Action { number, call, effect: effect.unwrap_or_default(), begun: effect.is_none() });
-        if effect.is_none()
-            && let Some(action) = &self.action
-        {
+        let begun = effect.is_none();
+        let effect = effect.unwrap_or_default();
+        self.action = Some(Action { number, call, effect, begun, is_lost: true, is_stopped: false });
+    }
+
+    /// Performs the begun action of the previous run again, unless a line that was queued in the meantime has ended it,
+    /// because the performer may have lost it. For an action that ends with a message on a topic, this has no
+    /// disadvantage. A cancelled or suspended action counts as cancelled: no performer can report its end any more.
+    pub(super) fn repeat_action(&mut self) {
+        let beliefs = self.control.beliefs();
+        let running = beliefs.running().map(|(number, _)| number);
+        let is_interrupted = beliefs.cancelling() || beliefs.suspended();
+        let Some(action) = self.action.as_mut().filter(|action| action.is_lost) else { return };
+        action.is_lost = false;
+        if running != Some(action.number) {
+            return;
+        }
+        let Action { number, begun, .. } = *action;
+        if is_interrupted {
+            self.action = None;
+            self.queue(&Event::Cancelled { action: number });
+        } else if begun {
             self.outputs.push(Output::Perform(number, action.call.clone()));
         }
     }

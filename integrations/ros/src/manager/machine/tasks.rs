@@ -7,6 +7,7 @@ use serde_json::json;
 
 use crate::manager::machine::io::{Output, State};
 use crate::manager::machine::{EMPTY_GOAL, Machine};
+use crate::manager::settings::fact_value;
 
 impl Machine {
     pub(super) fn reply(&mut self) {
@@ -44,8 +45,7 @@ impl Machine {
         if self.task.as_deref() != Some(task) {
             self.task = Some(task.to_owned());
             for (name, value) in &settings.facts {
-                let value = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
-                self.queue(&Event::Fact { name: name.clone(), value });
+                self.queue(&Event::Fact { name: name.clone(), value: fact_value(value) });
             }
             self.queue(&Event::Goal { goal: settings.goal });
         }

@@ -20,7 +20,11 @@ struct Robot {
 }
 
 fn control() -> (Loop, Settings) {
-    let mission = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/suave/suave.toml");
+    control_of("suave/suave.toml")
+}
+
+fn control_of(example: &str) -> (Loop, Settings) {
+    let mission = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples").join(example);
     let setup = Setup::read(&mission).expect("the mission is read");
     let settings = Settings::read(None, &mission).expect("settings");
     (Loop::new(setup.mission, setup.settings).expect("it can be planned for"), settings)
@@ -38,20 +42,35 @@ impl Robot {
     }
 
     fn with(
-        mut control: Loop,
+        control: Loop,
         settings: Settings,
         journal: Option<&Path>,
         mode: impl Fn(&str) -> &'static str,
     ) -> Self {
+        let mut robot = Self::waiting(control, settings, journal);
+        robot.ready(mode);
+        robot
+    }
+
+    /// Creates a machine that waits for its functions.
+    fn waiting(mut control: Loop, settings: Settings, journal: Option<&Path>) -> Self {
         let journal =
             journal.map(|path| Journal::open(path, Policy::default(), &mut control).expect("a journal").0);
-        let machine = Machine::new(control, journal, settings);
-        let modes =
-            machine.functions().iter().map(|name| (name.clone(), Some(mode(name).to_owned()))).collect();
-        let mut robot = Self { machine, now: Duration::ZERO };
+        let robot = Self { machine: Machine::new(control, journal, settings), now: Duration::ZERO };
         assert_eq!(robot.machine.state(), State::WaitGraph);
-        robot.handle(Input::Ready(modes));
         robot
+    }
+
+    fn ready(&mut self, mode: impl Fn(&str) -> &'static str) -> Vec<Output> {
+        let functions = self.machine.functions().iter();
+        let modes = functions.map(|name| (name.clone(), Some(mode(name).to_owned()))).collect();
+        self.handle(Input::Ready(modes))
+    }
+
+    /// Creates a machine that waits for its functions after a restart during the task of another one.
+    fn restarted(journal: &Path) -> Self {
+        let (control, settings) = control();
+        Self::waiting(control, settings, Some(journal))
     }
 
     /// Handles an input and returns the outputs other than events and plans.
@@ -207,6 +226,23 @@ fn a_function_without_reply_is_called_twice_and_again_once_it_replies() {
 }
 
 #[test]
+fn a_silent_function_has_one_outstanding_probe() {
+    let mut robot = Robot::new(None);
+    let outputs = robot.request("search_pipeline");
+    robot.obey(outputs);
+    let mut probes = 0;
+    for visibility in ["1.3", "2.3"] {
+        let mut outputs = robot.measure("water_visibility", visibility);
+        for _ in 0..2 {
+            let call = outputs.iter().find(|output| matches!(output, Output::Change(_))).expect("a call");
+            outputs = robot.answer(&call.clone(), Outcome::Failed("no answer".to_owned()));
+            probes += outputs.iter().filter(|output| matches!(output, Output::Probe(..))).count();
+        }
+    }
+    assert_eq!(probes, 1);
+}
+
+#[test]
 fn a_late_mode_report_is_accepted() {
     let mut robot = Robot::new(None);
     let outputs = robot.request("search_pipeline");
@@ -350,6 +386,108 @@ fn a_restart_repeats_no_fulfilled_request() {
     let text = format!("{report:?}");
     assert!(text.contains("WAIT_GRAPH -> IDLE: every function answers"), "{text}");
     assert!(text.contains("IDLE -> PLAN -> RECONFIGURE: the task search_pipeline is requested"), "{text}");
+}
+
+/// Mode of a function while the pipeline is searched.
+fn searching(function: &str) -> &'static str {
+    match function {
+        PATH => "fd_spiral_high",
+        MOTION => "fd_all_thrusters",
+        _ => "fd_unground",
+    }
+}
+
+#[test]
+fn a_degraded_robot_goes_on_when_a_component_has_healed() {
+    let (control, settings) = control_of("nav2/mission.toml");
+    let mut robot = Robot::with(control, settings, None, |_| "fd_unground");
+    let report = |component: &str, status: &str| {
+        Input::Line(format!(
+            r#"{{"event":"component_status","component":"{component}","status":"{status}"}}"#
+        ))
+    };
+    for component in ["c_lidar", "c_camera"] {
+        robot.handle(report(component, "FALSE"));
+        let pending: Vec<Output> = robot.machine.pending.values().cloned().map(Output::Change).collect();
+        robot.obey(pending);
+    }
+    assert_eq!(robot.machine.state(), State::Degraded);
+    robot.handle(report("c_lidar", "TRUE"));
+    assert_eq!(robot.machine.state(), State::Degraded, "the report must last");
+    robot.now += Duration::from_secs(3);
+    let outputs = robot.handle(Input::Tick);
+    robot.obey(outputs);
+    assert_eq!(robot.machine.state(), State::Execute);
+}
+
+#[test]
+fn an_action_that_is_suspended_is_stopped() {
+    let mut robot = Robot::new(None);
+    let outputs = robot.request("search_pipeline");
+    robot.obey(outputs);
+    let outputs = robot.measure("water_visibility", "1");
+    assert_eq!(outputs.iter().filter(|output| matches!(output, Output::Stop(1))).count(), 1, "{outputs:?}");
+    assert_eq!(robot.measure("water_visibility", "0.9"), [], "it is stopped once");
+    robot.handle(Input::Performed(1, Ended::Cancelled));
+    assert_eq!(robot.machine.state(), State::Degraded);
+    let outputs = robot.measure("water_visibility", "4");
+    assert_eq!(performed(&robot.obey(outputs)), ["search_pipeline"]);
+}
+
+#[test]
+fn a_mode_whose_task_has_ended_is_not_requested_again() {
+    let mut robot = Robot::new(None);
+    let outputs = robot.request("search_pipeline");
+    let path = outputs
+        .iter()
+        .find(|output| matches!(output, Output::Change(change) if change.function == PATH))
+        .expect("a change");
+    robot.answer(path, Outcome::Done);
+    // The motion has not answered yet.
+    let outputs = robot.handle(Input::Cancel(8, "search_pipeline".to_owned()));
+    assert_eq!(changes(&outputs), [(PATH, "fd_unground"), (MOTION, "fd_unground")]);
+    robot.obey(outputs);
+    assert_eq!(robot.machine.control().beliefs().outstanding().count(), 0);
+    robot.now += Duration::from_secs(30);
+    assert_eq!(changes(&robot.measure("water_visibility", "3.4")), []);
+    assert_eq!(robot.machine.state(), State::Idle);
+}
+
+#[test]
+fn a_task_that_is_cancelled_before_the_functions_are_found_is_not_carried_out() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let mut robot = Robot::new(Some(directory.path()));
+    let outputs = robot.request("search_pipeline");
+    robot.obey(outputs);
+    drop(robot);
+    let mut robot = Robot::restarted(directory.path());
+    assert_eq!(robot.handle(Input::Cancel(8, "search_pipeline".to_owned())), []);
+    let outputs = robot.ready(searching);
+    assert_eq!(performed(&outputs), Vec::<&str>::new());
+    assert_eq!(changes(&outputs), [(PATH, "fd_unground"), (MOTION, "fd_unground")]);
+    let outputs = robot.obey(outputs);
+    assert!(outputs.contains(&Output::Reply(8, true)), "{outputs:?}");
+    robot.now += Duration::from_secs(4);
+    robot.handle(Input::Tick);
+    let configuration = robot.machine.control().beliefs().configuration();
+    assert!(configuration.get(PATH).is_none() && configuration.get(MOTION).is_none(), "{configuration:?}");
+}
+
+#[test]
+fn an_action_that_was_being_cancelled_is_not_repeated_after_a_restart() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let mut robot = Robot::new(Some(directory.path()));
+    let outputs = robot.request("search_pipeline");
+    robot.obey(outputs);
+    let outputs = robot.measure("battery_level", "0.2");
+    assert!(outputs.iter().any(|output| matches!(output, Output::Stop(_))), "{outputs:?}");
+    // The program ends before the performer has reported the end.
+    drop(robot);
+    let mut robot = Robot::restarted(directory.path());
+    let mut outputs = robot.ready(searching);
+    robot.now += Duration::from_secs(4);
+    outputs.extend(robot.handle(Input::Tick));
+    assert_eq!(performed(&robot.obey(outputs)), ["recharge"]);
 }
 
 /// Creates a machine whose spiral has steps for its designs, but none for the time when it is not needed.

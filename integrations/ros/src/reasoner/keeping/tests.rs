@@ -1,6 +1,6 @@
 //! Tests of the reasoner without a robot: expected outputs after sequences of inputs.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::time::Duration;
 
@@ -90,6 +90,61 @@ fn a_design_that_is_refused_is_replaced_and_tried_again() {
     assert_eq!(requested_modes(&mut keeping), []);
     keeping.tick(NOW + Duration::from_secs(61));
     assert_eq!(modes(&requested_modes(&mut keeping)), ["fd_spiral_high"]);
+}
+
+#[test]
+fn a_design_required_during_a_cancellation_does_not_replace_it() {
+    for outcome in [Outcome::Done, Outcome::Refused] {
+        let (mut keeping, goal) = (keeping(), GoalId::new_random());
+        keeping.pursue(goal, &wanted(PATH));
+        let first = requested_modes(&mut keeping);
+        keeping.answered(&first[0], Outcome::Done, NOW);
+        keeping.cancel(goal);
+        let end = requested_modes(&mut keeping);
+        assert_eq!(modes(&end), ["fd_unground"]);
+        assert_eq!(see(&mut keeping, "2.3"), []);
+        let is_done = outcome == Outcome::Done;
+        keeping.answered(&end[0], outcome, NOW);
+        let outputs = keeping.outputs();
+        assert!(outputs.contains(&Output::Cancelled(goal, is_done)), "{outputs:?}");
+        let is_medium = |output: &Output| matches!(output, Output::Configure(wanted) if wanted.mode == "fd_spiral_medium");
+        assert_eq!(outputs.iter().any(is_medium), !is_done, "{outputs:?}");
+    }
+}
+
+#[test]
+fn a_function_keeps_its_design_until_its_last_objective_ends() {
+    let (mut keeping, goals) = (keeping(), [GoalId::new_random(), GoalId::new_random()]);
+    for goal in goals {
+        keeping.pursue(goal, &wanted(PATH));
+        for requested in requested_modes(&mut keeping) {
+            keeping.answered(&requested, Outcome::Done, NOW);
+        }
+    }
+    keeping.cancel(goals[0]);
+    let outputs = keeping.outputs();
+    assert!(outputs.contains(&Output::Cancelled(goals[0], true)), "{outputs:?}");
+    assert!(!outputs.iter().any(|output| matches!(output, Output::Configure(_))), "{outputs:?}");
+    keeping.cancel(goals[1]);
+    assert_eq!(modes(&requested_modes(&mut keeping)), ["fd_unground"]);
+}
+
+#[test]
+fn automatic_names_differ_from_those_before_a_restart() {
+    let goals = [GoalId::new_random(), GoalId::new_random(), GoalId::new_random()];
+    let mut before = keeping();
+    before.pursue(goals[0], &wanted(PATH));
+    before.pursue(goals[1], &wanted(PATH));
+    before.cancel(goals[0]);
+    let mut after = keeping();
+    after.remember(before.memory(), &goals[1..2], &BTreeMap::new());
+    after.pursue(goals[2], &wanted(PATH));
+    let remembered = after.memory().goals;
+    let names: BTreeSet<String> = remembered.into_iter().map(|goal| goal.wanted.objective_id).collect();
+    assert_eq!(
+        names,
+        ["obj_f_generate_search_path_2", "obj_f_generate_search_path_3"].map(str::to_owned).into()
+    );
 }
 
 #[test]
