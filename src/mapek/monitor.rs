@@ -17,7 +17,6 @@ use crate::mapek::event::Event;
 use crate::mapek::fields::Refusal;
 use crate::mapek::filter::Filters;
 use crate::mapek::settings::Settings;
-use crate::mapek::step::PlannedStep;
 use crate::message::{Message, did_you_mean};
 use crate::mission::Mission;
 use crate::number;
@@ -100,7 +99,7 @@ impl BeliefUpdate<'_> {
             Event::Started { action } => self.confirm_started(*action).map(|_| ()),
             Event::Progress { action, fraction } => {
                 self.confirm_started(*action)?.progressed = true;
-                self.progress(fraction)
+                self.progress(fraction).map(|_| ())
             }
             Event::Succeeded { action } => self.succeeded(*action),
             Event::Failed { action, reason } => {
