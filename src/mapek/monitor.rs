@@ -185,9 +185,14 @@ impl BeliefUpdate<'_> {
             let was_known = knowledge.fault().is_none();
             let delta =
                 knowledge.take(attribute, RobotReport::measured(value)).map_err(|message| fault(&message))?;
+            // An equal measurement is not a change. Without conclusions, the delta is empty despite changes.
+            let is_change = !was_known
+                || knowledge.fault().is_some()
+                || !(delta.insert.is_empty() && delta.delete.is_empty());
             self.record_delta(&delta, was_known);
-            if let Some(function) = self.beliefs.mission.fed_by(local_name(attribute)) {
-                self.changes.facts = true;
+            let functions = self.beliefs.mission.fed_by(local_name(attribute));
+            self.changes.facts |= is_change && !functions.is_empty();
+            for function in functions {
                 if self.beliefs.mission.value(&function).is_some() {
                     self.fact(&function, &number::decimal(value))?;
                 }
