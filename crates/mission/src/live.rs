@@ -175,6 +175,12 @@ impl Mission {
         self.adaptation.as_ref().and_then(|adaptation| adaptation.parameters(action))
     }
 
+    /// Returns the functions for whose designs the knowledge base has added parameters to an action, in the order of
+    /// these parameters.
+    pub fn added_functions(&self, action: &str) -> Vec<&str> {
+        self.adaptation.as_ref().map(|adaptation| adaptation.functions_of(action)).unwrap_or_default()
+    }
+
     /// Replaces the initial state of the problem.
     pub fn set_init(&mut self, init: Vec<InitialElement>) {
         self.current.take();
