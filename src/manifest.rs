@@ -14,6 +14,10 @@ use crate::file::{self, Kind, source};
 use crate::message::{Errors, Message, did_you_mean};
 use crate::number;
 
+/// Maximum number of faults that are looked for. Each costs two passes over the text, and a file of another kind can
+/// have thousands.
+const MAX_FAULTS: usize = 50;
+
 /// A step in a path to an entry of a manifest: a key of a table, or an index of an array.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Key {
@@ -190,13 +194,14 @@ fn shortened(path: &Path) -> PathBuf {
     parts.into_iter().collect()
 }
 
-/// Returns the faults of a manifest, sorted by position. The parser reports only the first fault, so each faulty entry
-/// is overwritten with blanks and the text is parsed again. If the text is not TOML, only the first fault is returned.
-/// Faults with equal descriptions are returned once. A missing field is returned only if it is the first fault.
+/// Returns the faults of a manifest, sorted by position, but not more than [`MAX_FAULTS`]. The parser reports only the
+/// first fault, so each faulty entry is overwritten with blanks and the text is parsed again. If the text is not TOML,
+/// only the first fault is returned. Faults with equal descriptions are returned once. A missing field is returned only
+/// if it is the first fault.
 fn mistakes<S: DeserializeOwned>(text: &str, first: toml::de::Error, name: &str) -> Vec<Message> {
     let mut messages: Vec<(Option<(usize, usize)>, Message)> = Vec::new();
     let (mut remaining, mut error) = (text.to_owned(), first);
-    loop {
+    for _ in 0..MAX_FAULTS {
         let description = error.message();
         let is_new = messages.iter().all(|(_, message)| !message.message.starts_with(description));
         // An earlier iteration may have blanked the entry that is reported as missing.
@@ -254,4 +259,22 @@ fn line_and_column(text: &str, offset: usize) -> (usize, usize) {
     let line = before.matches('\n').count() + 1;
     let column = before.rsplit('\n').next().map_or(0, |last| last.chars().count()) + 1;
     (line, column)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{MAX_FAULTS, mistakes};
+
+    #[derive(Debug, serde::Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Empty {}
+
+    #[test]
+    fn a_limited_number_of_faults_is_looked_for() {
+        for (keys, expected) in [(3, 3), (200, MAX_FAULTS)] {
+            let text: String = (0..keys).map(|number| format!("key{number} = 1\n")).collect();
+            let error = toml::from_str::<Empty>(&text).expect_err("unknown keys");
+            assert_eq!(mistakes::<Empty>(&text, error, "m.toml").len(), expected);
+        }
+    }
 }

@@ -203,11 +203,11 @@ impl HubSender {
 
 fn listen(hub: &Hub, receiver: &Receiver<Option<(f64, Entry)>>, backlog: &Backlog) {
     while let Ok(Some((at, entry))) = receiver.recv() {
-        backlog.bytes.fetch_sub(entry.bytes(), Ordering::Relaxed);
-        // Milliseconds are precise enough for a page.
-        let at = (at * 1000.0).round() / 1000.0;
         // The page shows the number of dropped lines.
         let missing = backlog.dropped.swap(0, Ordering::Relaxed);
+        backlog.bytes.fetch_sub(entry.bytes(), Ordering::Release);
+        // Milliseconds are precise enough for a page.
+        let at = (at * 1000.0).round() / 1000.0;
         if missing > 0 {
             hub.take(json!({"at": at, "left_out": missing}).to_string().into(), Vec::new());
         }
@@ -247,9 +247,13 @@ mod tests {
         let hub = Arc::new(Hub::default());
         let sender = HubSender::of(Arc::clone(&hub));
         let long = "x".repeat(1 << 20);
-        // The lock blocks the receiving thread.
+        // The lock blocks the receiving thread. It has then taken this line, and has read the number of dropped lines.
         let guard = hub.lock();
-        for number in 0..100 {
+        sender.send_event(0, "first");
+        while sender.backlog.bytes.load(Ordering::Acquire) > 0 {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        for number in 1..=100 {
             sender.send_event(number, &long);
         }
         assert!(sender.backlog.bytes.load(Ordering::Relaxed) <= MAX_QUEUED_BYTES);
@@ -258,7 +262,7 @@ mod tests {
         while sender.backlog.bytes.load(Ordering::Relaxed) > 0 {
             std::thread::sleep(Duration::from_millis(1));
         }
-        sender.send_event(100, "short");
+        sender.send_event(101, "short");
         sender.end();
         let (mut next, mut short_lines) = (0, 0);
         loop {

@@ -22,7 +22,7 @@ use crate::mapek::monitor::Changes;
 use crate::mapek::plan::Planner;
 use crate::mapek::react::trouble;
 use crate::mapek::settings::Settings;
-use crate::mapek::step::PlannedStep;
+use crate::mapek::step::{PlannedStep, plan_text};
 use crate::number;
 
 /// Number of consecutive failures of one step after which the plan is dropped and planning pauses.
@@ -338,11 +338,17 @@ impl Adaptation<'_> {
     /// Returns the reason to keep the current plan, or `None` if the benefit of `outcome` is sufficient or the metric
     /// of the current plan is undefined.
     fn insufficient_benefit(&self, outcome: &Outcome) -> Option<String> {
-        let current_metric = self.beliefs.metric()?;
-        if benefit(self.beliefs, self.settings, &current_metric, &outcome.cost).is_some() {
+        let (current_metric, metric) = if self.beliefs.mission.problem().metric.is_some() {
+            (self.beliefs.metric()?, outcome.cost.clone())
+        } else {
+            let current_plan = self.beliefs.remaining_plan();
+            let plan = plan_text(outcome.steps.iter().flatten());
+            (self.beliefs.default_metric(&current_plan)?, self.beliefs.default_metric(&plan)?)
+        };
+        if benefit(self.beliefs, self.settings, &current_metric, &metric).is_some() {
             return None;
         }
-        let gain = gain(self.beliefs, &current_metric, &outcome.cost);
+        let gain = gain(self.beliefs, &current_metric, &metric);
         let (benefit, minimum) = (number::decimal(&gain), number::decimal(&self.settings.minimum_benefit));
         Some(format!("the benefit of another plan is {benefit}, the minimum is {minimum}"))
     }

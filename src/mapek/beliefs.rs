@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use num_rational::BigRational;
-use pddl::ast::{Domain, Problem};
+use pddl::ast::{ActionBody, Domain, Problem};
 use pddl::validate::{Options, PlanText, Violation, advance, metric_of, validate};
 
 use crate::knowledge::Fault;
@@ -294,7 +294,7 @@ impl Beliefs {
         }
     }
 
-    fn remaining_plan(&self) -> PlanText {
+    pub(super) fn remaining_plan(&self) -> PlanText {
         let running = self.running.iter().map(|running| &running.step);
         plan_text(running.chain(self.plan.iter().flatten()))
     }
@@ -304,6 +304,16 @@ impl Beliefs {
     pub(super) fn metric(&self) -> Option<BigRational> {
         let (domain, problem) = self.remaining_mission();
         metric_of(&domain, &problem, &self.remaining_plan())
+    }
+
+    /// Returns the value that planning minimises without a metric, for a plan that begins with the action under way: the
+    /// total time if actions have durations, and otherwise the number of steps. `None` if the plan is not valid.
+    pub(super) fn default_metric(&self, plan: &PlanText) -> Option<BigRational> {
+        let (domain, problem) = self.remaining_mission();
+        let verdict = validate(&domain, &problem, plan, &Options::default());
+        let is_timed = domain.actions.iter().any(|action| matches!(action.body, ActionBody::Durative { .. }));
+        let steps = || BigRational::from_integer(plan.steps.len().into());
+        verdict.valid.then(|| if is_timed { verdict.total_time } else { steps() })
     }
 
     pub(super) fn obstacle(&self, running: &Running) -> Option<String> {

@@ -1,8 +1,9 @@
 //! Migration: moves a robot to another version of its mission. What the robot has reported is kept, except for reports
 //! that the noise filters still hold back.
 //!
-//! Facts and values are merged three ways: those that differ from the initial state of the former version are taken from
-//! the robot, all others from the new version. The plan is not transferred, because the new version needs another one.
+//! Facts and values, also those of the knowledge base, are merged three ways: those that differ from the initial state
+//! of the former version are taken from the robot, all others from the new version. The plan is not transferred, because
+//! the new version needs another one.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +11,7 @@ use pddl::ast::InitialElement;
 use serde_json::Value;
 
 use crate::knowledge::Knowledge;
-use crate::mapek::analyze::analyze;
+use crate::mapek::analyze::{analyze, report_contradictions};
 use crate::mapek::answer::Answer;
 use crate::mapek::control::Loop;
 use crate::mapek::record::{element_from_record, element_to_record};
@@ -40,9 +41,10 @@ impl Loop {
         let (beliefs, former) = (&mut self.beliefs, &robot.beliefs);
         if let Some(base) = beliefs.mission.knowledge_mut() {
             let statements = former.mission.knowledge().map(Knowledge::statements).unwrap_or_default();
-            base.restore(&statements)?;
+            base.restore_over(&statements)?;
+            // The rules of this version may have the conclusions that those of the former version lack.
             let waiting = former.mission.knowledge().map(Knowledge::waiting);
-            base.set_waiting(waiting.cloned().unwrap_or_default());
+            base.take_over(waiting.cloned().unwrap_or_default());
         }
         // The filters start from the values and statuses that the robot has reported; held reports are lost.
         beliefs.filters = self.monitor.filters().states(beliefs.mission.knowledge());
@@ -77,6 +79,7 @@ impl Loop {
         beliefs.numbers = former.numbers.clone();
         (beliefs.now, beliefs.considered) = (former.now, former.considered);
         let mut answers = Vec::new();
+        report_contradictions(beliefs, &mut answers);
         analyze(beliefs, &mut answers);
         Ok(answers)
     }

@@ -99,7 +99,7 @@ impl BeliefUpdate<'_> {
             Event::Started { action } => self.confirm_started(*action).map(|_| ()),
             Event::Progress { action, fraction } => {
                 self.confirm_started(*action)?.progressed = true;
-                self.progress(fraction).map(drop)
+                self.progress(fraction).map(|_| ())
             }
             Event::Succeeded { action } => self.succeeded(*action),
             Event::Failed { action, reason } => {
@@ -185,9 +185,14 @@ impl BeliefUpdate<'_> {
             let was_known = knowledge.fault().is_none();
             let delta =
                 knowledge.take(attribute, RobotReport::measured(value)).map_err(|message| fault(&message))?;
+            // An equal measurement is not a change. Without conclusions, the delta is empty despite changes.
+            let is_change = !was_known
+                || knowledge.fault().is_some()
+                || !(delta.insert.is_empty() && delta.delete.is_empty());
             self.record_delta(&delta, was_known);
-            if let Some(function) = self.beliefs.mission.fed_by(local_name(attribute)) {
-                self.changes.facts = true;
+            let functions = self.beliefs.mission.fed_by(local_name(attribute));
+            self.changes.facts |= is_change && !functions.is_empty();
+            for function in functions {
                 if self.beliefs.mission.value(&function).is_some() {
                     self.fact(&function, &number::decimal(value))?;
                 }

@@ -9,6 +9,7 @@
 //! subtracted from the value, which restores the value before the action.
 
 use num_rational::BigRational;
+use num_traits::Zero as _;
 use pddl::ast::{
     Action, ActionBody, Arithmetic, Assignment, Atom, Comparison, Condition, ConditionTime, Declaration,
     Domain, DurationConstraint, Effect, EffectTime, Expression, Identifier, Name, Span, Term,
@@ -57,12 +58,23 @@ pub(crate) fn resumed_goal(goal: &Condition) -> Condition {
     Condition::And(vec![goal.clone(), Condition::Atom(gate())])
 }
 
-/// Scales the duration, increases and decreases of a durative action to the share that is not yet `done`. In
-/// its conditions, except those at the end, each fluent that the action increases or decreases is replaced by
-/// its value before the action. Other kinds of actions remain unchanged.
+/// Scales the duration, increases and decreases of an action to the share that is not yet `done`. In its conditions,
+/// except those at the end, each fluent that the action increases or decreases is replaced by its value before the
+/// action.
 fn shorten(action: &mut Action, done: &BigRational) {
-    let ActionBody::Durative { duration, conditions, effects } = &mut action.body else { return };
     let remaining_share = BigRational::from_integer(1.into()) - done;
+    let (duration, conditions, effects) = match &mut action.body {
+        ActionBody::Durative { duration, conditions, effects } => (duration, conditions, effects),
+        // The robot can report progress of an action without duration, too.
+        ActionBody::Instantaneous { precondition, effect } => {
+            if !done.is_zero() {
+                let mut changes = Vec::new();
+                shorten_effect(effect, &remaining_share, None, &mut changes);
+                restore_condition(precondition, done, &changes);
+            }
+            return;
+        }
+    };
     // Without a duration, start and end would be one happening, in which the end effects could violate start
     // conditions.
     let time_left = remaining_share.clone().max(BigRational::new(1.into(), LEAST_LEFT.into()));

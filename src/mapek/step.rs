@@ -121,8 +121,16 @@ impl PlannedStep {
     pub fn with_design(&self, function: &str, design: &str) -> Self {
         let Some(old) = self.design(function).map(ToOwned::to_owned) else { return self.clone() };
         let mut step = self.clone();
-        for word in step.arguments.iter_mut().filter(|word| **word == old) {
-            design.clone_into(word);
+        // A design can serve several functions. If it is an argument for each of them, only the argument for `function`
+        // is replaced: these arguments have the order of the functions.
+        let served = self.configuration.iter().filter(|(_, design)| *design == old);
+        let served: Vec<&str> = served.map(|(name, _)| name.as_str()).collect();
+        let places = self.arguments.iter().filter(|word| **word == old).count();
+        let words = step.arguments.iter_mut().filter(|word| **word == old);
+        for (index, word) in words.enumerate() {
+            if places != served.len() || served.get(index) == Some(&function) {
+                design.clone_into(word);
+            }
         }
         for (_, word) in step.configuration.iter_mut().filter(|(name, _)| name == function) {
             design.clone_into(word);
@@ -191,4 +199,32 @@ pub(super) fn configuration_from_record(record: &Value) -> Option<Vec<(String, S
 
 pub(crate) fn plan_text<'a>(steps: impl IntoIterator<Item = &'a PlannedStep>) -> PlanText {
     PlanText { steps: steps.into_iter().map(PlannedStep::to_plan_step).collect() }
+}
+
+#[cfg(test)]
+mod tests {
+    use num_rational::BigRational;
+
+    use super::PlannedStep;
+
+    fn step(arguments: &[&str], configuration: &[(&str, &str)]) -> PlannedStep {
+        let pair = |(function, design): &(&str, &str)| ((*function).to_owned(), (*design).to_owned());
+        PlannedStep {
+            action: "go".to_owned(),
+            arguments: arguments.iter().map(|argument| (*argument).to_owned()).collect(),
+            written: 1,
+            configuration: configuration.iter().map(pair).collect(),
+            duration: BigRational::default(),
+            cost: BigRational::default(),
+        }
+    }
+
+    #[test]
+    fn a_design_of_two_functions_is_replaced_for_one() {
+        let both = step(&["a", "d", "d"], &[("f", "d"), ("g", "d")]);
+        assert_eq!(both.with_design("f", "e"), step(&["a", "e", "d"], &[("f", "e"), ("g", "d")]));
+        assert_eq!(both.with_design("g", "e"), step(&["a", "d", "e"], &[("f", "d"), ("g", "e")]));
+        let once = step(&["a", "d"], &[("f", "d"), ("g", "d")]);
+        assert_eq!(once.with_design("g", "e"), step(&["a", "e"], &[("f", "d"), ("g", "e")]));
+    }
 }

@@ -1,11 +1,12 @@
 //! Tests with a rule that does not terminate: no report is refused, and no action starts while inferred facts
 //! are missing. Once the rule terminates, the state equals that of a loop without the rule.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
 
 use metaplan::journal::{Journal, Policy, Sync};
-use metaplan::mapek::{Answer, Command, Loop, Settings};
+use metaplan::mapek::{Answer, Command, Loop, Observation, Settings};
 use metaplan::setup::Setup;
 use serde_json::json;
 
@@ -107,4 +108,50 @@ fn a_journal_restores_missing_conclusions() {
     assert!(recovery.warnings.is_empty(), "{:?}", recovery.warnings);
     assert_eq!(restored.snapshot(), control.snapshot());
     assert!(restored.beliefs().available().is_empty());
+}
+
+#[test]
+fn another_version_has_the_conclusions_that_were_missing() {
+    let (directory, mut next) = mission(3);
+    // The next version lacks a component.
+    let kb = directory.path().join("kb.ttl");
+    let text = std::fs::read_to_string(&kb).expect("text");
+    std::fs::write(&kb, text + ":c_9 a t:Component .\n").expect("written");
+    let initial = read(directory.path());
+    let (mut wild, mut told) = (initial.clone(), next.clone());
+    let report = |control: &mut Loop, number: usize, status: &str| {
+        control.react(&Observation::parse(&component(number, status)), Duration::from_secs(1))
+    };
+    report(&mut wild, 0, "FALSE");
+    report(&mut wild, 9, "FALSE");
+    report(&mut told, 0, "FALSE");
+    assert!(wild.beliefs().available().is_empty() && wild.beliefs().running().is_none());
+    let answers = next.migrate(&wild, &initial).expect("no action is under way");
+    assert_eq!(faults(&answers), [None], "{answers:?}");
+    nothing_begins(&report(&mut next, 1, "FALSE"));
+    report(&mut told, 1, "FALSE");
+    assert_eq!(next.beliefs().available(), told.beliefs().available());
+    assert_eq!(next.beliefs().statuses(), told.beliefs().statuses());
+}
+
+#[test]
+fn a_reported_value_replaces_that_of_another_version() {
+    let (directory, tame) = mission(3);
+    let kb = directory.path().join("kb.ttl");
+    let text = std::fs::read_to_string(&kb).expect("text");
+    std::fs::write(&kb, text.replace("t:hasValue 0.5", "t:hasValue 0.6")).expect("written");
+    let mut next = read(directory.path());
+    let mut robot = tame.clone();
+    let line = r#"{"event":"measured","attribute":"light","value":0.7}"#;
+    robot.react(&Observation::parse(line), Duration::from_secs(1));
+    let light = |control: &Loop| {
+        let knowledge = control.beliefs().mission().knowledge().expect("a knowledge base");
+        let values = knowledge.view().measurements().into_iter();
+        let values = values.map(|element| (element.attribute, element.value.map(|value| value.to_string())));
+        values.collect::<BTreeMap<_, _>>()
+    };
+    assert_eq!(light(&next)["light"].as_deref(), Some("3/5"));
+    next.migrate(&robot, &tame).expect("no action is under way");
+    assert_eq!(light(&next)["light"].as_deref(), Some("7/10"));
+    assert_eq!(light(&next)["depth"].as_deref(), Some("3/5"), "the robot has not reported it");
 }

@@ -252,6 +252,25 @@ fn rules_that_require_an_individual_of_nothing_conclude_nothing() {
     assert_eq!(answer["status"], "unsolvable", "{answer}");
 }
 
+/// The second parameter of the head is not a variable of the rule.
+#[test]
+fn rules_with_a_repeated_variable_in_the_head_capture_no_other_variable() {
+    let knowledge = knowledge(
+        "ClassAssertion(:Ca :i1) ObjectPropertyAssertion(:pa :i1 :i2)
+         DLSafeRule(Body(ObjectPropertyAtom(:pa Variable(:x) Variable(:x_2)))
+           Head(ObjectPropertyAtom(:pb Variable(:x) Variable(:x))))\n",
+    );
+    let domain = "(define (domain d) (:requirements :strips :derived-predicates)\n (:predicates (done ?x))
+ (:action b :parameters (?x) :precondition (inferred-Pb ?x ?x) :effect (done ?x)))\n"
+        .to_owned();
+    let problem = "(define (problem p) (:domain d) (:init) (:goal (done i1)))\n".to_owned();
+    let directory = tempfile::tempdir().expect("a directory");
+    let input = Texts { knowledge, domain, problem }.write(directory.path());
+    let (_, stdout, stderr) = metaplan(&input.arguments("plan", &["--format", "json"]));
+    let answer: serde_json::Value = serde_json::from_str(&stdout).unwrap_or_else(|_| panic!("{stderr}"));
+    assert_eq!(answer["status"], "optimal", "{answer}");
+}
+
 /// An observed fact is used even if no action could have added it: the action requires `Ca`, which is not
 /// asserted for `i2`.
 #[test]

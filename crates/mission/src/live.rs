@@ -59,11 +59,12 @@ impl Mission {
         &self.problem
     }
 
-    /// Returns the first numeric function of the domain whose value is the measured value of an attribute,
-    /// given by local name.
-    pub fn fed_by(&self, attribute: &str) -> Option<String> {
+    /// Returns the numeric functions of the domain whose value is the measured value of an attribute, given by local
+    /// name.
+    pub fn fed_by(&self, attribute: &str) -> Vec<String> {
         let fed = |declared: &&Declaration| self.bindings.is_measured(declared, attribute);
-        self.domain.functions.iter().find(fed).map(|declared| declared.identifier.name.to_string())
+        let functions = self.domain.functions.iter().filter(fed);
+        functions.map(|declared| declared.identifier.name.to_string()).collect()
     }
 
     /// Returns `true` if the domain has a numeric function, given as `name arguments`, with this
@@ -172,6 +173,12 @@ impl Mission {
     /// added design parameters. `None` for other actions.
     pub fn written_arguments(&self, action: &str) -> Option<usize> {
         self.adaptation.as_ref().and_then(|adaptation| adaptation.parameters(action))
+    }
+
+    /// Returns the functions for whose designs the knowledge base has added parameters to an action, in the order of
+    /// these parameters.
+    pub fn added_functions(&self, action: &str) -> Vec<&str> {
+        self.adaptation.as_ref().map(|adaptation| adaptation.functions_of(action)).unwrap_or_default()
     }
 
     /// Replaces the initial state of the problem.

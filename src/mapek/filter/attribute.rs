@@ -100,8 +100,8 @@ pub(crate) struct AttributeState {
     crossing: Option<(Micros, BigRational)>,
     last_sample_time: Option<Micros>,
     silent: bool,
-    /// Number of samples held back. Set to 0 when a crossing of a bound is confirmed, and when silence sets the
-    /// believed value to the worst one.
+    /// Number of samples held back. Set to 0 when a crossing of a bound is confirmed, when silence sets the believed
+    /// value to the worst one, and by the first sample after a withdrawal.
     pub held: u64,
 }
 
@@ -166,11 +166,16 @@ impl AttributeFilter {
         state.suspect = None;
         state.plausible = Some(value.clone());
         state.last_sample_time = Some(now);
+        let is_withdrawn = state.silent && self.stale == Stale::Unknown;
         state.silent = false;
         let Some(believed) = &state.believed else {
             state.believed = Some(value.clone());
             return Verdict::Accepted(value.clone());
         };
+        // There is no value that could stay, so the first sample after a withdrawal is not held back.
+        if is_withdrawn {
+            return self.accept(state, value);
+        }
         let target = self.target(believed, value);
         let crosses = !self.is_same_cell(believed, &target);
         state.recent.push_back(crosses);

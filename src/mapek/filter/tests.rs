@@ -7,7 +7,7 @@ use fastrand::Rng;
 use num_rational::BigRational;
 use ontology::tomasys::change::Status;
 
-use super::attribute::{AttributeFilter, AttributeState, Bound, Elapsed, Side, Stale, Verdict};
+use super::attribute::{AttributeFilter, AttributeState, Bound, Elapsed, Hold, Side, Stale, Verdict};
 use super::component::{ComponentFilter, ComponentState};
 
 fn value(thousandths: i64) -> BigRational {
@@ -252,6 +252,29 @@ fn silence_is_reported_once_after_the_period() {
             }
         }
     }
+}
+
+#[test]
+fn the_first_sample_after_a_withdrawal_is_believed() {
+    let filter = AttributeFilter {
+        bounds: vec![bound(800, Side::Most, 16)],
+        debounce: 5,
+        period: Some(2),
+        stale: Stale::Unknown,
+        ..AttributeFilter::default()
+    };
+    for (sample, is_kept) in [(795, false), (500, true)] {
+        let mut state = AttributeState::believing(Some(value(900)));
+        AttributeFilter::begin(&mut state, 0);
+        assert_eq!(filter.elapse(&mut state, 5), Some(Elapsed::Silent(None)));
+        let Verdict::Accepted(believed) = filter.sample(&mut state, 6, &value(sample)) else {
+            panic!("{sample} is held")
+        };
+        // The bound still has its hysteresis.
+        assert_eq!(filter.bounds[0].keeps(&believed), is_kept, "{sample}: {believed}");
+    }
+    let mut state = AttributeState::believing(Some(value(900)));
+    assert_eq!(filter.sample(&mut state, 1, &value(795)), Verdict::Held(Hold::Hysteresis));
 }
 
 #[test]

@@ -410,6 +410,24 @@ impl Knowledge {
         Ok(())
     }
 
+    /// Restores the differences of another version of this knowledge, see [`Knowledge::restore`]. If a value or status
+    /// differs there, it replaces the one that the documents of this version state.
+    ///
+    /// # Errors
+    /// Inference exceeds its limits; the knowledge is then unchanged.
+    pub fn restore_over(&mut self, statements: &Statements) -> Result<(), Message> {
+        let place =
+            |statement: &Statement| Some((statement.predicate.clone(), statement.arguments.first()?.clone()));
+        let differing = statements.added.iter().chain(&statements.removed).filter(|change| change.is_state());
+        let places: BTreeSet<_> = differing.filter_map(place).collect();
+        let engine = self.origin.engine();
+        let stated = engine.facts().filter(|fact| engine.is_asserted(fact));
+        let stated = stated.map(|fact| Statement::of(engine, &fact));
+        let mut merged = statements.clone();
+        merged.removed.extend(stated.filter(|own| place(own).is_some_and(|place| places.contains(&place))));
+        self.restore(&merged)
+    }
+
     /// Number of names and values that were interned since the documents were read or revised.
     pub fn growth(&self) -> usize {
         let count = |runtime: &Runtime| runtime.engine().symbols().len();

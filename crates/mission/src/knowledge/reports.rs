@@ -113,6 +113,21 @@ impl Knowledge {
         self.waiting = waiting;
     }
 
+    /// Applies reports and objectives that are pending in another version of this knowledge. Those about entities that
+    /// this version lacks are dropped.
+    pub fn take_over(&mut self, mut waiting: Waiting) {
+        let engine = self.runtime.engine_mut();
+        waiting.reports.retain(|(name, report)| report.update(engine, name).is_ok());
+        // The errors below are unknown names of pending objectives.
+        if let Some((name, report)) = waiting.reports.pop() {
+            self.waiting = waiting;
+            let _ = self.take(&name, report);
+        } else {
+            self.waiting = Waiting::default();
+            let _ = waiting.objectives.map(|objectives| self.pursue_in_time(&objectives));
+        }
+    }
+
     /// Sets the interrupt that can stop inference in later updates.
     pub fn interrupt(&mut self, interrupt: Interrupt) {
         let limits = Limits { interrupt: Some(interrupt), ..self.runtime.engine().limits().clone() };

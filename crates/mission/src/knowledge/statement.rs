@@ -1,6 +1,7 @@
 //! Assertions that refer to entities by name instead of interned symbol, for snapshots and
 //! certificates.
 
+use ontology::vocab::local_name;
 use rules::{Engine, Fact, Literal, Symbol, Symbols, Value};
 use serde::{Deserialize, Serialize};
 
@@ -57,7 +58,16 @@ pub struct Statements {
     pub removed: Vec<Statement>,
 }
 
+/// Local names of the properties with one value that the robot reports: measured values, statuses of components and
+/// realisability of designs.
+const STATES: [&str; 4] = ["hasValue", "qa_has_value", "c_status", "fd_realisability"];
+
 impl Statement {
+    /// Returns `true` if a report replaces the value of this statement.
+    pub(super) fn is_state(&self) -> bool {
+        STATES.contains(&local_name(&self.predicate))
+    }
+
     pub(super) fn of(engine: &Engine, fact: &Fact) -> Self {
         let symbols = engine.symbols();
         Self {

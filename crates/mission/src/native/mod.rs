@@ -188,6 +188,11 @@ impl CoAdaptation {
         self.actions.get(&Name::new(action)).map(|needs| needs.parameters)
     }
 
+    pub(super) fn functions_of(&self, action: &str) -> Vec<&str> {
+        let needs = self.actions.get(&Name::new(action));
+        needs.into_iter().flat_map(|needs| &needs.functions).map(|needed| needed.name.as_str()).collect()
+    }
+
     pub(super) fn explicit(&self, domain: &Domain) -> Domain {
         let mut explicit = domain.clone();
         for own in [FUNCTION, DESIGN] {

@@ -75,7 +75,15 @@ fn conclude(
                 parameter.name.to_string()
             }
             Term::Variable(parameter) | Term::Constant(parameter) => {
-                let parameter = format!("{}_{}", parameter.name, parameters.len() + 1);
+                // A name of another variable would be captured.
+                let is_used = |name: &str| {
+                    let mut names = variables.names.values().chain(&parameters);
+                    names.any(|other| other.eq_ignore_ascii_case(name))
+                };
+                let mut numbered =
+                    (parameters.len() + 1..).map(|number| format!("{}_{number}", parameter.name));
+                let free = numbered.find(|name| !is_used(name));
+                let parameter = free.unwrap_or_else(|| parameter.name.to_string());
                 equal.push(Condition::Equal(variable(&parameter), value, Span::default()));
                 parameter
             }
