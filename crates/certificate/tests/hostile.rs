@@ -3,7 +3,9 @@
 
 use std::fmt::Write as _;
 
-use metaplan_certificate::{Cause, Difference, Faithful, Fault, check, faithful, witness};
+use metaplan_certificate::{
+    Cause, Difference, Faithful, Fault, StepBound, check, faithful, formula, witness,
+};
 use num_rational::BigRational;
 use pddl::Source;
 use pddl::ast::{Domain, Problem};
@@ -143,8 +145,8 @@ fn many_non_dominated_design_combinations_are_rejected() {
     let slots = 19;
     let task = task("\"x\", \"y\"", &["(a)", "(b)"], &[("go", "", Some(0), 1), ("on", "", None, 0)]);
     let mut task: serde_json::Value = serde_json::from_str(&task).expect("JSON");
-    task["slots"] = serde_json::json!([[0, 1]]);
-    task["uses"] = serde_json::json!([[], vec![(0, [0, 1]); slots]]);
+    task["slots"] = serde_json::json!(vec![[0, 1]; slots]);
+    task["uses"] = serde_json::json!([[], (0..slots).map(|slot| (slot, [0, 1])).collect::<Vec<_>>()]);
     let powers = (0..slots).map(|slot| [0, 1 << slot]);
     task["tables"] = powers.collect();
     task["numbers"] = serde_json::json!([0]);
@@ -160,6 +162,29 @@ fn many_non_dominated_design_combinations_are_rejected() {
     let fault = check(&task.to_string(), argument, None).expect_err("too many");
     let Fault::Form { reason, .. } = &fault else { panic!("{fault}") };
     assert!(reason.starts_with("an operator with 524288 combinations of designs"), "{reason}");
+}
+
+#[test]
+fn a_slot_that_is_used_twice_is_rejected() {
+    let task = task("\"x\", \"y\"", &["(a)", "(b)"], &[("go", "", Some(0), 1), ("on", "", None, 0)]);
+    let mut task: serde_json::Value = serde_json::from_str(&task).expect("JSON");
+    task["slots"] = serde_json::json!([[0, 1]]);
+    task["uses"] = serde_json::json!([[], [(0, [0, 1]), (0, [0, 1])]]);
+    let argument = r#"{"format": "metaplan-argument/1", "potentials": [], "needs": [], "labels": []}"#;
+    let fault = check(&task.to_string(), argument, None).expect_err("a slot twice");
+    assert!(fault.to_string().ends_with("a slot that is used twice"), "{fault}");
+}
+
+#[test]
+fn formulas_do_not_cover_derived_variables_without_rules() {
+    let task = task("", &["(a)", "(b)", "(c)"], &[("go", "", Some(0), 1), ("on", "", None, 0)]);
+    let argument = r#"{"format": "metaplan-argument/1", "potentials": [{"pattern": [], "values": [0]}], "needs": [],
+      "labels": []}"#;
+    let claim = BigRational::from_integer(2.into());
+    let reason = |task: &str| formula((task, argument), Some(&claim), StepBound::Spent).err();
+    assert_eq!(reason(&task), None);
+    let derived = task.replace(r#""basic": 3"#, r#""basic": 2"#);
+    assert_eq!(reason(&derived).as_deref(), Some("derived predicates are not covered"));
 }
 
 /// Checks the need of 8 for two walking steps with a battery of 7. Each step uses 4 and requires at

@@ -64,7 +64,7 @@ pub struct Assignment {
 /// no assignment that respects the budgets is found, no design is selected.
 pub fn configure(functions: &[Vec<DesignChoice>], budgets: &[BigRational], limits: &Limits) -> Assignment {
     let problem = Problem::new(functions, budgets);
-    let (prices, incumbent) = problem.prices();
+    let (prices, incumbent) = problem.prices(limits);
     let (designs, optimal) = match problem.search(&prices, &incumbent, limits) {
         Ok(designs) => (designs, true),
         Err(Interrupted) => (incumbent.designs, false),
@@ -215,16 +215,16 @@ impl Problem {
     }
 
     /// Computes multipliers by a subgradient method. Also returns the best assignment found by
-    /// greedy selection along the way.
+    /// greedy selection along the way. At a limit, the multipliers are valid, but not good.
     #[expect(clippy::cast_possible_truncation, reason = "rounding is meant; bounds hold for whatever prices")]
-    fn prices(&self) -> (LagrangeMultipliers, Label) {
+    fn prices(&self, limits: &Limits) -> (LagrangeMultipliers, Label) {
         let float = |number: &BigInt| number.to_f64().unwrap_or(f64::MAX);
         let budgets: Vec<f64> = self.budgets.iter().map(float).collect();
         let mut incumbent = self.greedy(|item| float(&item.worth));
         let mut prices = vec![0.0_f64; budgets.len()];
         let mut best = (f64::INFINITY, prices.clone());
         let mut stride = 1.0;
-        for _ in 0..ROUNDS {
+        for _ in limits.watch(0..ROUNDS).map_while(Result::ok) {
             let reduced = |item: &Item| {
                 let paid: f64 =
                     item.demands.iter().zip(&prices).map(|(demand, price)| float(demand) * price).sum();
@@ -292,6 +292,10 @@ impl Problem {
     ) -> Result<Vec<Option<usize>>, Interrupted> {
         let target: BigInt = &incumbent.worth << PRICE_BITS;
         let mut labels = vec![self.nothing()];
+        let designs = self.functions.len().saturating_mul(size_of::<Option<usize>>());
+        // The digits of a number are stored outside of it.
+        let spent = self.budgets.len().saturating_mul(2_usize.saturating_mul(size_of::<BigInt>()));
+        let bytes = size_of::<Label>().saturating_add(designs).saturating_add(spent);
         for (from, designs) in (1..).zip(&self.functions) {
             let mut next: Vec<Label> = Vec::new();
             for label in limits.watch(&labels) {
@@ -308,6 +312,9 @@ impl Problem {
                     // Of equally good labels (partial assignments), the older one is preferred and kept.
                     next.retain(|old| old.worth >= new.worth || !new.is_as_free(old));
                     next.push(new);
+                    if next.len().saturating_mul(bytes) > limits.room() {
+                        return Err(Interrupted);
+                    }
                 }
             }
             labels = next;
@@ -508,5 +515,21 @@ mod tests {
         );
         let chosen = configure(&functions, &[number(6)], &Limits::none());
         assert_eq!((chosen.designs, chosen.optimal), (vec![Some(0), Some(1)], true));
+    }
+
+    #[test]
+    fn multipliers_and_labels_respect_the_limits() {
+        let item = |utility: i64, demand: i64| DesignChoice {
+            utility: number(utility),
+            demands: vec![number(demand)],
+            ..DesignChoice::default()
+        };
+        let functions = vec![vec![item(9, 5), item(1, 1)], vec![item(9, 5), item(2, 1)]];
+        let problem = Problem::new(&functions, &[number(6)]);
+        let price = |limits: &Limits| problem.prices(limits).0.each[0].clone();
+        assert!(price(&Limits::none()) > BigInt::zero());
+        assert_eq!(price(&Limits::none().with_time(Duration::ZERO)), BigInt::zero());
+        let chosen = configure(&functions, &[number(6)], &Limits::none().with_room(1));
+        assert_eq!((chosen.designs, chosen.optimal), (vec![Some(0), Some(1)], false));
     }
 }

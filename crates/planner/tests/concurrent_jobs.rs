@@ -90,12 +90,12 @@ fn thousandths(value: &BigRational) -> i64 {
     (value * BigRational::from(BigInt::from(1000))).ceil().to_integer().to_i64().expect("small")
 }
 
-/// Plans until the makespan is at most `target` thousandths, it is proved optimal, or a minute is
-/// over. The validator executes the plan. Also returns its makespan.
+/// Plans until the makespan is at most `target` thousandths, it is proved optimal, or ten minutes
+/// are over. The validator executes the plan. Also returns its makespan.
 fn solve(robots: usize, lengths: &[i64], target: i64) -> (Solution, i64) {
     let (domain, problem) = parse(DOMAIN, &problem(robots, lengths));
     let separation = rational(1, 1000);
-    let limits = Limits::none().with_time(Duration::from_secs(60));
+    let limits = Limits::none().with_time(Duration::from_secs(600));
     let task = ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation).expect("a task");
     let interrupt = limits.interrupt();
     let solution = optimize_concurrent(&task, &limits, &mut |improvement| {

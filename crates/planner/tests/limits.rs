@@ -86,7 +86,6 @@ fn run(domain: &Domain, problem: &Problem, limit: Duration, engine: Engine) -> (
 #[test]
 fn wherever_time_is_up_there_is_no_false_answer() {
     let (domain, problem) = depot(4, 2, 3);
-    let mut ended = 0;
     for engine in [Engine::Auto, Engine::Sat] {
         // The time limit increases by a fifth each time, from before the end of grounding to after the proof.
         let mut microseconds = 100.0_f64;
@@ -95,14 +94,14 @@ fn wherever_time_is_up_there_is_no_false_answer() {
             let (status, _) = run(&domain, &problem, limit, engine);
             let honest = [None, Some(Status::Unknown), Some(Status::Feasible), Some(Status::Optimal)];
             assert!(honest.contains(&status), "{status:?} after {limit:?}");
-            ended += usize::from(status == Some(Status::Optimal));
             if status == Some(Status::Optimal) {
                 break;
             }
             microseconds *= 1.2;
         }
     }
-    assert!(ended > 0, "nothing was ever proved");
+    let (status, _) = run(&domain, &problem, Duration::MAX, Engine::Auto);
+    assert_eq!(status, Some(Status::Optimal));
 }
 
 fn check_overrun(name: &str, (domain, problem): &(Domain, Problem)) {
@@ -134,14 +133,19 @@ fn expansion_of_a_temporal_node_with_many_successors_ends_at_the_limit() {
     );
     let (domain, problem) = parse(domain, &problem);
     let separation = BigRational::new(1.into(), 1000.into());
-    let task = ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation).expect("a task");
     let started = Instant::now();
-    let limits = Limits::none().with_time(Duration::from_millis(300));
+    let task = ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation).expect("a task");
+    let grounding = started.elapsed();
+    let started = Instant::now();
+    let limit = Duration::from_millis(300);
+    let limits = Limits::none().with_time(limit);
     let solution = optimize_concurrent(&task, &limits, &mut |_| {});
     let passed = started.elapsed();
-    println!("{passed:?}");
+    println!("{passed:?}, grounding {grounding:?}");
     assert!([Status::Unknown, Status::Feasible].contains(&solution.status));
-    assert!(passed < Duration::from_millis(1_300), "{passed:?}");
+    // The time of grounding is a measure of the speed of the machine.
+    let most = limit + Duration::from_secs(1).max(grounding * 2);
+    assert!(passed < most, "{passed:?}, grounding {grounding:?}");
 }
 
 /// Three robots that can do any of nine jobs, for which no search can prove a makespan with little memory.
@@ -156,20 +160,20 @@ fn searches_begin_again_until_the_deadline_when_memory_is_full() {
     let separation = BigRational::new(1.into(), 1000.into());
     let task = ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation).expect("a task");
     let thresholds = Thresholds::NONE;
-    let time = Duration::from_secs(2);
     let run = |limits: Limits| {
         let started = Instant::now();
         let solution = optimize_concurrent(&task, &limits.with_thresholds(thresholds), &mut |_| {});
         (solution, started.elapsed())
     };
+    // Without a deadline, the search ends.
+    let (solution, passed) = run(Limits::none().with_room(1 << 18));
+    assert_eq!(solution.status, Status::Feasible);
+    let cost = solution.plan.expect("a plan").cost;
+    let time = Duration::from_secs(2).max(passed * 3);
     let (solution, passed) = run(Limits::none().with_room(1 << 18).with_time(time));
     println!("{passed:?} {:?}", solution.statistics.restarts);
     assert!(solution.status == Status::Feasible && passed >= time, "{passed:?}");
-    let cost = solution.plan.expect("a plan").cost;
-    // Without a deadline, the search ends.
-    let (solution, _) = run(Limits::none().with_room(1 << 18));
-    assert_eq!(solution.status, Status::Feasible);
-    assert!(solution.plan.expect("a plan").cost >= cost);
+    assert!(solution.plan.expect("a plan").cost <= cost);
 }
 
 #[test]

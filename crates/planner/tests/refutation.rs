@@ -12,6 +12,7 @@ use metaplan_planner::{
 };
 use num_rational::BigRational;
 use pddl::{Source, read};
+use serde_json::{Value, json};
 use testing::missions::Mission;
 use testing::random::Random;
 
@@ -181,4 +182,27 @@ fn changed_refutations_are_rejected() {
             }
         }
     }
+}
+
+/// The bound on the number of steps relies on a potential. Without a check, greater values would allow fewer steps.
+#[test]
+fn steps_are_not_bounded_by_wrong_potentials() {
+    let mut tried = 0;
+    for seed in 0..40 {
+        let Some((mut certificate, cost)) = certified(seed) else { continue };
+        let Ok((steps, files)) = refutation(&certificate, &cost, StepBound::Potential) else { continue };
+        let mut argument: Value = serde_json::from_str(&certificate.argument).expect("JSON");
+        for potential in argument["potentials"].as_array_mut().expect("potentials") {
+            for bound in potential["values"].as_array_mut().expect("values") {
+                if let Some(number) = bound.as_i64() {
+                    *bound = json!(number + 1_000);
+                }
+            }
+        }
+        certificate.argument = argument.to_string();
+        let found = verdicts(&certificate, &cost, steps, &files);
+        assert!(found[2].is_err(), "seed {seed}: {found:?}");
+        tried += 1;
+    }
+    assert!(tried > 0, "no mission has a refutation");
 }

@@ -478,3 +478,25 @@ fn a_state_that_violates_a_mutex_group_is_ground_again() {
         assert_eq!(anew.plan.map(|plan| plan.steps.len()), Some(steps), "{goal}");
     }
 }
+
+/// A condition over all does not apply to an action with the duration 0, so the design need not be available.
+#[test]
+fn availability_over_all_is_required_only_with_a_duration() {
+    let available = [Name::new("fd_available")];
+    for (duration, condition, is_suited) in [
+        ("0", "(over all (fd_available ?d))", false),
+        ("0", "(and (at start (fd_available ?d)) (over all (fd_available ?d)))", true),
+        ("1", "(over all (fd_available ?d))", true),
+    ] {
+        let domain = format!(
+            "(define (domain d) (:types design) (:predicates (fd_available ?d - design) (done))
+              (:durative-action act :parameters (?d - design) :duration (= ?duration {duration}) :condition {condition}
+                :effect (at end (done))))"
+        );
+        let problem =
+            "(define (problem p) (:domain d) (:objects x - design) (:init (fd_available x)) (:goal (done)))";
+        let (domain, problem) = parse(&domain, problem);
+        let replanner = Replanner::new(&domain, &problem, &available, &GroundConfig::default());
+        assert_eq!(replanner.is_some(), is_suited, "{duration}, {condition}");
+    }
+}

@@ -12,9 +12,16 @@ pub fn limits(head_start: usize) -> Limits {
     Limits::none().with_thresholds(thresholds)
 }
 
+/// Checks with a time limit for each task. If too few tasks are decided, the machine may be slow, so the check is
+/// repeated with ten times the limit.
+pub fn with_enough_time(time: Duration, check: impl Fn(Duration) -> Result<(), String>) {
+    let found = check(time).or_else(|_| check(time * 10));
+    assert_eq!(found, Ok(()));
+}
+
 /// Solves a task. Returns `None` if the planner rejects the task; `reason` is the only admitted
-/// reason.
-pub fn solve(domain: &Domain, problem: &Problem, reason: &str) -> Option<Solution> {
+/// reason. If the task is known to have a plan, there is more time for finding one.
+pub fn solve(domain: &Domain, problem: &Problem, reason: &str, has_plan: bool) -> Option<Solution> {
     let task = match ground(domain, problem, &GroundConfig::default()) {
         Ok(task) => task,
         Err(errors) => {
@@ -23,8 +30,12 @@ pub fn solve(domain: &Domain, problem: &Problem, reason: &str) -> Option<Solutio
             return None;
         }
     };
-    let limits = Limits::none().with_time(Duration::from_secs(2));
-    Some(optimize(&task, &Config::default().with_limits(limits), &mut |_| {}))
+    let within = |seconds| {
+        let limits = Limits::none().with_time(Duration::from_secs(seconds));
+        optimize(&task, &Config::default().with_limits(limits), &mut |_| {})
+    };
+    let solution = within(2);
+    Some(if has_plan && solution.plan.is_none() { within(60) } else { solution })
 }
 
 pub struct Tally {

@@ -11,7 +11,8 @@ use crate::model::Model;
 /// task has an unsupported construct, `cost` is not positive, or the formula exceeds `limit`
 /// literals.
 pub(super) fn encode(model: &Model, cost: &Integer, steps: usize, limit: usize) -> Result<Formula, String> {
-    if !model.axioms.is_empty() {
+    // The initial values of derived variables are not checked, even if no rule derives them.
+    if !model.axioms.is_empty() || model.basic < model.variables.len() {
         return Err("derived predicates are not covered".into());
     }
     if model.operators.iter().any(|operator| !operator.conditional.is_empty()) {

@@ -9,7 +9,7 @@
 use crate::argument::Argument;
 use crate::integer::Integer;
 use crate::model::Model;
-use crate::table::Table;
+use crate::table::{Table, check_potential};
 
 /// The lower bound on the cost of a plan with more than T steps, by which T is determined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,7 +49,7 @@ pub(super) fn bound(
 }
 
 /// Checks by [`StepBound::Potential`] that no plan of more than `steps` steps costs less than
-/// `cost`. Returns the position of a potential that proves it.
+/// `cost`. Returns the position of a potential that proves it. The potential is checked, too.
 pub(super) fn check(
     model: &Model,
     argument: &Argument,
@@ -63,7 +63,8 @@ pub(super) fn check(
         let table = Table::new(model, &potential.pattern, &potential.values);
         let mut layers = Layers::new(model, &table)?;
         (0..=steps).for_each(|_| layers.advance());
-        layers.least().is_none_or(|least| least >= *cost).then_some(position)
+        let is_enough = layers.least().is_none_or(|least| least >= *cost);
+        (is_enough && check_potential(model, &table).is_ok()).then_some(position)
     };
     let position = argument.potentials.iter().enumerate().find_map(serves);
     position.ok_or_else(|| format!("a cheaper plan may have more than {steps} steps"))

@@ -11,6 +11,8 @@ mod paths;
 #[cfg(test)]
 mod tests;
 
+use rustc_hash::FxHashMap;
+
 use search::bounds::Bounds;
 use task::context::Context;
 use task::plan::ground::{GroundPlan, GroundStep, replay};
@@ -48,16 +50,26 @@ pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Conf
 /// Finds further cheapest plans as paths of a graph. Returns `None` if graph search is not applicable to the task.
 fn by_graph(context: Context<'_>, bounds: &Bounds, first: &GroundPlan, most: usize) -> Option<Alternatives> {
     let task = context.task;
-    let mut is_enough = |graph: &Graph| List::new(context, first, most, graph).0.is_full();
+    // Plans in the incomplete graph. At a limit, the enumeration of the final graph may list fewer.
+    let mut before = Vec::new();
+    let mut is_enough = |graph: &Graph| {
+        let (list, _) = List::new(context, first, most, graph);
+        let is_full = list.is_full();
+        if list.plans.len() > before.len() {
+            before = list.plans;
+        }
+        is_full
+    };
     let graph = cheapest(context, bounds, first.cost, &mut is_enough)?;
     let (list, end) = List::new(context, first, most, &graph);
+    let plans = if before.len() > list.plans.len() { before } else { list.plans };
     // If the task has waits (steps that only advance the time), several operators can represent one action, and an
     // action can have different positions in equal plans. So plans cannot be compared step by step.
     let has_waits = task.operators.iter().any(|operator| operator.wait.is_some());
     let is_known = graph.is_complete && graph.is_exact && !has_waits;
-    let forced = is_known.then(|| forced(task, &first.steps, &shared(task, &first.steps, &graph)));
+    let forced = is_known.then(|| forced(task, &first.steps, &shared(context, &first.steps, &graph)));
     let complete = graph.is_complete && graph.is_exact && end == End::Exhausted;
-    Some(Alternatives { plans: list.plans, complete, forced })
+    Some(Alternatives { plans, complete, forced })
 }
 
 /// Decoded plans other than the first plan, at most `most`. Plans that differ only in waits are listed once.
@@ -70,17 +82,28 @@ impl List {
     fn new(context: Context<'_>, first: &GroundPlan, most: usize, graph: &Graph) -> (Self, End) {
         let mut list = Self { plans: Vec::new(), most };
         let first_plan = decode(context, first);
-        let end = Paths::new(graph).each(&mut |steps| {
+        // For each sequence of actions, the indices of the plans with these actions.
+        let mut listed: FxHashMap<Vec<(String, Vec<String>)>, Vec<usize>> = FxHashMap::default();
+        let mut pulse = context.limits.pulse();
+        let end = Paths::new(graph, context.limits).each(&mut |steps| {
+            if pulse.beat().is_err() {
+                return false;
+            }
             // If a label represents several states, a path need not be a plan: a resource may not suffice.
             if !graph.is_exact && replay(context.task, &steps).is_none_or(|(_, cost)| cost != first.cost) {
                 return true;
             }
             let plan = decode(context, &GroundPlan { steps, cost: first.cost });
-            let is_new = plan != first_plan && !list.plans.contains(&plan);
-            if is_new && list.is_full() {
+            let names = plan.steps.iter().map(|step| (step.action.clone(), step.arguments.clone()));
+            let similar = listed.entry(names.collect()).or_default();
+            if plan == first_plan || similar.iter().any(|index| list.plans[*index] == plan) {
+                return true;
+            }
+            if list.is_full() {
                 return false;
             }
-            list.plans.extend(is_new.then_some(plan));
+            similar.push(list.plans.len());
+            list.plans.push(plan);
             true
         });
         (list, end)
@@ -93,12 +116,12 @@ impl List {
 
 /// Returns the choices of the first plan that all cheapest plans share. The graph must be complete, and each of its
 /// paths to a goal must be a plan.
-fn shared(task: &Task, first: &[GroundStep], graph: &Graph) -> Vec<Choice> {
-    let layers = Paths::new(graph).layers(first.len());
+fn shared(context: Context<'_>, first: &[GroundStep], graph: &Graph) -> Vec<Choice> {
+    let layers = Paths::new(graph, context.limits).layers(first.len());
     let mut choices = Choice::all(first);
     choices.retain(|choice| {
         layers[choice.step].as_ref().is_some_and(|steps| {
-            steps.iter().all(|step| shares(task, &first[choice.step], step, choice.slot))
+            steps.iter().all(|step| shares(context.task, &first[choice.step], step, choice.slot))
         })
     });
     choices

@@ -2,6 +2,7 @@
 //! are in the order of their operators and designs in the task.
 
 use rustc_hash::FxHashSet;
+use task::limits::Limits;
 use task::plan::ground::GroundStep;
 
 use crate::alternatives::graph::{Edge, Graph, ROOT};
@@ -17,6 +18,7 @@ pub(super) enum End {
 
 pub(super) struct Paths<'g> {
     graph: &'g Graph,
+    limits: &'g Limits,
     /// Index of the first edge of each label, followed by the number of edges.
     first: Vec<usize>,
     /// Pairs of a label and a number of steps in which no path leads from the label to a goal.
@@ -30,7 +32,7 @@ struct Branch {
 }
 
 impl<'g> Paths<'g> {
-    pub(super) fn new(graph: &'g Graph) -> Self {
+    pub(super) fn new(graph: &'g Graph, limits: &'g Limits) -> Self {
         let labels = graph.goals.len();
         let mut first = vec![graph.edges.len(); labels.saturating_add(1)];
         for (position, edge) in graph.edges.iter().enumerate().rev() {
@@ -39,7 +41,7 @@ impl<'g> Paths<'g> {
         for label in (0..labels).rev() {
             first[label] = first[label].min(first[label.saturating_add(1)]);
         }
-        Self { graph, first, dead: FxHashSet::default(), work: MAX_WORK }
+        Self { graph, limits, first, dead: FxHashSet::default(), work: MAX_WORK }
     }
 
     /// Returns the edges of a label that lead to labels from which a goal can be reached.
@@ -49,7 +51,8 @@ impl<'g> Paths<'g> {
     }
 
     /// Calls `visit` with the steps of each path from the initial label to a goal label, in order of length.
-    /// Stops early if `visit` returns `false` or the limit of [`MAX_WORK`] edges is reached.
+    /// Stops early if `visit` returns `false` one of the limits or the limit of [`MAX_WORK`] edges is
+    /// reached.
     pub(super) fn each(&mut self, visit: &mut dyn FnMut(Vec<GroundStep>) -> bool) -> End {
         if !self.graph.alive.first().is_some_and(|is_alive| *is_alive) {
             return End::Exhausted;
@@ -71,6 +74,7 @@ impl<'g> Paths<'g> {
         let mut branches = vec![Branch { label: ROOT, next: self.first[ROOT as usize] }];
         // For each label on the path: whether a goal was reached through it.
         let mut fruitful = vec![false];
+        let mut pulse = self.limits.pulse();
         while let Some(branch) = branches.last_mut() {
             let steps_left = length.saturating_sub(path.len());
             let end = self.first[(branch.label as usize).saturating_add(1)];
@@ -97,7 +101,9 @@ impl<'g> Paths<'g> {
             }
             let edge = self.graph.edges[branch.next];
             branch.next = branch.next.saturating_add(1);
-            let Some(work) = self.work.checked_sub(1) else { return End::Stopped };
+            let Some(work) = self.work.checked_sub(1).filter(|_| pulse.beat().is_ok()) else {
+                return End::Stopped;
+            };
             self.work = work;
             let to = edge.to;
             if self.graph.alive[to as usize] && !self.dead.contains(&(to, steps_left.saturating_sub(1))) {

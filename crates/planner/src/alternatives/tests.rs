@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::atomic::Ordering;
 
+use search::bounds::Bounds;
 use task::context::Context;
 use task::ground::{GroundConfig, ground};
 use task::limits::Limits;
@@ -13,7 +14,7 @@ use task::plan::{Plan, decode};
 use task::task::{State, Task};
 use testing::missions::Mission;
 
-use super::{Forced, alternatives};
+use super::{End, Forced, List, alternatives, cheapest};
 use crate::optimize::{Config, Engine, optimize};
 use pddl::{Source, read};
 
@@ -117,4 +118,25 @@ fn check(seed: u64) -> usize {
 fn all_cheapest_plans_and_their_common_choices_are_found() {
     let several = (0..300).filter(|seed| check(*seed) > 1).count();
     assert!(several > 8, "only {several} missions have several cheapest plans");
+}
+
+/// The enumeration ends even if the limit is reached after the graph is complete.
+#[test]
+fn the_enumeration_ends_at_a_limit() {
+    let domain = "(define (domain d) (:predicates (p) (q) (r)) (:action a :parameters () :effect (p))
+      (:action b :parameters () :effect (q)) (:action c :parameters () :effect (r)))";
+    let problem = "(define (problem p) (:domain d) (:init) (:goal (and (p) (q) (r))))";
+    let (domain, problem, _) = read(&Source::new("d", domain), &Source::new("p", problem)).expect("PDDL");
+    let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");
+    let solution = optimize(&task, &Config::default(), &mut |_| {});
+    let first = solution.ground.as_ref().expect("a plan");
+    let limits = Limits::none();
+    let context = Context::new(&task, &limits);
+    let bounds = Bounds::new(context).expect("bounds");
+    let graph = cheapest(context, &bounds, first.cost, &mut |_| false).expect("a graph");
+    let (list, end) = List::new(context, first, 9, &graph);
+    assert_eq!((list.plans.len(), end), (5, End::Exhausted));
+    limits.interrupt().store(true, Ordering::Relaxed);
+    let (list, end) = List::new(context, first, 9, &graph);
+    assert_eq!((list.plans.len(), end), (0, End::Stopped));
 }

@@ -54,7 +54,10 @@ pub(super) fn trim<'c>(
         } else {
             trimmer.conclude(&clause)?;
         }
-        if limits.reached() || trimmer.size > LITERAL_LIMIT {
+        if limits.reached() {
+            return Err("the solver's proof was not trimmed within the limits".to_owned());
+        }
+        if trimmer.size > LITERAL_LIMIT {
             return Err("the solver's proof is too long".to_owned());
         }
     }
@@ -343,5 +346,32 @@ impl Trimmer {
         }
         proof.flush()?;
         hints.flush()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::Ordering;
+
+    use super::*;
+
+    #[test]
+    fn a_limit_is_not_reported_as_a_long_proof() {
+        let clause = |text: &str| {
+            let mut clause = Vec::new();
+            lines::literals(text.as_bytes(), 2, &mut clause).expect("literals");
+            clause
+        };
+        let clauses = ["1 2 0", "1 -2 0", "-1 2 0", "-1 -2 0"].map(clause);
+        let trimmed = |limits: &Limits| {
+            let mut draft = &b"1 0\n0\n"[..];
+            let (mut proof, mut hints) = (Vec::new(), Vec::new());
+            trim(clauses.iter().map(Vec::as_slice), 2, &mut draft, (&mut proof, &mut hints), limits)
+        };
+        let limits = Limits::none();
+        assert_eq!(trimmed(&limits), Ok(()));
+        limits.interrupt().store(true, Ordering::Relaxed);
+        let reason = "the solver's proof was not trimmed within the limits";
+        assert_eq!(trimmed(&limits), Err(reason.to_owned()));
     }
 }

@@ -169,6 +169,10 @@ impl Progress<'_> {
             (true, End::Stopped) => (Status::Feasible, None),
             (false, End::Stopped) => (Status::Unknown, None),
         };
+        if proof.is_some() {
+            // The proof does not depend on the search for the first plan.
+            self.statistics.unchecked = None;
+        }
         let horizon = plan.as_ref().filter(|_| proof.is_some()).map_or(0, |plan| plan.steps.len());
         Solution {
             status,

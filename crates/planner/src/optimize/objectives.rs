@@ -118,7 +118,12 @@ pub fn pareto(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement))
             (Status::Unsolvable, _) if points.is_empty() => {
                 return Front { points: vec![point], status: Status::Unsolvable };
             }
-            (Status::Unsolvable, _) => return Front { points, status: Status::Optimal },
+            (Status::Unsolvable, _) => {
+                // An external solver may claim wrongly that there are no further points.
+                let is_proved = point.solution.statistics.unchecked.is_none();
+                let status = if is_proved { Status::Optimal } else { Status::Feasible };
+                return Front { points, status };
+            }
             (status, _) => {
                 points.extend((point.solution.plan.is_some() || points.is_empty()).then_some(point));
                 let status = if points.len() > 1 || points[0].solution.plan.is_some() {

@@ -59,9 +59,9 @@ pub struct Replanner {
 impl Replanner {
     /// Grounds a problem with all objects available. `available` lists the predicates that state
     /// availability. Returns `None` if replanning does not support the domain or problem. Examples:
-    /// availability is used other than as a condition on action parameters, there are timed initial
-    /// literals, preferences or trajectory constraints, actions have negative costs, or grounding
-    /// fails.
+    /// availability is used other than as a condition on action parameters, or only over all by an
+    /// action with the duration 0, there are timed initial literals, preferences or trajectory
+    /// constraints, actions have negative costs, or grounding fails.
     pub fn new(
         domain: &Domain,
         problem: &Problem,
@@ -81,6 +81,11 @@ impl Replanner {
         let generality = Generality { numbers: Some(PRECISION), ..Generality::default() };
         let task = ground_for(domain, &full, config, &generality).ok()?;
         if task.operators.iter().any(|operator| operator.cost.minimum() < 0 || operator.wait.is_some()) {
+            return None;
+        }
+        let only_over_all = usage::only_over_all(domain, available);
+        let may_ignore = |schema: u32| only_over_all.get(schema as usize).is_some_and(|only| *only);
+        if task.operators.iter().any(|own| may_ignore(own.schema) && own.duration.minimum() <= 0) {
             return None;
         }
         let layout = Layout::new(Usage::of(domain, problem), available, problem, &task);

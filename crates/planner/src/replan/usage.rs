@@ -7,7 +7,9 @@
 
 use rustc_hash::FxHashSet;
 
-use pddl::ast::{Atom, Condition, Domain, Effect, Expression, Name, Problem, Term};
+use pddl::ast::{
+    Action, ActionBody, Atom, Condition, ConditionTime, Domain, Effect, Expression, Name, Problem, Term,
+};
 use pddl::visit::Node;
 
 #[derive(Debug, Default)]
@@ -121,6 +123,21 @@ pub(super) fn requirements(domain: &Domain, predicates: &[Name]) -> Option<Vec<V
     }
     let total: usize = predicates.iter().map(|predicate| occurrences(domain, predicate)).sum();
     (total == mentions).then_some(requirements)
+}
+
+/// Returns, for each action, `true` if it requires some available object only in conditions over all. If the duration
+/// is 0, these conditions do not apply.
+pub(super) fn only_over_all(domain: &Domain, predicates: &[Name]) -> Vec<bool> {
+    let of = |action: &Action| {
+        let ActionBody::Durative { conditions, .. } = &action.body else { return false };
+        let keys = |over_all: bool| -> FxHashSet<String> {
+            let own = conditions.iter().filter(|(time, _)| (*time == ConditionTime::OverAll) == over_all);
+            let atoms = own.flat_map(|(_, condition)| conjuncts(condition));
+            atoms.filter(|atom| predicates.contains(&atom.predicate.name)).map(key).collect()
+        };
+        !keys(true).is_subset(&keys(false))
+    };
+    domain.actions.iter().map(of).collect()
 }
 
 fn conjuncts(condition: &Condition) -> Vec<&Atom> {

@@ -328,6 +328,33 @@ fn omitted_instances_are_detected() {
     }
 }
 
+/// The files have no changes of static atoms. So an effect on such a value of a variable would count as no effect, and
+/// a condition on it as the constant truth value of the atom.
+#[test]
+fn static_atoms_are_not_values_of_variables() {
+    let example = Example {
+        name: "static",
+        domain: "(define (domain d) (:predicates (p) (q) (g)) (:action a :parameters () :precondition () :effect (q))
+          (:action b :parameters () :precondition (and (p) (q)) :effect (g)))",
+        problem: "(define (problem x) (:domain d) (:init (p)) (:goal (g)))",
+        optimum: Some("2"),
+    };
+    let (certificate, witness) = certified(&example);
+    let mut task: Value = serde_json::from_str(&certificate.task).expect("JSON");
+    let added = |list: &mut Value, element: Value| list.as_array_mut().expect("an array").push(element);
+    let variable = task["basic"].as_u64().expect("a number");
+    added(&mut task["variables"], json!(["(p)", "none of these"]));
+    added(&mut task["values"], json!(0));
+    task["basic"] = json!(variable + 1);
+    // The first action makes the atom false, and the second requires it.
+    added(&mut task["operators"][0]["effects"], json!([variable, 1]));
+    added(&mut task["operators"][1]["condition"]["facts"], json!([variable, 0]));
+    let task = task.to_string();
+    assert!(lies(&example, &task), "{task}");
+    let found = compared(&example, &task, &witness);
+    assert!(matches!(found, Faithful::No(Difference::Form { .. })), "{found:?}");
+}
+
 /// A simultaneous assignment and addition to one number contradict each other, so there is no such step.
 #[test]
 fn contradictions_are_no_steps() {

@@ -267,4 +267,16 @@ pub const TASKS: &[Example] = &[
           (:init (p a) (= (least a) 5.25) (= (least b) 10) (= (least c) 2.5)) (:goal (q)))",
         optimum: Some("3"),
     },
+    // With the duration 0, there is no state to which the condition over all applies.
+    Example {
+        name: "at once",
+        domain: "(define (domain d) (:predicates (ok ?x) (ready) (done))
+          (:durative-action skip :parameters (?x) :duration (= ?duration 0) :condition (over all (ok ?x))
+            :effect (at end (ready)))
+          (:durative-action prepare :parameters () :duration (= ?duration 5) :condition () :effect (at end (ready)))
+          (:durative-action work :parameters () :duration (= ?duration 1) :condition (at start (ready))
+            :effect (at end (done))))",
+        problem: "(define (problem p) (:domain d) (:objects o) (:init) (:goal (done)))",
+        optimum: Some("1"),
+    },
 ];
