@@ -12,7 +12,7 @@
 //!
 //! [`faithful()`] checks that a ground task is faithful to its PDDL files, without grounding them.
 //! [`check_refutation`] checks an additional proof for small tasks: a formula, its refutation, and a bound on
-//! the number of steps. The bound relies on the potentials, which only [`check()`] checks.
+//! the number of steps.
 //! [`verification_conditions`] exports the label proof to SMT solvers.
 //!
 //! The crate contains no planner code: it links no grounder, no search and no SAT solver.

@@ -1,6 +1,5 @@
 //! An additional optimality proof for small tasks. It has three parts: a formula "some plan of at most T steps is
-//! cheaper", a refutation of the formula, and a proof that no plan of more than T steps is cheaper. The third part
-//! relies on the potentials of the argument, which only [`crate::check()`] checks.
+//! cheaper", a refutation of the formula, and a proof by potentials that no plan of more than T steps is cheaper.
 //!
 //! [`encoding`] is deliberately simple: one operator per step, explicit states, sums in binary. It has no time
 //! windows, no reduced costs and no symmetry breaking, and shares no code with the planner's encoding. For the
@@ -69,7 +68,7 @@ pub fn formula(
 
 /// Checks the three parts of a refutation: the formula encodes the task, the proof refutes the formula, and no
 /// plan of more than `steps` steps is cheaper. Returns for each part its name with a summary, or with the
-/// reason of failure. The potentials of the argument are assumed to be lower bounds; [`crate::check()`] checks this.
+/// reason of failure.
 pub fn check_refutation(
     (task, argument): (&str, &str),
     claim: Option<&BigRational>,

@@ -3,8 +3,7 @@
 //! The first T + 1 steps of a plan lead to some values of the variables of a potential (a table of lower bounds
 //! on the remaining cost). They cost at least as much as the cheapest sequence of T + 1 operators that leads to
 //! these values. The remaining steps cost at least the potential (or, for [`StepBound::Spent`], at least 0). If
-//! the sum is at least the claim for all values, a cheaper plan has at most T steps. This module does not check that
-//! potentials are lower bounds.
+//! the sum is at least the claim for all values, a cheaper plan has at most T steps.
 
 use crate::argument::Argument;
 use crate::integer::Integer;
