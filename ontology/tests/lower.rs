@@ -389,6 +389,27 @@ fn unusable_rules_are_reported_and_the_others_kept() {
     }
 }
 
+/// An axiom has the same condition as a rule that is left out, and keeps its conclusions.
+#[test]
+fn unusable_rules_do_not_take_conclusions_of_axioms_with_them() {
+    let some = "[ a owl:Restriction ; owl:onProperty :p ; owl:someValuesFrom :C ]";
+    let axioms = format!(":B rdfs:subClassOf {some} . {some} rdfs:subClassOf :A . :i :p :j . :j a :C . ");
+    let prefixes =
+        "@prefix swrl: <http://www.w3.org/2003/11/swrl#> . :x a swrl:Variable . :y a swrl:Variable . ";
+    let class = |class: &str, x: &str| {
+        format!("[ a swrl:ClassAtom ; swrl:classPredicate {class} ; swrl:argument1 {x} ]")
+    };
+    let unknown = "[ a swrl:BuiltinAtom ; swrl:builtin <http://custom/#f> ; swrl:arguments ( :x 2 ) ]";
+    for (built_in, conclusion) in [(unknown, class(":B", ":x")), ("", class(":B", ":y"))] {
+        let condition = class(some, ":x");
+        let rule =
+            format!("[] a swrl:Imp ; swrl:body ( {condition} {built_in} ) ; swrl:head ( {conclusion} ) .");
+        let (engine, warnings) = engine(&format!("{prefixes}{axioms}{rule}"));
+        assert_eq!(derived(&engine), BTreeSet::from(["i a A".to_owned()]));
+        assert!(warnings.iter().any(|warning| warning.starts_with("warning[O302]")), "{warnings:?}");
+    }
+}
+
 #[test]
 fn rules_for_axioms_are_labelled_with_the_axiom() {
     let (engine, _) = engine(":A rdfs:subClassOf :B . :i a :A .");

@@ -27,8 +27,7 @@ pub(crate) fn lower_rules(axioms: &[AnnotatedAxiom], context: &mut Context) {
         }
         // An axiom is used in part if it has rules in spite of its gaps.
         let before = context.rules.len();
-        context.identity = identity(axiom, position);
-        let mut lowering = AxiomLowering { identity: context.identity.clone(), context };
+        let mut lowering = AxiomLowering { identity: identity(axiom, position), context };
         let result = lowering.axiom(axiom);
         if let Err(reason) = context.take_gaps().and(result) {
             let partly = context.rules.len() > before;

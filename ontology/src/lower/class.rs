@@ -58,9 +58,8 @@ pub(crate) fn condition(
                     let mut variables = Variables::default();
                     let member = variables.fresh("x");
                     let head = context.relation(&name, [member]);
-                    let identity = context.identity.clone();
                     for body in some_value(context, property, filler, member, &mut variables) {
-                        context.rule(&identity, vec![head.clone()], body, &variables);
+                        context.auxiliary_rule(&restriction, head.clone(), body, &variables);
                     }
                 }
                 return vec![vec![context.relation(&name, [x])]];
@@ -130,10 +129,9 @@ pub(crate) fn abbreviated(
     if context.abbreviated.insert(name.clone()) {
         let mut variables = Variables::default();
         let member = variables.fresh("x");
-        let identity = context.identity.clone();
         for body in condition(context, class, member, &mut variables) {
-            let head = vec![context.relation(&name, [member])];
-            context.rule(&identity, head, body, &variables);
+            let head = context.relation(&name, [member]);
+            context.auxiliary_rule(class, head, body, &variables);
         }
     }
     vec![vec![context.relation(&name, [x])]]

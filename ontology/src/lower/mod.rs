@@ -74,6 +74,8 @@ pub fn lower_together(
     axiom::lower_rules(&ontology.axioms, &mut context);
     class::lower_inclusions(&mut context, ontology.axioms.len());
     context.drop_unusable();
+    let auxiliary = std::mem::take(&mut context.auxiliary);
+    context.rules.extend(auxiliary);
     axiom::lower_assertions(&ontology.axioms, &mut context);
     let before_additional = context.rules.len();
     context.add_rules(additional);
