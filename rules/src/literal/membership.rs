@@ -25,6 +25,10 @@ impl Literal {
         Self::Opaque { lexical: number.to_string().into(), datatype: FRESH.into() }
     }
 
+    pub(crate) fn is_fresh(&self) -> bool {
+        self.kind() == Kind::Fresh
+    }
+
     /// Returns `true` if two literals certainly have different values. Returns `false` if they are equal,
     /// or if that is undecided.
     pub fn differs(&self, other: &Self) -> bool {
