@@ -93,3 +93,14 @@ fn xml_literals_are_equal_or_undecided() {
     );
     assert!(!engine(&mixed, "").violations().is_empty(), "no string is a piece of XML");
 }
+
+#[test]
+fn a_constraint_on_differences_alone_has_derived_differences() {
+    let document = format!(
+        "{HEAD}:A a owl:Class . :B a owl:Class ; owl:disjointWith :A . :i a :A . :j a :B . :k a owl:NamedIndividual ."
+    );
+    for (other, consistent) in [("j", false), ("k", true)] {
+        let engine = engine(&document, &format!("differentFrom(:i, :{other}) -> ."));
+        assert_eq!(engine.violations().is_empty(), consistent, "{other}");
+    }
+}

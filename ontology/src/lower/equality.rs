@@ -25,9 +25,13 @@ pub(crate) fn lower(axioms: &[AnnotatedAxiom], context: &mut Context) -> bool {
     let merges_names = |rule: &Rule| rule.head.iter().any(|atom| matches!(atom, Atom::Same(..)));
     let depends = |rule: &Rule| {
         // The constraint against `differentFrom(x, x)` alone does not require derived differences.
-        let is_difference =
-            |atom: &Atom| matches!(atom, Atom::Relation { predicate, .. } if *predicate == different);
-        !(rule.head.is_empty() && rule.body.len() == 1) && rule.body.iter().any(is_difference)
+        let is_difference = |atom: &Atom| match atom {
+            Atom::Relation { predicate, arguments } => {
+                *predicate == different && arguments.first() != arguments.last()
+            }
+            _ => false,
+        };
+        rule.body.iter().any(is_difference)
     };
     let merges =
         context.rules.iter().any(merges_names) || context.facts.iter().any(|fact| fact.predicate == same_as);
