@@ -420,10 +420,17 @@ fn rules_for_axioms_are_labelled_with_the_axiom() {
 
 #[test]
 fn unique_names_do_not_merge() {
-    let text = format!("{PREFIXES}:p a owl:FunctionalProperty . :i :p :j , :k . :j a :A .");
-    let ontology = read_text(&text, "t", &ReadOptions::default()).expect("well-formed");
-    let mut symbols = Symbols::new();
-    let lowered = lower_with(&ontology, Equality::UniqueNames, &mut symbols);
-    let engine = Engine::new(symbols, lowered.program, lowered.facts).expect("safe");
-    assert_eq!(derived(&engine), BTreeSet::new());
+    let most = "[ a owl:Restriction ; owl:onProperty :p ; owl:maxCardinality 1 ]";
+    for axiom in [
+        ":p a owl:FunctionalProperty .".to_owned(),
+        format!(":B rdfs:subClassOf {most} . :i a :B ."),
+        ":B rdfs:subClassOf [ a owl:Class ; owl:oneOf ( :z ) ] . :i a :B .".to_owned(),
+    ] {
+        let text = format!("{PREFIXES}{axiom} :i :p :j , :k . :j a :A .");
+        let ontology = read_text(&text, "t", &ReadOptions::default()).expect("well-formed");
+        let mut symbols = Symbols::new();
+        let lowered = lower_with(&ontology, Equality::UniqueNames, &mut symbols);
+        let engine = Engine::new(symbols, lowered.program, lowered.facts).expect("safe");
+        assert_eq!(derived(&engine), BTreeSet::new(), "{axiom}");
+    }
 }

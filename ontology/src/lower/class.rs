@@ -3,7 +3,7 @@
 
 use rules::{Atom, Term};
 
-use super::context::{Conjunction, Context, INTERNAL, Variables, cross, identity};
+use super::context::{Conjunction, Context, Equality, INTERNAL, Variables, cross, identity};
 use super::range;
 use crate::owl::{Axiom, Bound, ClassExpression, DataRange, ObjectPropertyExpression};
 use crate::vocab::owl;
@@ -162,6 +162,10 @@ pub(crate) fn conclusions(
             }
             consequences
         }
+        // As for functional properties, different names are not concluded to be equal.
+        C::OneOf(individuals) if individuals.len() == 1 && context.equality == Equality::UniqueNames => {
+            Vec::new()
+        }
         C::OneOf(individuals) if individuals.len() == 1 => {
             heads(Atom::Same(x, context.constant(&individuals[0])))
         }
@@ -196,6 +200,7 @@ pub(crate) fn conclusions(
             let forbidden = cross(&edge, &condition(context, filler, y, variables));
             forbidden.into_iter().map(|body| (body, Vec::new())).collect()
         }
+        C::Cardinality(Bound::Max, 1, ..) if context.equality == Equality::UniqueNames => Vec::new(),
         C::Cardinality(Bound::Max, 1, property, filler) => {
             let (y, z) = (variables.fresh("y"), variables.fresh("z"));
             let edges = vec![vec![context.property(property, x, y), context.property(property, x, z)]];

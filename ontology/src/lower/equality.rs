@@ -6,7 +6,8 @@
 //! inverse functional properties. It is derived only if a rule depends on it.
 //!
 //! Under the unique name assumption ([`UniqueNames`](super::Equality::UniqueNames)) the rules of this file are
-//! not added: a functional object property has no consequences, and any two names differ.
+//! not added: a functional object property, a cardinality of at most 1, and a class of one individual have no
+//! consequences, and any two names differ.
 
 use std::collections::HashSet;
 
