@@ -211,6 +211,21 @@ fn invalid_constant_patterns_are_errors() {
 }
 
 #[test]
+fn rules_are_checked_without_evaluation() {
+    for (rules, code) in [
+        // The evaluation of these rules would not end.
+        ("-> n(1) . n(?x) ^ swrlb:add(?y, ?x, 1) -> n(?y) .", None),
+        ("p(?x) -> q(?y) .", Some("R202")),
+        ("p(?x) ^ not q(?x) -> q(?x) .", Some("R206")),
+    ] {
+        let mut symbols = Symbols::new();
+        let program = parse_rules(rules, "test", &mut symbols, &Prefixes::new()).expect("rules");
+        let errors = Engine::check(&program, &symbols).err();
+        assert_eq!(errors.map(|errors| errors[0].code()), code, "{rules}");
+    }
+}
+
+#[test]
 fn runaway_rules_end_in_an_error_that_names_them() {
     let rules = "[count] n(?x) ^ swrlb:add(?y, ?x, 1) -> n(?y) . go(?x) -> n(?x) . n(?x) -> seen(?x)";
     let mut symbols = Symbols::new();

@@ -124,7 +124,7 @@ impl Context<'_> {
         let is_bound = |rule: &&Rule| *rule.identity.source == *AXIOM_SOURCE && rule.body.iter().any(binds);
         let rules = self.rules.iter().filter(|rule| !is_bound(rule)).cloned().collect();
         let program = Program { rules, ..Program::default() };
-        let Err(errors) = rules::Engine::new(self.symbols.clone(), program, []) else { return };
+        let Err(errors) = rules::Engine::check(&program, self.symbols) else { return };
         for error in errors {
             let Some(identity) = rejected_rule(&error) else { continue };
             let identity = identity.clone();
