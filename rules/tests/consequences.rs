@@ -210,6 +210,22 @@ fn invalid_constant_patterns_are_errors() {
     }
 }
 
+/// Each of the two built-ins is evaluated once, but the second result is long.
+#[test]
+fn long_values_cost_steps_without_recursion() {
+    let concatenation = |result: &str, part: &str| {
+        format!("swrlb:stringConcat({result}, {})", vec![part; 31].join(", "))
+    };
+    let body = format!("t(?x) ^ {} ^ {}", concatenation("?y", "?x"), concatenation("?z", "?y"));
+    let mut symbols = Symbols::new();
+    let rule = format!("{body} -> u(?z) .");
+    let program = parse_rules(&rule, "test", &mut symbols, &Prefixes::new()).expect("rules");
+    let stated = facts(&mut symbols, &format!("t(\"{}\")", "x".repeat(100)));
+    let limits = Limits { steps: 1_000, ..Limits::default() };
+    let errors = Engine::with_limits(symbols, program, stated, limits).expect_err("96,100 bytes");
+    assert_eq!(errors[0].code(), "R301");
+}
+
 #[test]
 fn rules_are_checked_without_evaluation() {
     for (rules, code) in [
