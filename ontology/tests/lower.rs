@@ -418,6 +418,29 @@ fn rules_for_axioms_are_labelled_with_the_axiom() {
     assert_eq!(identity.label.as_deref(), Some("SubClassOf(<http://e/#A> <http://e/#B>)"));
 }
 
+/// The number of rules does not grow with the square of the number of alternatives.
+#[test]
+fn large_unions_are_combined_by_few_rules() {
+    let union = |letter: &str| {
+        let members: Vec<String> = (0..20).map(|number| format!(":{letter}{number}")).collect();
+        let declared: Vec<String> = members.iter().map(|member| format!("{member} a owl:Class .")).collect();
+        (declared.join(" "), format!("[ a owl:Class ; owl:unionOf ( {} ) ]", members.join(" ")))
+    };
+    let ((declared, first), (others, second)) = (union("M"), union("N"));
+    let most = "owl:onProperty :p ; owl:maxQualifiedCardinality \"1\"^^xsd:nonNegativeInteger";
+    let at_most = format!(":A rdfs:subClassOf [ a owl:Restriction ; {most} ; owl:onClass {first} ] .");
+    let text = format!("{declared} {at_most} :i a :A ; :p :j , :k , :l . :j a :M3 . :k a :M15 .");
+    let (merging, _) = engine(&text);
+    let expected = ["j a M15", "j owl:sameAs k", "k a M3", "k owl:sameAs j"].map(str::to_owned);
+    assert_eq!(derived(&merging), BTreeSet::from(expected));
+    let text = format!("{declared} {others} {first} owl:disjointWith {second} . :i a :M3 , :N15 .");
+    let (contradictory, _) = engine(&text);
+    assert_eq!(contradictory.violations().len(), 1);
+    for engine in [merging, contradictory] {
+        assert!(engine.program().rules.len() < 100, "{}", engine.program().rules.len());
+    }
+}
+
 #[test]
 fn unique_names_do_not_merge() {
     let most = "[ a owl:Restriction ; owl:onProperty :p ; owl:maxCardinality 1 ]";

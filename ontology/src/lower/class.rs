@@ -137,6 +137,21 @@ pub(crate) fn abbreviated(
     vec![vec![context.relation(&name, [x])]]
 }
 
+/// Lowers a class as a condition, like [`condition`], but replaces many alternatives by one atom of an auxiliary relation.
+/// Where two classes are combined, the number of rules would be quadratic.
+pub(crate) fn brief_condition(
+    context: &mut Context,
+    class: &ClassExpression,
+    x: Term,
+    variables: &mut Variables,
+) -> Vec<Conjunction> {
+    let alternatives = condition(context, class, x, variables);
+    if alternatives.len() > MAX_ALTERNATIVES {
+        return abbreviated(context, class, alternatives, x);
+    }
+    alternatives
+}
+
 fn range_condition(context: &mut Context, range: &DataRange, value: Term) -> Vec<Conjunction> {
     range::condition(context, range, value).unwrap_or_else(|reason| context.gap(reason))
 }
@@ -204,8 +219,8 @@ pub(crate) fn conclusions(
         C::Cardinality(Bound::Max, 1, property, filler) => {
             let (y, z) = (variables.fresh("y"), variables.fresh("z"));
             let edges = vec![vec![context.property(property, x, y), context.property(property, x, z)]];
-            let bodies = cross(&edges, &condition(context, filler, y, variables));
-            let bodies = cross(&bodies, &condition(context, filler, z, variables));
+            let bodies = cross(&edges, &brief_condition(context, filler, y, variables));
+            let bodies = cross(&bodies, &brief_condition(context, filler, z, variables));
             bodies.into_iter().map(|body| (body, vec![Atom::Same(y, z)])).collect()
         }
         C::DataCardinality(Bound::Max, limit @ (0 | 1), property, range) => {
