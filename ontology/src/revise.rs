@@ -116,6 +116,7 @@ impl Stated {
         let change = [&assertions.axioms[..], &removed].concat();
         let is_plain = assertions.rules.is_empty()
             && retractions.rules.is_empty()
+            && !self.declares(assertions, engine.program())
             && self.is_plain(&change, engine.program(), engine.symbols());
         let symbols = engine.symbols_mut();
         let mut inserted = facts(&assertions.axioms, symbols);
@@ -237,6 +238,15 @@ impl Stated {
             }
         }
         removed
+    }
+
+    /// Returns `true` if the assertions declare a new class or property, and names can be equal. The name of a class or
+    /// property can also denote an individual, whose equality has rules of its own.
+    fn declares(&self, assertions: &Ontology, program: &Program) -> bool {
+        let is_new = |entity: &(EntityKind, Iri)| {
+            entity.0 != EntityKind::NamedIndividual && self.ontology.entities.binary_search(entity).is_err()
+        };
+        program.equality && assertions.entities.iter().any(is_new)
     }
 
     /// Returns `true` if the change can be computed without a translation of the whole ontology. Then

@@ -1,8 +1,8 @@
 //! Entailment of each kind of statement, with counterexamples, and the class and property hierarchy.
 
 use ontology::entail::{Answer, annotations, entailments, schema};
-use ontology::{Ontology, ReadOptions, lower, read_text};
-use rules::{Engine, Symbols};
+use ontology::{Equality, Ontology, ReadOptions, lower, lower_together, read_text};
+use rules::{Engine, Prefixes, Symbols, parse_rules};
 
 const PREFIXES: &str = "@prefix : <http://e/#> .
 @prefix owl: <http://www.w3.org/2002/07/owl#> .
@@ -112,6 +112,40 @@ fn entailed_statements_are_proved_and_others_are_not() {
         assert!(!follows(&premise, &other), "{premise} does not entail {other}");
     }
     assert!(follows(":A owl:disjointWith :B . :i a :A , :B .", ":x :p :y ."), "anything follows");
+}
+
+fn follows_by(rule: &str, facts: &str, conclusion: &str) -> bool {
+    let mut symbols = Symbols::new();
+    let prefixes = Prefixes::new().with("", "http://e/#");
+    let rules = parse_rules(rule, "rules", &mut symbols, &prefixes).expect(rule).rules;
+    let lowered = lower_together(&read(facts), rules, Equality::Owl, &mut symbols);
+    let engine = Engine::new(symbols, lowered.program, lowered.facts).expect("safe");
+    let results = entailments(&engine, &read(conclusion)).expect("it ends");
+    assert!(!results.is_empty(), "{conclusion}");
+    results.iter().all(|result| matches!(result.answer, Answer::Follows(_)))
+}
+
+/// The rules conclude something from the absence of facts, or by a built-in that holds of some values only. In each case
+/// an individual is a counterexample.
+#[test]
+fn conclusions_about_some_individuals_are_not_proved_of_all() {
+    let negation = ":A(?x) ^ not :B(?x) -> :C(?x) .";
+    let below = ":A rdfs:subClassOf :C .";
+    for (rule, counterexample, conclusion) in [
+        (negation, ":i a :A , :B .", below),
+        (":A(?x) ^ 0 = count { :p(?x, ?y) } -> :C(?x) .", ":i a :A ; :p :i .", below),
+        (":d(?x, ?v) ^ swrlb:notEqual(?v, 5) -> :C(?x) .", ":i :d 5 .", ":d rdfs:domain :C ."),
+        (
+            ":d(?x, ?v) ^ swrlb:stringConcat(?s, ?v, \"\") ^ swrlb:stringLength(?l, ?s) ^ swrlb:lessThan(?l, 3) -> :C(?x) .",
+            ":i :d 5000 .",
+            ":d rdfs:domain :C .",
+        ),
+    ] {
+        assert!(!follows_by(rule, counterexample, ":i a :C ."), "{rule}");
+        assert!(!follows_by(rule, counterexample, conclusion), "{rule}");
+    }
+    assert!(follows_by(negation, ":i a :A .", ":i a :C ."), "it is looked up");
+    assert!(follows_by(":A(?x) -> :C(?x) .", ":i a :A .", below));
 }
 
 #[test]

@@ -389,6 +389,27 @@ fn unusable_rules_are_reported_and_the_others_kept() {
     }
 }
 
+/// An axiom has the same condition as a rule that is left out, and keeps its conclusions.
+#[test]
+fn unusable_rules_do_not_take_conclusions_of_axioms_with_them() {
+    let some = "[ a owl:Restriction ; owl:onProperty :p ; owl:someValuesFrom :C ]";
+    let axioms = format!(":B rdfs:subClassOf {some} . {some} rdfs:subClassOf :A . :i :p :j . :j a :C . ");
+    let prefixes =
+        "@prefix swrl: <http://www.w3.org/2003/11/swrl#> . :x a swrl:Variable . :y a swrl:Variable . ";
+    let class = |class: &str, x: &str| {
+        format!("[ a swrl:ClassAtom ; swrl:classPredicate {class} ; swrl:argument1 {x} ]")
+    };
+    let unknown = "[ a swrl:BuiltinAtom ; swrl:builtin <http://custom/#f> ; swrl:arguments ( :x 2 ) ]";
+    for (built_in, conclusion) in [(unknown, class(":B", ":x")), ("", class(":B", ":y"))] {
+        let condition = class(some, ":x");
+        let rule =
+            format!("[] a swrl:Imp ; swrl:body ( {condition} {built_in} ) ; swrl:head ( {conclusion} ) .");
+        let (engine, warnings) = engine(&format!("{prefixes}{axioms}{rule}"));
+        assert_eq!(derived(&engine), BTreeSet::from(["i a A".to_owned()]));
+        assert!(warnings.iter().any(|warning| warning.starts_with("warning[O302]")), "{warnings:?}");
+    }
+}
+
 #[test]
 fn rules_for_axioms_are_labelled_with_the_axiom() {
     let (engine, _) = engine(":A rdfs:subClassOf :B . :i a :A .");
@@ -397,12 +418,42 @@ fn rules_for_axioms_are_labelled_with_the_axiom() {
     assert_eq!(identity.label.as_deref(), Some("SubClassOf(<http://e/#A> <http://e/#B>)"));
 }
 
+/// The number of rules does not grow with the square of the number of alternatives.
+#[test]
+fn large_unions_are_combined_by_few_rules() {
+    let union = |letter: &str| {
+        let members: Vec<String> = (0..20).map(|number| format!(":{letter}{number}")).collect();
+        let declared: Vec<String> = members.iter().map(|member| format!("{member} a owl:Class .")).collect();
+        (declared.join(" "), format!("[ a owl:Class ; owl:unionOf ( {} ) ]", members.join(" ")))
+    };
+    let ((declared, first), (others, second)) = (union("M"), union("N"));
+    let most = "owl:onProperty :p ; owl:maxQualifiedCardinality \"1\"^^xsd:nonNegativeInteger";
+    let at_most = format!(":A rdfs:subClassOf [ a owl:Restriction ; {most} ; owl:onClass {first} ] .");
+    let text = format!("{declared} {at_most} :i a :A ; :p :j , :k , :l . :j a :M3 . :k a :M15 .");
+    let (merging, _) = engine(&text);
+    let expected = ["j a M15", "j owl:sameAs k", "k a M3", "k owl:sameAs j"].map(str::to_owned);
+    assert_eq!(derived(&merging), BTreeSet::from(expected));
+    let text = format!("{declared} {others} {first} owl:disjointWith {second} . :i a :M3 , :N15 .");
+    let (contradictory, _) = engine(&text);
+    assert_eq!(contradictory.violations().len(), 1);
+    for engine in [merging, contradictory] {
+        assert!(engine.program().rules.len() < 100, "{}", engine.program().rules.len());
+    }
+}
+
 #[test]
 fn unique_names_do_not_merge() {
-    let text = format!("{PREFIXES}:p a owl:FunctionalProperty . :i :p :j , :k . :j a :A .");
-    let ontology = read_text(&text, "t", &ReadOptions::default()).expect("well-formed");
-    let mut symbols = Symbols::new();
-    let lowered = lower_with(&ontology, Equality::UniqueNames, &mut symbols);
-    let engine = Engine::new(symbols, lowered.program, lowered.facts).expect("safe");
-    assert_eq!(derived(&engine), BTreeSet::new());
+    let most = "[ a owl:Restriction ; owl:onProperty :p ; owl:maxCardinality 1 ]";
+    for axiom in [
+        ":p a owl:FunctionalProperty .".to_owned(),
+        format!(":B rdfs:subClassOf {most} . :i a :B ."),
+        ":B rdfs:subClassOf [ a owl:Class ; owl:oneOf ( :z ) ] . :i a :B .".to_owned(),
+    ] {
+        let text = format!("{PREFIXES}{axiom} :i :p :j , :k . :j a :A .");
+        let ontology = read_text(&text, "t", &ReadOptions::default()).expect("well-formed");
+        let mut symbols = Symbols::new();
+        let lowered = lower_with(&ontology, Equality::UniqueNames, &mut symbols);
+        let engine = Engine::new(symbols, lowered.program, lowered.facts).expect("safe");
+        assert_eq!(derived(&engine), BTreeSet::new(), "{axiom}");
+    }
 }

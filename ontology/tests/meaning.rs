@@ -93,3 +93,27 @@ fn xml_literals_are_equal_or_undecided() {
     );
     assert!(!engine(&mixed, "").violations().is_empty(), "no string is a piece of XML");
 }
+
+#[test]
+fn a_constraint_on_differences_alone_has_derived_differences() {
+    let document = format!(
+        "{HEAD}:A a owl:Class . :B a owl:Class ; owl:disjointWith :A . :i a :A . :j a :B . :k a owl:NamedIndividual ."
+    );
+    for (other, consistent) in [("j", false), ("k", true)] {
+        let engine = engine(&document, &format!("differentFrom(:i, :{other}) -> ."));
+        assert_eq!(engine.violations().is_empty(), consistent, "{other}");
+    }
+}
+
+#[test]
+fn a_value_is_replaced_for_all_names_of_an_individual() {
+    let document = format!("{HEAD}:d a owl:DatatypeProperty . :i owl:sameAs :j . :i :d 1 . :j :d 2 .");
+    let mut engine = engine(&document, "");
+    let [property, subject] = ["http://e/#d", "http://e/#i"].map(|name| engine.symbols_mut().name(name));
+    let value = engine.symbols_mut().literal(rules::Literal::integer(3));
+    let delta = ontology::tomasys::change::replace(&engine, property, subject, Some(value));
+    engine.apply(delta).expect("it ends");
+    let pattern = [Some(subject), None];
+    let values: Vec<_> = engine.matching(property, &pattern).map(|row| row[1]).collect();
+    assert_eq!(values, [value]);
+}

@@ -273,6 +273,19 @@ fn malformed_documents_are_errors_with_a_place() {
     }
 }
 
+/// The pairs of the members would fill the memory.
+#[test]
+fn axioms_with_too_many_pairs_are_reported() {
+    let properties: Vec<String> = (0..1_001).map(|number| format!(":p{number}")).collect();
+    let declarations: Vec<String> =
+        properties.iter().map(|property| format!("{property} a owl:ObjectProperty .")).collect();
+    let members = properties.join(" ");
+    let axiom = format!("[] a owl:AllDisjointProperties ; owl:members ( {members} ) .");
+    let ontology = turtle(&format!("{}\n{axiom}", declarations.join("\n")));
+    let [warning] = &warnings(&ontology)[..] else { panic!("{:?}", ontology.warnings.len()) };
+    assert!(warning.starts_with("warning[O202]") && warning.contains("more than 1000 members"), "{warning}");
+}
+
 #[test]
 fn a_missing_file_is_an_error() {
     let errors =

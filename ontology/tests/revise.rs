@@ -414,6 +414,19 @@ fn anonymous_individuals_of_two_documents_are_different() {
     assert_eq!(answers(&revised.engine).0.len(), 2);
 }
 
+/// The asserted document declares a class that is also an individual, which becomes equal to another class.
+#[test]
+fn classes_of_a_change_can_be_equal_individuals() {
+    let base = "Declaration(ObjectProperty(:of)) FunctionalObjectProperty(:of) Declaration(Class(:Y))
+        ClassAssertion(:Y :y) ObjectPropertyAssertion(:of :x :Y)";
+    let added = "Declaration(ObjectProperty(:of)) Declaration(Class(:Z)) ObjectPropertyAssertion(:of :x :Z)";
+    let mut revised = Revised::new(&format!("{HEAD}{base}\n)"));
+    revised.change(&format!("{HEAD}{added}\n)"), &document(&[], false));
+    let (_, whole) = from_scratch(&format!("{HEAD}{base} {added}\n)"));
+    assert!(answers(&whole).0.contains(&("<urn:x#Z>(<urn:x#y>)".to_owned(), false, true)));
+    assert_eq!(answers(&revised.engine), answers(&whole));
+}
+
 #[test]
 fn inclusions_of_restrictions_follow_each_change() {
     let axioms = [

@@ -220,6 +220,21 @@ fn removing_an_objective_restores_the_facts() {
 }
 
 #[test]
+fn removing_an_objective_keeps_requirements_of_other_objectives() {
+    for (rule, is_kept) in [("-> t:hasNFR(t:p, t:o_nfr_light)", true), ("", false)] {
+        let mut runtime = robot_with(Mode::Retract, rule);
+        let requirements = vec![("light", decimal("0.5"))];
+        let objective = NewObjective { name: "o", function: "f_move", requirements, always_improve: false };
+        runtime.add_objective(&objective).expect("new");
+        runtime.remove_objective("o").expect("known");
+        let symbols = runtime.engine().symbols();
+        let [class, requirement] = ["QAvalue", "o_nfr_light"]
+            .map(|local| symbols.find_name(&format!("http://metacontrol.org/tomasys#{local}")).expect(local));
+        assert_eq!(runtime.engine().holds(&Fact::new(class, [requirement])), is_kept, "{rule}");
+    }
+}
+
+#[test]
 fn two_objectives_may_use_one_design() {
     let mut runtime = robot(Mode::Retract);
     let mut names = Vec::new();

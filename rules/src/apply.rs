@@ -20,7 +20,7 @@ use crate::error::{Error, Errors};
 use crate::fact::Fact;
 use crate::limits::Limits;
 use crate::maintain::{Maintenance, state_change};
-use crate::network::compile;
+use crate::network::{compile, without_plans};
 use crate::record::Records;
 use crate::rule::Program;
 use crate::store::Store;
@@ -49,6 +49,15 @@ impl Engine {
         facts: impl IntoIterator<Item = Fact>,
     ) -> Result<Self, Errors> {
         Self::with_limits(symbols, program, facts, Limits::default())
+    }
+
+    /// Checks rules without planning or evaluating them, which need not end within a budget.
+    ///
+    /// # Errors
+    /// Returns the errors of all rules (R2xx, R302), of which R206 and R208 are reported only if there is no other
+    /// error.
+    pub fn check(program: &Program, symbols: &Symbols) -> Result<(), Errors> {
+        without_plans(program, &mut symbols.clone(), &mut Store::default()).map(|_| ())
     }
 
     /// Creates an engine and derives all facts that follow from stated facts. The limits apply to this

@@ -47,7 +47,7 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "R205",
         "A head has an atom that cannot be concluded.",
-        "Heads can contain classes and properties. Built-ins, negation and `differentFrom` are tests.",
+        "Heads can contain classes, properties, `sameAs` and `differentFrom`. Built-ins, negation and aggregates are tests.",
         "Move the atom to the body.",
     ],
     [

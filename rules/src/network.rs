@@ -63,6 +63,17 @@ pub(crate) fn compile(
     store: &mut Store,
     limits: &Limits,
 ) -> Result<Network, Errors> {
+    let mut network = without_plans(program, symbols, store)?;
+    network.plan(store, false, (program, limits)).map_err(|error| vec![error])?;
+    Ok(network)
+}
+
+/// Lowers a program to a network without plans. Returns the errors of [`compile`], except R304.
+pub(crate) fn without_plans(
+    program: &Program,
+    symbols: &mut Symbols,
+    store: &mut Store,
+) -> Result<Network, Errors> {
     let mut errors: Vec<Error> = program.rules.iter().flat_map(check).collect();
     errors.extend(program.rules.iter().filter_map(|rule| unknown_symbols(rule, symbols)));
     errors.extend(program.rules.iter().filter_map(|rule| bad_pattern(rule, symbols)));
@@ -83,7 +94,6 @@ pub(crate) fn compile(
     network.stratum_of = stratify(program, symbols, store, &lowered, network.same_as)?;
     network.rules = split_by_stratum(lowered, &network.stratum_of);
     network.widths = network.rules.iter().map(|rule| rule.width).collect();
-    network.plan(store, false, (program, limits)).map_err(|error| vec![error])?;
     Ok(network)
 }
 

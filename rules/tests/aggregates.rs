@@ -1,7 +1,7 @@
 //! Aggregates: values before and after changes, explanations, and rejected rules.
 
 use crate::text::{engine, fact, facts};
-use metaplan_rules::{Delta, Engine, Obstacle, Reason};
+use metaplan_rules::{Delta, Engine, Limits, Obstacle, Reason};
 
 const RULES: &str = "
     [spares]  function(?f) ^ ?n = count { solves(?d, ?f) ^ not failed(?d) } -> spares(?f, ?n) .
@@ -155,6 +155,22 @@ fn near_misses_report_the_gap() {
         miss(&mut engine, "healthy()"),
         [format!("count is {}, not {}, by 1", integer("1"), integer("0"))]
     );
+}
+
+#[test]
+fn rows_of_aggregates_cost_steps() {
+    let stated: Vec<String> = (0..5_000).map(|number| format!("h({number})")).collect();
+    let mut engine = engine("?n = count { h(?y) } -> v(?n) .", &stated.join(", ")).expect("rules");
+    engine.set_limits(Limits { steps: 1_000, ..Limits::default() });
+    let insert = facts(engine.symbols_mut(), "h(a)");
+    let error = engine.apply(Delta { insert, delete: vec![] }).expect_err("too many rows");
+    assert_eq!(error.code(), "R301");
+}
+
+#[test]
+fn deeply_nested_aggregates_are_refused() {
+    let errors = engine(&"?n = count { ".repeat(100_000), "").expect_err("too deep");
+    assert_eq!(errors[0].code(), "R101");
 }
 
 fn refuse(rules: &str, expected: &[&str]) {

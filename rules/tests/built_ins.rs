@@ -146,6 +146,21 @@ fn mathematical_expressions_are_evaluated() {
     assert_eq!(solutions(&deep, "?r"), [""; 0]);
 }
 
+/// The calculations exceed 64 bits.
+#[test]
+fn extreme_moments_have_no_result() {
+    for body in [
+        "temporal:duration(?r, \"290000000-01-01T00:00:00\", \"-290000000-01-01T00:00:00\", \"Milliseconds\")",
+        "swrlb:addDayTimeDurationToDate(?r, \"1970-01-01\"^^xsd:date, \
+         \"-PT9223372036854775808S\"^^xsd:dayTimeDuration)",
+        "swrlb:addDayTimeDurationToDateTime(?m, \"1970-01-01T00:00:00-14:00\"^^xsd:dateTime, \
+         \"PT9223372036854775000S\"^^xsd:dayTimeDuration) ^ temporal:duration(?r, ?m, ?m, \"Days\")",
+        "swrlb:add(?r, 1, 1) ^ temporal:meets(\"292278994-08-17T07:12:55.807\", \"292278994-08-17T07:12:55.807\")",
+    ] {
+        assert_eq!(solutions(body, "?r"), [""; 0], "{body}");
+    }
+}
+
 #[test]
 fn temporal_functions_compute_moments_and_durations() {
     for (body, expected) in [

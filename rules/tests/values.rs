@@ -280,6 +280,8 @@ fn tests_hold_or_fail() {
         ("matches", "\"ABC\" \"b\"", false),
         ("matches", "\"ABC\" \"b\" \"i\"", true),
         ("matches", "\"ABC\" \"(\"", false),
+        ("matches", "\"a#c\" \"a#q\" \"x\"", false),
+        ("matches", "\"a#c\" \"^[#a]#c$\" \"x\"", true),
         ("matches", "1 \"1\"", false),
         ("add", "3 1 2", true),
         ("add", "3 1 1", false),

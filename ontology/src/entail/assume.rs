@@ -3,7 +3,7 @@
 use rules::{Delta, Engine, Error, Fact, Literal};
 
 use super::prover::{
-    ProofResult, Prover, contradiction, edge, explain, literal, member, same, value, with_facts,
+    ProofResult, Prover, contradiction, edge, explain, literal, member, monotone, same, value, with_facts,
 };
 use crate::lower::lower;
 use crate::owl::{AnnotatedAxiom, Axiom, Bound, ClassExpression, Iri, ObjectPropertyExpression, Ontology};
@@ -62,14 +62,14 @@ impl Prover {
             }
             C::Cardinality(Bound::Exact, n @ 1..=8, property, filler) => {
                 let at_most = C::Cardinality(Bound::Max, *n, property.clone(), filler.clone());
-                let copy = by_rules(copy, &at_most, individual)?;
+                let copy = by_rules(&copy, &at_most, individual)?;
                 return Self::witnesses(&copy, property, *n, filler, individual, next);
             }
             C::DataSomeValuesFrom(property, _) | C::DataCardinality(Bound::Min, 1, property, _) => {
                 *next += 1;
                 value(&mut copy, property, individual, Literal::fresh(*next))
             }
-            other => return Ok(vec![by_rules(copy, other, individual)?]),
+            other => return Ok(vec![by_rules(&copy, other, individual)?]),
         };
         Ok(vec![with_facts(&copy, [fact])?])
     }
@@ -220,7 +220,8 @@ pub(super) fn pairwise_different(engine: &mut Engine, names: &[Iri]) -> Vec<Fact
     pairs.map(|pair| Fact::new(different, pair)).collect()
 }
 
-fn by_rules(mut engine: Engine, class: &ClassExpression, individual: &Iri) -> Result<Engine, Error> {
+fn by_rules(engine: &Engine, class: &ClassExpression, individual: &Iri) -> Result<Engine, Error> {
+    let mut engine = monotone(engine)?;
     let axiom = Axiom::ClassAssertion(class.clone(), individual.clone());
     let axioms = vec![AnnotatedAxiom { axiom, annotations: Vec::new() }];
     let lowered = lower(&Ontology { axioms, ..Ontology::default() }, engine.symbols_mut());

@@ -43,7 +43,7 @@ impl Prover {
             Axiom::HasKey(class, objects, data) => {
                 // Two fresh members with equal values of all keys must be the same individual.
                 let (x, y, mut next) = (Self::fresh(0), Self::fresh(1), 2);
-                let mut copy = self.base.clone();
+                let mut copy = self.monotone.clone();
                 let mut facts = Vec::new();
                 for property in objects {
                     next += 1;
@@ -73,7 +73,7 @@ impl Prover {
     fn sub_class(&self, sub: &ClassExpression, sup: &ClassExpression) -> ProofResult {
         let (x, mut next) = (Self::fresh(0), 0);
         let mut reasons = String::new();
-        for case in Self::assume(&self.base, sub, &x, &mut next)? {
+        for case in Self::assume(&self.monotone, sub, &x, &mut next)? {
             match Self::is_in(&case, sup, &x, &mut next)? {
                 Some(reason) => reasons += &reason,
                 None => return Ok(None),
@@ -88,7 +88,7 @@ impl Prover {
             pairs.flat_map(|(index, first)| classes[index + 1..].iter().map(move |second| (first, second)));
         prove_all(pairs, |(first, second)| {
             let intersection = ClassExpression::IntersectionOf(vec![first.clone(), second.clone()]);
-            let cases = Self::assume(&self.base, &intersection, &Self::fresh(0), &mut 0)?;
+            let cases = Self::assume(&self.monotone, &intersection, &Self::fresh(0), &mut 0)?;
             Ok(refuted(&cases))
         })
     }
@@ -103,7 +103,7 @@ impl Prover {
     }
 
     fn assumed(&self, body: &[(&Property, usize, usize)]) -> Result<Engine, Error> {
-        let mut copy = self.base.clone();
+        let mut copy = self.monotone.clone();
         let facts: Vec<Fact> = body
             .iter()
             .map(|(property, from, to)| edge(&mut copy, property, &Self::fresh(*from), &Self::fresh(*to)))
@@ -153,7 +153,7 @@ impl Prover {
                 Characteristic::Irreflexive => Ok(refuted(&[self.assumed(&[(p, 0, 0)])?])),
                 Characteristic::Asymmetric => Ok(refuted(&[self.assumed(&[(p, 0, 1), (p, 1, 0)])?])),
                 Characteristic::Reflexive => {
-                    let mut copy = self.base.clone();
+                    let mut copy = self.monotone.clone();
                     let symbols = copy.symbols_mut();
                     let is_thing = Fact::new(symbols.name(owl::THING), [symbols.name(&Self::fresh(0))]);
                     let mut copy = with_facts(&copy, [is_thing])?;
@@ -167,7 +167,7 @@ impl Prover {
 
     fn data_properties(&self, axiom: &Axiom) -> ProofResult {
         let assumed = |properties: &[(&Iri, usize)]| -> Result<Engine, Error> {
-            let mut copy = self.base.clone();
+            let mut copy = self.monotone.clone();
             let facts: Vec<Fact> = properties
                 .iter()
                 .map(|(property, number)| {

@@ -2,10 +2,9 @@
 //! properties are looked up. Most other axioms are proved with *fresh individuals*, about which only the
 //! axiom's condition is assumed, or by *refutation*: the negation is assumed and contradicts the knowledge.
 //!
-//! The procedure is sound for the rules of axioms, which are sound for the assumed individuals. It is unsound for rules
-//! with negation as failure or aggregates, because the facts of a real individual can falsify their conditions, and for
-//! built-ins that hold for a fresh value, such as `swrlb:notEqual`. It is incomplete, because the rules are those of
-//! OWL 2 RL.
+//! The procedure is sound, because the rules are sound for the assumed individuals. Rules with a negation or an
+//! aggregate take no part in proofs from assumptions, and no built-in holds of a fresh value. The procedure is
+//! incomplete, because the rules are those of OWL 2 RL.
 
 mod assume;
 mod axiom;

@@ -1,6 +1,6 @@
 //! The prover's knowledge base, and constructors for facts that are assumed or proved.
 
-use rules::{Engine, Error, Fact, Literal, Program, Symbol};
+use rules::{Atom, Engine, Error, Fact, Literal, Program, Rule, Symbol};
 
 use crate::owl::{Iri, ObjectPropertyExpression};
 use crate::vocab::owl;
@@ -32,6 +32,8 @@ pub(super) fn contradiction(engine: &Engine) -> Option<String> {
 pub(super) struct Prover {
     /// In this engine, `owl:sameAs` is equality.
     pub(super) base: Engine,
+    /// `base` for proofs from assumptions; see [`monotone`].
+    pub(super) monotone: Engine,
 }
 
 pub(super) type ProofResult = Result<Option<String>, Error>;
@@ -43,7 +45,8 @@ impl Prover {
             let program = Program { equality: true, ..engine.program().clone() };
             base.set_program(program).map_err(|errors| errors.into_vec().remove(0))?;
         }
-        Ok(Self { base })
+        let monotone = monotone(&base)?;
+        Ok(Self { base, monotone })
     }
 
     /// Returns the name of a fresh individual, which occurs nowhere else. `number` distinguishes
@@ -81,8 +84,23 @@ pub(super) fn literal(literal: &crate::owl::Literal) -> Literal {
     Literal::parse(&literal.lexical, literal.datatype.as_deref(), literal.language.as_deref())
 }
 
+/// Returns a copy of the engine without the rules that have a negation or an aggregate. These rules draw conclusions from
+/// the absence of facts, but facts about a fresh individual are absent because it represents all individuals.
+pub(super) fn monotone(engine: &Engine) -> Result<Engine, Error> {
+    let is_monotone =
+        |rule: &Rule| !rule.body.iter().any(|atom| matches!(atom, Atom::Not { .. } | Atom::Aggregate { .. }));
+    let (mut copy, program) = (engine.clone(), engine.program());
+    if !program.rules.iter().all(is_monotone) {
+        let rules = program.rules.iter().filter(|rule| is_monotone(rule)).cloned().collect();
+        copy.set_program(Program { rules, equality: program.equality })
+            .map_err(|errors| errors.into_vec().remove(0))?;
+    }
+    Ok(copy)
+}
+
+/// Returns a copy of the engine with assumed facts, and with the rules of [`monotone`].
 pub(super) fn with_facts(engine: &Engine, facts: impl IntoIterator<Item = Fact>) -> Result<Engine, Error> {
-    let mut copy = engine.clone();
+    let mut copy = monotone(engine)?;
     let insert = facts.into_iter().collect();
     copy.apply(rules::Delta { insert, delete: Vec::new() })?;
     Ok(copy)

@@ -9,7 +9,7 @@ use crate::owl::{DataRange, Iri};
 
 impl Prover {
     pub(super) fn range(&self, property: &Iri, range: &DataRange) -> ProofResult {
-        let mut copy = self.base.clone();
+        let mut copy = self.monotone.clone();
         let assumed = value(&mut copy, property, &Self::fresh(0), Literal::fresh(1));
         let object = assumed.arguments[1];
         let copy = with_facts(&copy, [assumed])?;

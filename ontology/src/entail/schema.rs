@@ -42,7 +42,7 @@ pub struct Schema {
 /// # Errors
 /// Returns an error if the evaluation of the rules exceeds its budget or is interrupted.
 pub fn schema(engine: &Engine, named: &[(EntityKind, Iri)]) -> Result<Schema, Error> {
-    let mut base = Prover::new(engine)?.base;
+    let mut base = Prover::new(engine)?.monotone;
     Ok(Schema {
         classes: entities(&mut base, named, EntityKind::Class)?,
         object_properties: entities(&mut base, named, EntityKind::ObjectProperty)?,

@@ -27,8 +27,7 @@ pub(crate) fn lower_rules(axioms: &[AnnotatedAxiom], context: &mut Context) {
         }
         // An axiom is used in part if it has rules in spite of its gaps.
         let before = context.rules.len();
-        context.identity = identity(axiom, position);
-        let mut lowering = AxiomLowering { identity: context.identity.clone(), context };
+        let mut lowering = AxiomLowering { identity: identity(axiom, position), context };
         let result = lowering.axiom(axiom);
         if let Err(reason) = context.take_gaps().and(result) {
             let partly = context.rules.len() > before;
@@ -255,8 +254,8 @@ impl AxiomLowering<'_, '_> {
             for second in &classes[index + 1..] {
                 let mut variables = Variables::default();
                 let x = variables.fresh("x");
-                let left = class::condition(self.context, first, x, &mut variables);
-                let right = class::condition(self.context, second, x, &mut variables);
+                let left = class::brief_condition(self.context, first, x, &mut variables);
+                let right = class::brief_condition(self.context, second, x, &mut variables);
                 for body in cross(&left, &right) {
                     self.rule(body, Vec::new(), &variables);
                 }
@@ -295,8 +294,8 @@ impl AxiomLowering<'_, '_> {
     fn key(&mut self, class: &ClassExpression, objects: &[Property], data: &[Iri]) {
         let mut variables = Variables::default();
         let (x, y) = (variables.fresh("x"), variables.fresh("y"));
-        let left = class::condition(self.context, class, x, &mut variables);
-        let right = class::condition(self.context, class, y, &mut variables);
+        let left = class::brief_condition(self.context, class, x, &mut variables);
+        let right = class::brief_condition(self.context, class, y, &mut variables);
         let mut keys = Vec::new();
         for property in objects {
             let value = variables.fresh("v");

@@ -3,7 +3,7 @@
 
 use rules::{Atom, Term};
 
-use super::context::{Conjunction, Context, INTERNAL, Variables, cross, identity};
+use super::context::{Conjunction, Context, Equality, INTERNAL, Variables, cross, identity};
 use super::range;
 use crate::owl::{Axiom, Bound, ClassExpression, DataRange, ObjectPropertyExpression};
 use crate::vocab::owl;
@@ -58,9 +58,8 @@ pub(crate) fn condition(
                     let mut variables = Variables::default();
                     let member = variables.fresh("x");
                     let head = context.relation(&name, [member]);
-                    let identity = context.identity.clone();
                     for body in some_value(context, property, filler, member, &mut variables) {
-                        context.rule(&identity, vec![head.clone()], body, &variables);
+                        context.auxiliary_rule(&restriction, head.clone(), body, &variables);
                     }
                 }
                 return vec![vec![context.relation(&name, [x])]];
@@ -130,13 +129,27 @@ pub(crate) fn abbreviated(
     if context.abbreviated.insert(name.clone()) {
         let mut variables = Variables::default();
         let member = variables.fresh("x");
-        let identity = context.identity.clone();
         for body in condition(context, class, member, &mut variables) {
-            let head = vec![context.relation(&name, [member])];
-            context.rule(&identity, head, body, &variables);
+            let head = context.relation(&name, [member]);
+            context.auxiliary_rule(class, head, body, &variables);
         }
     }
     vec![vec![context.relation(&name, [x])]]
+}
+
+/// Lowers a class as a condition, like [`condition`], but replaces many alternatives by one atom of an auxiliary relation.
+/// Where two classes are combined, the number of rules would be quadratic.
+pub(crate) fn brief_condition(
+    context: &mut Context,
+    class: &ClassExpression,
+    x: Term,
+    variables: &mut Variables,
+) -> Vec<Conjunction> {
+    let alternatives = condition(context, class, x, variables);
+    if alternatives.len() > MAX_ALTERNATIVES {
+        return abbreviated(context, class, alternatives, x);
+    }
+    alternatives
 }
 
 fn range_condition(context: &mut Context, range: &DataRange, value: Term) -> Vec<Conjunction> {
@@ -163,6 +176,10 @@ pub(crate) fn conclusions(
                 consequences.extend(conclusions(context, class, x, variables));
             }
             consequences
+        }
+        // As for functional properties, different names are not concluded to be equal.
+        C::OneOf(individuals) if individuals.len() == 1 && context.equality == Equality::UniqueNames => {
+            Vec::new()
         }
         C::OneOf(individuals) if individuals.len() == 1 => {
             heads(Atom::Same(x, context.constant(&individuals[0])))
@@ -198,11 +215,12 @@ pub(crate) fn conclusions(
             let forbidden = cross(&edge, &condition(context, filler, y, variables));
             forbidden.into_iter().map(|body| (body, Vec::new())).collect()
         }
+        C::Cardinality(Bound::Max, 1, ..) if context.equality == Equality::UniqueNames => Vec::new(),
         C::Cardinality(Bound::Max, 1, property, filler) => {
             let (y, z) = (variables.fresh("y"), variables.fresh("z"));
             let edges = vec![vec![context.property(property, x, y), context.property(property, x, z)]];
-            let bodies = cross(&edges, &condition(context, filler, y, variables));
-            let bodies = cross(&bodies, &condition(context, filler, z, variables));
+            let bodies = cross(&edges, &brief_condition(context, filler, y, variables));
+            let bodies = cross(&bodies, &brief_condition(context, filler, z, variables));
             bodies.into_iter().map(|body| (body, vec![Atom::Same(y, z)])).collect()
         }
         C::DataCardinality(Bound::Max, limit @ (0 | 1), property, range) => {

@@ -7,7 +7,9 @@ use rustc_hash::FxHashMap;
 
 use super::inclusion::Inclusions;
 use crate::error::Warning;
-use crate::owl::{Axiom, DataRange, EntityKind, Iri, Literal, ObjectPropertyExpression, Ontology};
+use crate::owl::{
+    Axiom, ClassExpression, DataRange, EntityKind, Iri, Literal, ObjectPropertyExpression, Ontology,
+};
 use crate::vocab::{local_name, owl};
 
 /// Prefix of the IRIs of auxiliary relations, which are not part of the knowledge base.
@@ -41,11 +43,13 @@ pub(crate) struct Context<'a> {
     pub equality: Equality,
     pub definitions: HashMap<Iri, DataRange>,
     entities: HashSet<(EntityKind, Iri)>,
-    pub identity: RuleIdentity,
     gaps: Vec<&'static str>,
     pub inclusions: Inclusions,
     /// Names of the auxiliary relations whose rules have already been added.
     pub abbreviated: HashSet<String>,
+    /// Rules of the auxiliary relations. They are not in `rules`, because several axioms and rules share a relation, and
+    /// the first of them may be removed.
+    pub auxiliary: Vec<Rule>,
     /// Maps the address of an IRI's text to the symbol of the IRI. An ontology keeps each text once, so
     /// the look-up need not read the text.
     shared: FxHashMap<*const u8, Symbol>,
@@ -79,7 +83,10 @@ impl Variables {
 const MAX_LABEL_CHARS: usize = 2_000;
 
 pub(crate) fn identity(axiom: &Axiom, position: usize) -> RuleIdentity {
-    let mut label = axiom.to_string();
+    labelled(axiom.to_string(), position)
+}
+
+fn labelled(mut label: String, position: usize) -> RuleIdentity {
     if let Some((end, _)) = label.char_indices().nth(MAX_LABEL_CHARS) {
         label.truncate(end);
         label.push('…');
@@ -101,10 +108,10 @@ impl<'a> Context<'a> {
             equality,
             definitions: definitions.collect(),
             entities: ontology.entities.iter().cloned().collect(),
-            identity: RuleIdentity::new(AXIOM_SOURCE, 0),
             gaps: Vec::new(),
             inclusions: Inclusions::new(ontology),
             abbreviated: HashSet::new(),
+            auxiliary: Vec::new(),
             shared: FxHashMap::default(),
         }
     }
@@ -216,6 +223,18 @@ impl<'a> Context<'a> {
     ) {
         let variables = variables.names();
         self.rules.push(Rule { identity: identity.clone(), head, body, variables });
+    }
+
+    /// Adds a rule of an auxiliary relation, which contains the members of `class`.
+    pub(crate) fn auxiliary_rule(
+        &mut self,
+        class: &ClassExpression,
+        head: Atom,
+        body: Conjunction,
+        variables: &Variables,
+    ) {
+        let (identity, variables) = (labelled(class.to_string(), 0), variables.names());
+        self.auxiliary.push(Rule { identity, head: vec![head], body, variables });
     }
 
     pub(crate) fn outside(&mut self, axiom: &Axiom, partly: bool, reason: &str) {

@@ -6,8 +6,8 @@
 //! inverse functional properties. It is derived only if a rule depends on it.
 //!
 //! Under the unique name assumption ([`UniqueNames`](super::Equality::UniqueNames)) the rules of this file are
-//! not added: a functional object property has no consequences, and any two names differ. Maximum cardinalities of one
-//! and enumerations with one member still conclude `sameAs`.
+//! not added: a functional object property, a cardinality of at most 1, and a class of one individual have no
+//! consequences, and any two names differ.
 
 use std::collections::HashSet;
 
@@ -25,11 +25,14 @@ pub(crate) fn lower(axioms: &[AnnotatedAxiom], context: &mut Context) -> bool {
     let (same_as, different) = (context.name(owl::SAME_AS), context.name(owl::DIFFERENT_FROM));
     let merges_names = |rule: &Rule| rule.head.iter().any(|atom| matches!(atom, Atom::Same(..)));
     let depends = |rule: &Rule| {
-        // The constraint against `differentFrom(x, x)` does not require derived differences. The test also excludes
-        // every other constraint with one atom.
-        let is_difference =
-            |atom: &Atom| matches!(atom, Atom::Relation { predicate, .. } if *predicate == different);
-        !(rule.head.is_empty() && rule.body.len() == 1) && rule.body.iter().any(is_difference)
+        // The constraint against `differentFrom(x, x)` alone does not require derived differences.
+        let is_difference = |atom: &Atom| match atom {
+            Atom::Relation { predicate, arguments } => {
+                *predicate == different && arguments.first() != arguments.last()
+            }
+            _ => false,
+        };
+        rule.body.iter().any(is_difference)
     };
     let merges =
         context.rules.iter().any(merges_names) || context.facts.iter().any(|fact| fact.predicate == same_as);

@@ -74,6 +74,8 @@ pub fn lower_together(
     axiom::lower_rules(&ontology.axioms, &mut context);
     class::lower_inclusions(&mut context, ontology.axioms.len());
     context.drop_unusable();
+    let auxiliary = std::mem::take(&mut context.auxiliary);
+    context.rules.extend(auxiliary);
     axiom::lower_assertions(&ontology.axioms, &mut context);
     let before_additional = context.rules.len();
     context.add_rules(additional);
@@ -123,7 +125,7 @@ impl Context<'_> {
         let is_bound = |rule: &&Rule| *rule.identity.source == *AXIOM_SOURCE && rule.body.iter().any(binds);
         let rules = self.rules.iter().filter(|rule| !is_bound(rule)).cloned().collect();
         let program = Program { rules, ..Program::default() };
-        let Err(errors) = rules::Engine::new(self.symbols.clone(), program, []) else { return };
+        let Err(errors) = rules::Engine::check(&program, self.symbols) else { return };
         for error in errors {
             let Some(identity) = rejected_rule(&error) else { continue };
             let identity = identity.clone();

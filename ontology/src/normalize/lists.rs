@@ -56,13 +56,22 @@ fn groups(graph: &mut Graph) -> Vec<AnnotatedAxiom> {
     axioms
 }
 
+/// Maximum number of members of an axiom that [`pairs`] expands. Without a limit, a small document would fill the
+/// memory.
+const MAX_EXPANDED_MEMBERS: usize = 1_000;
+
 /// Replaces each n-ary axiom of the type `class` by one triple with `predicate` for each pair of members.
-/// Removes a malformed axiom, with a warning.
+/// Removes an axiom that is malformed or has too many members, with a warning.
 fn pairs(graph: &mut Graph, class: &str, predicate: &str, warnings: &mut Vec<Warning>) {
     for (_, node) in graph.instances(class) {
         let members = graph.object(&node, owl::MEMBERS).and_then(|head| graph.list(head));
         let axiom_triples: Vec<usize> = graph.of(&node).map(|(index, _)| index).collect();
         match members {
+            Ok(list) if list.items.len() > MAX_EXPANDED_MEMBERS => {
+                take(graph, list.spine);
+                let reason = format!("it has more than {MAX_EXPANDED_MEMBERS} members");
+                warnings.push(Warning::Unread { statement: format!("{node} a <{class}>"), reason });
+            }
             Ok(list) => {
                 let members: Vec<_> = list.items.iter().filter_map(subject_of).collect();
                 for (index, first) in members.iter().enumerate() {

@@ -65,7 +65,7 @@ impl Runtime {
         self.apply(Delta { insert, delete: Vec::new() })
     }
 
-    /// Removes an objective with its requirements and groundings.
+    /// Removes an objective with its groundings, and with the requirements that no other objective has.
     ///
     /// # Errors
     /// Returns [`Error::Unknown`] or [`Error::Engine`].
@@ -73,6 +73,9 @@ impl Runtime {
         let (objective, _) = self.all_facts().find("objective", terms::OBJECTIVE, objective)?;
         let facts = self.facts();
         let mut removed = facts.objects(objective, terms::HAS_NFR);
+        removed.retain(|&requirement| {
+            facts.subjects(requirement, terms::HAS_NFR).iter().all(|&owner| owner == objective)
+        });
         removed.extend(facts.subjects(objective, terms::SOLVES_O));
         removed.push(objective);
         let delete = removed.into_iter().flat_map(|individual| self.mentions(individual)).collect();

@@ -3,12 +3,14 @@
 //! The value of a functional property is replaced in one [`Delta`], so that no engine evaluates rules with two
 //! values. Conclusions from the old value are retracted with it.
 
+use std::collections::BTreeSet;
+
 use rules::{Atom, BuiltIn, Delta, Engine, Fact, Literal, Symbol, Symbols, Term as Argument};
 
 use super::facts::Facts;
 use super::terms::{self, term_for};
 use crate::error::Error;
-use crate::vocab::local_name;
+use crate::vocab::{local_name, owl};
 
 /// State of a component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -175,12 +177,16 @@ fn groundings(facts: Facts, kind: Symbol) -> Vec<Symbol> {
     designs.flat_map(|design| facts.subjects(design, terms::TYPE_FD)).collect()
 }
 
-/// Builds the update after which `value` is the only asserted value of a property of `subject`. Without
-/// `value`, the update removes all asserted values. Values that are asserted of an equal name are not removed.
+/// Builds the update after which `value` is the only asserted value of a property of `subject`, which can have several
+/// names. Without `value`, the update removes all asserted values.
 pub fn replace(engine: &Engine, property: Symbol, subject: Symbol, value: Option<Symbol>) -> Delta {
     let pattern = [Some(subject), None];
-    let rows = engine.matching(property, &pattern);
-    let old = rows.map(|row| Fact::new(property, [subject, row[1]])).filter(|fact| engine.is_asserted(fact));
+    let same_as = engine.symbols().find_name(owl::SAME_AS).filter(|_| engine.program().equality);
+    let mut names = BTreeSet::from([subject]);
+    names.extend(same_as.iter().flat_map(|&same_as| engine.matching(same_as, &pattern).map(|row| row[1])));
+    let values: BTreeSet<Symbol> = engine.matching(property, &pattern).map(|row| row[1]).collect();
+    let facts_of = |&name: &Symbol| values.iter().map(move |&value| Fact::new(property, [name, value]));
+    let old = names.iter().flat_map(facts_of).filter(|fact| engine.is_asserted(fact));
     let new = value.map(|value| Fact::new(property, [subject, value]));
     let delete = old.filter(|fact| Some(fact) != new.as_ref()).collect();
     Delta { insert: new.into_iter().collect(), delete }

@@ -20,6 +20,9 @@ impl BuiltIn {
     /// order. If all arguments are known, there is one empty solution if the built-in holds. The result is
     /// empty if the built-in does not [bind](Self::binds) the unknown arguments.
     pub fn solve(self, arguments: &[Option<&Literal>]) -> Vec<Vec<Literal>> {
+        if self.is_undecided(arguments.iter().copied().flatten()) {
+            return Vec::new();
+        }
         let bound_arguments: Option<Vec<&Literal>> = arguments.iter().copied().collect();
         if let Some(bound_arguments) = bound_arguments {
             return if self.holds(&bound_arguments) { vec![Vec::new()] } else { Vec::new() };
@@ -37,9 +40,18 @@ impl BuiltIn {
         }
     }
 
+    /// Returns `true` if an argument is a fresh value. It can be any value, so no built-in may hold of it, except data
+    /// ranges that contain all values.
+    fn is_undecided<'l>(self, mut arguments: impl Iterator<Item = &'l Literal>) -> bool {
+        !matches!(self, Self::DataRange | Self::OutsideDataRange) && arguments.any(Literal::is_fresh)
+    }
+
     /// Returns `true` if a test holds. For a function, returns `true` if the first argument is its result;
     /// for `tokenize`, if the first argument is one of its results.
     pub fn holds(self, arguments: &[&Literal]) -> bool {
+        if self.is_undecided(arguments.iter().copied()) {
+            return false;
+        }
         match (self, arguments) {
             (Self::Tokenize, [token, rest @ ..]) => pattern::tokens(rest).iter().any(|other| other == *token),
             (Self::Custom(custom), _) if !self.is_function() => custom.definition().holds(arguments),
@@ -95,7 +107,8 @@ impl BuiltIn {
     /// Returns the result of a function. `arguments` omits the first argument, which is the result.
     /// Returns `None` if the result is undefined.
     pub fn compute(self, arguments: &[&Literal]) -> Option<Literal> {
-        if !self.is_function() || !self.accepts(arguments.len() + 1) {
+        let is_applicable = self.is_function() && self.accepts(arguments.len() + 1);
+        if !is_applicable || self.is_undecided(arguments.iter().copied()) {
             return None;
         }
         if let Self::Custom(custom) = self {

@@ -140,6 +140,8 @@ fn translate(pattern: &str) -> Result<String, String> {
             }
             // `&&` and `~~` are set operations of the `regex` crate, but ordinary characters in `XPath`.
             '&' | '~' if depth > 0 => translated.extend(['\\', character]),
+            // With the flag `x`, `#` would begin a comment in the `regex` crate.
+            '#' => translated += "\\#",
             other => translated.push(other),
         }
     }

@@ -271,6 +271,22 @@ mod tests {
     }
 
     #[test]
+    fn trailing_zeros_are_removed_up_to_the_scale() {
+        let digits: BigInt = "-123456789012345678901".parse().expect("an integer");
+        for zeros in 0..70_u32 {
+            for scale in 0..70_u32 {
+                let removed = zeros.min(scale);
+                let expected = (&digits * power_of_ten(zeros - removed), scale - removed);
+                let value = Decimal::new(&digits * power_of_ten(zeros), scale);
+                assert_eq!(value.parts(), expected, "{zeros} {scale}");
+            }
+        }
+        // Quadratic time would be minutes.
+        let long = format!("1.{}", "0".repeat(1_000_000));
+        assert_eq!(Decimal::parse(&long), Some(Decimal::from(1)));
+    }
+
+    #[test]
     fn short_conversion_equals_general_conversion() {
         let mut values = vec![(i64::MAX, 1), (i64::MIN, 1), (i64::MAX, 10), (1, i64::MAX), (0, 7), (100, 1)];
         values

@@ -25,6 +25,10 @@ impl Literal {
         Self::Opaque { lexical: number.to_string().into(), datatype: FRESH.into() }
     }
 
+    pub(crate) fn is_fresh(&self) -> bool {
+        self.kind() == Kind::Fresh
+    }
+
     /// Returns `true` if two literals certainly have different values. Returns `false` if they are equal,
     /// or if that is undecided.
     pub fn differs(&self, other: &Self) -> bool {
@@ -135,6 +139,8 @@ mod tests {
             ("1980^gYear", "1981^gYear", 2),
             ("--01^gMonth", "01^string", 2),
             ("1/2^rational", "0.5^decimal", 1),
+            // 2^-40 has 40 fractional digits.
+            ("1/1099511627776^rational", "0.0000000000009094947017729282379150390625^decimal", 1),
             ("2/6^rational", "1/3^rational", 1),
             ("1/3^rational", "2/3^rational", 2),
             ("1/3^rational", "0.33^decimal", 2),
@@ -166,6 +172,7 @@ mod tests {
             ("<a/>^xml", "string", Some(false)),
             ("1/3^rational", "decimal", Some(false)),
             ("1/2^rational", "decimal", Some(true)),
+            ("1/1099511627776^rational", "decimal", Some(true)),
             ("1/3^rational", "rational", Some(true)),
             ("1980^gYear", "gYear", Some(true)),
             ("1980^gYear", "integer", Some(false)),
