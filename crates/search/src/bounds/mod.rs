@@ -111,7 +111,9 @@ impl Bounds {
         for pattern in patterns {
             projections.push(Projection::new(context, pattern)?);
         }
-        projections.sort_by_key(|projection| std::cmp::Reverse(projection.estimate(&task.initial)));
+        // A projection that proves the goal unreachable comes first, so that it is never omitted.
+        let estimate = |projection: &Projection| projection.estimate(&task.initial).unwrap_or(Int::MAX);
+        projections.sort_by_key(|projection| std::cmp::Reverse(estimate(projection)));
         let further = projections.split_off(projections.len().min(MAX_PROJECTIONS));
         let resources = resources::resources(context, &projections)?;
         Ok(Self { projections, resources, partitions: Vec::new(), further })
