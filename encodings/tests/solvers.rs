@@ -259,3 +259,13 @@ fn unusable_solver_names_and_programs_are_reported() {
     assert!(message("echo s UNSATISFIABLE").contains("answers wrongly"));
     assert!(message("echo s SATISFIABLE").contains("does not satisfy"));
 }
+
+/// The program needs more time for its first answer than the time that replaces a conflict budget.
+#[test]
+#[cfg(unix)]
+fn a_solver_that_starts_slowly_is_usable() {
+    let script = "if grep -q '^-'; then echo s UNSATISFIABLE; exit; fi
+      sleep 3; echo s SATISFIABLE; echo v 1 0";
+    let arguments = vec!["-c".to_owned(), script.to_owned()];
+    assert_eq!(Backend::Program { command: "sh".to_owned(), arguments }.check(), Ok(()));
+}
