@@ -1,6 +1,6 @@
 //! Conformance tests for all SAT solvers (back ends).
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use metaplan_encodings::sat::{Answer, Backend, BackendError, Lit, Solver};
 use task::limits::Limits;
@@ -219,29 +219,30 @@ fn answers_do_not_depend_on_earlier_calls() {
     }
 }
 
+/// The deadline has already passed and conflicts are counted, so the speed of the machine does not matter.
 #[test]
 fn limits_interrupt_every_back_end() {
-    let clauses = pigeons(13);
+    let clauses: Vec<Vec<Lit>> = pigeons(13).iter().map(|clause| literals(clause)).collect();
+    let stopped = |limits: &Limits, budget: u64, backend: &Backend| {
+        let mut solver = backend.start(limits, budget);
+        clauses.iter().for_each(|clause| solver.add_clause(clause));
+        assert_eq!(solver.solve(&[]), Answer::Interrupted, "{backend:?}, budget {budget}");
+        assert!(solver.failure().is_none(), "{backend:?}: {:?}", solver.failure());
+        // The limit stays exceeded, so further calls are interrupted as well.
+        solver.add_clause(&literals(&[1, 1_000]));
+        assert_ne!(solver.solve(&literals(&[-1])), Answer::Satisfiable, "{backend:?}, budget {budget}");
+        solver
+    };
     for backend in backends() {
-        let mut limited = backend.start(&Limits::none().with_time(Duration::from_millis(50)), u64::MAX);
-        let mut counted = backend.start(&Limits::none(), 200);
-        for clause in &clauses {
-            let clause = literals(clause);
-            limited.add_clause(&clause);
-            counted.add_clause(&clause);
-        }
-        let started = Instant::now();
-        assert_eq!(limited.solve(&[]), Answer::Interrupted, "{backend:?}, by time");
-        assert_eq!(counted.solve(&[]), Answer::Interrupted, "{backend:?}, by conflicts");
-        assert!(started.elapsed() < Duration::from_secs(20), "{backend:?}");
-        assert!(counted.failure().is_none());
-        // The time limit stays exceeded, so further calls are interrupted as well.
-        for solver in [&mut limited, &mut counted] {
-            solver.add_clause(&literals(&[1, 1_000]));
-            assert_ne!(solver.solve(&literals(&[-1])), Answer::Satisfiable, "{backend:?}");
-        }
-        assert_eq!(limited.solve(&[]), Answer::Interrupted, "{backend:?}, asked again");
+        let mut late = stopped(&Limits::none().with_time(Duration::ZERO), u64::MAX, &backend);
+        assert_eq!(late.solve(&[]), Answer::Interrupted, "{backend:?}, asked again");
     }
+    for backend in Backend::built_in() {
+        stopped(&Limits::none(), 200, &backend);
+    }
+    // Programs get a time instead of a number of conflicts. This one never answers.
+    let silent = Backend::Program { command: "sleep".to_owned(), arguments: vec!["1000".to_owned()] };
+    stopped(&Limits::none(), 200, &silent);
 }
 
 #[test]
@@ -258,4 +259,14 @@ fn unusable_solver_names_and_programs_are_reported() {
     }
     assert!(message("echo s UNSATISFIABLE").contains("answers wrongly"));
     assert!(message("echo s SATISFIABLE").contains("does not satisfy"));
+}
+
+/// The program needs more time for its first answer than the time that replaces a conflict budget.
+#[test]
+#[cfg(unix)]
+fn a_solver_that_starts_slowly_is_usable() {
+    let script = "if grep -q '^-'; then echo s UNSATISFIABLE; exit; fi
+      sleep 3; echo s SATISFIABLE; echo v 1 0";
+    let arguments = vec!["-c".to_owned(), script.to_owned()];
+    assert_eq!(Backend::Program { command: "sh".to_owned(), arguments }.check(), Ok(()));
 }

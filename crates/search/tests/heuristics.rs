@@ -41,6 +41,26 @@ fn heuristic_values_are_consistent_and_cost_partitionings_add_up() {
     assert!(fleets > 3 && depots > 3, "shares add up for {fleets} fleets and {depots} depots");
 }
 
+/// `a` and `b` exclude each other. Nothing costs anything, so only the pair of both shows it, among more
+/// projections than are evaluated for each state.
+#[test]
+fn a_projection_that_proves_the_goal_unreachable_is_kept() {
+    let domain = "(define (domain d) (:requirements :adl :action-costs)
+      (:predicates (a) (b) (g ?i) (given ?i)) (:functions (total-cost))
+      (:action set-a :parameters () :precondition (not (b)) :effect (a))
+      (:action set-b :parameters () :precondition (not (a)) :effect (b))
+      (:action set :parameters (?i) :precondition (given ?i) :effect (g ?i)))";
+    let problem = "(define (problem p) (:domain d) (:objects i j k l m)
+      (:init (given i) (given j) (given k) (given l) (given m) (= (total-cost) 0))
+      (:goal (and (a) (b) (g i) (g j) (g k) (g l) (g m))) (:metric minimize (total-cost)))";
+    let task = ground_text((domain.into(), problem.into()));
+    assert!(task.unreachable.is_none(), "grounding detects it already");
+    for compute in [Bounds::new, Bounds::of_projections] {
+        let bounds = compute(Context::new(&task, &Limits::none())).expect("no limit");
+        assert_eq!(bounds.estimate(&task.initial), None);
+    }
+}
+
 #[test]
 #[ignore = "takes minutes"]
 fn many_heuristic_values_are_consistent() {

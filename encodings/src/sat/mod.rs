@@ -14,12 +14,17 @@ mod totalizer;
 mod varisat;
 
 use std::str::FromStr;
+use std::time::Duration;
 
 use program::Program;
 pub use solver::{Answer, Lit, Solver};
 use task::limits::Limits;
 pub use totalizer::Totalizer;
 pub use varisat::refute_with_proof;
+
+/// Time limit of an external program for each formula of [`Backend::check`]. It detects programs
+/// that never answer; a program in a container or on a network file system may start slowly.
+const CHECK_TIME: Duration = Duration::from_secs(60);
 
 /// The SAT solver that decides the formulas.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -100,8 +105,7 @@ impl Backend {
         for (clauses, expected) in
             [(&[variable][..], Answer::Satisfiable), (&[variable, !variable][..], Answer::Unsatisfiable)]
         {
-            // A budget of 0 limits external programs to a short time.
-            let mut solver = self.start(&Limits::none(), 0);
+            let mut solver = self.start(&Limits::none().with_time(CHECK_TIME), u64::MAX);
             for literal in clauses {
                 solver.add_clause(&[*literal]);
             }

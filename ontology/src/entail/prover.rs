@@ -8,8 +8,7 @@ use crate::vocab::owl;
 /// Result of the proof of a statement.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Answer {
-    /// The statement is entailed, except in the cases in which the procedure is unsound (see the module of entailment);
-    /// the text is the explanation.
+    /// The statement is entailed; the text is the explanation.
     Follows(String),
     /// The statement was not proved; the text is the reason.
     Open(&'static str),

@@ -52,8 +52,8 @@ impl CostPartitioning {
         for position in order {
             let to_go = projections[*position].goal_distances(&remaining, limits)?;
             if to_go.iter().any(|cost| cost.is_some_and(|cost| cost > 0)) {
-                for (cost, used) in remaining.iter_mut().zip(projections[*position].saturated(&to_go)) {
-                    *cost = (*cost).saturating_sub(used);
+                for (operator, used) in projections[*position].saturated(&to_go) {
+                    remaining[operator] = remaining[operator].saturating_sub(used);
                 }
                 parts.push((*position, to_go));
             }
@@ -127,7 +127,8 @@ fn by_yield(projections: &[Projection], useful: &[usize], alone: impl Fn(usize) 
     let used_cost = |position: usize| {
         let projection = &projections[position];
         // The sum may saturate, because it affects only the order.
-        projection.saturated(projection.costs()).fold(0, Int::saturating_add).max(1)
+        let costs = projection.saturated(projection.costs()).map(|(_, cost)| cost);
+        costs.fold(0, Int::saturating_add).max(1)
     };
     let mut order: Vec<(usize, Int, Int)> =
         useful.iter().map(|position| (*position, alone(*position), used_cost(*position))).collect();

@@ -19,6 +19,7 @@ pub use lm_cut::{LandmarkCut, landmark_cut_bound};
 pub use pattern_database::Projection;
 
 use cost_partitioning::CostPartitioning;
+use pattern_database::operator_costs;
 use resources::Resource;
 
 use smallvec::SmallVec;
@@ -107,11 +108,14 @@ impl Bounds {
         if patterns.is_empty() {
             patterns.push(Vec::new());
         }
+        let costs = operator_costs(task);
         let mut projections: Vec<Projection> = Vec::new();
         for pattern in patterns {
-            projections.push(Projection::new(context, pattern)?);
+            projections.push(Projection::new(context, pattern, &costs)?);
         }
-        projections.sort_by_key(|projection| std::cmp::Reverse(projection.estimate(&task.initial)));
+        // A projection that proves the goal unreachable comes first, so that it is never omitted.
+        let estimate = |projection: &Projection| projection.estimate(&task.initial).unwrap_or(Int::MAX);
+        projections.sort_by_key(|projection| std::cmp::Reverse(estimate(projection)));
         let further = projections.split_off(projections.len().min(MAX_PROJECTIONS));
         let resources = resources::resources(context, &projections)?;
         Ok(Self { projections, resources, partitions: Vec::new(), further })
@@ -123,7 +127,7 @@ impl Bounds {
     /// # Errors
     /// Fails if the deadline has passed or the interrupt flag is set.
     pub fn trivial(context: Context<'_>) -> Result<Self, Interrupted> {
-        let projections = vec![Projection::new(context, Vec::new())?];
+        let projections = vec![Projection::new(context, Vec::new(), &operator_costs(context.task))?];
         Ok(Self { projections, resources: Vec::new(), partitions: Vec::new(), further: Vec::new() })
     }
 

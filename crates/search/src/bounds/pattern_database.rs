@@ -2,11 +2,12 @@
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::sync::Arc;
 
 use task::context::Context;
 use task::limits::{Interrupted, Limits};
 use task::number::{GROWTH_LIMIT, Int, dense};
-use task::task::{ConditionalEffect, Literal, OperatorId, State, VariableId};
+use task::task::{ConditionalEffect, Literal, OperatorId, State, Task, VariableId};
 
 /// A transition between two abstract states.
 #[derive(Debug, Clone, Copy)]
@@ -22,10 +23,13 @@ pub struct Projection {
     sizes: Vec<usize>,
     initial: u32,
     goals: Vec<u32>,
-    /// For each operator: its cost with the cheapest designs (0 if it is negative), and its
-    /// transitions. There are no transitions if the operator neither requires a fact of the pattern
-    /// nor changes the pattern.
-    operators: Vec<(Int, Vec<Transition>)>,
+    /// Result of [`operator_costs`].
+    costs: Arc<[Int]>,
+    /// Operators with transitions, ascending, each with the end of its transitions in `transitions`.
+    /// There are no transitions if the operator neither requires a fact of the pattern nor changes the
+    /// pattern. This holds for nearly all operators of a large task, so they take no memory.
+    operators: Vec<(usize, usize)>,
+    transitions: Vec<Transition>,
     /// Minimum cost of the operators without transitions, if there are any.
     idle_cost: Option<Int>,
     to_go: Vec<Option<Int>>,
@@ -37,8 +41,22 @@ fn sum(a: Int, b: Int) -> Int {
     a.saturating_add(b).min(GROWTH_LIMIT)
 }
 
+/// Returns the cost of each operator with its cheapest designs, 0 if it is negative. All projections of
+/// a task share the list.
+pub(super) fn operator_costs(task: &Task) -> Arc<[Int]> {
+    // Dijkstra's algorithm requires non-negative costs. An operator of negative cost is kept with
+    // cost 0. The distances are then no lower bounds, but still show from where the goal is
+    // reachable.
+    task.operators.iter().map(|operator| operator.cost.minimum().max(0)).collect()
+}
+
 impl Projection {
-    pub(crate) fn new(context: Context<'_>, pattern: Vec<VariableId>) -> Result<Self, Interrupted> {
+    /// Computes a projection. `costs` are as returned by [`operator_costs`].
+    pub(super) fn new(
+        context: Context<'_>,
+        pattern: Vec<VariableId>,
+        costs: &Arc<[Int]>,
+    ) -> Result<Self, Interrupted> {
         let Context { task, limits } = context;
         let sizes: Vec<_> =
             pattern.iter().map(|variable| task.variables[variable.index()].values.len()).collect();
@@ -47,19 +65,17 @@ impl Projection {
             sizes,
             initial: 0,
             goals: Vec::new(),
+            costs: Arc::clone(costs),
             operators: Vec::new(),
+            transitions: Vec::new(),
             idle_cost: None,
             to_go: Vec::new(),
         };
         projection.initial = projection.state(&task.initial);
         let goal = projection.required(&task.goal.facts);
         projection.goals = projection.matching(&goal);
-        for operator in limits.watch(&task.operators) {
-            let operator = operator?;
-            // Dijkstra's algorithm requires non-negative costs. An operator of negative cost is kept with
-            // cost 0. The distances are then no lower bounds, but still show from where the goal is
-            // reachable.
-            let cost = operator.cost.minimum().max(0);
+        for item in limits.watch(task.operators.iter().enumerate()) {
+            let (index, operator) = item?;
             let before = projection.required(&operator.condition.facts);
             let after = projection.required(&operator.effects);
             let conditional: Vec<_> = operator
@@ -69,21 +85,32 @@ impl Projection {
                 .filter(|(_, after)| after.iter().any(Option::is_some))
                 .collect();
             let touched = !conditional.is_empty() || before.iter().chain(&after).any(Option::is_some);
-            let mut transitions = Vec::new();
             if touched {
                 for source in projection.matching(&before) {
                     for target in projection.targets(source, &after, &conditional) {
-                        transitions.push(Transition { source, target });
+                        projection.transitions.push(Transition { source, target });
                     }
                 }
+                projection.operators.push((index, projection.transitions.len()));
             } else {
+                let cost = costs[index];
                 projection.idle_cost = Some(projection.idle_cost.map_or(cost, |least: Int| least.min(cost)));
             }
-            projection.operators.push((cost, transitions));
         }
-        let costs: Vec<Int> = projection.operators.iter().map(|(cost, _)| *cost).collect();
-        projection.to_go = projection.goal_distances(&costs, limits)?;
+        projection.to_go = projection.goal_distances(costs, limits)?;
         Ok(projection)
+    }
+
+    /// Returns the operators with transitions, ascending by index, each with its transitions.
+    fn by_operator(&self) -> impl Iterator<Item = (usize, &[Transition])> {
+        let starts = std::iter::once(0).chain(self.operators.iter().map(|(_, end)| *end));
+        let ranges = self.operators.iter().zip(starts);
+        ranges.map(move |((operator, end), start)| (*operator, &self.transitions[start..*end]))
+    }
+
+    /// Returns the position of an operator in `operators`, or `None` if it has no transitions.
+    fn place(&self, operator: usize) -> Option<usize> {
+        self.operators.binary_search_by_key(&operator, |(candidate, _)| *candidate).ok()
     }
 
     fn size(&self) -> usize {
@@ -188,15 +215,16 @@ impl Projection {
         self.distances(|operator| costs[operator], self.goals.iter().map(|goal| (*goal, 0)), limits)
     }
 
-    /// Returns the saturated costs: for each operator, the minimum non-negative cost that preserves the given
-    /// goal distances.
+    /// Returns the saturated costs: for each operator with transitions, given by index, the minimum
+    /// non-negative cost that preserves the given goal distances. The saturated cost of any other operator
+    /// is 0.
     #[expect(clippy::arithmetic_side_effects, reason = "costs to go are between 0 and GROWTH_LIMIT")]
-    pub(crate) fn saturated(&self, to_go: &[Option<Int>]) -> impl Iterator<Item = Int> {
-        self.operators.iter().map(|(_, transitions)| {
+    pub(crate) fn saturated(&self, to_go: &[Option<Int>]) -> impl Iterator<Item = (usize, Int)> {
+        self.by_operator().map(|(operator, transitions)| {
             let falls = transitions
                 .iter()
                 .filter_map(|t| Some(to_go[t.source as usize]? - to_go[t.target as usize]?));
-            falls.fold(0, Int::max)
+            (operator, falls.fold(0, Int::max))
         })
     }
 
@@ -223,7 +251,7 @@ impl Projection {
     /// goal distances.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(crate) fn transition_count(&self) -> usize {
-        self.size() + self.operators.iter().map(|(_, transitions)| transitions.len()).sum::<usize>()
+        self.size() + self.transitions.len()
     }
 
     pub(crate) fn steps_to_go(&self, limits: &Limits) -> Result<Vec<Option<Int>>, Interrupted> {
@@ -240,15 +268,15 @@ impl Projection {
         left: Int,
         limits: &Limits,
     ) -> Result<Vec<Option<Int>>, Interrupted> {
-        let replenishing = self.operators.iter().zip(used).filter(|(_, used)| used.is_none());
-        let free = replenishing.flat_map(|((_, transitions), _)| transitions).map(|t| (t.source, 0));
+        let replenishing = self.by_operator().filter(|(operator, _)| used[*operator].is_none());
+        let free = replenishing.flat_map(|(_, transitions)| transitions).map(|t| (t.source, 0));
         let goals = self.goals.iter().map(|goal| (*goal, left));
         self.distances(|operator| used[operator].unwrap_or(0).max(0), goals.chain(free), limits)
     }
 
     /// Returns `true` if the operator requires a fact of the pattern or may change the pattern.
     pub(crate) fn affects_pattern(&self, operator: usize) -> bool {
-        !self.operators[operator].1.is_empty()
+        self.place(operator).is_some()
     }
 
     /// Backward Dijkstra search. Returns, for each abstract state, the minimum of the path cost to
@@ -260,8 +288,8 @@ impl Projection {
         limits: &Limits,
     ) -> Result<Vec<Option<Int>>, Interrupted> {
         let mut incoming: Vec<Vec<(u32, Int)>> = vec![Vec::new(); self.size()];
-        for item in limits.watch(self.operators.iter().enumerate()) {
-            let (operator, (_, transitions)) = item?;
+        for item in limits.watch(self.by_operator()) {
+            let (operator, transitions) = item?;
             for transition in transitions.iter().filter(|t| t.source != t.target) {
                 incoming[transition.target as usize].push((transition.source, cost(operator)));
             }
@@ -302,7 +330,9 @@ impl Projection {
     /// Returns the transitions of an operator; empty if it neither requires a fact of the pattern
     /// nor changes it.
     pub fn transitions(&self, operator: OperatorId) -> &[Transition] {
-        &self.operators[operator.index()].1
+        let Some(place) = self.place(operator.index()) else { return &[] };
+        let start = place.checked_sub(1).map_or(0, |previous| self.operators[previous].1);
+        &self.transitions[start..self.operators[place].1]
     }
 
     /// Returns the minimum cost of each abstract state after one more step; `None` if it is
@@ -318,10 +348,10 @@ impl Projection {
                 }
             }
         }
-        for (step, transitions) in &self.operators {
+        for (operator, transitions) in self.by_operator() {
             for transition in transitions {
                 if let Some(cost) = costs[transition.source as usize] {
-                    improve(&mut next[transition.target as usize], sum(cost, *step));
+                    improve(&mut next[transition.target as usize], sum(cost, self.costs[operator]));
                 }
             }
         }
@@ -380,20 +410,55 @@ impl Projection {
             let row = row?;
             let through = |(c, h): (&Option<Int>, &Option<Int>)| Some(sum((*c)?, (*h)?));
             let cheapest = costs.iter().zip(&self.to_go).filter_map(through).min();
-            for (flag, (cost, transitions)) in row.iter_mut().zip(&self.operators) {
+            let mut by_operator = self.by_operator().peekable();
+            for ((index, flag), cost) in row.iter_mut().enumerate().zip(&self.costs[..]) {
+                let transitions = by_operator.next_if(|(operator, _)| *operator == index);
                 *flag = *flag
-                    && if transitions.is_empty() {
-                        cheapest.is_some_and(|least| within(sum(least, *cost)))
-                    } else {
-                        transitions.iter().any(|transition| {
+                    && match transitions {
+                        None => cheapest.is_some_and(|least| within(sum(least, *cost))),
+                        Some((_, transitions)) => transitions.iter().any(|transition| {
                             let through =
                                 (&costs[transition.source as usize], &self.to_go[transition.target as usize]);
                             matches!(through, (Some(c), Some(h)) if within(sum(sum(*c, *cost), *h)))
-                        })
+                        }),
                     };
             }
             costs = self.advance(&costs);
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use task::task::Fact;
+    use testing::{depot, ground_text};
+
+    use super::*;
+    use crate::bounds::Bounds;
+
+    /// Checks which operators are stored against the facts that each operator mentions.
+    #[test]
+    fn only_operators_that_mention_the_pattern_take_memory() {
+        let mut omitted = 0;
+        for seed in 0..4 {
+            let task = ground_text(depot(seed));
+            let bounds = Bounds::of_projections(Context::new(&task, &Limits::none())).expect("no limit");
+            for projection in &bounds.projections {
+                let mut stored = 0;
+                for (operator, id) in task.operators.iter().zip(OperatorId::all(task.operators.len())) {
+                    let conditional = operator.conditional.iter().flat_map(|effect| &effect.effects);
+                    let facts = operator.condition.facts.iter().chain(operator.effects.iter());
+                    let mentions = |fact: &Fact| projection.pattern.contains(&fact.variable);
+                    let is_affected = facts.chain(conditional).any(mentions);
+                    assert_eq!(projection.affects_pattern(id.index()), is_affected, "seed {seed}");
+                    assert_eq!(!projection.transitions(id).is_empty(), is_affected, "seed {seed}");
+                    stored += usize::from(is_affected);
+                }
+                assert_eq!(projection.operators.len(), stored, "seed {seed}");
+                omitted += task.operators.len() - stored;
+            }
+        }
+        assert!(omitted > 0);
     }
 }

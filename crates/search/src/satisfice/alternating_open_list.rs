@@ -33,13 +33,15 @@ pub struct AlternatingOpenList<K> {
     lists: Vec<List<K>>,
     /// Steps of all entries. A step is the id of an operator with designs.
     steps: Vec<u32>,
+    /// Number of entries of all lists together.
+    entries: usize,
 }
 
 impl<K: Ord> AlternatingOpenList<K> {
     /// Creates one list for each item. The item is `true` if the list contains preferred operators only.
     pub fn new(lists: impl IntoIterator<Item = bool>) -> Self {
         let list = |preferred| List { preferred, buckets: BTreeMap::new(), turns: 0 };
-        Self { lists: lists.into_iter().map(list).collect(), steps: Vec::new() }
+        Self { lists: lists.into_iter().map(list).collect(), steps: Vec::new(), entries: 0 }
     }
 
     /// Adds a state with its heuristic value for each list. Lists of preferred operators get its preferred
@@ -60,6 +62,7 @@ impl<K: Ord> AlternatingOpenList<K> {
             let entry = if list.preferred { preferred } else { all_steps };
             if entry.next < entry.end {
                 list.buckets.entry(value).or_default().push_back(entry);
+                self.entries = self.entries.saturating_add(1);
             }
         }
     }
@@ -77,6 +80,7 @@ impl<K: Ord> AlternatingOpenList<K> {
         entry.next = entry.next.saturating_add(1);
         if entry.next == entry.end {
             entries.pop_front();
+            self.entries = self.entries.saturating_sub(1);
             if entries.is_empty() {
                 bucket.remove();
             }
@@ -89,11 +93,42 @@ impl<K: Ord> AlternatingOpenList<K> {
         self.steps.len() / 2
     }
 
+    /// Returns the approximate memory use of the entries in 64-bit words: 12 bytes each, and unused capacity.
+    pub(super) fn size_of_entries(&self) -> usize {
+        self.entries.saturating_mul(2)
+    }
+
     /// Gives each list of preferred operators `PREFERRED_BOOST` extra turns. Called when a heuristic has
     /// found a new best value.
     pub fn boost(&mut self) {
         for list in self.lists.iter_mut().filter(|list| list.preferred) {
             list.turns = list.turns.saturating_sub(PREFERRED_BOOST);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn entries_are_counted_until_their_last_step_is_removed() {
+        let mut open = AlternatingOpenList::new([false, true]);
+        // The list of preferred steps gets no entry for a state without such steps.
+        let preferred: [&[u32]; 3] = [&[7], &[], &[5, 6]];
+        for (state, preferred) in (0..).zip(preferred) {
+            open.push(state, [state, state], &[5, 6, 7], preferred);
+        }
+        let mut removed = 0;
+        loop {
+            let in_lists: usize =
+                open.lists.iter().flat_map(|list| list.buckets.values()).map(VecDeque::len).sum();
+            assert_eq!(open.size_of_entries(), 2 * in_lists, "after {removed} steps");
+            if open.pop().is_none() {
+                break;
+            }
+            removed += 1;
+        }
+        assert_eq!(removed, 3 * 3 + 3);
     }
 }

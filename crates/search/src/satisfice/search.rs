@@ -153,11 +153,12 @@ impl<N: TaskNumber> Search<N> {
         search
     }
 
-    /// Returns the approximate memory use of states, landmarks, novelty and the steps in the open lists, in
-    /// 64-bit words. Nodes, hash tables and the entries of the open lists are not counted.
+    /// Returns the approximate memory use of states, nodes, landmarks and open lists, in 64-bit words.
     pub(super) fn size(&self) -> usize {
-        let states = self.store.size().saturating_add(self.reached.len());
-        states.saturating_add(self.open.size()).saturating_add(self.novelty.size())
+        let nodes = self.nodes.len().saturating_mul(size_of::<Node<N>>() / 8);
+        let states = self.store.size().saturating_add(nodes).saturating_add(self.reached.len());
+        let open = self.open.size().saturating_add(self.open.size_of_entries());
+        states.saturating_add(open).saturating_add(self.novelty.size())
     }
 
     pub(super) fn run(
@@ -351,5 +352,27 @@ impl<N: TaskNumber> Search<N> {
         // A cheaper path to a node of the plan may have been found since the goal was reached.
         let cost = cost(context.task, &steps).unwrap_or_else(|| self.nodes[goal as usize].cost.clone());
         GroundPlan { steps, cost }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use task::context::Context;
+    use task::number::Int;
+    use testing::{depot, ground_text};
+
+    use super::*;
+
+    #[test]
+    fn the_size_includes_the_nodes() {
+        let (task, limits) = (ground_text(depot(0)), Limits::none());
+        let context = SearchContext::new(Context::new(&task, &limits)).expect("no limit");
+        let mut context = context.expect("few combinations of designs");
+        let prices = context.prices(false);
+        let mut search = Search::new(&mut context, HeuristicWeight::Greedy, prices, SearchGoal::Task);
+        let before = search.size();
+        let node = || Node { parent: 0, step: 0, cost: 0, price: 0, is_pending: false };
+        search.nodes.extend((0..1_000).map(|_| node()));
+        assert!(8 * (search.size() - before) >= 1_000 * size_of::<Node<Int>>());
     }
 }

@@ -91,9 +91,10 @@ impl<N: Clone + Eq + std::hash::Hash> Store<N> {
         State { values: self.fields.iter().map(value).collect(), numbers }
     }
 
-    /// Returns the approximate memory use in 64-bit words.
+    /// Returns the approximate memory use in 64-bit words. The table takes about a word for each state.
     pub(super) fn size(&self) -> usize {
-        self.packed.len().saturating_add(self.stored_numbers.len().saturating_mul(2))
+        let numbers = self.stored_numbers.len().saturating_mul(2);
+        self.packed.len().saturating_add(numbers).saturating_add(self.count as usize)
     }
 }
 

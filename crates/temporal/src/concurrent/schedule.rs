@@ -10,8 +10,10 @@ use crate::concurrent::simple_temporal_network::Key;
 use crate::concurrent::temporal_task::TemporalTask;
 use crate::concurrent::time_number::TimeNumber;
 
-/// Constraint between two happenings: position of the first, position of the second, and least time
-/// from the first to the second.
+/// Constraint between two nodes: index of the first, index of the second, and least time from the
+/// first to the second. The happenings are the first nodes, in the order of the sequence. Each other
+/// node is the latest access of one kind up to a happening: constraints for all pairs of accesses
+/// would be quadratic in number.
 type Bound<T> = (usize, usize, T);
 
 /// Computes the earliest times of a sequence by the Bellman-Ford algorithm. `together` marks the
@@ -29,8 +31,8 @@ pub(super) fn schedule<T: TimeNumber>(
 ) -> Vec<T> {
     let mut times = vec![T::ZERO; sequence.len()];
     let bounds = bounds(concurrent, sequence, (together, durations), &mut times);
-    // No chain of bounds is longer than the sequence.
-    for _ in 0..=sequence.len() {
+    // No chain of bounds is longer than the number of nodes.
+    for _ in 0..=times.len() {
         let mut has_changed = false;
         for (from, to, by) in &bounds {
             let least = times[*from] + *by;
@@ -43,6 +45,7 @@ pub(super) fn schedule<T: TimeNumber>(
             break;
         }
     }
+    times.truncate(sequence.len());
     times
 }
 
@@ -65,6 +68,8 @@ pub(super) fn durations<T: TimeNumber>(concurrent: &TemporalTask<T>, sequence: &
     durations
 }
 
+/// Constraints of a sequence. Sets `times` of the happenings to the times of the timed initial
+/// literals before them, and appends the times of the other nodes.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "the first happening is together with none; durations have at most `TIME_BITS` bits"
@@ -73,10 +78,11 @@ fn bounds<T: TimeNumber>(
     concurrent: &TemporalTask<T>,
     sequence: &[OperatorId],
     (together, durations): (&[bool], &[T]),
-    times: &mut [T],
+    times: &mut Vec<T>,
 ) -> Vec<Bound<T>> {
     let mut bounds = Vec::new();
-    let mut marked: FxHashMap<Key, Vec<usize>> = FxHashMap::default();
+    // Node of the latest access of each kind so far.
+    let mut latest: FxHashMap<Key, usize> = FxHashMap::default();
     // Runs of an instance end in the order of their starts.
     let mut open_starts: FxHashMap<u32, VecDeque<usize>> = FxHashMap::default();
     // Running actions with a joint over-all condition, each with the last happening that wrote an
@@ -89,12 +95,8 @@ fn bounds<T: TimeNumber>(
             floor = concurrent.events[event as usize].0;
         }
         times[index] = floor;
-        for (key, by) in &happening.accesses.after {
-            bounds.extend(marked.get(key).into_iter().flatten().map(|earlier| (*earlier, index, *by)));
-        }
-        for key in &happening.accesses.marks {
-            marked.entry(*key).or_default().push(index);
-        }
+        let after = happening.accesses.after.iter();
+        bounds.extend(after.filter_map(|(key, by)| Some((*latest.get(key)?, index, *by))));
         if together[index] {
             bounds.extend([(index - 1, index, T::ZERO), (index, index - 1, T::ZERO)]);
         }
@@ -123,6 +125,44 @@ fn bounds<T: TimeNumber>(
             }
             _ => {}
         }
+        for key in &happening.accesses.marks {
+            let node = times.len();
+            times.push(floor);
+            bounds.push((index, node, T::ZERO));
+            bounds.extend(latest.insert(*key, node).map(|previous| (previous, node, T::ZERO)));
+        }
     }
     bounds
+}
+
+#[cfg(test)]
+mod tests {
+    use num_rational::BigRational;
+    use pddl::{Source, read};
+    use task::ground::GroundConfig;
+    use task::number::Int;
+
+    use super::*;
+    use crate::concurrent::ground_concurrent;
+
+    /// Each step reads and increases one number, so the steps are the separation apart.
+    #[test]
+    fn the_number_of_constraints_is_linear_in_the_number_of_steps() {
+        let domain = "(define (domain d) (:requirements :durative-actions :fluents) (:functions (count))
+            (:action step :parameters () :precondition (<= (count) 500) :effect (increase (count) 1)))";
+        let problem = "(define (problem p) (:domain d) (:init (= (count) 0)) (:goal (>= (count) 400)))";
+        let (domain, problem, _) =
+            read(&Source::new("domain", domain), &Source::new("problem", problem)).expect("PDDL");
+        let separation = BigRational::new(1.into(), 1000.into());
+        let task = ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation)
+            .expect("a task")
+            .narrow();
+        let is_step = |id: &OperatorId| task.happenings[id.index()].role == Role::Whole;
+        let step = OperatorId::all(task.happenings.len()).find(is_step).expect("an action");
+        let (sequence, together, durations) = ([step; 400], [false; 400], [0; 400]);
+        let expected: Vec<Int> = (0..400).map(|position: Int| position * task.separation).collect();
+        assert_eq!(schedule(&task, &sequence, &together, &durations), expected);
+        let count = bounds(&task, &sequence, (&together[..], &durations[..]), &mut vec![0; 400]).len();
+        assert!(count < 10 * 400, "{count} constraints");
+    }
 }
