@@ -272,9 +272,7 @@ async fn run(command: Command) -> Result<(), Errors> {
         }
         Command::Send { server, session } => {
             let store = server.open(10).await.map_err(|message| vec![message])?;
-            // The separator keeps sessions that end with a digit apart from the numbers of their messages.
-            let session = format!("{}.", session.unwrap_or_else(|| format!("{:016x}", fastrand::u64(..))));
-            lines::send(store, &session).await.map_err(|message| vec![message])?;
+            lines::send(store, &id_prefix(session)).await.map_err(|message| vec![message])?;
         }
         Command::Follow { server, robot, after } => {
             let store = server.open(10).await.map_err(|message| vec![message])?;
@@ -293,6 +291,12 @@ async fn run(command: Command) -> Result<(), Errors> {
         }
     }
     Ok(())
+}
+
+/// Returns the part of message ids before the number of the message. It ends with a separator, because sessions can end
+/// with a digit.
+fn id_prefix(session: Option<String>) -> String {
+    format!("{}.", session.unwrap_or_else(|| format!("{:016x}", fastrand::u64(..))))
 }
 
 fn own_name() -> String {
@@ -315,4 +319,15 @@ fn signals() -> Result<watch::Receiver<bool>, Errors> {
         vec![Message::error("N302", format!("the signal handler cannot be installed: {error}"))]
     })?;
     Ok(heard)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sessions_that_end_with_a_digit_share_no_message_ids() {
+        let id = |session: &str, number: u64| format!("{}{number}", id_prefix(Some(session.to_owned())));
+        assert_ne!(id("1", 11), id("11", 1));
+    }
 }

@@ -4,8 +4,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use metaplan_fleet::partition::{Order, Settings, Shared, serve};
+use metaplan_fleet::robot::{Begun, Robot};
 use metaplan_fleet::store::local::Local;
-use metaplan_fleet::store::{Message, Store as _, Stream};
+use metaplan_fleet::store::{Message, Store as _, Stored, Stream};
 use metaplan_fleet::wire::Address;
 use tokio::sync::watch;
 
@@ -83,4 +84,15 @@ async fn reactions_do_not_wait_for_plans_and_each_plan_is_found_by_some_owner() 
     }
     // How many plans there are, and which effects precede them, depends on the machine's speed.
     assert!(made.values().flatten().any(|decision| decision.planned), "plans come later");
+}
+
+#[test]
+fn the_plan_of_an_enrolment_stays_pending_for_the_next_owner() {
+    let (missions, mut robot) = (missions(), Robot::default());
+    let payload = br#"{"event": "enrol", "mission": "uuv"}"#.to_vec();
+    let event = Stored { sequence: 1, subject: "0.r".to_owned(), id: None, time: 0, payload };
+    let Ok(Begun::Search(search)) = robot.begin(&event, &missions) else { panic!("a search is necessary") };
+    let decided = robot.finish(search, None);
+    assert!(decided.planning);
+    assert!(Robot::restore(decided).is_pending());
 }

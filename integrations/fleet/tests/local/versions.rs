@@ -12,7 +12,7 @@ use metaplan_fleet::missions::Missions;
 use metaplan_fleet::partition::{Order, Settings, Shared, serve};
 use metaplan_fleet::robot::Robot;
 use metaplan_fleet::store::local::Local;
-use metaplan_fleet::store::{Store, Stored, Stream};
+use metaplan_fleet::store::{Message, Store, Stored, Stream};
 use metaplan_fleet::wire::{Decided, State};
 use metaplan_fleet::worker;
 use tempfile::TempDir;
@@ -152,6 +152,28 @@ async fn a_robot_without_its_version_can_be_retired_and_enrolled() {
     assert_eq!(events, [&[1], &sequences[..], &more].concat());
     assert!(made[1].retired && made[2].enrolled.is_some());
     assert_ne!(made[0].state.digest, made[2].state.digest);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_refused_retirement_discards_no_event_of_a_suspended_robot() {
+    let (versions, folder) = (Versions::new(), tempfile::tempdir().expect("a directory"));
+    let store = open(folder.path(), 1);
+    tell(&store, "r", &event(ENROL)).await;
+    let worker = Worker::start(versions.shared(&store, &["old"]));
+    decided(&store, 1).await;
+    worker.stop().await;
+    let mut sequences = tell(&store, "r", &[TICK, LOST].map(str::to_owned)).await;
+    let forged = Message { subject: "0.r", id: "other:2", after: None, payload: RETIRE.as_bytes() };
+    sequences.push(store.append(Stream::Events, forged).await.expect("it is our own directory").sequence);
+    let shared = versions.shared(&store, &["new"]);
+    let worker = Worker::start(Arc::clone(&shared));
+    // The suspension and the refused retirement.
+    while shared.counts.refused.load(Ordering::Relaxed) < 2 {
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    worker.stop().await;
+    let kept: Vec<u64> = all(&store, Stream::Events).await.iter().map(|event| event.sequence).collect();
+    assert_eq!(kept, sequences);
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
