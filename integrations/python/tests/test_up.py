@@ -322,3 +322,9 @@ def test_other_modes():
     assert results[-1].status in SOLVED and all(own.status == Status.INTERMEDIATE for own in results[:-1])
     with Replanner(problem, name="replanner[metaplan]") as replanner:
         assert replanner.resolve().status in SOLVED
+
+
+def test_without_a_metric_the_first_plan_ends_the_search():
+    with AnytimePlanner(name="metaplan") as planner:
+        results = list(planner.get_solutions(EXAMPLES["basic"].problem))
+    assert [result.status for result in results] == [Status.SOLVED_SATISFICING]
