@@ -346,8 +346,8 @@ class MetaplanEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin):
             if written.timed:
                 options["concurrent"] = written.separation
                 options.pop("certificate")
-            if not problem.quality_metrics:
-                # Without a metric, all plans are equally good.
+            if not problem.quality_metrics and not options.get("certificate"):
+                # Without a metric, all plans are equally good. A certificate needs the proof.
                 options["on_improvement"] = lambda *_: False
             found = mission.plan(time_limit=timeout, **options)
         except Error as error:

@@ -15,6 +15,7 @@ from unified_planning.plans import SequentialPlan
 from unified_planning.shortcuts import AnytimePlanner, OneshotPlanner, PlanValidator, Problem, Replanner, SequentialSimulator
 from unified_planning.test.examples import get_example_problems
 
+import metaplan
 import metaplan.up
 
 up.shortcuts.get_environment().credits_stream = None
@@ -328,3 +329,9 @@ def test_without_a_metric_the_first_plan_ends_the_search():
     with AnytimePlanner(name="metaplan") as planner:
         results = list(planner.get_solutions(EXAMPLES["basic"].problem))
     assert [result.status for result in results] == [Status.SOLVED_SATISFICING]
+
+
+def test_a_problem_without_a_metric_gets_a_certificate(tmp_path):
+    result = solve(EXAMPLES["basic"].problem, certificate=str(tmp_path / "certificate"))
+    assert result.status in SOLVED
+    assert metaplan.verify(result.metrics["certificate"])
