@@ -50,8 +50,9 @@ def _value(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):
-        # Decimal notation of the shortest representation: neither 1e-07 nor 0.1000000000000000055.
-        return format(Decimal(repr(value)), "f")
+        # Decimal notation of the shortest representation: neither 1e-07 nor 0.1000000000000000055. Classes derived from
+        # `float`, for example that of numpy, have another `repr`.
+        return format(Decimal(repr(float(value))), "f")
     return str(value)
 
 

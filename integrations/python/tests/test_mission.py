@@ -53,6 +53,15 @@ def test_numbers_are_exact():
     assert plan.to_df()["cost"].sum() == 3.5
 
 
+def test_classes_derived_from_float_are_numbers():
+    class Number(float):
+        def __repr__(self):
+            return f"np.float64({float(self)!r})"
+
+    own, plain = (metaplan.Mission.load(UGV).set(ambient_light=number) for number in (Number(0.9), 0.9))
+    assert own.pddl() == plain.pddl()
+
+
 def test_fractions_are_exact_and_numbers_of_a_plan_go_together():
     problem = PROBLEM.replace("(length a b) 1.5", "(length a b) (/ 1 3)").replace("(length b c) 2", "(length b c) 0.5")
     mission = metaplan.Mission.from_files(DOMAIN, problem)
