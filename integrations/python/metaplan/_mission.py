@@ -69,12 +69,17 @@ def _document(path: File) -> str:
 def _toml(value: Any) -> str:
     """Formats a value for a manifest (TOML)."""
     if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{json.dumps(str(key))} = {_toml(own)}" for key, own in value.items()) + " }"
+        return "{ " + ", ".join(f"{_text(str(key))} = {_toml(own)}" for key, own in value.items()) + " }"
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(map(_toml, value)) + "]"
     if isinstance(value, (bool, int, float, Decimal)):
         return _value(value)
-    return json.dumps(os.fspath(value) if isinstance(value, os.PathLike) else str(value))
+    return _text(os.fspath(value) if isinstance(value, os.PathLike) else str(value))
+
+
+def _text(text: str) -> str:
+    # TOML has no surrogate pairs, and permits no DEL.
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 class Mission:

@@ -161,6 +161,11 @@ def test_manifests_are_files_texts_and_mappings():
         metaplan.Mission.load({**OWN, "planing": {}}, ROOT)
 
 
+def test_texts_of_a_manifest_can_have_any_characters():
+    text = 'robot \U0001f916 "R\\1"'
+    assert metaplan.Mission.load({**OWN, "name": text}, ROOT).name == text
+
+
 def test_objectives_fronts_and_alternatives():
     mission = metaplan.Mission.from_files(DOMAIN, PROBLEM)
     assert mission.plan(minimize=["total-cost"]).objectives == {"total-cost": Decimal("3.5")}
