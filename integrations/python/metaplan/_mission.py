@@ -100,7 +100,8 @@ class Mission:
     @classmethod
     def _of(cls, source: _Source) -> Mission:
         maker, arguments = source
-        return cls(getattr(_native.Mission, maker)(*arguments), source)
+        # The working directory may be another one when the mission is pickled.
+        return cls(getattr(_native.Mission, maker)(*arguments), _portable(maker, arguments))
 
     def _change(self, *change: str) -> Mission:
         method, *arguments = change
@@ -111,8 +112,7 @@ class Mission:
 
     def __reduce__(self) -> tuple[Callable[..., Mission], tuple[Any, ...]]:
         with self._lock:
-            maker, arguments = self._source
-            return _restored, (type(self), _portable(maker, arguments), tuple(self._changes), self._native.digest())
+            return _restored, (type(self), self._source, tuple(self._changes), self._native.digest())
 
     @classmethod
     def load(cls, manifest: File | Mapping[str, Any], directory: File = ".") -> Mission:

@@ -109,6 +109,12 @@ def test_missions_are_pickled_with_their_situation(source, tmp_path, monkeypatch
         assert copied.name == mission.name and copied.pddl() == mission.pddl()
 
 
+def test_a_mission_is_pickled_with_its_files_after_a_change_of_the_directory(tmp_path, monkeypatch):
+    mission = metaplan.Mission.load(os.path.relpath(UGV))
+    monkeypatch.chdir(tmp_path)
+    assert pickle.loads(pickle.dumps(mission)).name == mission.name
+
+
 def test_a_pickled_mission_whose_files_have_changed_is_refused(tmp_path):
     for name, text in (("d.pddl", DOMAIN), ("p.pddl", PROBLEM)):
         (tmp_path / name).write_text(text)
