@@ -45,6 +45,8 @@ struct Slot {
     /// `true` if the last decision lacks a plan. Then the last event is not discarded, so that a new owner of the
     /// partition searches for the plan.
     is_pending: bool,
+    /// `true` if the robot was suspended while a plan was pending. Then the last event is not discarded, either.
+    is_kept: bool,
     /// The search for a plan that continues after the decision.
     search: ParallelSearch,
     /// Plans that were found.
@@ -289,6 +291,7 @@ impl<S: Store> Partition<S> {
         let is_decided = matches!(outcome, Outcome::Decided);
         // If the robot was suspended, this decision has retired it.
         slot.is_suspended &= !is_decided;
+        slot.is_kept &= !is_decided;
         let robot = task.loaded.as_ref().map(|loaded| &loaded.robot);
         let is_pending = robot.map_or(slot.is_pending, |robot| robot.is_pending());
         let plan = robot.filter(|_| is_decided).map(|robot| robot.event);
@@ -331,6 +334,8 @@ impl<S: Store> Partition<S> {
     }
 
     fn suspend(&mut self, name: &str, why: &str) {
+        let Some(slot) = self.slots.get_mut(name) else { return };
+        slot.is_kept |= slot.is_pending;
         self.set_pending(name, false);
         let Some(slot) = self.slots.get_mut(name) else { return };
         slot.is_suspended = true;
@@ -398,7 +403,7 @@ impl<S: Store> Partition<S> {
         let subject = self.subject(name);
         let Some(slot) = self.slots.get_mut(name).filter(|slot| !slot.is_discarding) else { return false };
         (slot.obsolete, slot.since, slot.is_discarding) = (0, None, true);
-        let last = slot.handled - u64::from(slot.is_pending);
+        let last = slot.handled - u64::from(slot.is_pending || slot.is_kept);
         self.discard(name, &subject, last);
         true
     }

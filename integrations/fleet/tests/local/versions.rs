@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use metaplan_fleet::missions::Missions;
 use metaplan_fleet::partition::{Order, Settings, Shared, serve};
-use metaplan_fleet::robot::Robot;
+use metaplan_fleet::robot::{Begun, Robot};
 use metaplan_fleet::store::local::Local;
 use metaplan_fleet::store::{Message, Store, Stored, Stream};
 use metaplan_fleet::wire::{Decided, State};
@@ -174,6 +174,32 @@ async fn a_refused_retirement_discards_no_event_of_a_suspended_robot() {
     worker.stop().await;
     let kept: Vec<u64> = all(&store, Stream::Events).await.iter().map(|event| event.sequence).collect();
     assert_eq!(kept, sequences);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_pending_plan_is_found_after_the_robot_was_suspended() {
+    let (versions, folder) = (Versions::new(), tempfile::tempdir().expect("a directory"));
+    let store = open(folder.path(), 1);
+    tell(&store, "r", &event(ENROL)).await;
+    // The decision of an owner that ends before it has found the plan.
+    let (enrolment, mut robot) = (all(&store, Stream::Events).await.remove(0), Robot::default());
+    let Ok(Begun::Search(search)) = robot.begin(&enrolment, &versions.missions(&["old"])) else {
+        panic!("a search is necessary")
+    };
+    let payload = serde_json::to_vec(&robot.finish(search, None)).expect("plain data");
+    let message = Message { subject: "0.r", id: "", after: Some(0), payload: &payload };
+    store.append(Stream::Decisions, message).await.expect("it is our own directory");
+    let shared = versions.shared(&store, &["new"]);
+    let worker = Worker::start(Arc::clone(&shared));
+    while shared.counts.refused.load(Ordering::Relaxed) < 1 {
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    worker.stop().await;
+    assert_eq!(all(&store, Stream::Events).await, [enrolment], "the event is kept for the plan");
+    let worker = Worker::start(versions.shared(&store, &["new", "old"]));
+    decided(&store, 2).await;
+    worker.stop().await;
+    assert!(of(&store, "r").await[1].planned);
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
