@@ -208,7 +208,8 @@ impl<S: Store> Partition<S> {
         slot.is_busy = true;
         let (is_late, may_search) = (slot.search.accepts_late_plans(), !slot.search.is_running());
         let loaded = slot.loaded.take();
-        let mut task = Task { name: name.to_owned(), subject, loaded, estimate: slot.estimate };
+        let (name, estimate) = (name.to_owned(), slot.estimate);
+        let mut task = Task { name, subject, loaded, is_restored: false, estimate };
         let (shared, is_suspended) = (Arc::clone(&self.shared), slot.is_suspended);
         self.jobs.push(Box::pin(async move {
             let (outcome, planning) = match (thoughts, sequence) {
@@ -295,7 +296,11 @@ impl<S: Store> Partition<S> {
         let robot = task.loaded.as_ref().map(|loaded| &loaded.robot);
         let is_pending = robot.map_or(slot.is_pending, |robot| robot.is_pending());
         let plan = robot.filter(|_| is_decided).map(|robot| robot.event);
-        if let Some(robot) = robot {
+        if task.is_restored {
+            // Plans for the problems of the former loop cannot be told from those for the problems of this one.
+            slot.thoughts = None;
+            slot.search.update(None);
+        } else if let Some(robot) = robot {
             slot.search.update(is_pending.then(|| robot.question()));
         }
         slot.loaded = task.loaded;
