@@ -422,3 +422,14 @@ fn exact_policy_iteration_ends_at_the_optimum() {
     let Outcome::Value(Answer::Finite(quantity)) = answer else { panic!("{answer:?}") };
     assert_eq!(quantity.exact.map(|exact| exact.to_string()).as_deref(), Some("1199"));
 }
+
+/// Values by hand: the reward of the first step is within the bound, that of the last one is not.
+#[test]
+fn rewards_above_a_bound_need_no_memory() {
+    let model = "dtmc module m s:[0..6000] init 0; [go] s<6000 -> (s'=s+1); [end] s=6000 -> true; endmodule
+        rewards \"t\" [go] s=0 : 1; [go] s=5999 : 99999; endrewards";
+    let question = |bound: usize, s: usize| format!("P=? [ F^{{rew{{\"t\"}}<={bound}}} s={s} ]");
+    agree(model, &question(1, 5999), "1");
+    agree(model, &question(1, 6000), "0");
+    assert_eq!(error(model, &question(99999, 6000)).0, "Q503");
+}
