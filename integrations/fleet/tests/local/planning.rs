@@ -89,10 +89,20 @@ async fn reactions_do_not_wait_for_plans_and_each_plan_is_found_by_some_owner() 
 #[test]
 fn the_plan_of_an_enrolment_stays_pending_for_the_next_owner() {
     let (missions, mut robot) = (missions(), Robot::default());
-    let payload = br#"{"event": "enrol", "mission": "uuv"}"#.to_vec();
-    let event = Stored { sequence: 1, subject: "0.r".to_owned(), id: None, time: 0, payload };
-    let Ok(Begun::Search(search)) = robot.begin(&event, &missions) else { panic!("a search is necessary") };
+    let event = |sequence, payload: &[u8]| {
+        let (subject, payload) = ("0.r".to_owned(), payload.to_vec());
+        Stored { sequence, subject, id: None, time: 0, payload }
+    };
+    let enrolment = event(1, br#"{"event": "enrol", "mission": "uuv"}"#);
+    let Ok(Begun::Search(search)) = robot.begin(&enrolment, &missions) else {
+        panic!("a search is necessary")
+    };
     let decided = robot.finish(search, None);
     assert!(decided.planning);
     assert!(Robot::restore(decided).is_pending());
+    // A request that plans nothing leaves the plan pending.
+    let Ok(Begun::Decided(decided)) = robot.begin(&event(2, br#"{"event": "migrate"}"#), &missions) else {
+        panic!("no search is necessary")
+    };
+    assert!(decided.planning);
 }
