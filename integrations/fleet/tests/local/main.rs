@@ -190,7 +190,10 @@ async fn only_the_last_decisions_of_a_robot_are_kept() {
     let kept = all(&store, Stream::Decisions).await;
     let kept: Vec<u8> = kept.iter().filter(|own| own.subject == "0.r").map(|own| own.payload[0]).collect();
     assert_eq!(kept, [7, 8, 9]);
+    let seventh = store.event(7).await.expect("it can be read").expect("it exists");
+    assert_eq!((seventh.sequence, seventh.payload), (7, vec![6]));
     store.discard("0.s", 7).await.expect("it can be written");
+    assert_eq!(store.event(7).await, Ok(None));
     assert_eq!(all(&store, Stream::Events).await.len(), 3);
 }
 
