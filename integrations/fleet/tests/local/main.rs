@@ -25,7 +25,7 @@ use metaplan_fleet::store::{Message, Store, Stored, Stream};
 use metaplan_fleet::wire::{Address, Decided};
 use metaplan_fleet::worker;
 use serde_json::Value;
-use tokio::sync::watch;
+use tokio::sync::{broadcast, watch};
 
 fn missions() -> Missions {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../missions");
@@ -120,6 +120,12 @@ async fn work<S: Store>(store: &S, name: &str, settings: Settings, count: usize)
     decided(store, count).await;
     stop.send_replace(true);
     task.await.expect("a worker ends in order");
+}
+
+/// Waits for the next notice, which is sent by another task, and returns its text.
+async fn heard(notices: &mut broadcast::Receiver<(String, String)>) -> String {
+    let notice = tokio::time::timeout(PATIENT, notices.recv()).await.expect("there is a notice");
+    notice.expect("there are few notices").1
 }
 
 /// Checks that a robot received the answers of a single local loop, with one decision per event.

@@ -18,7 +18,7 @@ use metaplan_fleet::worker;
 use tempfile::TempDir;
 use tokio::sync::watch;
 
-use super::{PATIENT, all, assert_same, decided, decisions, has_no_events, open, scripts, tell};
+use super::{PATIENT, all, assert_same, decided, decisions, has_no_events, heard, open, scripts, tell};
 
 /// Directories with two versions of the mission `ugv`: the original, and one with a setting.
 struct Versions(TempDir);
@@ -141,7 +141,7 @@ async fn a_robot_without_its_version_can_be_retired_and_enrolled() {
     let worker = Worker::start(versions.shared(&store, &["new"]));
     decided(&store, 4).await;
     worker.stop().await;
-    assert!(notices.try_recv().expect("there is a notice").1.contains("--former"));
+    assert!(heard(&mut notices).await.contains("--former"));
     // With the former files, the events before the retirement are not decided, either.
     let worker = Worker::start(versions.shared(&store, &["old", "new"]));
     let more = tell(&store, "r", &event(TICK)).await;
