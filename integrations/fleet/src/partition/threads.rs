@@ -162,7 +162,9 @@ mod tests {
             // The search ends when the sender is dropped.
             let (hold, held) = std::sync::mpsc::channel::<()>();
             holds.push(hold);
-            let work = move || drop(held.recv());
+            let work = move || {
+                let _ = held.recv();
+            };
             long.spawn(async move { threads.search("slow", None, work).await.map(|_| ()) });
         }
         // The first long searches leave their places, and others enter the last class.
