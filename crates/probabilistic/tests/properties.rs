@@ -433,3 +433,12 @@ fn rewards_above_a_bound_need_no_memory() {
     agree(model, &question(1, 6000), "0");
     assert_eq!(error(model, &question(99999, 6000)).0, "Q503");
 }
+
+/// Values by hand: the probability is 1/2 in the initial state and 0 in the state 2.
+#[test]
+fn a_quotient_needs_a_value_only_in_the_states_of_the_question() {
+    let model = "dtmc module m s:[0..2] init 0; [] s=0 -> 0.5:(s'=1) + 0.5:(s'=2); [] s>0 -> true; endmodule";
+    agree(model, "1/P=? [ F s=1 ]", "2");
+    agree(model, "filter(max, 1/P=? [ F s=1 ], s<2)", "2");
+    assert_eq!(error(model, "filter(max, 1/P=? [ F s=1 ], true)").0, "Q303");
+}
