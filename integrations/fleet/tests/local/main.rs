@@ -38,7 +38,7 @@ fn open(directory: &Path, partitions: u32) -> Local {
 }
 
 /// Patience with which each decision contains its plan, so that the answers do not depend on the speed of this machine.
-const PATIENT: Duration = Duration::from_secs(60);
+const PATIENT: Duration = Duration::from_secs(600);
 
 fn shared<S: Store>(store: S, name: &str, settings: Settings) -> Arc<Shared<S>> {
     let settings = Settings { patience: PATIENT, ..settings };
@@ -84,7 +84,7 @@ async fn has_no_events<S: Store>(store: &S) -> bool {
 
 /// Waits until all events are handled, their plans are found, and the events are discarded.
 async fn settle<S: Store>(store: &S) {
-    for _ in 0..12_000 {
+    for _ in 0..120_000 {
         if has_no_events(store).await {
             return;
         }
@@ -104,7 +104,7 @@ async fn decisions<S: Store>(store: &S) -> BTreeMap<String, Vec<Decided>> {
 }
 
 async fn decided<S: Store>(store: &S, count: usize) {
-    for _ in 0..6000 {
+    for _ in 0..60_000 {
         if decisions(store).await.values().map(Vec::len).sum::<usize>() >= count {
             return;
         }
