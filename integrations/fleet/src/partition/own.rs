@@ -459,3 +459,44 @@ async fn next(
         None => None,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::missions::Missions;
+    use crate::partition::Settings;
+    use crate::robot::{Begun, Robot};
+    use crate::store::local::Local;
+
+    #[test]
+    fn a_search_for_the_former_loop_of_a_robot_that_is_loaded_again_is_cancelled() {
+        let folder = tempfile::tempdir().expect("a directory");
+        let store = Local::open(folder.path(), 1, 8, Duration::from_secs(1))
+            .unwrap_or_else(|message| panic!("{message}"));
+        let missions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../missions");
+        let missions = Missions::read(&missions).unwrap_or_else(|errors| panic!("{errors}"));
+        let thinker = missions.get("uuv").expect("it exists").control.thinker();
+        let payload = br#"{"event": "enrol", "mission": "uuv"}"#.to_vec();
+        let event = Stored { sequence: 1, subject: "0.r".to_owned(), id: None, time: 0, payload };
+        let mut robot = Robot::default();
+        let Ok(Begun::Search(search)) = robot.begin(&event, &missions) else {
+            panic!("a search is necessary")
+        };
+        let decided = robot.finish(search, None);
+        let shared = Arc::new(Shared::new(store, missions, "w".to_owned(), Settings::default()));
+        for is_restored in [false, true] {
+            let mut partition = Partition::new(Arc::clone(&shared), 0);
+            partition.slots.entry("r".to_owned()).or_default().search.begin(thinker.handle());
+            // The numbers of both problems are 0.
+            let robot = Box::new(Robot::restore(decided.clone()));
+            let (name, subject) = ("r".to_owned(), "0.r".to_owned());
+            let loaded = Some(Loaded { robot, chain: 1 });
+            let task = Task { name, subject, loaded, is_restored, estimate: None };
+            partition.handled("r", task, None, Outcome::Known);
+            let slot = partition.slots.get_mut("r").expect("it is in memory");
+            assert_eq!(slot.search.end(), is_restored);
+        }
+    }
+}
