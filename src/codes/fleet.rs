@@ -58,7 +58,7 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "N320",
         "An event was refused, or a robot is suspended.",
-        "The robot is not enrolled, its mission is unknown or has changed, or the message has the id of another robot.",
+        "The robot is not enrolled, its mission is unknown or has changed, or the message has the id of another robot. Warnings are missing if standard error is not read for some time.",
         "The message gives the reason. A refused event has changed nothing, and a suspended robot keeps its events.",
     ],
 ];

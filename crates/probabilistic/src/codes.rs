@@ -160,7 +160,12 @@ pub const CODES: &[[&str; 4]] = &[
         "The value depends on the policy of a decision process.",
         "Use `Pmin`, `Pmax`, `Rmin` or `Rmax`.",
     ],
-    ["Q503", "A step bound is wrong.", "A step bound must be an integer of at least 0.", "Correct it."],
+    [
+        "Q503",
+        "A step bound is wrong.",
+        "A step bound must be an integer of at least 0. A bound on a reward must be below 100,000, and the values for all rewards up to it must fit into 4 GB.",
+        "Correct it.",
+    ],
     [
         "Q508",
         "Bounds do not decide a part of a property.",

@@ -3,6 +3,8 @@
 //! The choices of all states are stored contiguously, as are the transitions of all choices.
 //! Therefore all successors of a state form one slice, which the graph algorithms iterate over.
 
+use std::collections::BTreeMap;
+
 use num_rational::BigRational;
 
 use crate::error::Error;
@@ -31,7 +33,12 @@ pub struct Mdp<N> {
     targets: Vec<u32>,
     probabilities: Vec<N>,
     actions: Vec<u32>,
+    /// Positions of the targets of the current choice, if there are more than [`MAX_SCANNED`]; otherwise empty.
+    positions: BTreeMap<u32, usize>,
 }
+
+/// Maximum number of targets of a choice that are compared one by one with each further target.
+const MAX_SCANNED: usize = 64;
 
 impl<N: Number> Default for Mdp<N> {
     fn default() -> Self {
@@ -41,6 +48,7 @@ impl<N: Number> Default for Mdp<N> {
             targets: Vec::new(),
             probabilities: Vec::new(),
             actions: Vec::new(),
+            positions: BTreeMap::new(),
         }
     }
 }
@@ -123,11 +131,24 @@ impl<N: Number> Mdp<N> {
     )]
     pub fn push_transition(&mut self, target: u32, probability: N) {
         let first = self.first_transition[self.actions.len()] as usize;
-        if let Some(at) = self.targets[first..].iter().position(|existing| *existing == target) {
-            self.probabilities[first + at] = self.probabilities[first + at].plus(&probability);
+        let is_wide = !self.positions.is_empty();
+        let known = if is_wide {
+            self.positions.get(&target).copied()
         } else {
-            self.targets.push(target);
-            self.probabilities.push(probability);
+            let at = self.targets[first..].iter().position(|existing| *existing == target);
+            at.map(|at| first + at)
+        };
+        if let Some(at) = known {
+            self.probabilities[at] = self.probabilities[at].plus(&probability);
+            return;
+        }
+        self.targets.push(target);
+        self.probabilities.push(probability);
+        let end = self.targets.len();
+        if is_wide {
+            self.positions.insert(target, end - 1);
+        } else if end - first > MAX_SCANNED {
+            self.positions.extend(self.targets[first..].iter().copied().zip(first..));
         }
     }
 
@@ -142,6 +163,7 @@ impl<N: Number> Mdp<N> {
         }
         self.actions.push(action);
         self.first_transition.push(end);
+        self.positions.clear();
         Ok(())
     }
 
@@ -171,6 +193,7 @@ impl<N: Number> Mdp<N> {
             targets: self.targets.clone(),
             probabilities: self.probabilities.iter().map(Number::to_f64).collect(),
             actions: self.actions.clone(),
+            positions: BTreeMap::new(),
         }
     }
 }
@@ -185,6 +208,7 @@ impl Mdp<Fraction> {
             targets: self.targets.clone(),
             probabilities: self.probabilities.iter().map(Fraction::rounded).collect::<Option<_>>()?,
             actions: self.actions.clone(),
+            positions: BTreeMap::new(),
         })
     }
 }
@@ -192,4 +216,23 @@ impl Mdp<Fraction> {
 /// Converts an exact number of the model to the number type of the solver.
 pub fn number<N: Number>(value: &BigRational) -> N {
     N::from_rational(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn targets_of_wide_choices_are_not_repeated() {
+        let mut mdp = Mdp::<f64>::default();
+        for target in (0..300).chain((0..300).rev()) {
+            mdp.push_transition(target, 0.25);
+        }
+        mdp.end_choice(0).expect("there are few choices");
+        mdp.push_transition(299, 1.0);
+        mdp.end_choice(0).expect("there are few choices");
+        mdp.end_state();
+        assert!(mdp.transitions(0).eq((0..300).map(|target| (target, &0.5))));
+        assert!(mdp.transitions(1).eq([(299, &1.0)]));
+    }
 }

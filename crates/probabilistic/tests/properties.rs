@@ -425,3 +425,23 @@ fn exact_policy_iteration_ends_at_the_optimum() {
     let Outcome::Value(Answer::Finite(quantity)) = answer else { panic!("{answer:?}") };
     assert_eq!(quantity.exact.map(|exact| exact.to_string()).as_deref(), Some("1199"));
 }
+
+/// Values by hand: the reward of the first step is within the bound, that of the last one is not.
+#[test]
+fn rewards_above_a_bound_need_no_memory() {
+    let model = "dtmc module m s:[0..6000] init 0; [go] s<6000 -> (s'=s+1); [end] s=6000 -> true; endmodule
+        rewards \"t\" [go] s=0 : 1; [go] s=5999 : 99999; endrewards";
+    let question = |bound: usize, s: usize| format!("P=? [ F^{{rew{{\"t\"}}<={bound}}} s={s} ]");
+    agree(model, &question(1, 5999), "1");
+    agree(model, &question(1, 6000), "0");
+    assert_eq!(error(model, &question(99999, 6000)).0, "Q503");
+}
+
+/// Values by hand: the probability is 1/2 in the initial state and 0 in the state 2.
+#[test]
+fn a_quotient_needs_a_value_only_in_the_states_of_the_question() {
+    let model = "dtmc module m s:[0..2] init 0; [] s=0 -> 0.5:(s'=1) + 0.5:(s'=2); [] s>0 -> true; endmodule";
+    agree(model, "1/P=? [ F s=1 ]", "2");
+    agree(model, "filter(max, 1/P=? [ F s=1 ], s<2)", "2");
+    assert_eq!(error(model, "filter(max, 1/P=? [ F s=1 ], true)").0, "Q303");
+}

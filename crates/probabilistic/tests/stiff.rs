@@ -14,9 +14,9 @@ fn value(model: &str, question: &str, exactness: Exactness) -> Quantity {
     let options = Options::default().with_exactness(exactness);
     let start = Instant::now();
     let report = check(&model, &property::parse(question).expect("a property"), &options).expect("an answer");
-    // Elimination takes milliseconds, whereas iteration would take minutes. The limit is generous
-    // for slow machines and unoptimised code.
-    assert!(start.elapsed() < Duration::from_secs(5), "{question}: {:?}", start.elapsed());
+    // Elimination takes milliseconds, whereas iteration would take up to an hour. The limit is
+    // generous for slow machines and unoptimised code.
+    assert!(start.elapsed() < Duration::from_secs(300), "{question}: {:?}", start.elapsed());
     match report.outcome {
         Outcome::Value(Answer::Finite(quantity)) => quantity,
         other => panic!("{question}: {other:?}"),

@@ -54,13 +54,18 @@ impl Watch {
         self.interrupt.load(Ordering::Relaxed) || self.started.elapsed() >= self.time
     }
 
-    /// Ends the verification and returns its report, with a failed part `limits` if the time limit
-    /// is exceeded. Afterwards `give_up` is not called; if it is being called already, this
+    /// Ends the verification and returns its report, with a failed part `limits` if a limit is
+    /// exceeded. Afterwards `give_up` is not called; if it is being called already, this
     /// function does not return.
     #[must_use]
     pub fn end(&self, mut report: Verification) -> Verification {
-        if self.started.elapsed() > self.time {
-            report.parts.push(VerifiedPart { part: "limits", result: Err(LATE.to_owned()) });
+        let is_late = self.started.elapsed() > self.time;
+        // Some computations do not poll the limits.
+        let is_large = self.interrupt.load(Ordering::Relaxed);
+        if is_late || is_large {
+            let large = || format!("it needs more than {MEMORY_LIMIT} MB");
+            let reason = if is_late { LATE.to_owned() } else { large() };
+            report.parts.push(VerifiedPart { part: "limits", result: Err(reason) });
         }
         // If the flag was set already, the watching thread is reporting the limit and ends the
         // program.
@@ -78,4 +83,17 @@ impl Watch {
 pub fn seconds(text: &str) -> Result<Duration, String> {
     let seconds: f64 = text.parse().map_err(|_| format!("`{text}` is not a number of seconds"))?;
     Duration::try_from_secs_f64(seconds).map_err(|error| error.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_is_verified_with_too_much_memory() {
+        let watch = Watch::start(Duration::from_secs(3600), |_| {});
+        watch.interrupt.store(true, Ordering::Relaxed);
+        let report = watch.end(Verification { claim: None, subject: None, parts: Vec::new() });
+        assert!(report.parts.iter().any(|part| part.part == "limits" && part.result.is_err()));
+    }
 }

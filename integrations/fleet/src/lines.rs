@@ -17,6 +17,7 @@ use metaplan_fleet::wire::{Address, Decided, is_name};
 use metaplan_fleet::worker;
 use serde_json::{Value, json};
 use tokio::io::{AsyncBufReadExt as _, BufReader, stdin};
+use tokio::sync::broadcast::error::RecvError;
 use tokio::sync::{mpsc, watch};
 
 /// Maximum number of input lines of a robot that are read but not stored.
@@ -227,9 +228,8 @@ pub(crate) async fn up(
     let written = Arc::new(Mutex::new(beginning(&store, partitions, after).await?));
     let mut notices = store.notices();
     tokio::spawn(async move {
-        while let Ok((subject, text)) = notices.recv().await {
-            let robot = Address::parse(&subject).map_or(subject, |address| address.robot);
-            say(&Message::warning("N320", format!("robot `{robot}`: {text}")));
+        while let Some(message) = warning(notices.recv().await) {
+            say(&message);
         }
     });
     let (order, orders) = watch::channel(false);
@@ -254,6 +254,22 @@ pub(crate) async fn up(
         outcome?;
     }
     fed
+}
+
+/// Returns the warning for a notice, or for notices that were lost because standard error was not read in time.
+/// Returns `None` if there are no further ones.
+fn warning(received: Result<(String, String), RecvError>) -> Option<Message> {
+    let text = match received {
+        Ok((subject, text)) => {
+            let robot = Address::parse(&subject).map_or(subject, |address| address.robot);
+            format!("robot `{robot}`: {text}")
+        }
+        Err(RecvError::Lagged(count)) => {
+            format!("{count} warnings are missing, because standard error was not read in time")
+        }
+        Err(RecvError::Closed) => return None,
+    };
+    Some(Message::warning("N320", text))
 }
 
 /// Returns `true` if all stored events are decided, refused, or of a suspended robot, and all decisions are written.
@@ -317,4 +333,26 @@ fn status_text(status: &Status) -> String {
         }
     }
     format!("{workers}\n\n{partitions}\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use tokio::sync::broadcast;
+
+    use super::*;
+
+    #[tokio::test]
+    async fn warnings_continue_after_a_burst() {
+        let (sender, mut notices) = broadcast::channel(2);
+        for number in 0..5 {
+            sender.send(("0.r".to_owned(), format!("notice {number}"))).expect("there is a receiver");
+        }
+        drop(sender);
+        let mut texts = Vec::new();
+        while let Some(message) = warning(notices.recv().await) {
+            texts.push(message.text().to_owned());
+        }
+        assert_eq!(texts.len(), 3, "{texts:?}");
+        assert!(texts[0].contains("3 warnings") && texts[2].contains("robot `r`: notice 4"), "{texts:?}");
+    }
 }

@@ -17,6 +17,7 @@ use metaplan_fleet::robots::status;
 use metaplan_fleet::store::Store;
 use metaplan_fleet::store::local::Local;
 use metaplan_fleet::store::nats::{Access, DEFAULT_FLEET, Layout, Nats};
+use metaplan_fleet::wire::is_name;
 use metaplan_fleet::worker;
 use tokio::sync::watch;
 use tracing::level_filters::LevelFilter;
@@ -50,7 +51,7 @@ enum Command {
         #[command(flatten)]
         work: Work,
         /// Set the name of the worker, which must be unique. [default: host name and process id]
-        #[arg(long, value_name = "NAME")]
+        #[arg(long, value_name = "NAME", value_parser = worker_name)]
         name: Option<String>,
     },
     /// Run a whole fleet in one process: events from standard input, decisions to standard output.
@@ -272,9 +273,7 @@ async fn run(command: Command) -> Result<(), Errors> {
         }
         Command::Send { server, session } => {
             let store = server.open(10).await.map_err(|message| vec![message])?;
-            // The separator keeps sessions that end with a digit apart from the numbers of their messages.
-            let session = format!("{}.", session.unwrap_or_else(|| format!("{:016x}", fastrand::u64(..))));
-            lines::send(store, &session).await.map_err(|message| vec![message])?;
+            lines::send(store, &id_prefix(session)).await.map_err(|message| vec![message])?;
         }
         Command::Follow { server, robot, after } => {
             let store = server.open(10).await.map_err(|message| vec![message])?;
@@ -293,6 +292,18 @@ async fn run(command: Command) -> Result<(), Errors> {
         }
     }
     Ok(())
+}
+
+/// Returns the part of message ids before the number of the message. It ends with a separator, because sessions can end
+/// with a digit.
+fn id_prefix(session: Option<String>) -> String {
+    format!("{}.", session.unwrap_or_else(|| format!("{:016x}", fastrand::u64(..))))
+}
+
+/// Parses the name of a worker, under which the server stores its status.
+fn worker_name(text: &str) -> Result<String, String> {
+    let name = is_name(text).then(|| text.to_owned());
+    name.ok_or_else(|| "a name has up to 64 letters, digits, `-` and `_`".to_owned())
 }
 
 fn own_name() -> String {
@@ -315,4 +326,24 @@ fn signals() -> Result<watch::Receiver<bool>, Errors> {
         vec![Message::error("N302", format!("the signal handler cannot be installed: {error}"))]
     })?;
     Ok(heard)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sessions_that_end_with_a_digit_share_no_message_ids() {
+        let id = |session: &str, number: u64| format!("{}{number}", id_prefix(Some(session.to_owned())));
+        assert_ne!(id("1", 11), id("11", 1));
+    }
+
+    #[test]
+    fn names_of_workers_can_be_keys() {
+        let parse = |name| {
+            let words = ["metaplan-fleet", "worker", "--nats", "nats://h", "--missions", "m", "--name", name];
+            Arguments::try_parse_from(words).is_ok()
+        };
+        assert!(parse("a-b_1") && !parse("a b"));
+    }
 }

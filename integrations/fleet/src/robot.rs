@@ -324,6 +324,8 @@ impl Robot {
         let mut snapshot = Value::Null;
         if let Control::Loaded(control, baseline) = &mut self.control {
             decided.answers = control.decision(&answers).answers;
+            // A request to migrate does not plan, so an earlier plan can still be pending.
+            decided.planning |= control.has_agenda();
             snapshot = baseline.difference(control);
         }
         decided.state = State {

@@ -80,8 +80,9 @@ pub struct Decided {
     /// `true` if with this event the robot has changed to another version of its mission.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub migrated: bool,
-    /// `true` if the decision contains only the reaction to the event, because the search for a plan takes longer. The
-    /// plan follows in a decision with `planned`, or in the decision about a later event.
+    /// `true` if the decision contains only the reaction to the event, because the search for a plan takes longer,
+    /// or if it is about a migration while an earlier plan is missing. The plan follows in a decision with `planned`, or
+    /// in the decision about a later event.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub planning: bool,
     /// `true` if the decision completes earlier decisions, the last of which was about this event.

@@ -50,8 +50,9 @@ def _value(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):
-        # Decimal notation of the shortest representation: neither 1e-07 nor 0.1000000000000000055.
-        return format(Decimal(repr(value)), "f")
+        # Decimal notation of the shortest representation: neither 1e-07 nor 0.1000000000000000055. Classes derived from
+        # `float`, for example that of numpy, have another `repr`.
+        return format(Decimal(repr(float(value))), "f")
     return str(value)
 
 
@@ -68,12 +69,17 @@ def _document(path: File) -> str:
 def _toml(value: Any) -> str:
     """Formats a value for a manifest (TOML)."""
     if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{json.dumps(str(key))} = {_toml(own)}" for key, own in value.items()) + " }"
+        return "{ " + ", ".join(f"{_text(str(key))} = {_toml(own)}" for key, own in value.items()) + " }"
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(map(_toml, value)) + "]"
     if isinstance(value, (bool, int, float, Decimal)):
         return _value(value)
-    return json.dumps(os.fspath(value) if isinstance(value, os.PathLike) else str(value))
+    return _text(os.fspath(value) if isinstance(value, os.PathLike) else str(value))
+
+
+def _text(text: str) -> str:
+    # TOML has no surrogate pairs, and permits no DEL.
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 class Mission:
@@ -94,7 +100,8 @@ class Mission:
     @classmethod
     def _of(cls, source: _Source) -> Mission:
         maker, arguments = source
-        return cls(getattr(_native.Mission, maker)(*arguments), source)
+        # The working directory may be another one when the mission is pickled.
+        return cls(getattr(_native.Mission, maker)(*arguments), _portable(maker, arguments))
 
     def _change(self, *change: str) -> Mission:
         method, *arguments = change
@@ -105,8 +112,7 @@ class Mission:
 
     def __reduce__(self) -> tuple[Callable[..., Mission], tuple[Any, ...]]:
         with self._lock:
-            maker, arguments = self._source
-            return _restored, (type(self), _portable(maker, arguments), tuple(self._changes), self._native.digest())
+            return _restored, (type(self), self._source, tuple(self._changes), self._native.digest())
 
     @classmethod
     def load(cls, manifest: File | Mapping[str, Any], directory: File = ".") -> Mission:

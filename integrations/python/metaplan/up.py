@@ -245,6 +245,9 @@ _STATUSES = {
     "unknown": PlanGenerationResultStatus.TIMEOUT,
 }
 
+_MAX_SHARE = 1e6
+"""Maximum time limit of a search, in seconds, if there is no other limit: more cannot be represented at some point."""
+
 
 class MetaplanEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin):
     """Planner by search and SAT; a plan that it calls optimal is proved to be.
@@ -315,7 +318,9 @@ class MetaplanEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin):
             left = None if timeout is None else timeout - (time.monotonic() - began)
             is_last = left is not None and left <= share
             result = self._answer(problem, left if is_last else share, output_stream)
-            is_ended = result.status not in (
+            # Without a metric, all plans are equally good.
+            is_best = result.plan is not None and not problem.quality_metrics
+            is_ended = is_best or result.status not in (
                 PlanGenerationResultStatus.SOLVED_SATISFICING,
                 PlanGenerationResultStatus.TIMEOUT,
             )
@@ -326,7 +331,7 @@ class MetaplanEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin):
                 best = Fraction(result.metrics["cost"])
                 result.status = PlanGenerationResultStatus.INTERMEDIATE
                 yield result
-            share *= 2
+            share = min(2 * share, _MAX_SHARE)
 
     def _answer(self, problem: Any, timeout: float | None, output_stream: IO[str] | None) -> PlanGenerationResult:
         began = time.monotonic()
@@ -344,8 +349,8 @@ class MetaplanEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin):
             if written.timed:
                 options["concurrent"] = written.separation
                 options.pop("certificate")
-            if not problem.quality_metrics:
-                # Without a metric, all plans are equally good.
+            if not problem.quality_metrics and not options.get("certificate"):
+                # Without a metric, all plans are equally good. A certificate needs the proof.
                 options["on_improvement"] = lambda *_: False
             found = mission.plan(time_limit=timeout, **options)
         except Error as error:

@@ -53,6 +53,15 @@ def test_numbers_are_exact():
     assert plan.to_df()["cost"].sum() == 3.5
 
 
+def test_classes_derived_from_float_are_numbers():
+    class Number(float):
+        def __repr__(self):
+            return f"np.float64({float(self)!r})"
+
+    own, plain = (metaplan.Mission.load(UGV).set(ambient_light=number) for number in (Number(0.9), 0.9))
+    assert own.pddl() == plain.pddl()
+
+
 def test_fractions_are_exact_and_numbers_of_a_plan_go_together():
     problem = PROBLEM.replace("(length a b) 1.5", "(length a b) (/ 1 3)").replace("(length b c) 2", "(length b c) 0.5")
     mission = metaplan.Mission.from_files(DOMAIN, problem)
@@ -98,6 +107,12 @@ def test_missions_are_pickled_with_their_situation(source, tmp_path, monkeypatch
     assert plan.steps == own.steps and plan.cost == own.cost and plan.text == own.text and plan.svg() == own.svg()
     for copied in (copy.copy(mission), copy.deepcopy(mission)):
         assert copied.name == mission.name and copied.pddl() == mission.pddl()
+
+
+def test_a_mission_is_pickled_with_its_files_after_a_change_of_the_directory(tmp_path, monkeypatch):
+    mission = metaplan.Mission.load(os.path.relpath(UGV))
+    monkeypatch.chdir(tmp_path)
+    assert pickle.loads(pickle.dumps(mission)).name == mission.name
 
 
 def test_a_pickled_mission_whose_files_have_changed_is_refused(tmp_path):
@@ -150,6 +165,11 @@ def test_manifests_are_files_texts_and_mappings():
     assert mission.name == "mine" and mission.plan()
     with pytest.raises(metaplan.Error):
         metaplan.Mission.load({**OWN, "planing": {}}, ROOT)
+
+
+def test_texts_of_a_manifest_can_have_any_characters():
+    text = 'robot \U0001f916 "R\\1"'
+    assert metaplan.Mission.load({**OWN, "name": text}, ROOT).name == text
 
 
 def test_objectives_fronts_and_alternatives():

@@ -15,6 +15,7 @@ from unified_planning.plans import SequentialPlan
 from unified_planning.shortcuts import AnytimePlanner, OneshotPlanner, PlanValidator, Problem, Replanner, SequentialSimulator
 from unified_planning.test.examples import get_example_problems
 
+import metaplan
 import metaplan.up
 
 up.shortcuts.get_environment().credits_stream = None
@@ -34,7 +35,7 @@ def is_valid(problem, plan):
 
 def solve(problem, **options):
     with OneshotPlanner(name="metaplan", params=options) as planner:
-        return planner.solve(problem, timeout=20)
+        return planner.solve(problem, timeout=600)
 
 
 def test_what_is_solved_is_declared():
@@ -255,7 +256,7 @@ def test_constraints_on_trajectories_hold(seed):
 def test_problems_of_the_package(name):
     own = EXAMPLES[name]
     with OneshotPlanner(name="metaplan") as planner:
-        result = planner.solve(own.problem, timeout=20)
+        result = planner.solve(own.problem, timeout=600)
     if own.solvable:
         assert result.status in SOLVED, result
         assert is_valid(own.problem, result.plan)
@@ -318,7 +319,19 @@ def test_what_is_optimal_is_called_so():
 def test_other_modes():
     problem = EXAMPLES["robot_loader_adv"].problem
     with AnytimePlanner(name="metaplan") as planner:
-        results = list(planner.get_solutions(problem, timeout=20))
+        results = list(planner.get_solutions(problem, timeout=600))
     assert results[-1].status in SOLVED and all(own.status == Status.INTERMEDIATE for own in results[:-1])
     with Replanner(problem, name="replanner[metaplan]") as replanner:
         assert replanner.resolve().status in SOLVED
+
+
+def test_without_a_metric_the_first_plan_ends_the_search():
+    with AnytimePlanner(name="metaplan") as planner:
+        results = list(planner.get_solutions(EXAMPLES["basic"].problem))
+    assert [result.status for result in results] == [Status.SOLVED_SATISFICING]
+
+
+def test_a_problem_without_a_metric_gets_a_certificate(tmp_path):
+    result = solve(EXAMPLES["basic"].problem, certificate=str(tmp_path / "certificate"))
+    assert result.status in SOLVED
+    assert metaplan.verify(result.metrics["certificate"])

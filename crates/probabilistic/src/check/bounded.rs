@@ -22,6 +22,8 @@ use crate::solve::{Direction, Problem, Work, solve_within};
 
 /// Upper limit (exclusive) on the bound of an accumulated reward, as a whole number.
 const MAX_BUDGET: usize = 100_000;
+/// Upper limit on the number of values that are stored at the same time: 4 GB of doubles.
+const MAX_VALUES: usize = 500_000_000;
 
 impl<N: Number> Query<'_, N> {
     /// Computes for each state the minimal or maximal probability of reaching a terminal state of `problem`.
@@ -58,8 +60,14 @@ impl<N: Number> Query<'_, N> {
         let earned = whole_rewards(self.rewards(name)?)?;
         let layers = Layers::new(self.mdp(), problem, &earned)?;
         let n = self.mdp().states();
-        let greatest = earned.iter().max().copied().unwrap_or(0);
-        // Values for the last budgets (remaining rewards), the smallest budget first. No choice has
+        // A choice with a greater reward reads no value.
+        let greatest = earned.iter().filter(|reward| **reward <= budgets).max().copied().unwrap_or(0);
+        if greatest.saturating_mul(n) > MAX_VALUES {
+            let text = "the rewards up to the bound are too large for this number of states: the values would need \
+                        more than 4 GB";
+            return Err(property_error("Q503", place, text).into());
+        }
+        // Values for the last budgets (remaining rewards), the smallest budget first. No usable choice has
         // a reward above `greatest`, so at most `greatest` older vectors are read.
         let mut previous: Vec<Vec<N>> = Vec::new();
         let mut vector = Vector::exactly(vec![N::zero(); n], Span::Probability);

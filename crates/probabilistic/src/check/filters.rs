@@ -33,7 +33,7 @@ impl<N: Number> Query<'_, N> {
         let chosen = states.map_or_else(|| Ok(self.every()), |states| self.truth(states))?;
         let values = match self.kind_of(inner)? {
             Type::Bool => Values::Truth(self.truth(inner)?),
-            _ => Values::Numbers(self.numbers(inner)?),
+            _ => Values::Numbers(self.numbers(inner, &chosen)?),
         };
         if chosen.is_clear() {
             return Err(refusal("Q509", "no state satisfies the condition of the filter"));

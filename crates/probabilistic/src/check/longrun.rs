@@ -97,23 +97,28 @@ impl<N: Number> Query<'_, N> {
     /// Returns the states from which a policy can avoid all nonzero rewards forever (a greatest
     /// fixpoint).
     fn free_forever(&self, rewards: &[N]) -> FixedBitSet {
-        let mdp = self.mdp();
-        let mut free = self.every();
-        loop {
-            let stays = |state: usize| {
-                mdp.choices(state).any(|choice| {
-                    rewards[choice].is_zero()
-                        && mdp.targets(choice).iter().all(|t| free.contains(*t as usize))
-                })
-            };
-            let removed: Vec<usize> = free.ones().filter(|state| !stays(*state)).collect();
-            if removed.is_empty() {
-                return free;
-            }
-            for state in removed {
-                free.set(state, false);
+        let (mdp, mut free) = (self.mdp(), self.every());
+        let incoming = Incoming::new(mdp);
+        // The choices without a reward whose targets are all free, and their number for each state.
+        let mut usable = FixedBitSet::with_capacity(mdp.choice_count());
+        usable.extend((0..mdp.choice_count()).filter(|choice| rewards[*choice].is_zero()));
+        let count = |state| mdp.choices(state).filter(|choice| usable.contains(*choice)).count();
+        let mut counts: Vec<usize> = (0..mdp.states()).map(count).collect();
+        let mut queue: Vec<usize> = (0..mdp.states()).filter(|state| counts[*state] == 0).collect();
+        while let Some(state) = queue.pop() {
+            free.set(state, false);
+            for choice in incoming.of(state) {
+                if usable.contains(choice) {
+                    usable.set(choice, false);
+                    let owner = mdp.owner(choice);
+                    counts[owner] = counts[owner].saturating_sub(1);
+                    if counts[owner] == 0 {
+                        queue.push(owner);
+                    }
+                }
             }
         }
+        free
     }
 
     /// Computes for each state of a Markov chain the long-run average reward per step.
@@ -174,14 +179,50 @@ fn without_policy<N>(values: Valued<N>) -> Valued<N> {
 }
 
 fn reach_back<N: Number>(mdp: &Mdp<N>, set: &mut FixedBitSet) {
-    loop {
-        let reaches =
-            |state: &usize| mdp.successors(*state).iter().any(|target| set.contains(*target as usize));
-        let predecessors: Vec<usize> = set.zeroes().filter(reaches).collect();
-        if predecessors.is_empty() {
-            return;
+    let incoming = Incoming::new(mdp);
+    let mut queue: Vec<usize> = set.ones().collect();
+    while let Some(state) = queue.pop() {
+        for choice in incoming.of(state) {
+            let owner = mdp.owner(choice);
+            if !set.put(owner) {
+                queue.push(owner);
+            }
         }
-        set.extend(predecessors);
+    }
+}
+
+/// For each state, the choices that lead to it. So a fixpoint needs not scan all states for each of its steps.
+struct Incoming {
+    starts: Vec<usize>,
+    choices: Vec<u32>,
+}
+
+impl Incoming {
+    fn new<N: Number>(mdp: &Mdp<N>) -> Self {
+        let mut starts = vec![0_usize; mdp.states().saturating_add(1)];
+        for target in (0..mdp.choice_count()).flat_map(|choice| mdp.targets(choice)) {
+            starts[*target as usize] = starts[*target as usize].saturating_add(1);
+        }
+        let mut end = 0_usize;
+        for start in &mut starts {
+            end = end.saturating_add(*start);
+            *start = end;
+        }
+        // Choices are inserted from last to first, so each start moves down to the first choice to its state.
+        let mut choices = vec![0_u32; mdp.transition_count()];
+        for choice in (0..mdp.choice_count()).rev() {
+            for target in mdp.targets(choice) {
+                let at = &mut starts[*target as usize];
+                *at = at.saturating_sub(1);
+                choices[*at] = dense(choice);
+            }
+        }
+        Self { starts, choices }
+    }
+
+    fn of(&self, state: usize) -> impl Iterator<Item = usize> {
+        let range = self.starts[state]..self.starts[state.saturating_add(1)];
+        self.choices[range].iter().map(|choice| *choice as usize)
     }
 }
 

@@ -291,8 +291,10 @@ impl Processes {
                 self.exact = Some(explore(&Remembered::new(exact), &options.bounds)?);
             }
             if self.budget < budget {
-                self.budget = budget;
-                return self.report(program, Some(exact), property, options, computed_rewards);
+                let usual = std::mem::replace(&mut self.budget, budget);
+                let report = self.report(program, Some(exact), property, options, computed_rewards);
+                self.budget = usual;
+                return report;
             }
         }
         Ok(report(program, explored, answer, options))

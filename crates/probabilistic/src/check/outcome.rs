@@ -57,7 +57,11 @@ impl<N: Number> Query<'_, N> {
                         None,
                     ))
                 }
-                _ => Ok((self.of_starts(&self.numbers(inner)?), None)),
+                _ => {
+                    let mut starts = FixedBitSet::with_capacity(self.mdp().states());
+                    starts.insert_range(..self.explored.starts);
+                    Ok((self.of_starts(&self.numbers(inner, &starts)?), None))
+                }
             },
         }
     }
@@ -84,9 +88,10 @@ impl<N: Number> Query<'_, N> {
         }
     }
 
-    pub fn property_numbers(&self, property: &Property) -> Checked<Vector<N>> {
+    /// Computes the value of a numeric property in the states `wanted`, as [`Self::numbers`] does.
+    pub fn property_numbers(&self, property: &Property, wanted: &FixedBitSet) -> Checked<Vector<N>> {
         match property {
-            Property::Expression(inner) => self.numbers(inner),
+            Property::Expression(inner) => self.numbers(inner, wanted),
             Property::Filter(filter, inner, states) => {
                 let Filtered::Number(answer) = self.filtered(*filter, inner, states.as_ref())? else {
                     return Err(refusal("Q403", "a filter that is part of a property must have one value"));

@@ -209,7 +209,8 @@ impl<N: Number> Query<'_, N> {
     }
 
     fn compared(&self, op: BinaryOp, left: &Expr, right: &Expr) -> Checked<FixedBitSet> {
-        let (left, right) = (self.numbers(left)?, self.numbers(right)?);
+        let every = self.every();
+        let (left, right) = (self.numbers(left, &every)?, self.numbers(right, &every)?);
         let mut satisfying = FixedBitSet::with_capacity(self.mdp().states());
         for state in 0..self.mdp().states() {
             let order = |a: &BigRational, b: &BigRational| compare(op, a.cmp(b));
@@ -232,17 +233,19 @@ impl<N: Number> Query<'_, N> {
         Ok(satisfying)
     }
 
-    /// Computes the value of a numeric expression in all states. Values of properties can only be
-    /// negated, added, subtracted, multiplied and divided.
-    pub fn numbers(&self, expression: &Expr) -> Checked<Vector<N>> {
+    /// Computes the value of a numeric expression in the states `wanted`. In other states, it may have no value, for
+    /// example because of a division by zero. Values of properties can only be negated, added, subtracted, multiplied
+    /// and divided.
+    pub fn numbers(&self, expression: &Expr, wanted: &FixedBitSet) -> Checked<Vector<N>> {
         match &expression.kind {
-            ExprKind::Property(property) if is_number(property) => self.property_numbers(property),
+            ExprKind::Property(property) if is_number(property) => self.property_numbers(property, wanted),
             ExprKind::Negative(inner) if is_numeric(inner) => {
                 let zero = Vector::exactly(vec![N::zero(); self.mdp().states()], Span::Any);
-                joined(BinaryOp::Minus, &zero, &self.numbers(inner)?, expression)
+                joined(BinaryOp::Minus, [&zero, &self.numbers(inner, wanted)?], expression, wanted)
             }
             ExprKind::Binary(op, left, right) if op.is_arithmetic() && is_numeric(expression) => {
-                joined(*op, &self.numbers(left)?, &self.numbers(right)?, expression)
+                let operands = [&self.numbers(left, wanted)?, &self.numbers(right, wanted)?];
+                joined(*op, operands, expression, wanted)
             }
             _ if is_numeric(expression) => Err(property_error(
                 "Q403",
@@ -250,19 +253,22 @@ impl<N: Number> Query<'_, N> {
                 "values of properties support sums, differences, products and quotients only",
             )
             .into()),
-            _ => self.plain_numbers(expression),
+            _ => self.plain_numbers(expression, wanted),
         }
     }
 
-    fn plain_numbers(&self, expression: &Expr) -> Checked<Vector<N>> {
+    fn plain_numbers(&self, expression: &Expr, wanted: &FixedBitSet) -> Checked<Vector<N>> {
         let (code, sets) = self.prepared(expression, Type::Double)?;
         let mut values = Vec::new();
         let mut vector = Vector::exactly(Vec::new(), Span::Any);
         for (number, state) in self.explored.states.iter().enumerate() {
             self.program.unpack(state, &mut values);
             values.extend(sets.iter().map(|set| i64::from(set.contains(number))));
-            let value =
-                code.number(&values).map_err(|fault| property_error("Q303", expression.place, fault.0))?;
+            let value = match code.number(&values) {
+                Ok(value) => value,
+                Err(_) if !wanted.contains(number) => BigRational::default(),
+                Err(fault) => return Err(property_error("Q303", expression.place, fault.0).into()),
+            };
             if !N::EXACT {
                 let (lower, upper) = enclosing(&value);
                 vector.errors.push(upper - lower);
@@ -302,10 +308,15 @@ pub fn compare(op: BinaryOp, order: std::cmp::Ordering) -> bool {
 }
 
 /// Combines two vectors state by state with an arithmetic operator. The resulting errors include the errors of
-/// the operands and the rounding of the operation. Fails for a division by zero in any state, also in one whose
-/// value is not asked for. Infinite operands are permitted only in sums, as the first operand of a difference, and
-/// as a divisor.
-fn joined<N: Number>(op: BinaryOp, left: &Vector<N>, right: &Vector<N>, at: &Expr) -> Checked<Vector<N>> {
+/// the operands and the rounding of the operation. Fails for a division by zero in a state of `wanted`; in other states,
+/// the result is 0. Infinite operands are permitted only in sums, as the first operand of a difference, and as a
+/// divisor.
+fn joined<N: Number>(
+    op: BinaryOp,
+    [left, right]: [&Vector<N>; 2],
+    at: &Expr,
+    wanted: &FixedBitSet,
+) -> Checked<Vector<N>> {
     let fault = |text: &str| Stop::Wrong(property_error("Q303", at.place, text));
     let mut vector = Vector::exactly(Vec::with_capacity(left.values.len()), Span::Any);
     vector.infinite.grow(left.values.len());
@@ -313,13 +324,19 @@ fn joined<N: Number>(op: BinaryOp, left: &Vector<N>, right: &Vector<N>, at: &Exp
         let ends = [left.infinite.contains(state), right.infinite.contains(state)];
         let (value, infinite) = match (op, ends) {
             (BinaryOp::Divide, [false, _]) if ends[1] => (N::zero(), false),
-            (BinaryOp::Divide, [false, false]) if b.is_zero() => return Err(fault("a division by zero")),
+            (BinaryOp::Divide, [false, false]) if b.is_zero() => {
+                if wanted.contains(state) {
+                    return Err(fault("a division by zero"));
+                }
+                (N::zero(), false)
+            }
             (BinaryOp::Plus, [false, false]) => (a.plus(b), false),
             (BinaryOp::Minus, [false, false]) => (a.minus(b), false),
             (BinaryOp::Times, [false, false]) => (a.times(b), false),
             (BinaryOp::Divide, [false, false]) => (a.over(b), false),
             (BinaryOp::Plus, _) | (BinaryOp::Minus, [true, false]) => (N::zero(), true),
-            _ => return Err(fault("an operation with an infinite value")),
+            _ if wanted.contains(state) => return Err(fault("an operation with an infinite value")),
+            _ => (N::zero(), false),
         };
         vector.infinite.set(state, infinite);
         if !N::EXACT {

@@ -234,7 +234,9 @@ impl<'a, N: Number> Rows<'a, N> {
                         }
                     }
                     // The next sweep over all rows may select other rows for the policy.
-                    continue;
+                    if work < MAX_WORK {
+                        continue;
+                    }
                 }
                 if change <= threshold || work >= MAX_WORK {
                     break;

@@ -45,6 +45,8 @@ struct Slot {
     /// `true` if the last decision lacks a plan. Then the last event is not discarded, so that a new owner of the
     /// partition searches for the plan.
     is_pending: bool,
+    /// `true` if the robot was suspended while a plan was pending. Then the last event is not discarded, either.
+    is_kept: bool,
     /// The search for a plan that continues after the decision.
     search: ParallelSearch,
     /// Plans that were found.
@@ -206,7 +208,8 @@ impl<S: Store> Partition<S> {
         slot.is_busy = true;
         let (is_late, may_search) = (slot.search.accepts_late_plans(), !slot.search.is_running());
         let loaded = slot.loaded.take();
-        let mut task = Task { name: name.to_owned(), subject, loaded, estimate: slot.estimate };
+        let (name, estimate) = (name.to_owned(), slot.estimate);
+        let mut task = Task { name, subject, loaded, is_restored: false, estimate };
         let (shared, is_suspended) = (Arc::clone(&self.shared), slot.is_suspended);
         self.jobs.push(Box::pin(async move {
             let (outcome, planning) = match (thoughts, sequence) {
@@ -289,10 +292,15 @@ impl<S: Store> Partition<S> {
         let is_decided = matches!(outcome, Outcome::Decided);
         // If the robot was suspended, this decision has retired it.
         slot.is_suspended &= !is_decided;
+        slot.is_kept &= !is_decided;
         let robot = task.loaded.as_ref().map(|loaded| &loaded.robot);
         let is_pending = robot.map_or(slot.is_pending, |robot| robot.is_pending());
         let plan = robot.filter(|_| is_decided).map(|robot| robot.event);
-        if let Some(robot) = robot {
+        if task.is_restored {
+            // Plans for the problems of the former loop cannot be told from those for the problems of this one.
+            slot.thoughts = None;
+            slot.search.update(None);
+        } else if let Some(robot) = robot {
             slot.search.update(is_pending.then(|| robot.question()));
         }
         slot.loaded = task.loaded;
@@ -331,6 +339,8 @@ impl<S: Store> Partition<S> {
     }
 
     fn suspend(&mut self, name: &str, why: &str) {
+        let Some(slot) = self.slots.get_mut(name) else { return };
+        slot.is_kept |= slot.is_pending;
         self.set_pending(name, false);
         let Some(slot) = self.slots.get_mut(name) else { return };
         slot.is_suspended = true;
@@ -398,7 +408,7 @@ impl<S: Store> Partition<S> {
         let subject = self.subject(name);
         let Some(slot) = self.slots.get_mut(name).filter(|slot| !slot.is_discarding) else { return false };
         (slot.obsolete, slot.since, slot.is_discarding) = (0, None, true);
-        let last = slot.handled - u64::from(slot.is_pending);
+        let last = slot.handled - u64::from(slot.is_pending || slot.is_kept);
         self.discard(name, &subject, last);
         true
     }
@@ -447,5 +457,46 @@ async fn next(
     match events {
         Some(events) => events.next().await,
         None => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::missions::Missions;
+    use crate::partition::Settings;
+    use crate::robot::{Begun, Robot};
+    use crate::store::local::Local;
+
+    #[test]
+    fn a_search_for_the_former_loop_of_a_robot_that_is_loaded_again_is_cancelled() {
+        let folder = tempfile::tempdir().expect("a directory");
+        let store = Local::open(folder.path(), 1, 8, Duration::from_secs(1))
+            .unwrap_or_else(|message| panic!("{message}"));
+        let missions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../missions");
+        let missions = Missions::read(&missions).unwrap_or_else(|errors| panic!("{errors}"));
+        let thinker = missions.get("uuv").expect("it exists").control.thinker();
+        let payload = br#"{"event": "enrol", "mission": "uuv"}"#.to_vec();
+        let event = Stored { sequence: 1, subject: "0.r".to_owned(), id: None, time: 0, payload };
+        let mut robot = Robot::default();
+        let Ok(Begun::Search(search)) = robot.begin(&event, &missions) else {
+            panic!("a search is necessary")
+        };
+        let decided = robot.finish(search, None);
+        let shared = Arc::new(Shared::new(store, missions, "w".to_owned(), Settings::default()));
+        for is_restored in [false, true] {
+            let mut partition = Partition::new(Arc::clone(&shared), 0);
+            partition.slots.entry("r".to_owned()).or_default().search.begin(thinker.handle());
+            // The numbers of both problems are 0.
+            let robot = Box::new(Robot::restore(decided.clone()));
+            let (name, subject) = ("r".to_owned(), "0.r".to_owned());
+            let loaded = Some(Loaded { robot, chain: 1 });
+            let task = Task { name, subject, loaded, is_restored, estimate: None };
+            partition.handled("r", task, None, Outcome::Known);
+            let slot = partition.slots.get_mut("r").expect("it is in memory");
+            assert_eq!(slot.search.end(), is_restored);
+        }
     }
 }

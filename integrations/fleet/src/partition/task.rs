@@ -28,6 +28,8 @@ pub(super) struct Task {
     /// Subject of the robot's messages.
     pub(super) subject: String,
     pub(super) loaded: Option<Loaded>,
+    /// `true` if the robot was loaded from its last decision. Its loop then counts the planning problems anew.
+    pub(super) is_restored: bool,
     /// Estimated duration of the robot's next search, if it has searched before.
     pub(super) estimate: Option<Duration>,
 }
@@ -196,6 +198,7 @@ impl Task {
         if let Some(loaded) = self.loaded.take() {
             return loaded;
         }
+        self.is_restored = true;
         let last = persist(|| shared.store.last(Stream::Decisions, &self.subject)).await;
         let chain = last.as_ref().map_or(0, |last| last.sequence);
         let robot = match last.map(|last| Decided::parse(&last.payload)) {

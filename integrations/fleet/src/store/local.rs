@@ -125,6 +125,8 @@ struct Messages {
     /// By stream, partition and sequence number. Messages without an address have the partition [`u32::MAX`].
     by_partition: BTreeMap<(Stream, u32, u64), Arc<Stored>>,
     by_subject: BTreeMap<(Stream, String), BTreeMap<u64, Arc<Stored>>>,
+    /// Events by sequence number.
+    events: BTreeMap<u64, Arc<Stored>>,
     /// Sequence numbers of events by message id.
     ids: BTreeMap<String, u64>,
     /// Last sequence number of each stream.
@@ -140,8 +142,9 @@ impl Messages {
         let (sequence, message) = (message.sequence, Arc::new(message));
         let partition = Address::parse(&message.subject).map_or(u32::MAX, |address| address.partition);
         self.by_partition.insert((stream, partition, sequence), Arc::clone(&message));
-        if let (Stream::Events, Some(id)) = (stream, &message.id) {
-            self.ids.insert(id.clone(), sequence);
+        if stream == Stream::Events {
+            self.events.insert(sequence, Arc::clone(&message));
+            self.ids.extend(message.id.clone().map(|id| (id, sequence)));
         }
         let subject = self.by_subject.entry((stream, message.subject.clone())).or_default();
         subject.insert(sequence, message);
@@ -199,6 +202,9 @@ impl Messages {
         let partition = Address::parse(subject).map_or(u32::MAX, |address| address.partition);
         for (sequence, message) in removed {
             self.by_partition.remove(&(stream, partition, sequence));
+            if stream == Stream::Events {
+                self.events.remove(&sequence);
+            }
             self.ids.remove(message.id.as_deref().unwrap_or_default());
             tables.messages.remove((stream as u8, sequence))?;
         }
@@ -339,10 +345,7 @@ impl Store for Local {
     }
 
     async fn event(&self, sequence: u64) -> Result<Option<Stored>, Fault> {
-        self.read(|messages| {
-            let mut events = messages.by_partition.iter().filter(|(key, _)| key.0 == Stream::Events);
-            events.find(|(key, _)| key.2 == sequence).map(|(_, message)| Stored::clone(message))
-        })
+        self.read(|messages| messages.events.get(&sequence).map(|message| Stored::clone(message)))
     }
 
     async fn announce(&self, worker: &str, status: Option<&Presence>) -> Result<(), Fault> {

@@ -197,14 +197,20 @@ async fn without_the_comparison_events_are_decided_twice() {
             sequences.extend(tell(&store, "r", std::slice::from_ref(event)).await);
             tokio::time::sleep(Duration::from_millis(10)).await;
         }
-        decided(&store, events.len()).await;
-        tokio::time::sleep(Duration::from_millis(300)).await;
-        owners.iter().for_each(tokio::task::JoinHandle::abort);
-        let decided = &decisions(&store).await["r"];
+        let mut count = events.len();
+        decided(&store, count).await;
+        // An owner that starts late knows the first decisions of the other one, and repeats only later ones.
+        while !fences && decisions(&store).await["r"].len() <= count {
+            assert!(count < 10_000, "no event is decided twice");
+            count += tell(&store, "r", &[r#"{"event": "tick"}"#.to_owned()]).await.len();
+            decided(&store, count).await;
+        }
         if fences {
-            assert_same("r", decided, &sequences, &answers);
-        } else {
-            assert!(decided.len() > events.len(), "{} decisions", decided.len());
+            tokio::time::sleep(Duration::from_millis(300)).await;
+        }
+        owners.iter().for_each(tokio::task::JoinHandle::abort);
+        if fences {
+            assert_same("r", &decisions(&store).await["r"], &sequences, &answers);
         }
     }
 }
@@ -270,7 +276,7 @@ async fn a_drain_does_not_wait_for_jobs_without_end() {
         let task = tokio::spawn(serve(shared(crashing, "first", settings), 0, heard));
         over.notified().await;
         orders.send_replace(Order::Drain);
-        let end = tokio::time::timeout(Duration::from_secs(30), task).await;
+        let end = tokio::time::timeout(Duration::from_secs(600), task).await;
         end.expect("it ends in time").expect("no panic");
         work(&store, "second", settings, events.len()).await;
         assert_same("r", &decisions(&store).await["r"], &sequences, &answers);

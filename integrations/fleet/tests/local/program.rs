@@ -44,7 +44,7 @@ impl Program {
 
     fn get(&self, path: &str) -> Option<(u16, String)> {
         let mut stream = TcpStream::connect(("127.0.0.1", self.port)).ok()?;
-        stream.set_read_timeout(Some(Duration::from_secs(5))).ok()?;
+        stream.set_read_timeout(Some(Duration::from_secs(60))).ok()?;
         write!(stream, "GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n").ok()?;
         let mut text = String::new();
         stream.read_to_string(&mut text).ok()?;
@@ -56,16 +56,16 @@ impl Program {
         fs::read_to_string(self.folder.path().join("log")).expect("it can be read")
     }
 
-    /// Calls `look` until it returns a value, at most for a minute.
+    /// Calls `look` until it returns a value, at most for ten minutes.
     fn poll<T>(&mut self, look: impl Fn(&Self) -> Option<T>) -> T {
-        for _ in 0..600 {
+        for _ in 0..6000 {
             if let Some(value) = look(self) {
                 return value;
             }
             assert!(self.child.try_wait().expect("it is a child").is_none(), "it has ended: {}", self.log());
             std::thread::sleep(Duration::from_millis(100));
         }
-        panic!("not seen within a minute; log: {}", self.log());
+        panic!("not seen within ten minutes; log: {}", self.log());
     }
 
     fn wait(&mut self, path: &str, status: u16) -> String {
@@ -93,7 +93,7 @@ fn a_worker_is_ready_when_it_has_reached_its_log() {
 #[test]
 fn a_worker_that_waits_for_servers_is_alive_but_not_ready() {
     // Port 9 (discard) has no server.
-    let mut program = Program::start("worker", &["--nats", "nats://127.0.0.1:9", "--wait", "60"]);
+    let mut program = Program::start("worker", &["--nats", "nats://127.0.0.1:9", "--wait", "600"]);
     program.wait("/live", 200);
     assert!(program.wait("/ready", 503).contains("not reached the log"));
 }

@@ -10,15 +10,15 @@ use std::time::Duration;
 
 use metaplan_fleet::missions::Missions;
 use metaplan_fleet::partition::{Order, Settings, Shared, serve};
-use metaplan_fleet::robot::Robot;
+use metaplan_fleet::robot::{Begun, Robot};
 use metaplan_fleet::store::local::Local;
-use metaplan_fleet::store::{Store, Stored, Stream};
+use metaplan_fleet::store::{Message, Store, Stored, Stream};
 use metaplan_fleet::wire::{Decided, State};
 use metaplan_fleet::worker;
 use tempfile::TempDir;
 use tokio::sync::watch;
 
-use super::{PATIENT, all, assert_same, decided, decisions, has_no_events, open, scripts, tell};
+use super::{PATIENT, all, assert_same, decided, decisions, has_no_events, heard, open, scripts, tell};
 
 /// Directories with two versions of the mission `ugv`: the original, and one with a setting.
 struct Versions(TempDir);
@@ -141,7 +141,7 @@ async fn a_robot_without_its_version_can_be_retired_and_enrolled() {
     let worker = Worker::start(versions.shared(&store, &["new"]));
     decided(&store, 4).await;
     worker.stop().await;
-    assert!(notices.try_recv().expect("there is a notice").1.contains("--former"));
+    assert!(heard(&mut notices).await.contains("--former"));
     // With the former files, the events before the retirement are not decided, either.
     let worker = Worker::start(versions.shared(&store, &["old", "new"]));
     let more = tell(&store, "r", &event(TICK)).await;
@@ -152,6 +152,54 @@ async fn a_robot_without_its_version_can_be_retired_and_enrolled() {
     assert_eq!(events, [&[1], &sequences[..], &more].concat());
     assert!(made[1].retired && made[2].enrolled.is_some());
     assert_ne!(made[0].state.digest, made[2].state.digest);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_refused_retirement_discards_no_event_of_a_suspended_robot() {
+    let (versions, folder) = (Versions::new(), tempfile::tempdir().expect("a directory"));
+    let store = open(folder.path(), 1);
+    tell(&store, "r", &event(ENROL)).await;
+    let worker = Worker::start(versions.shared(&store, &["old"]));
+    decided(&store, 1).await;
+    worker.stop().await;
+    let mut sequences = tell(&store, "r", &[TICK, LOST].map(str::to_owned)).await;
+    let forged = Message { subject: "0.r", id: "other:2", after: None, payload: RETIRE.as_bytes() };
+    sequences.push(store.append(Stream::Events, forged).await.expect("it is our own directory").sequence);
+    let shared = versions.shared(&store, &["new"]);
+    let worker = Worker::start(Arc::clone(&shared));
+    // The suspension and the refused retirement.
+    while shared.counts.refused.load(Ordering::Relaxed) < 2 {
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    worker.stop().await;
+    let kept: Vec<u64> = all(&store, Stream::Events).await.iter().map(|event| event.sequence).collect();
+    assert_eq!(kept, sequences);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_pending_plan_is_found_after_the_robot_was_suspended() {
+    let (versions, folder) = (Versions::new(), tempfile::tempdir().expect("a directory"));
+    let store = open(folder.path(), 1);
+    tell(&store, "r", &event(ENROL)).await;
+    // The decision of an owner that ends before it has found the plan.
+    let (enrolment, mut robot) = (all(&store, Stream::Events).await.remove(0), Robot::default());
+    let Ok(Begun::Search(search)) = robot.begin(&enrolment, &versions.missions(&["old"])) else {
+        panic!("a search is necessary")
+    };
+    let payload = serde_json::to_vec(&robot.finish(search, None)).expect("plain data");
+    let message = Message { subject: "0.r", id: "", after: Some(0), payload: &payload };
+    store.append(Stream::Decisions, message).await.expect("it is our own directory");
+    let shared = versions.shared(&store, &["new"]);
+    let worker = Worker::start(Arc::clone(&shared));
+    while shared.counts.refused.load(Ordering::Relaxed) < 1 {
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    worker.stop().await;
+    assert_eq!(all(&store, Stream::Events).await, [enrolment], "the event is kept for the plan");
+    let worker = Worker::start(versions.shared(&store, &["new", "old"]));
+    decided(&store, 2).await;
+    worker.stop().await;
+    assert!(of(&store, "r").await[1].planned);
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -271,7 +319,7 @@ async fn owners_with_different_versions_agree_on_what_was_decided() {
             if made.last().is_some_and(|decided| decided.event == last) {
                 break;
             }
-            assert!(attempt < 3000, "the last event is not decided: {:?}", made.last());
+            assert!(attempt < 60_000, "the last event is not decided: {:?}", made.last());
             tokio::time::sleep(Duration::from_millis(10)).await;
         }
         worker.stop().await;
