@@ -147,3 +147,27 @@ fn numbers_without_an_initial_value_are_refused() {
         assert_eq!(solution.plan.expect("a plan").cost.to_string(), expected, "{constraints}");
     }
 }
+
+/// A quotient by 0 is undefined, so a comparison with it and the negation of this comparison are both false.
+#[test]
+fn divisors_that_may_be_zero_are_refused() {
+    let domain = "(define (domain d) (:predicates (g)) (:functions (x) (c ?o))
+      (:action act :parameters (?o) :precondition (preference a (< (/ (x) (c ?o)) 5))
+        :effect (and (g) (increase (x) 1))))";
+    let ground_with = |divisor: u32, preference: &str| {
+        let problem = format!(
+            "(define (problem p) (:domain d) (:objects o) (:init (= (c o) {divisor}) (= (x) 0))
+               (:goal (and (g) (preference b (< (/ (x) (c o)) 5)))) (:metric minimize (is-violated {preference})))"
+        );
+        let (domain, problem, _) =
+            read(&Source::new("domain", domain), &Source::new("problem", &problem)).expect("PDDL");
+        ground(&domain, &problem, &GroundConfig::default())
+    };
+    for preference in ["a", "b"] {
+        let errors = ground_with(0, preference).expect_err("it would be neither met nor violated");
+        assert!(errors.iter().all(|error| error.to_string().contains("may be 0")), "{errors:?}");
+        let solution =
+            optimize(&ground_with(2, preference).expect("a task"), &Config::default(), &mut |_| {});
+        assert_eq!(solution.plan.expect("a plan").cost.to_string(), "0", "{preference}");
+    }
+}
