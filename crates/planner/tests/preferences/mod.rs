@@ -171,3 +171,24 @@ fn divisors_that_may_be_zero_are_refused() {
         assert_eq!(solution.plan.expect("a plan").cost.to_string(), "0", "{preference}");
     }
 }
+
+/// The start adds the atom that the end reads, so they would interfere if the duration is 0.
+#[test]
+fn sometime_before_over_start_and_end_needs_a_positive_duration() {
+    let task = |duration: u32| {
+        let domain = format!(
+            "(define (domain d) (:predicates (b) (g))
+               (:durative-action a :parameters () :duration (= ?duration {duration}) :condition (and)
+                 :effect (and (at start (b)) (at end (g)))))"
+        );
+        let problem = "(define (problem p) (:domain d) (:init) (:goal (g))
+          (:constraints (preference w (sometime-before (g) (b)))) (:metric minimize (is-violated w)))";
+        let (domain, problem, _) =
+            read(&Source::new("domain", &domain), &Source::new("problem", problem)).expect("PDDL");
+        ground(&domain, &problem, &GroundConfig::default())
+    };
+    let errors = task(0).expect_err("a plan violates the preference, but no action would be applicable");
+    assert!(errors.iter().all(|error| error.to_string().contains("may be one time")), "{errors:?}");
+    let solution = optimize(&task(1).expect("a task"), &Config::default(), &mut |_| {});
+    assert_eq!(solution.plan.expect("a plan").cost.to_string(), "0");
+}
