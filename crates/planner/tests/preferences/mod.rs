@@ -192,3 +192,27 @@ fn sometime_before_over_start_and_end_needs_a_positive_duration() {
     let solution = optimize(&task(1).expect("a task"), &Config::default(), &mut |_| {});
     assert_eq!(solution.plan.expect("a plan").cost.to_string(), "0");
 }
+
+/// If the duration is 0, start and end are one happening. A preference reads nothing, so it does not interfere with a
+/// change of its condition.
+#[test]
+fn preferences_of_actions_without_duration_do_not_interfere() {
+    for (time, other) in [("start", "end"), ("end", "start")] {
+        let domain = format!(
+            "(define (domain d) (:predicates (p) (g))
+               (:durative-action a :parameters () :duration (= ?duration 0)
+                 :condition (and (preference w (at {time} (p))))
+                 :effect (and (at {other} (not (p))) (at end (g)))))"
+        );
+        let problem = "(define (problem p) (:domain d) (:init (p)) (:goal (g))
+          (:metric minimize (+ (total-time) (* 3 (is-violated w)))))";
+        let (domain, problem, _) =
+            read(&Source::new("domain", &domain), &Source::new("problem", problem)).expect("PDDL");
+        let plan = PlanText::parse(&Source::new("plan", "0: (a) [0]")).expect("a plan");
+        let verdict = validate(&domain, &problem, &plan, &Options::default());
+        assert!(verdict.valid, "{verdict:?}");
+        let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");
+        let best = optimize(&task, &Config::default(), &mut |_| {}).plan.expect("a plan");
+        assert_eq!(Some(best.cost.to_string()), verdict.metric.map(|metric| metric.to_string()), "{time}");
+    }
+}
