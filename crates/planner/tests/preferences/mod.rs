@@ -216,3 +216,21 @@ fn preferences_of_actions_without_duration_do_not_interfere() {
         assert_eq!(Some(best.cost.to_string()), verdict.metric.map(|metric| metric.to_string()), "{time}");
     }
 }
+
+/// Each of the 60 effects may change the compared number or not, so there would be 2^60 cases.
+#[test]
+fn a_comparison_with_too_many_cases_is_refused_at_once() {
+    let list = |item: &dyn Fn(u32) -> String| (0..60).map(item).collect::<String>();
+    let domain = format!(
+        "(define (domain d) (:predicates (g)) (:functions (f ?x))
+           (:action a :parameters ({}) :effect (and (g) {})))",
+        list(&|index| format!("?x{index} ")),
+        list(&|index| format!("(increase (f ?x{index}) 1) "))
+    );
+    let problem = "(define (problem p) (:domain d) (:objects o) (:init (= (f o) 0)) (:goal (g))
+      (:constraints (always (<= (f o) 100))))";
+    let (domain, problem, _) =
+        read(&Source::new("domain", &domain), &Source::new("problem", problem)).expect("PDDL");
+    let errors = ground(&domain, &problem, &GroundConfig::default()).expect_err("there are too many cases");
+    assert!(errors.iter().all(|error| error.to_string().contains("many functions")), "{errors:?}");
+}
