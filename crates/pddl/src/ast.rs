@@ -103,7 +103,7 @@ impl From<Name> for Identifier {
 }
 
 /// Type of a typed-list entry: one type name, or several for `either`. The type `object` is represented by an
-/// empty list.
+/// empty list, except within `either`.
 #[derive(Debug, Clone, Default)]
 pub struct TypeExpression {
     /// Names of the alternative types.
