@@ -102,8 +102,8 @@ impl From<Name> for Identifier {
     }
 }
 
-/// Type of a typed-list entry: one type name, or several for `either`. The type `object` alone is represented by
-/// an empty list; as one of several types it is listed.
+/// Type of a typed-list entry: one type name, or several for `either`. The type `object` is represented by an
+/// empty list, except within `either`.
 #[derive(Debug, Clone, Default)]
 pub struct TypeExpression {
     /// Names of the alternative types.

@@ -63,11 +63,16 @@ pub const CODES: &[[&str; 4]] = &[
         "A problem needs `:domain` and `:goal`, a durative action `:duration`.",
         "Add it.",
     ],
-    ["P111", "A section is repeated.", "A keyword can occur only once.", "Merge the two sections."],
+    [
+        "P111",
+        "A section is repeated.",
+        "`:domain`, `:goal`, `:metric` and the keywords of an action can occur only once.",
+        "Merge the two sections.",
+    ],
     [
         "P113",
         "A construct is not supported.",
-        "Processes, events, continuous effects, hierarchies, timed initial values, and object fluents in durations and metrics are not supported.",
+        "For example, processes, events, continuous effects, hierarchies, timed initial values, preferences over all, and object fluents in durations and metrics are not supported.",
         "Use another formulation. The book lists the supported constructs.",
     ],
     [
@@ -139,7 +144,7 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "P126",
         "The type of an argument is wrong.",
-        "An object or variable does not have the declared type. A warning if the object has no type.",
+        "An object or variable does not have the declared type. A warning if the object has no type, unless it is the value of an object fluent.",
         "Declare it with this type, or use another object.",
     ],
     [
@@ -152,7 +157,7 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "P129",
         "A derived predicate or a function cannot be set here.",
-        "An effect sets a derived predicate, or `:derived` defines a function.",
+        "An effect or `:init` sets a derived predicate, or `:derived` defines a function.",
         "Set the predicates from which it is derived.",
     ],
     [

@@ -147,11 +147,13 @@ pub(crate) struct Sink<'s> {
     source: &'s Source,
     diagnostics: Vec<Diagnostic>,
     beyond_limit: usize,
+    /// `true` if a diagnostic that was only counted is an error.
+    omits_error: bool,
 }
 
 impl<'s> Sink<'s> {
     pub(crate) fn new(source: &'s Source) -> Self {
-        Self { source, diagnostics: Vec::new(), beyond_limit: 0 }
+        Self { source, diagnostics: Vec::new(), beyond_limit: 0, omits_error: false }
     }
 
     pub(crate) fn error(
@@ -185,6 +187,7 @@ impl<'s> Sink<'s> {
         let index = self.diagnostics.len().min(MAX_DIAGNOSTICS);
         if self.is_full() {
             self.beyond_limit += 1;
+            self.omits_error |= severity == Severity::Error;
             return &mut self.diagnostics[index];
         }
         self.diagnostics.push(Diagnostic::new(self.source, span, severity, code, message));
@@ -206,19 +209,20 @@ impl<'s> Sink<'s> {
     }
 
     pub(crate) fn has_errors(&self) -> bool {
-        self.beyond_limit > 0 || has_errors(&self.diagnostics)
+        self.omits_error || has_errors(&self.diagnostics)
     }
 
     /// Returns the collected diagnostics, sorted by position and without successive duplicates. If
-    /// some were only counted, P119 with the number of missing diagnostics replaces the last stored
-    /// one. P119 is an error even if all diagnostics are warnings.
+    /// some were only counted, P119 with the number of missing diagnostics replaces the last stored one. P119 is a
+    /// warning if all missing diagnostics are warnings.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(crate) fn finish(mut self) -> Vec<Diagnostic> {
         if let (Some(last), true) = (self.diagnostics.get_mut(MAX_DIAGNOSTICS), self.beyond_limit > 0) {
+            let severity = if self.omits_error { Severity::Error } else { last.severity };
             *last = Diagnostic::new(
                 self.source,
                 last.span,
-                Severity::Error,
+                severity,
                 "P119",
                 format!("{} more messages about this file are not shown", self.beyond_limit + 1),
             );

@@ -67,8 +67,12 @@ impl TypeHierarchy {
     pub fn fits(&self, subtype: &TypeExpression, supertype: &TypeExpression) -> bool {
         let is_subtype =
             |lower: &Name| supertype.alternatives.iter().any(|upper| self.is_a(lower, &upper.name));
+        // Every object is of type `object`, even one without a type.
+        let is_root = |upper: &Name| self.index.get(upper) == Some(&0);
         // An object declared with `either` counts as an object of each alternative.
-        supertype.alternatives.is_empty() || subtype.alternatives.iter().any(|lower| is_subtype(&lower.name))
+        supertype.alternatives.is_empty()
+            || supertype.alternatives.iter().any(|upper| is_root(&upper.name))
+            || subtype.alternatives.iter().any(|lower| is_subtype(&lower.name))
     }
 
     /// Returns `true` if some object can be of both types: an alternative of one is a subtype of an

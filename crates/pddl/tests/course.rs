@@ -54,6 +54,11 @@ fn numbers_change_at_starts_and_ends() {
     ];
     assert_eq!(trace("0: (drive a) [2]\n2: (charge a)"), expected);
     assert_eq!(trace("(drive a)\n(charge a)"), expected, "without times one action follows the other");
+    assert_eq!(
+        trace("0: (drive a) [2]\n(charge a)"),
+        expected,
+        "a missing time makes the order of the text count"
+    );
 }
 
 #[test]

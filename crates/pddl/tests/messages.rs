@@ -362,3 +362,16 @@ fn the_number_of_messages_about_a_file_is_limited() {
     assert_eq!(diagnostics.len(), 201);
     assert!(diagnostics.iter().any(|diagnostic| diagnostic.code == "P119"));
 }
+
+#[test]
+fn any_number_of_warnings_is_no_error() {
+    let domain = Source::new("domain", "(define (domain d) (:predicates (p)))");
+    let repeated = |goal: &str| {
+        let facts = "(p) ".repeat(300);
+        Source::new("problem", format!("(define (problem n) (:domain d) (:init {facts}) (:goal {goal}))"))
+    };
+    let (_, _, warnings) = read(&domain, &repeated("(p)")).expect("warnings only");
+    assert!(warnings.iter().any(|diagnostic| diagnostic.code == "P119"));
+    // An error among the messages that are not shown remains an error.
+    assert!(read(&domain, &repeated("(q)")).is_err());
+}

@@ -238,6 +238,27 @@ fn derived_predicates_are_recomputed_in_each_state() {
 }
 
 #[test]
+fn an_object_without_a_type_fits_either_of_object_and_a_type() {
+    let task = parse(
+        "(define (domain d) (:requirements :typing) (:types robot) (:predicates (g ?x))
+         (:action a :parameters (?x - (either object robot)) :effect (g ?x)))",
+        "(define (problem p) (:domain d) (:objects b - object r - robot) (:init)
+         (:goal (forall (?x - (either robot object)) (g ?x))))",
+    );
+    check(&task, &[("(a b)\n(a r)", "valid time=0")]);
+}
+
+#[test]
+fn an_empty_preference_is_never_violated() {
+    let task = parse(
+        "(define (domain d) (:predicates (g)) (:durative-action a :parameters () :duration (= ?duration 1)
+           :condition (preference w (at start (and))) :effect (at end (g))))",
+        "(define (problem p) (:domain d) (:init) (:goal (g)) (:metric minimize (is-violated w)))",
+    );
+    check(&task, &[("0: (a) [1]", "valid time=1 metric=0")]);
+}
+
+#[test]
 fn the_output_of_popf_is_parsed() {
     let text = "Number of literals: 3\n(not a step)\n;;;; Solution Found\n; States: 3\n; Cost: 1.000\n0.000: (old)  [1.000]\n\
                 ;;;; Solution Found\r\n; Cost: 0.5\n0.000: (move Robot a)  [5.000]\r\n5.001: (stop)\n\n * All goal deadlines now no later than 10\n";

@@ -194,3 +194,24 @@ fn search_statistics_and_history_are_recorded() {
     assert_eq!(solution.statistics.found_by, Some(PlannerPart::Satisficing));
     assert!(solution.statistics.history.iter().any(|moment| moment.cost.is_some()));
 }
+
+/// The planner evaluates durations at the start. A value at the end may differ.
+#[test]
+fn a_duration_at_end_must_not_read_what_changes() {
+    let ground_with = |time: &str| {
+        let domain = format!(
+            "(define (domain d) (:predicates (g) (h)) (:functions (f))
+               (:durative-action a :parameters () :duration ({time} (= ?duration (f))) :condition (and)
+                 :effect (at end (g)))
+               (:action b :parameters () :precondition (and) :effect (and (assign (f) 7) (h))))"
+        );
+        let problem = "(define (problem p) (:domain d) (:init (= (f) 3)) (:goal (and (g) (h))))";
+        let (domain, problem, _) =
+            read(&Source::new("domain", domain), &Source::new("problem", problem)).expect("PDDL");
+        let separation = BigRational::new(BigInt::from(1), BigInt::from(1000));
+        ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation)
+    };
+    assert!(ground_with("at start").is_ok());
+    let Err(errors) = ground_with("at end") else { panic!("the plan would be invalid") };
+    assert!(errors.iter().all(|error| error.to_string().contains("a duration `at end`")), "{errors:?}");
+}

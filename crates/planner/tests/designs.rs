@@ -151,3 +151,26 @@ fn the_best_of_66_000_designs_is_found() {
     assert_eq!(answer(&solution), found("934001", &["run d65999"]), "{:?}", solution.status);
     assert_eq!(solution.status, Status::Optimal);
 }
+
+/// A disjunction with a comparison becomes an axiom. The comparison must not depend on a design there.
+#[test]
+fn numbers_that_a_design_changes_at_start_may_be_compared_at_the_end() {
+    let problem = "(define (problem p) (:domain d)
+      (:init (fd_solve_f d1 f1) (fd_solve_f d2 f1) (= (use d1) 1) (= (use d2) 2) (= (b) 3)) (:goal (g)))";
+    for (condition, effect) in [
+        ("", "(when (> (b) 1) (g))"),
+        ("(at end (or (> (b) 1) (g)))", "(g)"),
+        ("(over all (not (= (b) 1)))", "(g)"),
+    ] {
+        let domain = format!(
+            "(define (domain d) (:requirements :adl :fluents :durative-actions) (:types fd fn)
+               (:constants d1 d2 - fd f1 - fn) (:predicates (fd_solve_f ?x - fd ?y - fn) (g))
+               (:functions (use ?x - fd) (b))
+               (:durative-action go :parameters (?d - fd) :duration (= ?duration 1)
+                 :condition (and (at start (fd_solve_f ?d f1)) {condition})
+                 :effect (and (at start (decrease (b) (use ?d))) (at end {effect}))))"
+        );
+        // With d2, the number is 1 at the end.
+        assert_eq!(answer(&solve(&domain, problem)), found("1", &["go d1"]), "{condition} {effect}");
+    }
+}

@@ -35,7 +35,7 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "E306",
         "A limit was reached during grounding.",
-        "The time or memory limit does not suffice to instantiate the actions.",
+        "The time or memory limit does not suffice to instantiate the actions, or Ctrl-C was pressed.",
         "Raise the limit, or use fewer objects and parameters.",
     ],
 ];

@@ -263,9 +263,15 @@ mod tests {
 
     #[test]
     fn slow_items_are_watched_one_by_one() {
-        let limits = Limits::none().with_time(Duration::from_millis(60));
-        let slow = |_| std::thread::sleep(Duration::from_millis(5));
+        // An interrupt instead of a deadline: a busy machine may stop the test for any time.
+        let limits = Limits::none();
+        let slow = |item: i32| {
+            std::thread::sleep(Duration::from_millis(5));
+            if item == 10 {
+                limits.interrupt().store(true, Ordering::Relaxed);
+            }
+        };
         let passed = limits.watch(0..1_000).map_while(Result::ok).map(slow).count();
-        assert!((1..=14).contains(&passed), "{passed}");
+        assert!((11..=12).contains(&passed), "{passed}");
     }
 }

@@ -70,12 +70,17 @@ impl Parser<'_> {
         let mut raw_preferences = Vec::new();
         self.hard_timed(item, &Context::default(), conditions, &mut raw_preferences);
         for RawPreference { variables, time, name, body, whole } in raw_preferences {
-            let mut inner = Vec::new();
+            let (mut inner, message_count) = (Vec::new(), self.sink.len());
             match time {
                 Some(time) => inner.extend(self.condition(body).map(|condition| (time, condition))),
                 None => self.timed_conditions(body, &mut inner),
             }
-            let Some((time, _)) = inner.first().cloned() else { continue };
+            if inner.is_empty() && self.sink.len() > message_count {
+                continue;
+            }
+            // An empty conjunction has no parts. Its preference is kept, because a metric may name it.
+            let stated = inner.first().map(|(time, _)| *time);
+            let time = stated.or_else(|| timed(body).map(|(time, _)| time)).unwrap_or(ConditionTime::AtStart);
             if time == ConditionTime::OverAll || inner.iter().any(|(other_time, _)| *other_time != time) {
                 self.refuse(whole, "preferences for conditions over all, or at several times,")
                     .help("give each condition at start or at end a preference of its own");

@@ -63,8 +63,8 @@ pub struct NumberBound {
     pub bound: BigRational,
 }
 
-/// Executes a plan and records the numbers. A step without a start time begins when the preceding
-/// step ends.
+/// Executes a plan and records the numbers. If a step has no start time, every step begins when the preceding step
+/// ends, as in [`validate`](super::validate()).
 ///
 /// # Errors
 /// Returns a violation if a step is not an action of the domain, or if its effects are undefined or
@@ -73,9 +73,10 @@ pub fn course(domain: &Domain, problem: &Problem, plan: &PlanText) -> Result<Cou
     let world = World::new(domain, problem, &|| false);
     let texts = plan.steps.iter().zip(1..);
     let steps: Vec<Step<'_>> = texts.map(|(text, number)| step::resolve(&world, number, text)).collect();
+    let is_timed = steps.iter().all(|step| step.text.start.is_some());
+    let stated = |index: usize| steps[index].text.start.as_ref().filter(|_| is_timed);
     let mut starts: Vec<usize> = (0..steps.len()).collect();
-    starts
-        .sort_by(|left, right| steps[*right].text.start.cmp(&steps[*left].text.start).then(right.cmp(left)));
+    starts.sort_by(|left, right| stated(*right).cmp(&stated(*left)).then(right.cmp(left)));
     let options = Options::default();
     let mut follower = Follower {
         execution: Execution::new(&world, &options),
@@ -91,17 +92,17 @@ pub fn course(domain: &Domain, problem: &Problem, plan: &PlanText) -> Result<Cou
         let end = next_end.map(|position| &running[position].1.end);
         // At equal times ends precede starts. A step without a start time waits for the end of a running
         // action.
-        let ends_first = match (end, starts.last().map(|next_step| &steps[*next_step].text.start)) {
+        let ends_first = match (end, starts.last().map(|next_step| stated(*next_step))) {
             (None, None) => break,
             (None, Some(_)) => false,
             (Some(_), None) => true,
-            (Some(end), Some(start)) => start.as_ref().is_none_or(|start| end <= start),
+            (Some(end), Some(start)) => start.is_none_or(|start| end <= start),
         };
         if let Some(position) = next_end.filter(|_| ends_first) {
             let (index, running_action) = running.remove(position);
             follower.end(index, &running_action)?;
         } else if let Some(next_step) = starts.pop() {
-            let new_action = follower.start(next_step, &steps[next_step])?;
+            let new_action = follower.start(next_step, &steps[next_step], stated(next_step))?;
             running.extend(new_action.map(|new_action| (next_step, new_action)));
         }
     }
@@ -117,10 +118,15 @@ struct Follower<'e, 'p> {
 }
 
 impl<'e, 'p> Follower<'e, 'p> {
-    /// Starts a step at its start time or, if none is stated, at the time of the last end of an action.
+    /// Starts a step at the time `stated` or, if there is none, at the time of the last end of an action.
     /// Returns `None` if the action takes no time and has already ended.
-    fn start(&mut self, index: usize, step: &'e Step<'p>) -> Result<Option<Running<'e, 'p>>, Box<Violation>> {
-        let time = step.text.start.clone().unwrap_or_else(|| self.clock.clone());
+    fn start(
+        &mut self,
+        index: usize,
+        step: &'e Step<'p>,
+        stated: Option<&BigRational>,
+    ) -> Result<Option<Running<'e, 'p>>, Box<Violation>> {
+        let time = stated.unwrap_or(&self.clock).clone();
         self.execution.apply_events_until(&time, true);
         // The schema whose conditions hold is preferred. The effects are shown even if no schema is
         // applicable.

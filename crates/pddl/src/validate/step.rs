@@ -81,13 +81,16 @@ fn requires_other_objects(world: &World<'_>, instance: &Instance<'_>) -> bool {
 }
 
 /// Returns all readings of a plan: each chooses one instance for every ambiguous step. Empty if there is only
-/// one reading or if there are more than `limit`.
+/// one reading or if there are more than `limit`. Readings are created one by one, because each is a copy of the plan.
 #[expect(clippy::arithmetic_side_effects, reason = "each step has a way at least")]
-pub(super) fn readings<'p>(steps: &[Step<'p>], limit: usize) -> Vec<Vec<Step<'p>>> {
+pub(super) fn readings<'s, 'p>(
+    steps: &'s [Step<'p>],
+    limit: usize,
+) -> impl Iterator<Item = Vec<Step<'p>>> + use<'s, 'p> {
     let choice_count = |step: &Step<'p>| step.instances.len().max(1);
     let count = steps.iter().try_fold(1_usize, |count, step| count.checked_mul(choice_count(step)));
-    let Some(count) = count.filter(|count| (2..=limit).contains(count)) else { return Vec::new() };
-    let reading = |mut number: usize| {
+    let count = count.filter(|count| (2..=limit).contains(count)).unwrap_or(0);
+    let reading = move |mut number: usize| {
         let chosen = steps.iter().map(|step| {
             // The number of the reading is a mixed-radix number with one digit per step.
             let choice = number % choice_count(step);
@@ -95,9 +98,9 @@ pub(super) fn readings<'p>(steps: &[Step<'p>], limit: usize) -> Vec<Vec<Step<'p>
             let instances = step.instances.get(choice).cloned().into_iter().collect();
             Step { number: step.number, text: step.text, instances }
         });
-        chosen.collect()
+        chosen.collect::<Vec<_>>()
     };
-    (0..count).map(reading).collect()
+    (0..count).map(reading)
 }
 
 fn instantiate<'p>(world: &World<'p>, action: &'p Action, objects: &[Symbol]) -> Option<Instance<'p>> {

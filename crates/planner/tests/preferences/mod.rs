@@ -150,3 +150,90 @@ fn numbers_without_an_initial_value_are_refused() {
         assert_eq!(solution.plan.expect("a plan").cost.to_string(), expected, "{constraints}");
     }
 }
+
+/// A quotient by 0 is undefined, so a comparison with it and the negation of this comparison are both false.
+#[test]
+fn divisors_that_may_be_zero_are_refused() {
+    let domain = "(define (domain d) (:predicates (g)) (:functions (x) (c ?o))
+      (:action act :parameters (?o) :precondition (preference a (< (/ (x) (c ?o)) 5))
+        :effect (and (g) (increase (x) 1))))";
+    let ground_with = |divisor: u32, preference: &str| {
+        let problem = format!(
+            "(define (problem p) (:domain d) (:objects o) (:init (= (c o) {divisor}) (= (x) 0))
+               (:goal (and (g) (preference b (< (/ (x) (c o)) 5)))) (:metric minimize (is-violated {preference})))"
+        );
+        let (domain, problem, _) =
+            read(&Source::new("domain", domain), &Source::new("problem", &problem)).expect("PDDL");
+        ground(&domain, &problem, &GroundConfig::default())
+    };
+    for preference in ["a", "b"] {
+        let errors = ground_with(0, preference).expect_err("it would be neither met nor violated");
+        assert!(errors.iter().all(|error| error.to_string().contains("may be 0")), "{errors:?}");
+        let solution =
+            optimize(&ground_with(2, preference).expect("a task"), &Config::default(), &mut |_| {});
+        assert_eq!(solution.plan.expect("a plan").cost.to_string(), "0", "{preference}");
+    }
+}
+
+/// The start adds the atom that the end reads, so they would interfere if the duration is 0.
+#[test]
+fn sometime_before_over_start_and_end_needs_a_positive_duration() {
+    let task = |duration: u32| {
+        let domain = format!(
+            "(define (domain d) (:predicates (b) (g))
+               (:durative-action a :parameters () :duration (= ?duration {duration}) :condition (and)
+                 :effect (and (at start (b)) (at end (g)))))"
+        );
+        let problem = "(define (problem p) (:domain d) (:init) (:goal (g))
+          (:constraints (preference w (sometime-before (g) (b)))) (:metric minimize (is-violated w)))";
+        let (domain, problem, _) =
+            read(&Source::new("domain", &domain), &Source::new("problem", problem)).expect("PDDL");
+        ground(&domain, &problem, &GroundConfig::default())
+    };
+    let errors = task(0).expect_err("a plan violates the preference, but no action would be applicable");
+    assert!(errors.iter().all(|error| error.to_string().contains("may be one time")), "{errors:?}");
+    let solution = optimize(&task(1).expect("a task"), &Config::default(), &mut |_| {});
+    assert_eq!(solution.plan.expect("a plan").cost.to_string(), "0");
+}
+
+/// If the duration is 0, start and end are one happening. A preference reads nothing, so it does not interfere with a
+/// change of its condition.
+#[test]
+fn preferences_of_actions_without_duration_do_not_interfere() {
+    for (time, other) in [("start", "end"), ("end", "start")] {
+        let domain = format!(
+            "(define (domain d) (:predicates (p) (g))
+               (:durative-action a :parameters () :duration (= ?duration 0)
+                 :condition (and (preference w (at {time} (p))))
+                 :effect (and (at {other} (not (p))) (at end (g)))))"
+        );
+        let problem = "(define (problem p) (:domain d) (:init (p)) (:goal (g))
+          (:metric minimize (+ (total-time) (* 3 (is-violated w)))))";
+        let (domain, problem, _) =
+            read(&Source::new("domain", &domain), &Source::new("problem", problem)).expect("PDDL");
+        let plan = PlanText::parse(&Source::new("plan", "0: (a) [0]")).expect("a plan");
+        let verdict = validate(&domain, &problem, &plan, &Options::default());
+        assert!(verdict.valid, "{verdict:?}");
+        let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");
+        let best = optimize(&task, &Config::default(), &mut |_| {}).plan.expect("a plan");
+        assert_eq!(Some(best.cost.to_string()), verdict.metric.map(|metric| metric.to_string()), "{time}");
+    }
+}
+
+/// Each of the 60 effects may change the compared number or not, so there would be 2^60 cases.
+#[test]
+fn a_comparison_with_too_many_cases_is_refused_at_once() {
+    let list = |item: &dyn Fn(u32) -> String| (0..60).map(item).collect::<String>();
+    let domain = format!(
+        "(define (domain d) (:predicates (g)) (:functions (f ?x))
+           (:action a :parameters ({}) :effect (and (g) {})))",
+        list(&|index| format!("?x{index} ")),
+        list(&|index| format!("(increase (f ?x{index}) 1) "))
+    );
+    let problem = "(define (problem p) (:domain d) (:objects o) (:init (= (f o) 0)) (:goal (g))
+      (:constraints (always (<= (f o) 100))))";
+    let (domain, problem, _) =
+        read(&Source::new("domain", &domain), &Source::new("problem", problem)).expect("PDDL");
+    let errors = ground(&domain, &problem, &GroundConfig::default()).expect_err("there are too many cases");
+    assert!(errors.iter().all(|error| error.to_string().contains("many functions")), "{errors:?}");
+}

@@ -30,6 +30,19 @@ fn key(atom: &Atom, binding: &Binding) -> Key {
     (atom.predicate.name.clone(), atom.arguments.iter().map(name).collect())
 }
 
+/// Returns `true` if no argument of the atom is a free variable.
+fn is_bound(atom: &Atom, binding: &Binding) -> bool {
+    atom.arguments.iter().all(|argument| matches!(term(argument, binding), Term::Constant(_)))
+}
+
+/// A part of a condition that may have no value.
+enum Undefined<'c> {
+    /// A numeric function without an initial value.
+    Function(&'c Name),
+    /// A quotient whose divisor may be 0.
+    Quotient,
+}
+
 impl<'t> Initial<'t> {
     pub(super) fn of(domain: &'t Domain, problem: &Problem, objects: &'t Objects<'t>) -> Self {
         let (mut facts, mut values) = (FxHashSet::default(), FxHashMap::default());
@@ -54,25 +67,29 @@ impl<'t> Initial<'t> {
         self.truth(condition, &mut Vec::new()) == Some(true)
     }
 
-    /// Checks that all numeric functions in a condition have initial values, and returns an error at `place` if
-    /// a value is missing. With a missing value, both the condition and its negation could be false.
+    /// Checks that all numeric functions in a condition have initial values and all divisors are other than 0, and
+    /// returns an error at `place` if not. With an undefined value, both the condition and its negation could be
+    /// false.
     pub(super) fn is_defined(&self, condition: &Condition, place: (File, Span)) -> Result<(), Error> {
-        match self.undefined(condition, &mut Vec::new()) {
-            None => Ok(()),
-            Some(name) => Err(unsupported(
+        let (construct, instead) = match self.undefined(condition, &mut Vec::new()) {
+            None => return Ok(()),
+            Some(Undefined::Function(name)) => (
                 format!(
                     "a constraint or preference on `{name}`, which has no initial value for some objects"
                 ),
                 "an initial value for each",
-                place,
-            )),
-        }
+            ),
+            Some(Undefined::Quotient) => (
+                "a constraint or preference that divides by a number that may be 0".to_owned(),
+                "divisors that are never 0",
+            ),
+        };
+        Err(unsupported(construct, instead, place))
     }
 
-    /// Returns a numeric function in the condition that may have no value, or `None` if all values are defined. A
-    /// function with a free variable among its arguments must have a value for every tuple of objects of its declared
-    /// types.
-    fn undefined<'c>(&self, condition: &'c Condition, binding: &mut Binding) -> Option<&'c Name> {
+    /// Returns a part of the condition that may have no value, or `None` if all values are defined. A function with a
+    /// free variable among its arguments must have a value for every tuple of objects of its declared types.
+    fn undefined<'c>(&self, condition: &'c Condition, binding: &mut Binding) -> Option<Undefined<'c>> {
         match condition {
             Condition::Exists(variables, body) | Condition::ForAll(variables, body) => {
                 let mut instances = self.objects.bindings(variables, binding);
@@ -85,16 +102,42 @@ impl<'t> Initial<'t> {
         }
     }
 
-    fn undefined_in<'c>(&self, expression: &'c Expression, binding: &Binding) -> Option<&'c Name> {
-        match expression {
-            Expression::Fluent(atom) => (!self.has_value(atom, binding)).then_some(&atom.predicate.name),
-            other => other.operands().iter().find_map(|operand| self.undefined_in(operand, binding)),
+    fn undefined_in<'c>(&self, expression: &'c Expression, binding: &Binding) -> Option<Undefined<'c>> {
+        if let Expression::Fluent(atom) = expression {
+            return (!self.has_value(atom, binding)).then_some(Undefined::Function(&atom.predicate.name));
+        }
+        let operands = expression.operands();
+        let undefined = operands.iter().find_map(|operand| self.undefined_in(operand, binding));
+        let is_quotient = matches!(expression, Expression::Operation(Arithmetic::Divide, ..));
+        undefined.or_else(|| {
+            let mut divisors = operands.iter().skip(1);
+            let is_undefined = is_quotient && divisors.any(|divisor| self.may_be_zero(divisor, binding));
+            is_undefined.then_some(Undefined::Quotient)
+        })
+    }
+
+    /// Returns `false` if a divisor is certainly not 0. Its value in the initial state suffices, because the planner
+    /// refuses divisors that change.
+    fn may_be_zero(&self, divisor: &Expression, binding: &Binding) -> bool {
+        match divisor {
+            // A free variable may stand for any object.
+            Expression::Fluent(atom) if !is_bound(atom, binding) => {
+                let name = &atom.predicate.name;
+                self.values.iter().any(|((function, _), value)| function == name && value.is_zero())
+            }
+            Expression::Operation(Arithmetic::Multiply, factors, _) => {
+                factors.iter().any(|factor| self.may_be_zero(factor, binding))
+            }
+            other => {
+                let mut all_bound = true;
+                other.walk_fluents(&mut |atom| all_bound &= is_bound(atom, binding));
+                !all_bound || self.value(other, binding).is_none_or(|value| value.is_zero())
+            }
         }
     }
 
     fn has_value(&self, atom: &Atom, binding: &Binding) -> bool {
-        let is_bound = |argument: &Term| matches!(term(argument, binding), Term::Constant(_));
-        if atom.arguments.iter().all(is_bound) {
+        if is_bound(atom, binding) {
             return self.values.contains_key(&key(atom, binding));
         }
         let name = &atom.predicate.name;

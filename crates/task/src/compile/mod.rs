@@ -69,6 +69,11 @@ pub fn is_violation(action: &str) -> bool {
     is_hidden(action) && action.ends_with(preferences::VIOLATION)
 }
 
+/// Returns `true` if the name belongs to an auxiliary function, which counts violations of a preference.
+pub(crate) fn is_violation_count(function: &Name) -> bool {
+    preferences::is_count(function)
+}
+
 /// Compiles preferences and trajectory constraints away. Preferences that do not occur in `objectives` (if this is
 /// empty: in the metric of the problem) are dropped.
 ///

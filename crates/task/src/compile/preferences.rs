@@ -30,8 +30,15 @@ pub(super) const VIOLATION: &str = " is violated";
 /// Atom that hidden actions add if actions may overlap. It is never true, because these actions are never executed.
 const VIOLATED: &str = "a preference is violated";
 
+/// Beginning of the names of the functions that count violations. It contains a space, so no other function has it.
+const COUNT: &str = "violations of ";
+
 pub(super) fn count(preference: &Name) -> Atom {
-    flag(&format!("violations of {preference}"))
+    flag(&format!("{COUNT}{preference}"))
+}
+
+pub(super) fn is_count(function: &Name) -> bool {
+    function.as_str().starts_with(COUNT)
 }
 
 fn violate(preference: &Name) -> Effect {

@@ -26,6 +26,9 @@ type Way = (Condition, Vec<(Atom, Expression)>);
 
 pub(super) struct NotRegressable(pub(super) &'static str);
 
+const TOO_MANY_CASES: NotRegressable =
+    NotRegressable("a comparison of many functions that one action changes");
+
 impl Happening {
     pub(super) fn of(action: &Action, time: EffectTime) -> Self {
         let mut changes = Vec::new();
@@ -176,6 +179,10 @@ impl Happening {
                     cases.push((all([condition, not(hits.clone())]), value));
                 }
                 cases.retain(|(condition, _)| !is_false(condition));
+                // The cases may double with each effect, so the limit must be checked before the next one.
+                if cases.len() > MAX_CASES {
+                    return Err(TOO_MANY_CASES);
+                }
                 values = cases;
             }
             let longer = ways.iter().flat_map(|(condition, assigned): &Way| {
@@ -187,7 +194,7 @@ impl Happening {
             });
             ways = longer.collect();
             if ways.len() > MAX_CASES {
-                return Err(NotRegressable("a comparison of many functions that one action changes"));
+                return Err(TOO_MANY_CASES);
             }
         }
         Ok(ways)

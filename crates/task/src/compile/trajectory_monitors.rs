@@ -175,12 +175,11 @@ impl<'t> Monitors<'t> {
     /// Calls `make` for each start or end of an action that may change one of `conditions`, and adds the returned
     /// preconditions and effects to this start or end. The arguments of `make` are a condition under which the change
     /// may occur, and `conditions` regressed to the state before the change. If the first argument would be a
-    /// disjunction, `make` is called once for each disjunct. If start and end of an action may coincide and both may
-    /// change the conditions, the action also gets the precondition that its duration is positive.
+    /// disjunction, `make` is called once for each disjunct. Start and end are kept apart by
+    /// [`separate`](Self::separate).
     ///
-    /// Fails if a positive duration is needed but cannot be required (for example in sequential plans), if a
-    /// condition cannot be regressed, or if the conditions contain derived predicates or atoms that timed initial
-    /// literals change.
+    /// Fails if `separate` fails, if a condition cannot be regressed, or if the conditions contain derived predicates
+    /// or atoms that timed initial literals change.
     pub(super) fn after_each(
         &mut self,
         conditions: &[&Condition],
@@ -190,26 +189,12 @@ impl<'t> Monitors<'t> {
         for condition in conditions {
             self.can_be_watched(condition, place)?;
         }
+        self.separate(conditions, place)?;
         for (action, additions) in self.domain.actions.iter().zip(&mut self.additions) {
             let happenings = TIMES.map(|time| Happening::of(action, time));
             let touched = happenings
                 .each_ref()
                 .map(|one| any(conditions.iter().map(|condition| one.touches(condition))));
-            if touched.iter().all(|touched| !is_false(touched))
-                && !takes_time(self.domain, self.problem, action)
-            {
-                let takes_time =
-                    positive(action).filter(|_| matches!(self.course, PlanSemantics::Overlapping(_)));
-                let takes_time = takes_time.ok_or_else(|| {
-                    let construct = format!(
-                        "a constraint on what `{}` changes both at its start and at its end, which may be one time",
-                        action.identifier.name
-                    );
-                    unsupported(construct, "a duration that is known to be above 0", place)
-                })?;
-                additions[0].conditions.push(takes_time);
-                self.narrows = true;
-            }
             for ((happening, touched), addition) in happenings.iter().zip(touched).zip(additions) {
                 if is_false(&touched) {
                     continue;
@@ -232,6 +217,35 @@ impl<'t> Monitors<'t> {
                     addition.effects.extend(addition_of_way.effects);
                 }
             }
+        }
+        Ok(())
+    }
+
+    /// Adds the precondition that the duration is positive to each action whose start and end may coincide and may both
+    /// change one of `conditions`. Otherwise one of them could read an auxiliary atom that the other changes.
+    ///
+    /// Fails if the precondition is needed but cannot be required (for example in sequential plans).
+    fn separate(&mut self, conditions: &[&Condition], place: (File, Span)) -> Result<(), Error> {
+        for (action, additions) in self.domain.actions.iter().zip(&mut self.additions) {
+            let may_change = |time| {
+                let happening = Happening::of(action, time);
+                conditions.iter().any(|condition| !is_false(&happening.touches(condition)))
+            };
+            // Most actions have no effect at their end.
+            if !TIMES.into_iter().rev().all(may_change) || takes_time(self.domain, self.problem, action) {
+                continue;
+            }
+            let takes_time =
+                positive(action).filter(|_| matches!(self.course, PlanSemantics::Overlapping(_)));
+            let takes_time = takes_time.ok_or_else(|| {
+                let construct = format!(
+                    "a constraint on what `{}` changes both at its start and at its end, which may be one time",
+                    action.identifier.name
+                );
+                unsupported(construct, "a duration that is known to be above 0", place)
+            })?;
+            additions[0].conditions.push(takes_time);
+            self.narrows = true;
         }
         Ok(())
     }
@@ -338,6 +352,8 @@ impl<'t> Monitors<'t> {
         hard: bool,
         place: (File, Span),
     ) -> Result<Condition, Error> {
+        // What changes the first condition reads the atom that changes of the second condition add.
+        self.separate(&[first, second], place)?;
         let was_met = self.remember("was met", self.initial.holds(second));
         let at_first = self.initial.holds(first);
         let broken = if hard { None } else { Some(self.remember("is broken", at_first)) };

@@ -37,8 +37,12 @@ pub fn simplify(task: &mut GroundTask<'_>) -> Result<(), Interrupted> {
         }
     }
     retain(&mut task.operators, limits, |operator| {
-        let conditions = operator.conditional.iter_mut().flat_map(|effect| &mut effect.condition);
-        conditions.for_each(|literal| rename(literal, &bodies));
+        for effect in &mut operator.conditional {
+            effect.condition.iter_mut().for_each(|literal| rename(literal, &bodies));
+            // The search for mutex groups looks literals up in these sorted lists.
+            effect.condition.sort_unstable();
+            effect.condition.dedup();
+        }
         inline(&mut operator.condition, &bodies)
     })?;
     if task.goal.as_mut().is_some_and(|goal| !inline(goal, &bodies)) {

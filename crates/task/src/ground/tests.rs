@@ -137,3 +137,25 @@ fn prune_ignores_initial_numbers_that_may_change() {
         assert_eq!(counts(lifted, &task)[3], ("fly".to_owned(), 4));
     });
 }
+
+#[test]
+fn conditions_of_effects_stay_sorted() {
+    let domain = "(define (domain d) (:predicates (a) (b) (da) (db) (g) (h))
+      (:derived (da) (a)) (:derived (db) (b))
+      (:action on :parameters () :effect (and (a) (b)))
+      (:action act :parameters ()
+        :effect (and (when (and (da) (b)) (g)) (when (and (db) (a)) (h)))))";
+    let problem = "(define (problem p) (:domain d) (:init) (:goal (and (g) (h))))";
+    let (domain, problem, _) =
+        read(&Source::new("domain", domain), &Source::new("problem", problem)).expect("PDDL");
+    let lifted = normalize(&domain, &problem, &[]).expect("a lifted task");
+    let (reached, limits, slots) = (reached(&lifted), Limits::none(), none(&lifted));
+    let world = World::new(&lifted, &reached, &limits);
+    let mut task = instantiate::instantiate(world, &slots, &slots).expect("operators");
+    derived::simplify(&mut task).expect("no limit");
+    let effects = task.operators.iter().flat_map(|operator| &operator.conditional);
+    let conditions: Vec<_> = effects.map(|effect| &effect.condition).collect();
+    // One of the two has the other order before it is sorted.
+    assert_eq!(conditions.len(), 2);
+    assert!(conditions.iter().all(|condition| condition.is_sorted()), "{conditions:?}");
+}

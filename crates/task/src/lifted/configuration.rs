@@ -4,12 +4,13 @@
 //! In the explicit form (Metaplan paper, Listings 1 and 2), a schema has parameters `?fd` with a condition
 //! `(fd_solve_f ?fd ?f)`. Such a parameter is *separable* and becomes a slot if no fluent has it as an argument, and it
 //! does not occur in conditions of effects, in conditions that mix static atoms and fluents, or in products and
-//! quotients with fluents. The number of designs then does not multiply the number of ground operators.
+//! quotients with fluents, and if start effects do not change numbers by it that a disjunction or the condition of an
+//! end effect compares. The number of designs then does not multiply the number of ground operators.
 
 use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
 
-use crate::lifted::task::{Change, Expression, Formula, Lifted, PredicateId, Schema, Term};
+use crate::lifted::task::{Change, Expression, Formula, FunctionId, Lifted, PredicateId, Schema, Term};
 use crate::number::dense;
 use crate::task::quantity::SlotSet;
 use pddl::ast::Name;
@@ -81,6 +82,51 @@ fn is_separable(lifted: &Lifted, schema: &Schema, parameter: u32) -> bool {
                 }
             }
     }) && schema.duration.as_ref().is_none_or(|duration| expression_separable(lifted, duration, parameter))
+        && !may_enter_axiom(schema, parameter)
+}
+
+/// Returns `true` if a start effect changes a number by a value that depends on the parameter, and a disjunction of the
+/// middle or the condition of an end effect compares this number. Over the state before the start, the comparison
+/// depends on the parameter, and may become the body of an axiom. Axioms have no slots.
+fn may_enter_axiom(schema: &Schema, parameter: u32) -> bool {
+    schema.start_effects.iter().any(|effect| match &effect.change {
+        Change::Assign { function, expression, .. } => {
+            expression_mentions(expression, parameter)
+                && (compares_in_disjunction(&schema.middle_condition, *function)
+                    || schema.end_effects.iter().any(|end| compares(&end.condition, *function)))
+        }
+        Change::Add(..) | Change::Delete(..) => false,
+    })
+}
+
+fn compares_in_disjunction(formula: &Formula, function: FunctionId) -> bool {
+    match formula {
+        Formula::And(parts) => parts.iter().any(|part| compares_in_disjunction(part, function)),
+        Formula::ForAll(_, body) => compares_in_disjunction(body, function),
+        Formula::Or(_) | Formula::Exists(..) => compares(formula, function),
+        Formula::Literal { .. } | Formula::Equal { .. } | Formula::Compare(..) => false,
+    }
+}
+
+fn compares(formula: &Formula, function: FunctionId) -> bool {
+    match formula {
+        Formula::And(parts) | Formula::Or(parts) => parts.iter().any(|part| compares(part, function)),
+        Formula::Exists(_, body) | Formula::ForAll(_, body) => compares(body, function),
+        Formula::Compare(_, left, right, _) => reads(left, function) || reads(right, function),
+        Formula::Literal { .. } | Formula::Equal { .. } => false,
+    }
+}
+
+fn reads(expression: &Expression, function: FunctionId) -> bool {
+    match expression {
+        Expression::Number(_) | Expression::TotalTime => false,
+        Expression::Function(own, ..) => *own == function,
+        Expression::Negate(inner) => reads(inner, function),
+        Expression::Sum(parts) | Expression::Product(parts, _) => {
+            parts.iter().any(|part| reads(part, function))
+        }
+        Expression::Quotient(left, right, _) => reads(left, function) || reads(right, function),
+    }
 }
 
 /// Returns `true` if the parameter occurs only as an argument of static functions, and in no product or quotient that

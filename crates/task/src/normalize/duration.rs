@@ -5,8 +5,8 @@
 //! effect may depend on the duration. Other variable durations are errors. If actions may overlap, the planner
 //! chooses a duration when the action starts.
 
-use crate::error::{File, Place};
-use crate::lifted::{Expression, Formula, Function, FunctionId, Metric, Rational, Term};
+use crate::error::{Error, File, Place};
+use crate::lifted::{Expression, Formula, Function, FunctionId, Lifted, Metric, Rational, Term};
 use crate::normalize::condition::expression;
 use crate::normalize::names::{Duration, Names, Scope};
 use crate::number::dense;
@@ -134,6 +134,29 @@ pub(super) fn duration(
     });
     let conditions = conditions.collect();
     (chosen, conditions)
+}
+
+/// Returns an error for each duration constraint `at end` over a function that actions change, because the planner
+/// evaluates all duration constraints at the start.
+pub(super) fn changing_at_end(domain: &ast::Domain, lifted: &Lifted) -> Vec<Error> {
+    let is_fluent =
+        |name: &Name| lifted.functions.iter().any(|function| function.fluent && function.name == *name);
+    let mut errors = Vec::new();
+    for action in &domain.actions {
+        let ast::ActionBody::Durative { duration, .. } = &action.body else { continue };
+        for constraint in duration.iter().filter(|constraint| constraint.time == ast::EffectTime::AtEnd) {
+            let mut may_change = false;
+            constraint.expression.walk_fluents(&mut |atom| may_change |= is_fluent(&atom.predicate.name));
+            if may_change {
+                errors.push(Error::Unsupported {
+                    construct: "a duration `at end` over a function that actions change".into(),
+                    instead: "the duration `at start`".into(),
+                    place: Place { file: File::Domain, span: constraint.span },
+                });
+            }
+        }
+    }
+    errors
 }
 
 /// Creates the auxiliary numeric function for the chosen duration of an action.

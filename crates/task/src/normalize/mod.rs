@@ -94,7 +94,8 @@ fn named(
         metrics,
     };
     fluents::mark_fluents(&mut lifted);
-    Ok(lifted)
+    let errors = duration::changing_at_end(domain, &lifted);
+    if errors.is_empty() { Ok(lifted) } else { Err(errors.into()) }
 }
 
 fn schema(names: &mut Names, longest: Option<bool>, action: &ast::Action, index: u32) -> Schema {

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::compile::is_violation_count;
 use crate::ground::evaluate::normal_form::Definitions;
 use crate::ground::evaluate::reads::Reads;
 use crate::ground::instantiate::conditional_effects::{Middle, cases};
@@ -20,7 +21,7 @@ use crate::ground::vocabulary::operator::GroundOperator;
 use crate::ground::vocabulary::partial_eval::Residual;
 use crate::ground::vocabulary::world::World;
 use crate::lifted::configuration::SlotParameter;
-use crate::lifted::{Effect, Formula, Joint, Lifted, ObjectId, Schema, Term};
+use crate::lifted::{Change, Effect, Formula, Joint, Lifted, ObjectId, Schema, Term};
 use crate::task::timing::Timing;
 use crate::task::{Argument, ForbiddenCombinations};
 
@@ -144,12 +145,26 @@ fn joint_clashes(
 ) -> Result<Vec<Residual>, Failure> {
     let lifted = build.world.lifted;
     let (first, second) = schema.end_effects.split_at(joint.start_effects);
-    let first_reads = reads(lifted, &joint.start, first, &build.binding);
-    let second_reads = reads(lifted, &joint.end, second, &build.binding);
+    // By definition, preferences read nothing. So the effects that count violations do not interfere.
+    let reads_of = |condition: &Formula, effects: &[Effect]| {
+        let mut reads = reads(lifted, condition, &[], &build.binding);
+        for effect in effects.iter().filter(|effect| !counts_violations(lifted, effect)) {
+            reads.effects(lifted, std::slice::from_ref(effect), &build.binding);
+        }
+        reads
+    };
+    let (first_reads, second_reads) = (reads_of(&joint.start, first), reads_of(&joint.end, second));
     let (first_operands, second_operands) = frame.end_operands.split_at(joint.start_effects);
     let first = SimultaneousEffects::new(build, first, first_operands)?;
     let second = SimultaneousEffects::new(build, second, second_operands)?;
     Ok(clashes(build.world, (&first_reads, &first), (&second_reads, &second)))
+}
+
+fn counts_violations(lifted: &Lifted, effect: &Effect) -> bool {
+    match &effect.change {
+        Change::Assign { function, .. } => is_violation_count(&lifted.functions[function.index()].name),
+        Change::Add(..) | Change::Delete(..) => false,
+    }
 }
 
 fn conflicts(
