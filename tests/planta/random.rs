@@ -234,6 +234,25 @@ fn classes_required_by_one_action_do_not_guard_facts_of_others() {
     assert_eq!(comparison.least_steps, Some(2));
 }
 
+/// The domain may conclude a predicate of the knowledge base from a predicate that only the domain has, settled
+/// or changed by an action.
+#[test]
+fn conclusions_from_predicates_of_the_domain_are_kept() {
+    let knowledge = knowledge("ClassAssertion(:Ca :i1) ClassAssertion(:Ca :i2)\n");
+    let problem = "(define (problem p) (:domain d) (:init (charged i1)) (:goal (done i1)))\n".to_owned();
+    let changes = ["", "(:action c :parameters (?x) :precondition (Ca ?x) :effect (charged ?x))\n"];
+    for change in changes {
+        let domain = format!(
+            "(define (domain d) (:requirements :strips :derived-predicates)\n (:predicates (done ?x) (charged ?x))
+ (:derived (inferred-Cb ?x) (charged ?x))
+ {change}(:action b :parameters (?x) :precondition (inferred-Cb ?x) :effect (done ?x)))\n"
+        );
+        let texts = Texts { knowledge: knowledge.clone(), domain, problem: problem.clone() };
+        let comparison = compare(&texts, "predicates of the domain").expect("few states");
+        assert_eq!(comparison.least_steps, Some(1));
+    }
+}
+
 #[test]
 fn rules_that_require_an_individual_of_nothing_conclude_nothing() {
     let knowledge = knowledge(
