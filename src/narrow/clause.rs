@@ -114,9 +114,15 @@ fn disjuncts(condition: &Condition, variables: &mut BTreeSet<Name>) -> Option<Ve
             Some(conjunctions)
         }
         Condition::Or(parts) => {
-            let parts: Option<Vec<_>> =
-                parts.iter().map(|part| disjuncts(part, &mut variables.clone())).collect();
-            Some(parts?.concat())
+            // Several disjuncts may bind the same name, but no later conjunct.
+            let outer = variables.clone();
+            let mut conjunctions = Vec::new();
+            for part in parts {
+                let mut names = outer.clone();
+                conjunctions.extend(disjuncts(part, &mut names)?);
+                variables.extend(names);
+            }
+            Some(conjunctions)
         }
         Condition::Exists(bound, inner) => {
             let types = typed(bound, variables)?;

@@ -253,6 +253,24 @@ fn conclusions_from_predicates_of_the_domain_are_kept() {
     }
 }
 
+/// A name that a disjunct binds is another variable than the same name in a later conjunct.
+#[test]
+fn variables_of_disjuncts_are_not_merged_with_later_ones() {
+    let knowledge = knowledge(
+        "ClassAssertion(:Ca :i1) ClassAssertion(:Cb :i2)
+         ObjectPropertyAssertion(:pa :i1 :i2) ObjectPropertyAssertion(:pb :i2 :i1)\n",
+    );
+    let domain = "(define (domain d)
+ (:requirements :strips :derived-predicates :existential-preconditions :disjunctive-preconditions)
+ (:predicates (done ?x) (ready ?f))
+ (:derived (ready ?f) (and (Ca ?f) (or (exists (?x ?y) (pa ?x ?y)) (Cd ?f)) (exists (?x) (pb ?x ?f))))
+ (:action b :parameters (?f) :precondition (and (inferred-Ca ?f) (ready ?f)) :effect (done ?f)))\n"
+        .to_owned();
+    let problem = "(define (problem p) (:domain d) (:init) (:goal (done i1)))\n".to_owned();
+    let comparison = compare(&Texts { knowledge, domain, problem }, "disjuncts").expect("few states");
+    assert_eq!(comparison.least_steps, Some(1));
+}
+
 #[test]
 fn rules_that_require_an_individual_of_nothing_conclude_nothing() {
     let knowledge = knowledge(
