@@ -60,10 +60,9 @@ impl Folded {
         self.possible.restrict(domain);
     }
 
-    /// Returns the derived facts of settled predicates, without those in `stated` (the initial facts of
-    /// the vocabulary and of [`premises`](Self::premises)), and the
-    /// bounds of other derived predicates as facts, e.g. `(possible-p a)`. `is_of(object, type)` returns `true`
-    /// if an object has a type.
+    /// Returns the derived facts of settled predicates, without those in `stated` (the initial facts of the
+    /// vocabulary and of [`premises`](Self::premises)), and the bounds of other derived predicates as facts,
+    /// e.g. `(possible-p a)`. `is_of(object, type)` returns `true` if an object has a type.
     pub fn facts(
         &self,
         stated: &BTreeSet<Fact>,
