@@ -319,6 +319,29 @@ fn before_and_after_share_one_axis() {
 }
 
 #[test]
+fn designs_of_one_function_in_one_step_share_a_bar() {
+    let mut plan = plan(3, "");
+    plan.steps[1].configuration.push(("f_1".to_owned(), "fd_9".to_owned()));
+    let text = plan.text(150).expect("a picture");
+    assert!(text.lines().any(|line| line.contains("f_1") && line.contains("fd_0, fd_9")), "{text}");
+    let end = text.lines().next().map(|line| line.chars().count());
+    assert!(text.lines().take(3).all(|line| Some(line.chars().count()) == end), "{text}");
+}
+
+/// The end of a step is the sum of two doubles, and may be greater than the start of the next step.
+#[test]
+fn rounding_errors_of_times_do_not_make_bars_overlap() {
+    let mut plan = plan(2, "");
+    (plan.steps[0].start, plan.steps[0].end) = (0.0, 3.0 + 4e-16);
+    (plan.steps[1].start, plan.steps[1].end) = (3.0 - 4e-16, 6.0);
+    for columns in 60..200 {
+        let text = plan.text(columns).expect("a picture");
+        let length = text.lines().next().map(|line| line.chars().count());
+        assert_eq!(length, Some(columns), "{text}");
+    }
+}
+
+#[test]
 fn short_bars_have_the_number_of_their_step() {
     let mut plan = plan(30, "");
     plan.steps[29].end = 300.0;
