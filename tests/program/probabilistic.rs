@@ -349,6 +349,17 @@ fn missions_without_places_are_compared() {
 }
 
 #[test]
+fn missions_whose_goal_holds_already_are_compared() {
+    for file in ["missions/ugv.toml", "missions/ugv_plain.toml"] {
+        let outcome = metaplan(&["compare", file, "--set", "robot_at=wp9", "--format", "json"]);
+        assert_eq!(outcome.status, 0, "{outcome:#?}");
+        let candidates = &outcome.json()["comparisons"][0]["candidates"];
+        let optimum = candidates.as_array().expect("candidates").iter().find(|one| one["kind"] == "f");
+        assert_eq!(optimum.expect("an optimum")["penalised_time"].as_f64(), Some(0.0), "{candidates:#}");
+    }
+}
+
+#[test]
 fn invalid_processes_are_refused() {
     use pddl::ast::{InitialElement, Name, Problem as Pddl, Term};
     let Setup { mission, roles, .. } =
