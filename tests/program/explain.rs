@@ -72,7 +72,8 @@ fn changes_that_affect_the_plan_are_listed() {
 fn bounds_of_small_values_are_found() {
     let directory = tempfile::tempdir().expect("a directory");
     let write = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).expect("written");
-    let actions = "(:action a :parameters () :precondition (>= (x) 0.000495) :effect (and (done) (increase (c) 1)))
+    let actions = "(:action a :parameters () :precondition (>= (x) 0.000495)
+           :effect (and (done) (increase (c) 1)))
          (:action b :parameters () :precondition () :effect (and (done) (increase (c) 2)))";
     write(
         "domain.pddl",
@@ -89,7 +90,8 @@ fn bounds_of_small_values_are_found() {
     write(
         "m.toml",
         &format!(
-            "name = 'small'\n[knowledge]\nfiles = ['{}']\n[planning]\ndomain = 'domain.pddl'\nproblem = 'problem.pddl'\n",
+            "name = 'small'\n[knowledge]\nfiles = ['{}']\n[planning]\n\
+             domain = 'domain.pddl'\nproblem = 'problem.pddl'\n",
             knowledge.display()
         ),
     );
