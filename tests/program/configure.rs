@@ -150,7 +150,7 @@ fn failed_changes_restore_the_design_that_the_robot_has() {
     ];
     let kb = file.to_str().expect("UTF-8");
     let arguments = ["run", kb, "--configure", "--rules", "coadaptation", "--objective", "f_move"];
-    let outcome = crate::common::metaplan_in(&crate::common::root(), &arguments, &(events.join("\n") + "\n"));
+    let outcome = metaplan_in(&root(), &arguments, &(events.join("\n") + "\n"));
     let answers: Vec<serde_json::Value> =
         outcome.stdout.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
     let changes = answers.iter().filter(|answer| answer["answer"] == "reconfigure");
