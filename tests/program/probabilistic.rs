@@ -3,7 +3,8 @@
 #![allow(clippy::print_stdout)]
 
 use metaplan::comparison::{
-    Coadaptation, MapOptions, Priority, Process, Risk, import_map, program, published, shortest_routes,
+    Arc, Coadaptation, MapOptions, Priority, Process, Risk, Traversal, import_map, program, published,
+    published_program, shortest_routes,
 };
 use metaplan::mission::{Mission, Planning as _};
 use metaplan::setup::Setup;
@@ -356,6 +357,37 @@ fn missions_whose_goal_holds_already_are_compared() {
         let candidates = &outcome.json()["comparisons"][0]["candidates"];
         let optimum = candidates.as_array().expect("candidates").iter().find(|one| one["kind"] == "f");
         assert_eq!(optimum.expect("an optimum")["penalised_time"].as_f64(), Some(0.0), "{candidates:#}");
+    }
+}
+
+/// The moves from `a` to `b_c` and from `a_b` to `c` would have the same name. Each move has its own reward.
+#[test]
+fn rewards_of_moves_with_similar_names_are_separate() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let example = "missions/camara_like.toml";
+    let Setup { mission, roles, .. } = Setup::read(&root().join(example)).expect("a mission");
+    let (problem, _) = mission.filled().expect("filled");
+    let mut mission = Coadaptation::new(&mission, &problem, &roles).expect("a process");
+    let whole = |value: i64| BigRational::from_integer(value.into());
+    let arc = |from: usize, time: i64| {
+        let traversal = Traversal { time: whole(time), energy: whole(0), success: whole(1), hit: whole(0) };
+        Arc { from, to: from + 1, by: vec![Some(traversal)] }
+    };
+    mission.places = ["a", "b_c", "a_b", "c"].map(str::to_owned).to_vec();
+    mission.arcs = vec![arc(0, 10), arc(1, 1), arc(2, 100)];
+    mission.configurations.truncate(1);
+    mission.configurations[0].available = true;
+    mission.switches = vec![vec![None]];
+    (mission.start, mission.goal, mission.initial) = (0, 3, 0);
+    (mission.battery, mission.loss) = (None, None);
+    for model in [program(&mission, Risk::all(&mission)), published_program(&mission)] {
+        let file = directory.path().join("model.prism");
+        std::fs::write(&file, probabilistic::prism::write(&model)).expect("written");
+        let question = "R{\"time\"}min=? [ F \"goal\" ]";
+        let constant: &[&str] = if model.constants.is_empty() { &[] } else { &["--const", "ROUTE=0"] };
+        let arguments = [&["check", file.to_str().expect("UTF-8"), question][..], constant].concat();
+        let outcome = metaplan(&arguments);
+        assert_eq!(outcome.stdout.trim(), "111", "{outcome:#?}");
     }
 }
 
