@@ -402,7 +402,16 @@ fn invalid_processes_are_refused() {
         Err(messages) => messages.iter().map(|message| message.code.clone()).collect::<Vec<_>>(),
     };
     assert!(codes(&problem).is_empty());
-    for (symbol, value) in [("time", -1), ("energy", -5), ("hit", 2), ("success", -1), ("switch_time", -1)] {
+    for (symbol, value) in [
+        ("time", -1_i64),
+        ("energy", -5),
+        ("hit", 2),
+        ("success", -1),
+        ("switch_time", -1),
+        ("battery", -5),
+        ("battery", 10_i64.pow(15)),
+        ("reserve", 10_i64.pow(15)),
+    ] {
         let mut changed = problem.clone();
         let element = changed.init.iter_mut().find_map(|element| match element {
             InitialElement::Value(atom, value, _) if atom.predicate.name.as_str() == symbol => Some(value),
