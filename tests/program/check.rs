@@ -55,6 +55,15 @@ fn one_answer_is_a_table_of_one_row() {
 }
 
 #[test]
+fn constants_are_given_once() {
+    let arguments = ["check", "-", "Pmax=? [ F s=1 ]", "--const", "n=1:2", "--const", "n=3:4"];
+    let model = MODEL.replace("mdp\n", "mdp\nconst int n;\n").replace("PROBABILITIES", "(s'=1)");
+    let outcome = metaplan_in(&root(), &arguments, &model);
+    assert_eq!(outcome.status, 2, "{outcome:#?}");
+    assert!(outcome.stderr.contains("M107") && outcome.stderr.contains("two values"), "{outcome:#?}");
+}
+
+#[test]
 fn policies_are_written_and_evaluated() {
     let Some(folder) = data("reference/prism_cases") else { return };
     let model = folder.join("c12_det_plan_vs_policy.prism");
