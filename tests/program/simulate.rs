@@ -332,6 +332,15 @@ fn greedy_control_observes_requirements_in_a_ward() {
 }
 
 #[test]
+fn repeated_strategies_and_large_seeds_are_simulated_once() {
+    let mut arguments = vec!["simulate", "missions/ugv.toml", "--scenario", "kinect_at_wp2"];
+    arguments.extend(["--strategy", "none", "--strategy", "none", "--seed", "18446744073709551615"]);
+    arguments.extend(["--runs", "2"]);
+    let outcome = metaplan(&arguments);
+    assert!(outcome.stdout.contains("none: none of 2 accomplished"), "{outcome:#?}");
+}
+
+#[test]
 fn failed_missions_are_reported_with_the_reason() {
     let arguments =
         ["simulate", "missions/ugv.toml", "--scenario", "kinect_at_wp2", "--strategy", "none", "--runs", "2"];
