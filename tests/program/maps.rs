@@ -129,6 +129,15 @@ fn map_errors_have_a_position() {
 }
 
 #[test]
+fn dark_corridors_are_corridors_of_the_map() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let outcome = import(directory.path(), &map(), &["--dark", "h2-h1,h1-h3"]);
+    assert_eq!(outcome.status, 3, "{outcome:#?}");
+    assert_eq!(outcome.stderr.matches("error[M124]").count(), 1, "{outcome:#?}");
+    assert!(outcome.stderr.contains("no corridor between `h1` and `h3`"), "{outcome:#?}");
+}
+
+#[test]
 fn all_errors_of_a_map_are_reported() {
     let directory = tempfile::tempdir().expect("a directory");
     let text = map()
