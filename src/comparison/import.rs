@@ -403,7 +403,7 @@ fn problem(map: &Map<'_>, options: &MapOptions) -> String {
             let (before, after) = (old.components(), new.components());
             let off = before.iter().filter(|component| !after.contains(component)).count();
             let on = after.iter().filter(|component| !before.contains(component)).count();
-            let seconds = (off + on) as u32 * options.switch_seconds;
+            let seconds = (off + on) as u64 * u64::from(options.switch_seconds);
             let _ = writeln!(init, "    (= (switch_time {} {}) {seconds})", old.object(), new.object());
         }
     }

@@ -84,6 +84,10 @@ fn maps_of_2017_become_missions() {
 #[test]
 fn both_map_formats_give_the_same_mission() {
     let options = MapOptions { start: "h1".to_owned(), goal: "h4".to_owned(), ..MapOptions::default() };
+    // The times of long switches exceed 32 bits.
+    let long = MapOptions { switch_seconds: u32::MAX, ..options.clone() };
+    let slow = import_map("map", &map(), &long).expect("a map").problem;
+    assert!(slow.contains(&format!(" {})", 2 * u64::from(u32::MAX))), "{slow}");
     let (old, new) = (map(), map().replace("\"coord\"", "\"coords\""));
     let [old, new] = [old, new].map(|text| import_map("map", &text, &options).expect("a map"));
     assert_eq!((&old.manifest, &old.knowledge, &old.domain), (&new.manifest, &new.knowledge, &new.domain));
