@@ -184,6 +184,8 @@ impl World {
         self.time = rounded(self.time + step);
         self.work(step, remaining, &mut events);
         self.disturb(&mut events)?;
+        // A disturbance can fulfil the condition of another one, also while no action makes progress.
+        self.watch();
         self.swing(&mut events)?;
         events.push(Event::Tick);
         Ok(events)
@@ -256,9 +258,12 @@ impl World {
         }
     }
 
-    /// Records the time at which the pipeline is found. Schedules the disturbances whose conditions
-    /// now hold for the first time.
+    /// Records the time at which the pipeline is found, and the loss of the robot. Schedules the disturbances
+    /// whose conditions now hold for the first time.
     fn watch(&mut self) {
+        let lifeline = self.watched.lifeline.as_ref();
+        let value = lifeline.and_then(|lifeline| self.truth.value(lifeline.trim_matches(['(', ')'])));
+        self.lost |= value.is_some_and(|value| value <= BigRational::default());
         if self.found.is_none() && self.watched.found.as_ref().is_some_and(|found| self.holds(found)) {
             self.found = Some(self.time);
         }
