@@ -339,7 +339,7 @@ impl Coadaptation {
 /// Converts the battery's level or reserve to a number of levels (M122).
 fn battery_levels(name: &str, levels: &BigRational) -> Result<u32, Errors> {
     levels.to_integer().to_u32().ok_or_else(|| {
-        let text = format!("`{name}` is {levels} levels of the battery; it must be between 0 and {}", u32::MAX);
+        let text = format!("`{name}` is {levels} battery levels; it must be between 0 and {}", u32::MAX);
         vec![Message::error("M122", text)].into()
     })
 }

@@ -202,7 +202,8 @@ fn rounded(value: f64, digits: usize) -> f64 {
 /// Converts the text of a map to the files of a mission.
 ///
 /// # Errors
-/// The text is not a map of the supported form, or a place, corridor or configuration in `options` does not exist.
+/// The text is not a map of the supported form, or a place, corridor or configuration in `options` does not
+/// exist.
 pub fn import_map(file: &str, text: &str, options: &MapOptions) -> Result<Files, Errors> {
     let map = Map::read(file, text)?;
     let places = map.places();

@@ -84,8 +84,8 @@ pub(super) fn names_of_moves(mission: &Coadaptation) -> Vec<String> {
     distinct(mission.arcs.iter().map(|arc| format!("go_{}_{}", place(arc.from), place(arc.to))))
 }
 
-/// Converts names to identifiers. Identifiers that would be equal get a number, because rewards belong to the name of
-/// an action.
+/// Converts names to identifiers. Identifiers that would be equal get a number, because rewards belong to the
+/// name of an action.
 fn distinct(names: impl Iterator<Item = String>) -> Vec<String> {
     let mut used = BTreeSet::new();
     let mut identifiers = Vec::new();

@@ -316,7 +316,8 @@ impl Keeper {
             return Ok(());
         };
         self.configurator.knowledge_mut().take(&to, RobotReport::Design(false))?;
-        // A later change of the same objective has replaced this change. It begins with the design that the robot has.
+        // A later change of the same objective has replaced this change. It begins with the design that the
+        // robot has.
         let mut later = self.pending_changes.range_mut(effect..).map(|(_, later)| later);
         if let Some(later) = later.find(|later| later.objective == objective) {
             later.from = from;

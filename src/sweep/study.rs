@@ -200,7 +200,7 @@ impl Study {
         if sections.time_limit.is_some_and(|limit| !is_time(limit)) {
             mistakes.push(wrong(
                 &["time_limit".into()],
-                "`time_limit` should be a number of seconds above 0 that is not too large for a clock".to_owned(),
+                "`time_limit` should be a number of seconds above 0 and below 10^19".to_owned(),
             ));
         }
         if !sections.rows.is_empty() && !sections.rows.starts_with('/') {

@@ -49,7 +49,8 @@ fn one_answer_is_a_table_of_one_row() {
     let directory = tempfile::tempdir().expect("a directory");
     let file = directory.path().join("one.csv");
     let arguments = ["check", "-", "Pmax=? [ F s=1 ]", "--csv", file.to_str().expect("UTF-8")];
-    let outcome = metaplan_in(&root(), &arguments, &MODEL.replace("PROBABILITIES", "0.5:(s'=1) + 0.5:(s'=2)"));
+    let model = MODEL.replace("PROBABILITIES", "0.5:(s'=1) + 0.5:(s'=2)");
+    let outcome = metaplan_in(&root(), &arguments, &model);
     assert_eq!(outcome.status, 0, "{outcome:#?}");
     assert_eq!(std::fs::read_to_string(&file).expect("a table"), "Pmax=? [ F s=1 ]\n0.5\n");
 }

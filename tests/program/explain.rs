@@ -84,7 +84,8 @@ fn bounds_of_small_values_are_found() {
     );
     write(
         "problem.pddl",
-        "(define (problem p) (:domain d) (:init (= (x) 0.0005) (= (c) 0)) (:goal (done)) (:metric minimize (c)))",
+        "(define (problem p) (:domain d) (:init (= (x) 0.0005) (= (c) 0)) (:goal (done))
+         (:metric minimize (c)))",
     );
     let knowledge = crate::common::root().join("ontology/kb/ugv.ttl");
     write(

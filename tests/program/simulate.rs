@@ -347,9 +347,9 @@ fn simulate_stalled(settings: &str) -> Value {
     let path = |name: &str| root().join(name).display().to_string();
     let events = "[[scenarios.s.simulation.events]]";
     let text = format!(
-        "name = 'm'\n[knowledge]\nfiles = ['{}']\n[planning]\ndomain = '{}'\nproblem = '{}'\ntime_unit = 'minutes'\n\
-         [scenarios.s]\ndescription = 'e'\n[scenarios.s.simulation]\nstep = 0.1\ntime_budget = 20\npatience = 0.5\n\
-         {}\n",
+        "name = 'm'\n[knowledge]\nfiles = ['{}']\n[planning]\ndomain = '{}'\nproblem = '{}'\n\
+         time_unit = 'minutes'\n[scenarios.s]\ndescription = 'e'\n[scenarios.s.simulation]\nstep = 0.1\n\
+         time_budget = 20\npatience = 0.5\n{}\n",
         path("ontology/kb/ugv.ttl"),
         path("encodings/ugv/domain.pddl"),
         path("encodings/ugv/problem.pddl"),
