@@ -234,6 +234,19 @@ fn classes_required_by_one_action_do_not_guard_facts_of_others() {
     assert_eq!(comparison.least_steps, Some(2));
 }
 
+#[test]
+fn names_of_companions_can_be_predicates_of_the_domain() {
+    let knowledge = knowledge("ClassAssertion(:Ca :i1)\n");
+    let domain = "(define (domain d) (:requirements :strips :derived-predicates)
+ (:predicates (done ?x) (possible-inferred-Cb ?x))
+ (:action a :parameters (?x) :precondition (Ca ?x) :effect (Cb ?x))
+ (:action b :parameters (?x) :precondition (and (inferred-Cb ?x) (possible-inferred-Cb ?x)) :effect (done ?x)))\n"
+        .to_owned();
+    let problem = "(define (problem p) (:domain d) (:init) (:goal (done i1)))\n".to_owned();
+    let comparison = compare(&Texts { knowledge, domain, problem }, "companions").expect("few states");
+    assert_eq!(comparison.least_steps, None);
+}
+
 /// The domain may conclude a predicate of the knowledge base from a predicate that only the domain has, settled
 /// or changed by an action.
 #[test]
