@@ -60,8 +60,9 @@ pub struct World {
 }
 
 fn exact(value: f64) -> BigRational {
-    let scaled = (value * GRAIN).round();
-    BigRational::new((scaled as i64).into(), (GRAIN as i64).into())
+    // Infinite values do not pass the checks of the settings.
+    let scaled = BigRational::from_float((value * GRAIN).round()).unwrap_or_default();
+    scaled / BigRational::from_integer((GRAIN as i64).into())
 }
 
 fn rounded(value: f64) -> f64 {
@@ -368,4 +369,15 @@ impl World {
 
 fn is_valid(domain: &Domain, problem: &Problem) -> bool {
     validate(domain, problem, &PlanText::default(), &Options::default()).valid
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn large_values_are_exact() {
+        assert_eq!(exact(1e14), BigRational::from_integer(100_000_000_000_000_i64.into()));
+        assert_eq!(exact(-0.25), BigRational::new((-1).into(), 4.into()));
+    }
 }
