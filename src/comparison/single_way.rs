@@ -99,11 +99,7 @@ impl RouteWriter<'_> {
                 open.op(BinaryOp::Or, Expr::name("ROUTE").op(BinaryOp::Equal, Expr::int(route as i64)));
             let chosen = vec![assign("r", Expr::int(route as i64))];
             let guard = all([equals("r", 0), is_requested]);
-            commands.push(command(
-                format!("route_{route}"),
-                guard,
-                updates([(BigRational::one(), chosen)]),
-            ));
+            commands.push(command(format!("route_{route}"), guard, updates([(BigRational::one(), chosen)])));
         }
         let chosen = || Expr::name("r").op(BinaryOp::NotEqual, Expr::int(0));
         for (new, _) in mission.configurations.iter().enumerate().filter(|(_, c)| c.available) {
