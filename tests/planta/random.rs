@@ -110,9 +110,10 @@ fn condition(random: &mut Rng, has_axiom: bool) -> String {
 
 fn effect(random: &mut Rng) -> String {
     let variable = pick(random, &["?x", "?x", "?y"]);
-    let atom = match random.u8(..6) {
+    let atom = match random.u8(..7) {
         0 | 1 => format!("({} {variable})", pick(random, &CLASSES)),
         2 | 3 => format!("({} ?x ?y)", pick(random, &PROPERTIES)),
+        4 => format!("(charged {variable})"),
         _ => format!("(done {variable})"),
     };
     if random.u8(..10) < 2 { format!("(not {atom})") } else { atom }
@@ -122,13 +123,18 @@ fn texts(seed: u64) -> Texts {
     let mut random = Rng::with_seed(seed);
     let knowledge = knowledge(&axioms(&mut random));
     let mut domain =
-        "(define (domain d) (:requirements :strips :derived-predicates)\n (:predicates (done ?x)".to_owned();
+        "(define (domain d) (:requirements :strips :derived-predicates)\n (:predicates (done ?x) (charged ?x)"
+            .to_owned();
     let has_axiom = random.u8(..10) < 4;
     if has_axiom {
         let [first, second] = [pick(&mut random, &CLASSES), pick(&mut random, &CLASSES)].map(inferred);
         let _ = write!(domain, " (usable ?x))\n (:derived (usable ?x) (and ({first} ?x) ({second} ?x)))");
     } else {
         domain.push(')');
+    }
+    // The domain concludes a predicate of the knowledge base from a predicate of its own.
+    if random.u8(..10) < 3 {
+        let _ = write!(domain, "\n (:derived ({} ?x) (charged ?x))", inferred(pick(&mut random, &CLASSES)));
     }
     // PLANTA's form is recognised by an inferred predicate in a condition, so the first action has one.
     for number in 0..random.usize(2..5) {
@@ -154,7 +160,7 @@ fn texts(seed: u64) -> Texts {
         inferred(pick(&mut random, &CLASSES)),
         pick(&mut random, &INDIVIDUALS)
     );
-    let problem = format!("(define (problem p) (:domain d) (:init) (:goal {goal}))\n");
+    let problem = format!("(define (problem p) (:domain d) (:init (charged i1)) (:goal {goal}))\n");
     Texts { knowledge, domain, problem }
 }
 
