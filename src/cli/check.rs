@@ -126,6 +126,10 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     }
     progress.finish();
     if queries.listed.len() == 1 && !is_series && arguments.props.is_none() {
+        if let (Some(path), [one]) = (&arguments.csv, &answered[..]) {
+            let rows = [(one.combination, &one.reports[..])];
+            output::write_file(path, &csv(&[&queries.listed[0].text[..]], &rows))?;
+        }
         let report = answered.swap_remove(0).reports.swap_remove(0).map_err(failed)?;
         return single(arguments, common, &queries.listed[0].text, &report);
     }

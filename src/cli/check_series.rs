@@ -28,7 +28,11 @@ pub type Row<'a> = (&'a Combination, &'a [Result<Report, Error>]);
 /// fastest.
 pub fn combinations(constants: &[(String, String)]) -> Result<Vec<Combination>, Failure> {
     let mut combinations = vec![Combination { settings: Settings::new(), varied: Vec::new() }];
-    for (name, text) in constants {
+    for (index, (name, text)) in constants.iter().enumerate() {
+        if constants[..index].iter().any(|(earlier, _)| earlier == name) {
+            let text = format!("the constant `{name}` has two values");
+            return Err(Failure::usage(Message::error("M107", text)));
+        }
         let values = values(name, text).map_err(|text| Failure::usage(Message::error("M107", text)))?;
         if combinations.len().saturating_mul(values.len()) > MOST {
             let text = format!("more than {MOST} combinations of the values of constants");

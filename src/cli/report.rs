@@ -75,7 +75,9 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     output::warnings(common, setup.mission.warnings());
     let limits = guard.plan();
     let separation = arguments.overlap.separation();
-    let answer = during("planning", common, || Answer::of(&setup.mission, &positions, separation, &limits))?;
+    // Of two plans, the first gets half of the time.
+    let first = if before.is_some() { limits.half() } else { limits.clone() };
+    let answer = during("planning", common, || Answer::of(&setup.mission, &positions, separation, &first))?;
     let before = match &before {
         Some(before) => {
             let work = || Answer::of(&before.mission, &positions, separation, &limits);

@@ -86,11 +86,16 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     experiment.note_doubts();
     output::warnings(common, experiment.mission().warnings());
     consistent(experiment.mission().knowledge())?;
-    let strategies: Vec<Strategy> = if arguments.strategy.is_empty() {
-        Strategy::ALL.to_vec()
-    } else {
-        arguments.strategy.iter().map(|who| who.strategy()).collect()
-    };
+    let mut strategies: Vec<Strategy> = Vec::new();
+    for strategy in arguments.strategy.iter().map(|who| who.strategy()) {
+        // The missions of a repeated strategy would be counted twice.
+        if !strategies.contains(&strategy) {
+            strategies.push(strategy);
+        }
+    }
+    if strategies.is_empty() {
+        strategies = Strategy::ALL.to_vec();
+    }
     let limits = guard.plan();
     let played = play(&experiment, &strategies, arguments, &limits, common)?;
     let runs = &played.runs;
@@ -158,7 +163,8 @@ fn play(
     let total = strategies.len() as u64 * u64::from(arguments.runs);
     let progress = Progress::new("simulating", common);
     let (mut runs, mut logs) = (Vec::new(), vec![String::new(); strategies.len()]);
-    'all: for seed in (arguments.seed..).take(arguments.runs as usize) {
+    'all: for number in 0..u64::from(arguments.runs) {
+        let seed = arguments.seed.wrapping_add(number);
         let is_first = seed == arguments.seed && arguments.log.is_some();
         for (index, &strategy) in strategies.iter().enumerate() {
             let mut note = |observation: &Observation, answers: &[Answer]| {

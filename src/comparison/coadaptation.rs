@@ -234,14 +234,15 @@ impl Coadaptation {
             designs.iter().map(|old| designs.iter().map(|new| switch(old, new)).collect()).collect();
         let unit = BigRational::from(BigInt::from(roles.battery_unit.max(1)));
         let reserve = facts.value(&roles.reserve, &[]).unwrap_or_else(BigRational::zero);
-        let battery = facts
-            .value(&roles.battery, &[])
-            .and_then(|value| (value / &unit).floor().to_integer().to_u32())
-            .map(|initial| Battery {
-                initial,
-                reserve: (reserve / &unit).ceil().to_integer().to_u32().unwrap_or(0),
+        let reserve = (reserve / &unit).ceil();
+        let battery = facts.value(&roles.battery, &[]).map(|value| {
+            Ok::<_, Errors>(Battery {
+                initial: battery_levels(&roles.battery, &(value / &unit).floor())?,
+                reserve: battery_levels(&roles.reserve, &reserve)?,
                 unit: roles.battery_unit.max(1),
-            });
+            })
+        });
+        let battery = battery.transpose()?;
         let loss = roles.loss_component.clone().map(|component| Loss {
             component,
             rate: probabilistic::number::from_shortest_decimal(roles.loss_rate)
@@ -333,6 +334,14 @@ impl Coadaptation {
         }
         result
     }
+}
+
+/// Converts the battery's level or reserve to a number of levels (M122).
+fn battery_levels(name: &str, levels: &BigRational) -> Result<u32, Errors> {
+    levels.to_integer().to_u32().ok_or_else(|| {
+        let text = format!("`{name}` is {levels} battery levels; it must be between 0 and {}", u32::MAX);
+        vec![Message::error("M122", text)].into()
+    })
 }
 
 pub(super) fn fits(places: usize, configurations: usize) -> Result<(), Errors> {

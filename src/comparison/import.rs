@@ -202,7 +202,8 @@ fn rounded(value: f64, digits: usize) -> f64 {
 /// Converts the text of a map to the files of a mission.
 ///
 /// # Errors
-/// The text is not a map of the supported form, or a place or configuration in `options` does not exist.
+/// The text is not a map of the supported form, or a place, corridor or configuration in `options` does not
+/// exist.
 pub fn import_map(file: &str, text: &str, options: &MapOptions) -> Result<Files, Errors> {
     let map = Map::read(file, text)?;
     let places = map.places();
@@ -218,6 +219,13 @@ pub fn import_map(file: &str, text: &str, options: &MapOptions) -> Result<Files,
             Message::at("M124", file, None, text)
         })
         .collect();
+    let arcs = arcs(&map);
+    for (a, b) in options.dark.iter().filter(|(a, b)| !arcs.contains(&pair(a, b))) {
+        if places.contains(a.as_str()) && places.contains(b.as_str()) {
+            let text = format!("the map has no corridor between `{a}` and `{b}`, so it cannot be dark");
+            problems.push(Message::at("M124", file, None, text));
+        }
+    }
     if !DESIGNS.iter().any(|Design(name, ..)| *name == options.configuration) {
         let names: Vec<_> = DESIGNS.iter().map(|Design(name, ..)| *name).collect();
         let text =
@@ -331,17 +339,20 @@ fn domain(options: &MapOptions) -> String {
     lines.fold(String::new(), |text, line| text + line + "\n")
 }
 
+fn arcs(map: &Map<'_>) -> BTreeSet<Corridor> {
+    let nodes = map.nodes.iter();
+    let neighbours =
+        nodes.flat_map(|node| node.neighbours.iter().map(|neighbour| pair(&node.id.text, &neighbour.text)));
+    neighbours.collect()
+}
+
 fn problem(map: &Map<'_>, options: &MapOptions) -> String {
     let times = measured(&map.time, "mean", 4);
     let hits = measured(&map.hitrate, "hitrate", 9);
     let successes = measured(&map.successrate, "successrate", 9);
     let at: BTreeMap<&str, &Coordinates> =
         map.nodes.iter().map(|node| (node.id.text.as_str(), &node.coords)).collect();
-    let arcs: BTreeSet<Corridor> = map
-        .nodes
-        .iter()
-        .flat_map(|node| node.neighbours.iter().map(|neighbour| pair(&node.id.text, &neighbour.text)))
-        .collect();
+    let arcs = arcs(map);
     let length =
         |(a, b): &Corridor| (at[a.as_str()].x - at[b.as_str()].x).hypot(at[a.as_str()].y - at[b.as_str()].y);
     let dark: BTreeSet<Corridor> = options.dark.iter().map(|(a, b)| pair(a, b)).collect();
@@ -393,7 +404,7 @@ fn problem(map: &Map<'_>, options: &MapOptions) -> String {
             let (before, after) = (old.components(), new.components());
             let off = before.iter().filter(|component| !after.contains(component)).count();
             let on = after.iter().filter(|component| !before.contains(component)).count();
-            let seconds = (off + on) as u32 * options.switch_seconds;
+            let seconds = (off + on) as u64 * u64::from(options.switch_seconds);
             let _ = writeln!(init, "    (= (switch_time {} {}) {seconds})", old.object(), new.object());
         }
     }

@@ -19,7 +19,8 @@ use crate::comparison::process::{REWARDS, Risk};
 /// Returns the PRISM model of a mission. Its variables are the place `l`, the configuration `c` and, as far as `risk`
 /// includes them, the battery `b` and the flags `hit`, `failed` and `lost`.
 pub fn program(mission: &Coadaptation, risk: Risk) -> Model {
-    let writer = ProcessWriter { mission, risk };
+    let writer =
+        ProcessWriter { mission, risk, sets: names_of_changes(mission), moves: names_of_moves(mission) };
     model(
         writer.remark(),
         Vec::new(),
@@ -66,6 +67,38 @@ pub(super) fn flag(name: &str) -> Variable {
 struct ProcessWriter<'a> {
     mission: &'a Coadaptation,
     risk: Risk,
+    /// Names of the actions that change to each configuration.
+    sets: Vec<String>,
+    /// Names of the moves along each arc.
+    moves: Vec<String>,
+}
+
+/// Returns the names of the actions that change to each configuration.
+pub(super) fn names_of_changes(mission: &Coadaptation) -> Vec<String> {
+    distinct(mission.configurations.iter().map(|configuration| format!("set_{}", configuration.name)))
+}
+
+/// Returns the names of the moves along each arc.
+pub(super) fn names_of_moves(mission: &Coadaptation) -> Vec<String> {
+    let place = |place: usize| &mission.places[place];
+    distinct(mission.arcs.iter().map(|arc| format!("go_{}_{}", place(arc.from), place(arc.to))))
+}
+
+/// Converts names to identifiers. Identifiers that would be equal get a number, because rewards belong to the
+/// name of an action.
+fn distinct(names: impl Iterator<Item = String>) -> Vec<String> {
+    let mut used = BTreeSet::new();
+    let mut identifiers = Vec::new();
+    for name in names {
+        let plain = identifier(&name);
+        let (mut distinct, mut number) = (plain.clone(), 1);
+        while !used.insert(distinct.clone()) {
+            number += 1;
+            distinct = format!("{plain}_{number}");
+        }
+        identifiers.push(distinct);
+    }
+    identifiers
 }
 
 pub(super) fn equals(variable: &str, value: usize) -> Expr {
@@ -144,12 +177,11 @@ impl ProcessWriter<'_> {
     }
 
     fn set(&self, configuration: usize) -> String {
-        identifier(&format!("set_{}", self.mission.configurations[configuration].name))
+        self.sets[configuration].clone()
     }
 
     fn go(&self, arc: usize) -> String {
-        let arc = &self.mission.arcs[arc];
-        identifier(&format!("go_{}_{}", self.mission.places[arc.from], self.mission.places[arc.to]))
+        self.moves[arc].clone()
     }
 
     fn commands(&self) -> Vec<Command> {

@@ -13,11 +13,11 @@ use probabilistic::Place;
 use probabilistic::prism::ast::{
     BinaryOp, Constant, Expr, ExprKind, Function, Model, Named, Rewards, Type, Variable,
 };
-use probabilistic::prism::identifier;
 
 use crate::comparison::coadaptation::Coadaptation;
 use crate::comparison::program::{
-    all, assign, command, equals, flag, item, model, not, number, range, updates,
+    all, assign, command, equals, flag, item, model, names_of_changes, names_of_moves, not, number, range,
+    updates,
 };
 use crate::comparison::published::{ROUTES, shortest_routes};
 
@@ -26,7 +26,8 @@ use crate::comparison::published::{ROUTES, shortest_routes};
 /// after a reconfiguration; the flag `collided` is true if the latest risky move has collided.
 pub fn published_program(mission: &Coadaptation) -> Model {
     let routes = shortest_routes(mission, ROUTES);
-    let writer = RouteWriter { mission, routes };
+    let writer =
+        RouteWriter { mission, routes, sets: names_of_changes(mission), moves: names_of_moves(mission) };
     let route = Constant { name: "ROUTE".to_owned(), kind: Type::Int, value: None, place: Place::default() };
     let parts = (writer.variables(), writer.commands());
     model(writer.remark(), vec![route], parts, writer.rewards(), writer.labels())
@@ -35,10 +36,8 @@ pub fn published_program(mission: &Coadaptation) -> Model {
 struct RouteWriter<'a> {
     mission: &'a Coadaptation,
     routes: Vec<Vec<usize>>,
-}
-
-fn name(what: &str, thing: &str) -> String {
-    identifier(&format!("{what}_{thing}"))
+    sets: Vec<String>,
+    moves: Vec<String>,
 }
 
 impl RouteWriter<'_> {
@@ -100,20 +99,16 @@ impl RouteWriter<'_> {
                 open.op(BinaryOp::Or, Expr::name("ROUTE").op(BinaryOp::Equal, Expr::int(route as i64)));
             let chosen = vec![assign("r", Expr::int(route as i64))];
             let guard = all([equals("r", 0), is_requested]);
-            commands.push(command(
-                name("route", &route.to_string()),
-                guard,
-                updates([(BigRational::one(), chosen)]),
-            ));
+            commands.push(command(format!("route_{route}"), guard, updates([(BigRational::one(), chosen)])));
         }
         let chosen = || Expr::name("r").op(BinaryOp::NotEqual, Expr::int(0));
-        for (new, configuration) in mission.configurations.iter().enumerate().filter(|(_, c)| c.available) {
+        for (new, _) in mission.configurations.iter().enumerate().filter(|(_, c)| c.available) {
             let Some(switch) = &mission.switches[mission.initial][new] else { continue };
             let guard = all([chosen(), equals("p", 0), not(Expr::name("rd")), equals("c", mission.initial)]);
             let mut changed = self.spent(&switch.energy);
             changed.extend([assign("c", Expr::int(new as i64)), assign("rd", Expr::bool(true))]);
             let updates = updates([(BigRational::one(), changed)]);
-            commands.push(command(name("set", &configuration.name), guard, updates));
+            commands.push(command(self.sets[new].clone(), guard, updates));
         }
         for (route, arcs) in self.routes.iter().enumerate() {
             for (position, arc) in arcs.iter().enumerate() {
@@ -144,8 +139,7 @@ impl RouteWriter<'_> {
     }
 
     fn go(&self, arc: usize) -> String {
-        let arc = &self.mission.arcs[arc];
-        name("go", &format!("{}_{}", self.mission.places[arc.from], self.mission.places[arc.to]))
+        self.moves[arc].clone()
     }
 
     fn rewards(&self) -> Vec<Rewards> {
@@ -158,13 +152,9 @@ impl RouteWriter<'_> {
                 }
             }
         };
-        for (new, configuration) in mission.configurations.iter().enumerate() {
+        for (new, set) in self.sets.iter().enumerate() {
             if let Some(switch) = &mission.switches[mission.initial][new] {
-                add_reward(
-                    &name("set", &configuration.name),
-                    Expr::bool(true),
-                    [&switch.time, &switch.energy],
-                );
+                add_reward(set, Expr::bool(true), [&switch.time, &switch.energy]);
             }
         }
         let arcs: std::collections::BTreeSet<usize> = self.routes.iter().flatten().copied().collect();

@@ -86,7 +86,8 @@ impl Tasked {
         let mut way = Vec::new();
         let mut place = situation.place;
         // Predecessor links give the actions in reverse order.
-        while let Some((before, act)) = &self.origins[place] {
+        // The merged goal place of a mission whose goal holds already is no task state.
+        while let Some(Some((before, act))) = self.origins.get(place) {
             way.push(act);
             place = *before;
         }

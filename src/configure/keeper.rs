@@ -309,15 +309,18 @@ impl Keeper {
     }
 
     /// Undoes a failed change of design. Marks the new design as not realisable, so that the next best design is
-    /// chosen. Restores the previous design, unless a later change of the same objective is stored. Does nothing if
-    /// the failed change is not stored (any more).
+    /// chosen. Restores the previous design, unless a later change of the same objective is stored, which then restores
+    /// it if it fails, too. Does nothing if the failed change is not stored (any more).
     fn undo(&mut self, effect: u64) -> Result<(), Message> {
         let Some(PendingChange { objective, from, to }) = self.pending_changes.remove(&effect) else {
             return Ok(());
         };
         self.configurator.knowledge_mut().take(&to, RobotReport::Design(false))?;
-        // A later change of the same objective has replaced this change.
-        if self.pending_changes.range(effect..).any(|(_, later)| later.objective == objective) {
+        // A later change of the same objective has replaced this change. It begins with the design that the
+        // robot has.
+        let mut later = self.pending_changes.range_mut(effect..).map(|(_, later)| later);
+        if let Some(later) = later.find(|later| later.objective == objective) {
+            later.from = from;
             return Ok(());
         }
         self.configurator.revert(&objective, from.as_deref())

@@ -13,7 +13,7 @@ use crate::message::Errors;
 use crate::mission::Mission;
 use crate::number;
 
-/// Bisection ends if the interval is at most the current value divided by this number.
+/// Bisection ends if the interval is at most the current value divided by this number, or at most [`little`].
 const BISECTION_RESOLUTION: i64 = 1000;
 
 /// Result of [`smallest_changes`]: smallest changes of single values that lead to another plan.
@@ -149,7 +149,8 @@ impl VariedMission<'_> {
             same = value;
         }
         let Some((mut value, mut then)) = other else { return Ok(Outcome::None) };
-        let fine = from / whole(BISECTION_RESOLUTION);
+        // Values are rounded, so an interval of [`little`] cannot be divided.
+        let fine = (from / whole(BISECTION_RESOLUTION)).max(little());
         loop {
             let distance = if upwards { &value - &same } else { &same - &value };
             if distance <= fine {

@@ -5,6 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use pddl::ast::{Condition, Derived, Name, Term, TypedName};
 
+/// Maximum number of clauses of an axiom, and of the clauses that unfolding a predicate considers.
+pub(super) const MAX_CLAUSES: usize = 1000;
+
 pub(super) type Fact = (Name, Vec<Name>);
 
 /// A Horn clause `head(arguments) ← body`, possibly with inequalities in the body. Its variables
@@ -59,7 +62,7 @@ pub(super) fn of_type(r#type: &Name) -> Name {
 
 /// Converts a derived predicate to clauses without equalities. Supports conjunctions, disjunctions and existential
 /// quantifiers over atoms, equalities and negated equalities. Returns `None` for other conditions, for repeated
-/// variable names, and for variables with several types.
+/// variable names, for variables with several types, and if a limit is exceeded.
 pub(super) fn clauses(derived: &Derived) -> Option<Vec<Clause>> {
     let head = &derived.head;
     let mut variables: BTreeSet<Name> = BTreeSet::new();
@@ -96,7 +99,7 @@ fn typed(variables: &[TypedName], names: &mut BTreeSet<Name>) -> Option<Vec<Lite
 }
 
 /// Converts a condition to disjunctive normal form, as a list of conjunctions. Returns `None` for
-/// unsupported conditions.
+/// unsupported conditions, and for more than [`MAX_CLAUSES`] conjunctions.
 fn disjuncts(condition: &Condition, variables: &mut BTreeSet<Name>) -> Option<Vec<Vec<Literal>>> {
     let single = |literal| Some(vec![vec![literal]]);
     match condition {
@@ -106,6 +109,11 @@ fn disjuncts(condition: &Condition, variables: &mut BTreeSet<Name>) -> Option<Ve
                 let part = disjuncts(part, variables)?;
                 let concatenated =
                     |left: &Vec<Literal>, right: &Vec<Literal>| [left.clone(), right.clone()].concat();
+                // The form grows exponentially with the conjuncts; an axiom that is not a clause is merely less
+                // efficient.
+                if conjunctions.len() * part.len() > MAX_CLAUSES {
+                    return None;
+                }
                 conjunctions = conjunctions
                     .iter()
                     .flat_map(|left| part.iter().map(move |right| concatenated(left, right)))
@@ -114,9 +122,15 @@ fn disjuncts(condition: &Condition, variables: &mut BTreeSet<Name>) -> Option<Ve
             Some(conjunctions)
         }
         Condition::Or(parts) => {
-            let parts: Option<Vec<_>> =
-                parts.iter().map(|part| disjuncts(part, &mut variables.clone())).collect();
-            Some(parts?.concat())
+            // Several disjuncts may bind the same name, but no later conjunct.
+            let outer = variables.clone();
+            let mut conjunctions = Vec::new();
+            for part in parts {
+                let mut names = outer.clone();
+                conjunctions.extend(disjuncts(part, &mut names)?);
+                variables.extend(names);
+            }
+            Some(conjunctions)
         }
         Condition::Exists(bound, inner) => {
             let types = typed(bound, variables)?;
@@ -222,5 +236,24 @@ impl Clause {
         body.extend(pairs.map(|(left, right)| Literal::Equal(true, left, right)));
         body.extend(by.body);
         Self { head: self.head.clone(), arguments: self.arguments.clone(), body }.resolved()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn conjunctions_of_many_disjunctions_are_not_clauses() {
+        let clauses_of = |conjuncts: usize| {
+            let text = format!(
+                "(define (domain d) (:predicates (a ?x) (b ?x) (c ?x))\n (:derived (c ?x) (and {})))",
+                "(or (a ?x) (b ?x)) ".repeat(conjuncts)
+            );
+            let domain = pddl::parse_domain(&pddl::Source::new("d.pddl", text)).0.expect("a domain");
+            clauses(&domain.derived[0]).map(|clauses| clauses.len())
+        };
+        assert_eq!(clauses_of(2), Some(4));
+        assert_eq!(clauses_of(40), None);
     }
 }

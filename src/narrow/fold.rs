@@ -49,14 +49,20 @@ impl Folded {
         Self { settled, possible }
     }
 
+    /// Returns the predicates on whose facts the result of [`facts`](Self::facts) depends.
+    pub fn premises(&self) -> BTreeSet<&Name> {
+        let clauses = self.settled.values().flatten().chain(self.possible.clauses());
+        clauses.flat_map(|clause| &clause.body).filter_map(Literal::name).collect()
+    }
+
     pub fn shorten(&self, domain: &mut Domain) {
         domain.derived.retain(|axiom| !self.settled.contains_key(&axiom.head.identifier.name));
         self.possible.restrict(domain);
     }
 
-    /// Returns the derived facts of settled predicates, without those in `stated` (the initial facts), and the
-    /// bounds of other derived predicates as facts, e.g. `(possible-p a)`. `is_of(object, type)` returns `true`
-    /// if an object has a type.
+    /// Returns the derived facts of settled predicates, without those in `stated` (the initial facts of the
+    /// vocabulary and of [`premises`](Self::premises)), and the bounds of other derived predicates as facts,
+    /// e.g. `(possible-p a)`. `is_of(object, type)` returns `true` if an object has a type.
     pub fn facts(
         &self,
         stated: &BTreeSet<Fact>,

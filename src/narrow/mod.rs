@@ -48,12 +48,11 @@ pub(crate) fn narrowed<'t>(
 /// extensions, so grounding handles them.
 fn narrow(domain: &Domain, problem: &Problem, completed: &HashSet<Name>) -> (Domain, Problem) {
     let mentioned = Mentioned::by_domain(domain).and_problem(problem);
-    let facts: BTreeSet<Fact> = problem
-        .init
-        .iter()
-        .filter_map(InitialElement::fact)
-        .filter(|(predicate, _)| completed.contains(predicate))
-        .collect();
+    let facts_of = |is_needed: &dyn Fn(&Name) -> bool| -> BTreeSet<Fact> {
+        let facts = problem.init.iter().filter_map(InitialElement::fact);
+        facts.filter(|(predicate, _)| is_needed(predicate)).collect()
+    };
+    let facts = facts_of(&|predicate| completed.contains(predicate));
     let heads = domain.derived.iter().map(|axiom| &axiom.head.identifier.name);
     let varying = mentioned.changed.iter().chain(heads).cloned().collect();
     let mut guards: Guards = settle::guards(domain, &varying, &mentioned.timed);
@@ -63,6 +62,9 @@ fn narrow(domain: &Domain, problem: &Problem, completed: &HashSet<Name>) -> (Dom
             && facts.iter().all(|fact| settle::keeps(fact, guard, &facts))
     });
     let folded = Folded::new(domain, (&mentioned.changed, &mentioned.timed), &guards, completed);
+    // An axiom of the domain can conclude a predicate of the knowledge base from a predicate of the domain.
+    let premises = folded.premises();
+    let facts = facts_of(&|predicate| completed.contains(predicate) || premises.contains(predicate));
     let (mut domain, mut problem) = (domain.clone(), problem.clone());
     folded.shorten(&mut domain);
     drop_unused(&mut domain, &problem);

@@ -38,8 +38,8 @@ pub(super) struct Possible {
 
 impl Possible {
     /// Determines which open predicates (predicates that actions can change) get a bound. A predicate has no bound if
-    /// one of its axioms is not a clause or leaves a variable unbound. Predicates that timed initial literals change
-    /// have no bound. If an action adds the predicate, each argument must be a constant, or a parameter for which the
+    /// one of its axioms is not a clause or leaves a variable unbound, or if the domain has a predicate with the
+    /// name of the companion. Predicates that timed initial literals change have no bound. If an action adds the predicate, each argument must be a constant, or a parameter for which the
     /// action requires a class. A predicate that depends on a predicate without bound has no bound, either.
     pub fn new(
         domain: &Domain,
@@ -48,6 +48,9 @@ impl Possible {
         is_class: &dyn Fn(&Name) -> bool,
     ) -> Self {
         let mut free = timed.clone();
+        // The name of a companion may belong to a predicate of the domain.
+        let names: BTreeSet<&Name> = domain.predicates.iter().map(|atom| &atom.identifier.name).collect();
+        free.extend(open.keys().filter(|name| names.contains(&possible(name))).cloned());
         free.extend(open.iter().filter(|(_, clauses)| clauses.is_none()).map(|(name, _)| name.clone()));
         // Members of a class have to be known before the bounds are computed, so open predicates do
         // not count as classes: their extensions may be larger in other states.

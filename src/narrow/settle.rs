@@ -19,10 +19,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use pddl::ast::{Action, ActionBody, Atom, Condition, Domain, Effect, Name, Term};
 
-use super::clause::{Clause, Fact, Literal, Operand};
+use super::clause::{Clause, Fact, Literal, MAX_CLAUSES, Operand};
 
 const MAX_DEPTH: usize = 8;
-const MAX_CLAUSES: usize = 1000;
 
 /// Guards. A guard is a predicate, an argument position and a class (unary predicate that never
 /// changes). In every fact of the predicate that an action adds, the argument at this position is in

@@ -13,6 +13,9 @@ use crate::mapek::{fact_text, unavailable};
 use crate::mission::Mission;
 use crate::number::decimal;
 
+/// Maximum depth of a tree of reasons. A page shows fewer levels.
+const DEPTH: usize = 100;
+
 /// Returns all designs of the mission's knowledge base, each with the numbers of the steps that use
 /// it.
 pub fn designs(mission: &Mission, steps: &[Step]) -> Vec<Design> {
@@ -99,20 +102,31 @@ pub(super) fn because(knowledge: &Knowledge, design: &str, available: bool) -> V
     let trees = states.into_iter().flat_map(|knowledge| {
         let symbols = knowledge.engine().symbols();
         let derivations = unavailable(knowledge, &design.individual.name);
-        let trees = derivations.iter().map(|derivation| tree(derivation, 0, symbols, &mut BTreeSet::new()));
+        let trees =
+            derivations.iter().map(|derivation| tree(derivation, 0, symbols, &mut BTreeSet::new(), 0));
         trees.collect::<Vec<_>>()
     });
     introduction.into_iter().chain(trees).collect()
 }
 
-/// Converts the step `at` of a derivation to a tree of reasons. A fact that is already in
-/// `explained` is named without its reasons.
-fn tree(derivation: &Derivation, at: usize, symbols: &Symbols, explained: &mut BTreeSet<usize>) -> Reason {
+/// Converts the step `at` of a derivation to a tree of reasons. Names facts that are already in `explained`, and
+/// facts below [`DEPTH`] levels, without their reasons.
+fn tree(
+    derivation: &Derivation,
+    at: usize,
+    symbols: &Symbols,
+    explained: &mut BTreeSet<usize>,
+    depth: usize,
+) -> Reason {
     let step = &derivation.steps[at];
     let fact = fact_text(&step.fact, symbols);
     let leaf = |text: String| Reason { text, supports: Vec::new() };
     if matches!(step.reason, Why::Asserted) {
         return leaf(format!("{fact} is stated"));
+    }
+    // Trees are converted, drawn and dropped by recursion, so the stack limits their depth.
+    if depth == DEPTH {
+        return leaf(format!("{fact} follows from further facts"));
     }
     // A derivation is a directed acyclic graph. Shared facts are expanded once.
     if !explained.insert(at) {
@@ -132,6 +146,32 @@ fn tree(derivation: &Derivation, at: usize, symbols: &Symbols, explained: &mut B
             (format!("the rule “{label}”"), supports.iter().chain(counted).copied().collect())
         }
     };
-    under.extend(supports.iter().map(|support| tree(derivation, *support, symbols, explained)));
+    under.extend(supports.iter().map(|support| tree(derivation, *support, symbols, explained, depth + 1)));
     Reason { text: format!("{fact} follows by {by}"), supports: under }
+}
+
+#[cfg(test)]
+mod tests {
+    use rules::{DerivationStep, Fact};
+
+    use super::*;
+
+    #[test]
+    fn long_derivations_end_at_the_maximum_depth() {
+        let mut symbols = Symbols::new();
+        let fact = Fact::new(symbols.name("http://x.org/p"), [symbols.name("http://x.org/a")]);
+        let step = |at: usize| DerivationStep {
+            fact: fact.clone(),
+            reason: Why::Equality { supports: vec![at + 1] },
+        };
+        let mut steps: Vec<DerivationStep> = (0..100_000).map(step).collect();
+        steps.push(DerivationStep { fact: fact.clone(), reason: Why::Asserted });
+        let mut reason = tree(&Derivation { steps }, 0, &symbols, &mut BTreeSet::new(), 0);
+        let mut depth = 0;
+        while let Some(support) = reason.supports.pop() {
+            reason = support;
+            depth += 1;
+        }
+        assert_eq!(depth, DEPTH);
+    }
 }

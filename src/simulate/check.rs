@@ -8,6 +8,11 @@ use crate::message::{Message, did_you_mean};
 use crate::mission::conditions::{self, Fault, written};
 use crate::mission::{Mission, Mistake, setting};
 
+/// Maximum of times, so that a clock in microseconds can hold them in each time unit.
+const MAX_TIME: f64 = 1e9;
+/// Maximum number of random failures of a component in a mission.
+const MAX_FAILURES: f64 = 1e6;
+
 #[derive(Debug, Clone, Default)]
 pub(super) struct Watched {
     /// Condition of each event, in the order of the events. `None` for an event with a time.
@@ -44,7 +49,7 @@ impl Simulation {
             checker.signal(index, signal);
         }
         for (index, failure) in self.failures.iter().enumerate() {
-            checker.failure(index, failure);
+            checker.failure(index, failure, self);
         }
         if let Some(suave) = &self.suave {
             checker.suave(suave, &mut watched);
@@ -82,6 +87,11 @@ impl Checker<'_> {
         }
         if simulation.step > 0.0 && simulation.time_budget / simulation.step > 1e6 {
             self.wrong(vec!["time_budget".into()], "`time_budget` is more than a million times `step`");
+        }
+        let seconds = simulation.time_budget.max(simulation.step);
+        if seconds.is_finite() && seconds > MAX_TIME {
+            let text = format!("`time_budget` and `step` should be at most {MAX_TIME:e}");
+            self.wrong(vec!["time_budget".into()], text);
         }
     }
 
@@ -186,12 +196,16 @@ impl Checker<'_> {
         }
     }
 
-    fn failure(&mut self, index: usize, failure: &RandomFailure) {
+    fn failure(&mut self, index: usize, failure: &RandomFailure, simulation: &Simulation) {
         let path = |key: &str| -> Vec<Key> { vec!["failures".into(), index.into(), key.into()] };
         self.component(path("component"), &failure.component);
         self.positive(path("mean_time"), failure.mean_time);
         if let Some(recovery) = failure.recovery {
             self.not_negative(path("recovery"), recovery);
+            if simulation.time_budget / (failure.mean_time + recovery) > MAX_FAILURES {
+                let text = "the component fails more than a million times within `time_budget`";
+                self.wrong(path("mean_time"), text);
+            }
         }
     }
 

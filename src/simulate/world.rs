@@ -60,8 +60,9 @@ pub struct World {
 }
 
 fn exact(value: f64) -> BigRational {
-    let scaled = (value * GRAIN).round();
-    BigRational::new((scaled as i64).into(), (GRAIN as i64).into())
+    // Infinite values do not pass the checks of the settings.
+    let scaled = BigRational::from_float((value * GRAIN).round()).unwrap_or_default();
+    scaled / BigRational::from_integer((GRAIN as i64).into())
 }
 
 fn rounded(value: f64) -> f64 {
@@ -184,6 +185,8 @@ impl World {
         self.time = rounded(self.time + step);
         self.work(step, remaining, &mut events);
         self.disturb(&mut events)?;
+        // A disturbance can fulfil the condition of another one, also while no action makes progress.
+        self.watch();
         self.swing(&mut events)?;
         events.push(Event::Tick);
         Ok(events)
@@ -256,9 +259,12 @@ impl World {
         }
     }
 
-    /// Records the time at which the pipeline is found. Schedules the disturbances whose conditions
-    /// now hold for the first time.
+    /// Records the time at which the pipeline is found, and the loss of the robot. Schedules the disturbances
+    /// whose conditions now hold for the first time.
     fn watch(&mut self) {
+        let lifeline = self.watched.lifeline.as_ref();
+        let value = lifeline.and_then(|lifeline| self.truth.value(lifeline.trim_matches(['(', ')'])));
+        self.lost |= value.is_some_and(|value| value <= BigRational::default());
         if self.found.is_none() && self.watched.found.as_ref().is_some_and(|found| self.holds(found)) {
             self.found = Some(self.time);
         }
@@ -363,4 +369,15 @@ impl World {
 
 fn is_valid(domain: &Domain, problem: &Problem) -> bool {
     validate(domain, problem, &PlanText::default(), &Options::default()).valid
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn large_values_are_exact() {
+        assert_eq!(exact(1e14), BigRational::from_integer(100_000_000_000_000_i64.into()));
+        assert_eq!(exact(-0.25), BigRational::new((-1).into(), 4.into()));
+    }
 }

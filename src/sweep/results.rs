@@ -74,9 +74,9 @@ impl Results {
             Err(TryLockError::WouldBlock) => return Err(wrong(&path, "another process writes it")),
             Err(TryLockError::Error(error)) => return Err(failed(error)),
         }
-        let mut text = String::new();
-        file.read_to_string(&mut text).map_err(failed)?;
-        let whole = text.rfind('\n').map_or(0, |end| end + 1);
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes).map_err(failed)?;
+        let whole = whole_lines(&bytes);
         let header = Header {
             format: FORMAT.to_owned(),
             study: study.digest.clone(),
@@ -91,7 +91,7 @@ impl Results {
                     "it exists already; continue with `--resume`, or use another directory",
                 ));
             }
-            let (found, lines) = parse(&path, &text[..whole])?;
+            let (found, lines) = parse(&path, &bytes[..whole])?;
             if found != header {
                 return Err(wrong(&path, OTHER_STUDY));
             }
@@ -128,7 +128,13 @@ fn wrong(path: &Path, text: &str) -> Message {
     Message::error("M151", format!("{}: {text}", path.display()))
 }
 
-fn parse(path: &Path, text: &str) -> Result<(Header, Vec<Line>), Message> {
+/// Returns the length of the complete lines. An incomplete last line may end within a character.
+fn whole_lines(bytes: &[u8]) -> usize {
+    bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1)
+}
+
+fn parse(path: &Path, bytes: &[u8]) -> Result<(Header, Vec<Line>), Message> {
+    let text = std::str::from_utf8(bytes).map_err(|error| wrong(path, &error.to_string()))?;
     let mut lines = text.lines();
     let header: Header = lines
         .next()
@@ -161,19 +167,20 @@ pub fn read_lines(directory: &Path, study: &Study) -> Result<Vec<Line>, Errors> 
     let header_start = format!("{{\"format\":\"{FORMAT}\"");
     let (mut all, mut mistakes) = (BTreeMap::<usize, Line>::new(), Vec::new());
     for path in &files {
-        let text = match std::fs::read_to_string(path) {
-            Ok(text) => text,
+        let bytes = match std::fs::read(path) {
+            Ok(bytes) => bytes,
             Err(error) => {
                 mistakes.push(wrong(path, &error.to_string()));
                 continue;
             }
         };
-        let whole = text.rfind('\n').map_or(0, |end| end + 1);
-        if whole == 0 && (text.starts_with(&header_start) || header_start.starts_with(&text)) {
+        let whole = whole_lines(&bytes);
+        let header_start = header_start.as_bytes();
+        if whole == 0 && (bytes.starts_with(header_start) || header_start.starts_with(&bytes)) {
             // The process was killed before it had written the header.
             continue;
         }
-        match parse(path, &text[..whole]) {
+        match parse(path, &bytes[..whole]) {
             Err(message) => mistakes.push(message),
             Ok((header, lines)) => {
                 if header.study != study.digest {

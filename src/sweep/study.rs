@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::time::Duration;
 
 use schemars::{JsonSchema, Schema, schema_for};
 use serde::Deserialize;
@@ -196,10 +197,11 @@ impl Study {
                 "`command` is empty; it should begin with a command such as `plan`".to_owned(),
             ));
         }
-        if sections.time_limit.is_some_and(|limit| limit.is_nan() || limit <= 0.0) {
+        let is_time = |limit: f64| limit > 0.0 && Duration::try_from_secs_f64(limit).is_ok();
+        if sections.time_limit.is_some_and(|limit| !is_time(limit)) {
             mistakes.push(wrong(
                 &["time_limit".into()],
-                "`time_limit` should be a number of seconds above 0".to_owned(),
+                "`time_limit` should be a number of seconds above 0 and below 10^19".to_owned(),
             ));
         }
         if !sections.rows.is_empty() && !sections.rows.starts_with('/') {
@@ -510,6 +512,10 @@ mod tests {
             study(&format!("command = ['plan']\n[vary]\n{wide}")).expect_err("it is wrong").to_string();
         assert!(errors.contains("`vary.b` has more than 10000000 values"), "{errors}");
         assert!(errors.contains("`vary.c` has no value"), "{errors}");
+        for limit in ["-1", "nan", "inf", "1e30"] {
+            let errors = study(&format!("command = ['plan']\ntime_limit = {limit}\n")).expect_err(limit);
+            assert!(errors.to_string().contains("time_limit"), "{errors}");
+        }
         let errors = study("command = ['plan', '{x}']").expect_err("x is not varied");
         assert!(errors.to_string().contains("{x}"), "{errors}");
         assert!(

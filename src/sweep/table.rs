@@ -7,8 +7,8 @@ use serde_json::{Map, Value};
 use super::results::{Line, essence};
 use crate::simulate::Sample;
 
-/// Column of the exit statuses, of which no mean is computed.
-const STATUS: &str = "status";
+/// Column of the exit statuses, of which no mean is computed. Many answers have a field `status`.
+const STATUS: &str = "exit_status";
 
 /// Value in a cell. `None` if the row has no value for the column.
 pub type Cell = Option<Value>;
@@ -199,7 +199,7 @@ mod tests {
             line(2, 1, "b", json!({"x": {"kind": "p"}})),
         ];
         let table = Table::new(&lines, "", false);
-        assert_eq!(table.columns, ["fail", "seed", "status", "timed_out", "x.cost", "x.kind"]);
+        assert_eq!(table.columns, ["fail", "seed", "exit_status", "timed_out", "x.cost", "x.kind"]);
         assert_eq!(table.rows[2].cells[4], None);
         let groups = table.groups(&["seed".to_owned()]);
         assert_eq!(groups.iter().map(|group| group.count).collect::<Vec<_>>(), [2, 1]);
@@ -209,6 +209,11 @@ mod tests {
         // the square root of two.
         assert!((costs.half_width - 12.706).abs() < 1e-9);
         assert!(Table::new(&lines, "", true).columns.contains(&"seconds".to_owned()));
+        // The status of an answer is a text that separates groups.
+        let answers = ["optimal", "feasible"].map(|status| line(0, 1, "a", json!({"status": status})));
+        let table = Table::new(&answers, "", false);
+        assert_eq!(table.columns, ["fail", "seed", "exit_status", "status", "timed_out"]);
+        assert_eq!(table.groups(&["seed".to_owned()]).len(), 2);
         let parts = Table::new(&[line(0, 1, "a", json!({"l": [{"v": 1}, {"v": 2}]}))], "/l", false);
         assert_eq!(parts.rows.len(), 2);
     }

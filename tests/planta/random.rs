@@ -110,9 +110,10 @@ fn condition(random: &mut Rng, has_axiom: bool) -> String {
 
 fn effect(random: &mut Rng) -> String {
     let variable = pick(random, &["?x", "?x", "?y"]);
-    let atom = match random.u8(..6) {
+    let atom = match random.u8(..7) {
         0 | 1 => format!("({} {variable})", pick(random, &CLASSES)),
         2 | 3 => format!("({} ?x ?y)", pick(random, &PROPERTIES)),
+        4 => format!("(charged {variable})"),
         _ => format!("(done {variable})"),
     };
     if random.u8(..10) < 2 { format!("(not {atom})") } else { atom }
@@ -122,13 +123,18 @@ fn texts(seed: u64) -> Texts {
     let mut random = Rng::with_seed(seed);
     let knowledge = knowledge(&axioms(&mut random));
     let mut domain =
-        "(define (domain d) (:requirements :strips :derived-predicates)\n (:predicates (done ?x)".to_owned();
+        "(define (domain d) (:requirements :strips :derived-predicates)\n (:predicates (done ?x) (charged ?x)"
+            .to_owned();
     let has_axiom = random.u8(..10) < 4;
     if has_axiom {
         let [first, second] = [pick(&mut random, &CLASSES), pick(&mut random, &CLASSES)].map(inferred);
         let _ = write!(domain, " (usable ?x))\n (:derived (usable ?x) (and ({first} ?x) ({second} ?x)))");
     } else {
         domain.push(')');
+    }
+    // The domain concludes a predicate of the knowledge base from a predicate of its own.
+    if random.u8(..10) < 3 {
+        let _ = write!(domain, "\n (:derived ({} ?x) (charged ?x))", inferred(pick(&mut random, &CLASSES)));
     }
     // PLANTA's form is recognised by an inferred predicate in a condition, so the first action has one.
     for number in 0..random.usize(2..5) {
@@ -154,7 +160,7 @@ fn texts(seed: u64) -> Texts {
         inferred(pick(&mut random, &CLASSES)),
         pick(&mut random, &INDIVIDUALS)
     );
-    let problem = format!("(define (problem p) (:domain d) (:init) (:goal {goal}))\n");
+    let problem = format!("(define (problem p) (:domain d) (:init (charged i1)) (:goal {goal}))\n");
     Texts { knowledge, domain, problem }
 }
 
@@ -232,6 +238,56 @@ fn classes_required_by_one_action_do_not_guard_facts_of_others() {
     let problem = "(define (problem p) (:domain d) (:init) (:goal (done i2)))\n".to_owned();
     let comparison = compare(&Texts { knowledge, domain, problem }, "two actions").expect("few states");
     assert_eq!(comparison.least_steps, Some(2));
+}
+
+#[test]
+fn names_of_companions_can_be_predicates_of_the_domain() {
+    let knowledge = knowledge("ClassAssertion(:Ca :i1)\n");
+    let domain = "(define (domain d) (:requirements :strips :derived-predicates)
+ (:predicates (done ?x) (possible-inferred-Cb ?x))
+ (:action a :parameters (?x) :precondition (Ca ?x) :effect (Cb ?x))
+ (:action b :parameters (?x) :precondition (and (inferred-Cb ?x) (possible-inferred-Cb ?x)) :effect (done ?x)))\n"
+        .to_owned();
+    let problem = "(define (problem p) (:domain d) (:init) (:goal (done i1)))\n".to_owned();
+    let comparison = compare(&Texts { knowledge, domain, problem }, "companions").expect("few states");
+    assert_eq!(comparison.least_steps, None);
+}
+
+/// The domain may conclude a predicate of the knowledge base from a predicate that only the domain has, settled
+/// or changed by an action.
+#[test]
+fn conclusions_from_predicates_of_the_domain_are_kept() {
+    let knowledge = knowledge("ClassAssertion(:Ca :i1) ClassAssertion(:Ca :i2)\n");
+    let problem = "(define (problem p) (:domain d) (:init (charged i1)) (:goal (done i1)))\n".to_owned();
+    let changes = ["", "(:action c :parameters (?x) :precondition (Ca ?x) :effect (charged ?x))\n"];
+    for change in changes {
+        let domain = format!(
+            "(define (domain d) (:requirements :strips :derived-predicates)\n (:predicates (done ?x) (charged ?x))
+ (:derived (inferred-Cb ?x) (charged ?x))
+ {change}(:action b :parameters (?x) :precondition (inferred-Cb ?x) :effect (done ?x)))\n"
+        );
+        let texts = Texts { knowledge: knowledge.clone(), domain, problem: problem.clone() };
+        let comparison = compare(&texts, "predicates of the domain").expect("few states");
+        assert_eq!(comparison.least_steps, Some(1));
+    }
+}
+
+/// A name that a disjunct binds is another variable than the same name in a later conjunct.
+#[test]
+fn variables_of_disjuncts_are_not_merged_with_later_ones() {
+    let knowledge = knowledge(
+        "ClassAssertion(:Ca :i1) ClassAssertion(:Cb :i2)
+         ObjectPropertyAssertion(:pa :i1 :i2) ObjectPropertyAssertion(:pb :i2 :i1)\n",
+    );
+    let domain = "(define (domain d)
+ (:requirements :strips :derived-predicates :existential-preconditions :disjunctive-preconditions)
+ (:predicates (done ?x) (ready ?f))
+ (:derived (ready ?f) (and (Ca ?f) (or (exists (?x ?y) (pa ?x ?y)) (Cd ?f)) (exists (?x) (pb ?x ?f))))
+ (:action b :parameters (?f) :precondition (and (inferred-Ca ?f) (ready ?f)) :effect (done ?f)))\n"
+        .to_owned();
+    let problem = "(define (problem p) (:domain d) (:init) (:goal (done i1)))\n".to_owned();
+    let comparison = compare(&Texts { knowledge, domain, problem }, "disjuncts").expect("few states");
+    assert_eq!(comparison.least_steps, Some(1));
 }
 
 #[test]

@@ -45,6 +45,26 @@ fn invalid_models_and_properties_are_refused_with_their_position() {
 }
 
 #[test]
+fn one_answer_is_a_table_of_one_row() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let file = directory.path().join("one.csv");
+    let arguments = ["check", "-", "Pmax=? [ F s=1 ]", "--csv", file.to_str().expect("UTF-8")];
+    let model = MODEL.replace("PROBABILITIES", "0.5:(s'=1) + 0.5:(s'=2)");
+    let outcome = metaplan_in(&root(), &arguments, &model);
+    assert_eq!(outcome.status, 0, "{outcome:#?}");
+    assert_eq!(std::fs::read_to_string(&file).expect("a table"), "Pmax=? [ F s=1 ]\n0.5\n");
+}
+
+#[test]
+fn constants_are_given_once() {
+    let arguments = ["check", "-", "Pmax=? [ F s=1 ]", "--const", "n=1:2", "--const", "n=3:4"];
+    let model = MODEL.replace("mdp\n", "mdp\nconst int n;\n").replace("PROBABILITIES", "(s'=1)");
+    let outcome = metaplan_in(&root(), &arguments, &model);
+    assert_eq!(outcome.status, 2, "{outcome:#?}");
+    assert!(outcome.stderr.contains("M107") && outcome.stderr.contains("two values"), "{outcome:#?}");
+}
+
+#[test]
 fn policies_are_written_and_evaluated() {
     let Some(folder) = data("reference/prism_cases") else { return };
     let model = folder.join("c12_det_plan_vs_policy.prism");

@@ -118,3 +118,42 @@ fn the_loop_reconfigures() {
     assert_eq!(answers[1].1.as_deref(), Some("fd_amcl_kinect"));
     assert_eq!(answers[4].1.as_deref(), Some("fd_aruco"));
 }
+
+/// If two consecutive changes fail, the robot still has the design before both of them.
+#[test]
+fn failed_changes_restore_the_design_that_the_robot_has() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let file = directory.path().join("kb.ttl");
+    let mut knowledge = "@prefix : <http://x.org/k#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix t: <http://metacontrol.org/tomasys#> .
+<http://x.org/k> a owl:Ontology ; owl:imports <http://metacontrol.org/tomasys> .
+:f_move a owl:NamedIndividual , t:Function .\n"
+        .to_owned();
+    for number in 1..=3 {
+        knowledge += &format!(
+            ":c_{number} a owl:NamedIndividual , t:Component .\n:fd_{number} a owl:NamedIndividual , \
+             t:FunctionDesign ; t:solvesF :f_move ; t:requiresC :c_{number} .\n"
+        );
+    }
+    std::fs::write(&file, knowledge).expect("written");
+    let events = [
+        r#"{"event":"acknowledged","effect":1,"time":0}"#,
+        r#"{"event":"component_status","component":"c_1","status":"FALSE","time":1}"#,
+        r#"{"event":"component_status","component":"c_2","status":"FALSE","time":2}"#,
+        r#"{"event":"reconfiguration_failed","effect":2,"time":3}"#,
+        r#"{"event":"reconfiguration_failed","effect":3,"time":4}"#,
+        r#"{"event":"component_status","component":"c_2","status":"RECOVERED","time":5}"#,
+        r#"{"event":"tick","time":15}"#,
+        r#"{"event":"design_status","design":"fd_2","realisable":true,"time":16}"#,
+        r#"{"event":"tick","time":17}"#,
+    ];
+    let kb = file.to_str().expect("UTF-8");
+    let arguments = ["run", kb, "--configure", "--rules", "coadaptation", "--objective", "f_move"];
+    let outcome = metaplan_in(&root(), &arguments, &(events.join("\n") + "\n"));
+    let answers: Vec<serde_json::Value> =
+        outcome.stdout.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    let changes = answers.iter().filter(|answer| answer["answer"] == "reconfigure");
+    let changes: Vec<_> = changes.map(|change| (change["from"].as_str(), change["to"].as_str())).collect();
+    assert_eq!(changes.last(), Some(&(Some("fd_1"), Some("fd_2"))), "{outcome:#?}");
+}

@@ -69,6 +69,40 @@ fn changes_that_affect_the_plan_are_listed() {
 }
 
 #[test]
+fn bounds_of_small_values_are_found() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let write = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).expect("written");
+    let actions = "(:action a :parameters () :precondition (>= (x) 0.000495)
+           :effect (and (done) (increase (c) 1)))
+         (:action b :parameters () :precondition () :effect (and (done) (increase (c) 2)))";
+    write(
+        "domain.pddl",
+        &format!(
+            "(define (domain d) (:requirements :strips :numeric-fluents) (:predicates (done))
+             (:functions (x) (c)) {actions})"
+        ),
+    );
+    write(
+        "problem.pddl",
+        "(define (problem p) (:domain d) (:init (= (x) 0.0005) (= (c) 0)) (:goal (done))
+         (:metric minimize (c)))",
+    );
+    let knowledge = crate::common::root().join("ontology/kb/ugv.ttl");
+    write(
+        "m.toml",
+        &format!(
+            "name = 'small'\n[knowledge]\nfiles = ['{}']\n[planning]\n\
+             domain = 'domain.pddl'\nproblem = 'problem.pddl'\n",
+            knowledge.display()
+        ),
+    );
+    let file = directory.path().join("m.toml");
+    let answer = explain(&[file.to_str().expect("UTF-8"), "--time-limit", "120"]);
+    let costs: Vec<Value> = changes(&answer).iter().map(|change| change[3].clone()).collect();
+    assert_eq!(costs.iter().map(Value::as_f64).collect::<Vec<_>>(), [Some(2.0)], "{answer:#}");
+}
+
+#[test]
 fn unknown_designs_are_usage_errors() {
     let outcome = metaplan(&["explain", "missions/ugv.toml", "fd_none"]);
     assert_eq!(outcome.status, 2);

@@ -84,6 +84,10 @@ fn maps_of_2017_become_missions() {
 #[test]
 fn both_map_formats_give_the_same_mission() {
     let options = MapOptions { start: "h1".to_owned(), goal: "h4".to_owned(), ..MapOptions::default() };
+    // The times of long switches exceed 32 bits.
+    let long = MapOptions { switch_seconds: u32::MAX, ..options.clone() };
+    let slow = import_map("map", &map(), &long).expect("a map").problem;
+    assert!(slow.contains(&format!(" {})", 2 * u64::from(u32::MAX))), "{slow}");
     let (old, new) = (map(), map().replace("\"coord\"", "\"coords\""));
     let [old, new] = [old, new].map(|text| import_map("map", &text, &options).expect("a map"));
     assert_eq!((&old.manifest, &old.knowledge, &old.domain), (&new.manifest, &new.knowledge, &new.domain));
@@ -126,6 +130,15 @@ fn map_errors_have_a_position() {
     check("],\n", "],,\n", "8:3", "this is not a map");
     check("\n}\n", "\n", "12:1", "EOF");
     check("],\n", "],\n\"time\": [{\"from\": \"h1\"}],\n", "9:24", "needs the place `to`");
+}
+
+#[test]
+fn dark_corridors_are_corridors_of_the_map() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let outcome = import(directory.path(), &map(), &["--dark", "h2-h1,h1-h3"]);
+    assert_eq!(outcome.status, 3, "{outcome:#?}");
+    assert_eq!(outcome.stderr.matches("error[M124]").count(), 1, "{outcome:#?}");
+    assert!(outcome.stderr.contains("no corridor between `h1` and `h3`"), "{outcome:#?}");
 }
 
 #[test]

@@ -86,6 +86,21 @@ fn events_have_a_time_or_a_condition_and_do_something() {
 }
 
 #[test]
+fn simulations_have_a_limited_time_and_number_of_failures() {
+    let event = "[[scenarios.lidar_under_way.simulation.events]]";
+    let failure = "[[scenarios.lidar_under_way.simulation.failures]]\ncomponent = \"c_lidar\"\n\
+                   mean_time = 1e-7\nrecovery = 0\n";
+    check(
+        &[(MISSION, event, &format!("{failure}{event}"))],
+        &[("1e-7", &["M135", "more than a million times"])],
+    );
+    check(
+        &[(MISSION, "step = 1 ", "step = 1e7 "), (MISSION, "time_budget = 600", "time_budget = 1e12")],
+        &[("1e12", &["M135", "at most 1e9"])],
+    );
+}
+
+#[test]
 fn all_unknown_names_of_a_scenario_are_reported_together() {
     check(
         &[

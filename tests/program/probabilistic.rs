@@ -3,7 +3,8 @@
 #![allow(clippy::print_stdout)]
 
 use metaplan::comparison::{
-    Coadaptation, MapOptions, Priority, Process, Risk, import_map, program, published, shortest_routes,
+    Arc, Coadaptation, MapOptions, Priority, Process, Risk, Traversal, import_map, program, published,
+    published_program, shortest_routes,
 };
 use metaplan::mission::{Mission, Planning as _};
 use metaplan::setup::Setup;
@@ -349,6 +350,48 @@ fn missions_without_places_are_compared() {
 }
 
 #[test]
+fn missions_whose_goal_holds_already_are_compared() {
+    for file in ["missions/ugv.toml", "missions/ugv_plain.toml"] {
+        let outcome = metaplan(&["compare", file, "--set", "robot_at=wp9", "--format", "json"]);
+        assert_eq!(outcome.status, 0, "{outcome:#?}");
+        let candidates = &outcome.json()["comparisons"][0]["candidates"];
+        let optimum = candidates.as_array().expect("candidates").iter().find(|one| one["kind"] == "f");
+        assert_eq!(optimum.expect("an optimum")["penalised_time"].as_f64(), Some(0.0), "{candidates:#}");
+    }
+}
+
+/// The moves from `a` to `b_c` and from `a_b` to `c` would have the same name. Each move has its own reward.
+#[test]
+fn rewards_of_moves_with_similar_names_are_separate() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let example = "missions/camara_like.toml";
+    let Setup { mission, roles, .. } = Setup::read(&root().join(example)).expect("a mission");
+    let (problem, _) = mission.filled().expect("filled");
+    let mut mission = Coadaptation::new(&mission, &problem, &roles).expect("a process");
+    let whole = |value: i64| BigRational::from_integer(value.into());
+    let arc = |from: usize, time: i64| {
+        let traversal = Traversal { time: whole(time), energy: whole(0), success: whole(1), hit: whole(0) };
+        Arc { from, to: from + 1, by: vec![Some(traversal)] }
+    };
+    mission.places = ["a", "b_c", "a_b", "c"].map(str::to_owned).to_vec();
+    mission.arcs = vec![arc(0, 10), arc(1, 1), arc(2, 100)];
+    mission.configurations.truncate(1);
+    mission.configurations[0].available = true;
+    mission.switches = vec![vec![None]];
+    (mission.start, mission.goal, mission.initial) = (0, 3, 0);
+    (mission.battery, mission.loss) = (None, None);
+    for model in [program(&mission, Risk::all(&mission)), published_program(&mission)] {
+        let file = directory.path().join("model.prism");
+        std::fs::write(&file, probabilistic::prism::write(&model)).expect("written");
+        let question = "R{\"time\"}min=? [ F \"goal\" ]";
+        let constant: &[&str] = if model.constants.is_empty() { &[] } else { &["--const", "ROUTE=0"] };
+        let arguments = [&["check", file.to_str().expect("UTF-8"), question][..], constant].concat();
+        let outcome = metaplan(&arguments);
+        assert_eq!(outcome.stdout.trim(), "111", "{outcome:#?}");
+    }
+}
+
+#[test]
 fn invalid_processes_are_refused() {
     use pddl::ast::{InitialElement, Name, Problem as Pddl, Term};
     let Setup { mission, roles, .. } =
@@ -359,7 +402,16 @@ fn invalid_processes_are_refused() {
         Err(messages) => messages.iter().map(|message| message.code.clone()).collect::<Vec<_>>(),
     };
     assert!(codes(&problem).is_empty());
-    for (symbol, value) in [("time", -1), ("energy", -5), ("hit", 2), ("success", -1), ("switch_time", -1)] {
+    for (symbol, value) in [
+        ("time", -1_i64),
+        ("energy", -5),
+        ("hit", 2),
+        ("success", -1),
+        ("switch_time", -1),
+        ("battery", -5),
+        ("battery", 10_i64.pow(15)),
+        ("reserve", 10_i64.pow(15)),
+    ] {
         let mut changed = problem.clone();
         let element = changed.init.iter_mut().find_map(|element| match element {
             InitialElement::Value(atom, value, _) if atom.predicate.name.as_str() == symbol => Some(value),

@@ -80,6 +80,46 @@ fn plans_before_and_after_are_compared_with_reasons() {
     }
 }
 
+/// The plan of the current situation must not use up the time for the plan before.
+#[test]
+fn both_plans_are_shown_at_the_time_limit() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let write = |name: &str, text: &str| {
+        let path = directory.path().join(name);
+        std::fs::write(&path, text).expect("written");
+        path.to_str().expect("UTF-8").to_owned()
+    };
+    let domain = "(define (domain d) (:requirements :strips :typing :numeric-fluents) (:types loc pkg trk)
+        (:predicates (at ?t - trk ?l - loc) (pat ?p - pkg ?l - loc) (in ?p - pkg ?t - trk))
+        (:functions (c) (w ?a ?b - loc))
+        (:action drive :parameters (?t - trk ?a ?b - loc) :precondition (at ?t ?a)
+          :effect (and (not (at ?t ?a)) (at ?t ?b) (increase (c) (w ?a ?b))))
+        (:action load :parameters (?p - pkg ?t - trk ?a - loc) :precondition (and (at ?t ?a) (pat ?p ?a))
+          :effect (and (not (pat ?p ?a)) (in ?p ?t) (increase (c) 1)))
+        (:action unload :parameters (?p - pkg ?t - trk ?a - loc) :precondition (and (at ?t ?a) (in ?p ?t))
+          :effect (and (not (in ?p ?t)) (pat ?p ?a) (increase (c) 1))))";
+    let (mut init, mut goal) = ("(= (c) 0) (at t0 l0) (at t1 l5)".to_owned(), String::new());
+    for a in 0..12 {
+        for b in 0..12 {
+            init += &format!(" (= (w l{a} l{b}) {})", 2 + (a * 7 + b * 5 + a * b) % 19);
+        }
+        init += &format!(" (pat p{a} l{})", a * 5 % 12);
+        goal += &format!(" (pat p{a} l{})", (a * 7 + 3) % 12);
+    }
+    let names = |letter: &str| (0..12).map(|number| format!("{letter}{number} ")).collect::<String>();
+    let objects = format!("{}- loc {}- pkg t0 t1 - trk", names("l"), names("p"));
+    let problem = format!(
+        "(define (problem p) (:domain d) (:objects {objects}) (:init {init}) (:goal (and {goal}))
+         (:metric minimize (c)))"
+    );
+    let (domain, problem) = (write("d.pddl", domain), write("p.pddl", &problem));
+    let outcome = metaplan(&["report", &domain, &problem, "--set", "c=1", "--time-limit", "8"]);
+    assert!(outcome.status <= 1, "{}", outcome.stderr);
+    for plan in ["data-plan=\"before\"", "data-plan=\"after\""] {
+        assert!(outcome.stdout.contains(plan), "{plan}: {}", outcome.stderr);
+    }
+}
+
 #[test]
 fn missing_plan_is_stated_plainly() {
     let outcome = metaplan(&["report", "missions/ugv.toml", "--set", "battery=1"]);

@@ -332,6 +332,50 @@ fn greedy_control_observes_requirements_in_a_ward() {
 }
 
 #[test]
+fn repeated_strategies_and_large_seeds_are_simulated_once() {
+    let mut arguments = vec!["simulate", "missions/ugv.toml", "--scenario", "kinect_at_wp2"];
+    arguments.extend(["--strategy", "none", "--strategy", "none", "--seed", "18446744073709551615"]);
+    arguments.extend(["--runs", "2"]);
+    let outcome = metaplan(&arguments);
+    assert_eq!(outcome.status, 0, "{outcome:#?}");
+    assert!(outcome.stdout.contains(" of 2 "), "{outcome:#?}");
+}
+
+/// Simulates the vehicle whose designs all fail at once, with further events.
+fn simulate_stalled(settings: &str) -> Value {
+    let directory = tempfile::tempdir().expect("a directory");
+    let path = |name: &str| root().join(name).display().to_string();
+    let events = "[[scenarios.s.simulation.events]]";
+    let text = format!(
+        "name = 'm'\n[knowledge]\nfiles = ['{}']\n[planning]\ndomain = '{}'\nproblem = '{}'\n\
+         time_unit = 'minutes'\n[scenarios.s]\ndescription = 'e'\n[scenarios.s.simulation]\nstep = 0.1\n\
+         time_budget = 20\npatience = 0.5\n{}\n",
+        path("ontology/kb/ugv.ttl"),
+        path("encodings/ugv/domain.pddl"),
+        path("encodings/ugv/problem.pddl"),
+        settings.replace("[[event]]", events)
+    );
+    let file = directory.path().join("m.toml");
+    std::fs::write(&file, text).expect("written");
+    let arguments = ["simulate", file.to_str().expect("UTF-8"), "--scenario", "s", "--strategy", "joint"];
+    let outcome = metaplan(&[&arguments[..], &["--format", "json"]].concat());
+    assert_eq!(outcome.status, 0, "{outcome:#?}");
+    outcome.json()["runs"][0].clone()
+}
+
+#[test]
+fn events_and_losses_do_not_need_a_working_action() {
+    let fail = "[[event]]\nat = 0\nfail = ['c_kinect', 'c_lidar', 'c_camera']\n";
+    let recovered = simulate_stalled(&format!(
+        "{fail}[[event]]\nat = 2\nset = {{robot_at = 'wp5'}}\n[[event]]\nwhen = 'robot_at wp5'\n\
+         recover = ['c_kinect', 'c_lidar', 'c_camera']\n"
+    ));
+    assert_eq!(recovered["accomplished"], true, "{recovered:#}");
+    let lost = simulate_stalled("lifeline = 'battery'\n[[event]]\nat = 0.5\nset = {battery = '0'}\n");
+    assert_eq!(lost["lost"], true, "{lost:#}");
+}
+
+#[test]
 fn failed_missions_are_reported_with_the_reason() {
     let arguments =
         ["simulate", "missions/ugv.toml", "--scenario", "kinect_at_wp2", "--strategy", "none", "--runs", "2"];

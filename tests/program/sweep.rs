@@ -57,10 +57,12 @@ fn killed_shards_give_the_same_table() {
         // A kill can leave an incomplete line at the end of the file.
         let index = &shard[..1];
         let file = shards.join(format!("shard-000{index}-of-0003.jsonl"));
-        let mut text = fs::read_to_string(&file).unwrap_or_default();
-        text.push_str("{\"run\": 1, \"va");
+        let mut bytes = fs::read(&file).unwrap_or_default();
+        bytes.extend(b"{\"run\": 1, \"va");
+        // The line may also end within a character, here after the first byte of `é`.
+        bytes.push(0xc3);
         fs::create_dir_all(&shards).expect("it can be made");
-        fs::write(&file, text).expect("it can be written");
+        fs::write(&file, bytes).expect("it can be written");
         let outcome = sweep(STUDY, &shards, &["--shard", shard, "--resume"]);
         assert_eq!((outcome.status, &outcome.json()["done"]), (0, &4.into()), "{outcome:#?}");
     }

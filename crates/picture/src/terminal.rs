@@ -32,22 +32,27 @@ impl Plan {
     /// Names are printed unchanged. Callers that write to a terminal must make invisible characters
     /// visible first.
     pub fn text(&self, columns: usize) -> Option<String> {
-        let mut lanes: BTreeMap<&str, Vec<(usize, &str)>> = BTreeMap::new();
+        let mut lanes: BTreeMap<&str, Vec<(usize, String)>> = BTreeMap::new();
         for (index, step) in self.steps.iter().enumerate() {
             for (function, design) in &step.configuration {
-                lanes.entry(function).or_default().push((index, design));
+                let bars = lanes.entry(function).or_default();
+                match bars.last_mut() {
+                    // An action can use several designs for one function.
+                    Some((last, names)) if *last == index => *names = format!("{names}, {design}"),
+                    _ => bars.push((index, design.clone())),
+                }
             }
         }
         let label = lanes.keys().map(|name| length(name)).max().unwrap_or(0).clamp("actions".len(), NAME);
         let room = columns.checked_sub(label + 2).filter(|_| columns >= LEAST)?;
-        let actions: Vec<(usize, &str)> =
-            self.steps.iter().map(|step| step.label.as_str()).enumerate().collect();
+        let actions: Vec<(usize, String)> =
+            self.steps.iter().map(|step| step.label.clone()).enumerate().collect();
         let axis = match self.axis {
             Axis::Time => "time",
             Axis::Steps => "step",
         };
         let band = |places: Columns| {
-            let line = |name: &str, bars: &[(usize, &str)]| {
+            let line = |name: &str, bars: &[(usize, String)]| {
                 format!("{:>label$}  {}\n", short(name, label), self.bars(name, bars, &places))
             };
             let functions = lanes.iter().map(|(function, bars)| line(function, bars));
@@ -83,7 +88,14 @@ impl Plan {
     fn to_scale(&self, room: usize) -> Option<Vec<(usize, usize)>> {
         let end = self.steps.iter().map(|step| step.end).fold(0.0, f64::max);
         let column = |at: f64| if end > 0.0 { (at / end * room as f64).round() as usize } else { 0 };
-        let places: Vec<_> = self.steps.iter().map(|step| (column(step.start), column(step.end))).collect();
+        let mut previous = 0;
+        let place = |step: &Step| {
+            // The end of a step can exceed the start of the next one by a rounding error.
+            let from = column(step.start).max(previous);
+            previous = column(step.end);
+            (from, previous)
+        };
+        let places: Vec<_> = self.steps.iter().map(place).collect();
         let is_wide = places.iter().all(|(from, to)| *to >= from + COLUMN);
         is_wide.then_some(places)
     }
@@ -106,7 +118,7 @@ impl Plan {
         places
     }
 
-    fn bars(&self, lane: &str, bars: &[(usize, &str)], places: &Columns) -> String {
+    fn bars(&self, lane: &str, bars: &[(usize, String)], places: &Columns) -> String {
         let mut line = String::new();
         let mut column = 0;
         let place = |step: usize| places.iter().find(|(index, _)| *index == step).map(|(_, place)| *place);
