@@ -213,9 +213,8 @@ fn invalid_constant_patterns_are_errors() {
 /// Each of the two built-ins is evaluated once, but the second result is long.
 #[test]
 fn long_values_cost_steps_without_recursion() {
-    let concatenation = |result: &str, part: &str| {
-        format!("swrlb:stringConcat({result}, {})", vec![part; 31].join(", "))
-    };
+    let concatenation =
+        |result: &str, part: &str| format!("swrlb:stringConcat({result}, {})", vec![part; 31].join(", "));
     let body = format!("t(?x) ^ {} ^ {}", concatenation("?y", "?x"), concatenation("?z", "?y"));
     let mut symbols = Symbols::new();
     let rule = format!("{body} -> u(?z) .");
