@@ -121,8 +121,9 @@ fn parse_rational(lexical: &str) -> Parsed {
         return Parsed::IllTyped;
     }
     let exact = BigRational::new(numerator, denominator);
-    Parsed::Value(Decimal::exact(&exact).map(Literal::Decimal).unwrap_or_else(|| {
+    let fraction = || {
         let lexical = format!("{}/{}", exact.numer(), exact.denom());
         Literal::Opaque { lexical: lexical.into(), datatype: OWL_RATIONAL.into() }
-    }))
+    };
+    Parsed::Value(Decimal::exact(&exact).map_or_else(fraction, Literal::Decimal))
 }

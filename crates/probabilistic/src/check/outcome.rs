@@ -49,20 +49,16 @@ impl<N: Number> Query<'_, N> {
             Property::Filter(filter, inner, states) => {
                 Ok((shown(self.filtered(*filter, inner, states.as_ref())?), None))
             }
-            Property::Expression(inner) => match self.kind_of(inner)? {
-                Type::Bool => {
-                    let holds = self.truth(inner)?;
-                    Ok((
-                        Outcome::Truth((0..self.explored.starts).all(|start| holds.contains(start)), None),
-                        None,
-                    ))
-                }
-                _ => {
-                    let mut starts = FixedBitSet::with_capacity(self.mdp().states());
-                    starts.insert_range(..self.explored.starts);
-                    Ok((self.of_starts(&self.numbers(inner, &starts)?), None))
-                }
-            },
+            Property::Expression(inner) if self.kind_of(inner)? == Type::Bool => {
+                let holds = self.truth(inner)?;
+                let holds = (0..self.explored.starts).all(|start| holds.contains(start));
+                Ok((Outcome::Truth(holds, None), None))
+            }
+            Property::Expression(inner) => {
+                let mut starts = FixedBitSet::with_capacity(self.mdp().states());
+                starts.insert_range(..self.explored.starts);
+                Ok((self.of_starts(&self.numbers(inner, &starts)?), None))
+            }
         }
     }
 
