@@ -14,7 +14,7 @@ use crate::file::{self, Kind, source};
 use crate::message::{Errors, Message, did_you_mean};
 use crate::number;
 
-/// Maximum number of faults that are looked for. Each costs two passes over the text, and a file of another kind can
+/// Maximum number of faults that are reported. Each costs two passes over the text, and a file of another kind can
 /// have thousands.
 const MAX_FAULTS: usize = 50;
 

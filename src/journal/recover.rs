@@ -35,7 +35,7 @@ pub(super) fn usable<'a>(
     warnings: &mut Vec<Message>,
 ) -> Result<(u64, Vec<&'a Segment>), String> {
     let mut problems = Vec::new();
-    // Only existing files are looked at: a foreign file with a huge number must not cost time and memory.
+    // Only the numbers of existing files count: a foreign file with a huge number must not cost time and memory.
     let numbers: BTreeSet<u64> = contents.segments.keys().chain(contents.snapshots.keys()).copied().collect();
     let first = numbers.first().copied().unwrap_or(0);
     for &from in numbers.iter().rev() {

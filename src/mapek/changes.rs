@@ -9,8 +9,8 @@ use crate::mapek::answer::Answer;
 pub(super) struct Changes {
     pub(super) base: Base,
     /// Whether inputs of planning may have changed: facts or values of the problem, or facts of the knowledge base.
-    /// Also `true` after an action that ended without success, and after a measurement, even an equal one, whose value
-    /// the problem uses. Effects of the progress and success of actions do not count.
+    /// Also `true` after an action that ended without success. Effects of the progress and success of actions do not
+    /// count.
     pub(super) facts: bool,
     /// Whether a report has changed facts of the problem or a design of the action under way, and not only values.
     pub(super) predicates: bool,

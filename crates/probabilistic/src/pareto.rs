@@ -199,7 +199,7 @@ impl<'a, N: Number> Pareto<'a, N> {
         let secondary = usize::from(first == 0);
         let (second, _) = self.solve(&unit(secondary), Some(&optimal_choices))?;
         // Where the second probability is 0, the second policy may be any that preserves the first value, for example one
-        // that waits for ever and never attains it.
+        // that always waits and never attains it.
         let is_free =
             |state: usize| second.policy[state] == NONE || !self.has_costs && second.values[state].is_zero();
         let choice = |state: usize| if is_free(state) { best.policy[state] } else { second.policy[state] };

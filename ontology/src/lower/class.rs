@@ -138,7 +138,7 @@ pub(crate) fn abbreviated(
 }
 
 /// Lowers a class as a condition, like [`condition`], but replaces many alternatives by one atom of an auxiliary relation.
-/// Where two classes are combined, the number of rules would be quadratic.
+/// If two classes are combined, the number of rules would be quadratic.
 pub(crate) fn brief_condition(
     context: &mut Context,
     class: &ClassExpression,

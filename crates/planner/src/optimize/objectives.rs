@@ -75,7 +75,7 @@ pub fn lexicographic(task: &Task, config: &Config, report: &mut dyn FnMut(Improv
 }
 
 /// Enumerates the Pareto front of the first two objectives until it is complete or a limit is reached. For
-/// each pair of values, only one plan is returned. `report` is called as by [`lexicographic`], for each point anew.
+/// each pair of values, only one plan is returned. For each point, `report` is called as by [`lexicographic`].
 ///
 /// # Panics
 /// The task has fewer than two objectives.

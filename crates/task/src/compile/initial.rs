@@ -120,7 +120,7 @@ impl<'t> Initial<'t> {
     /// refuses divisors that change.
     fn may_be_zero(&self, divisor: &Expression, binding: &Binding) -> bool {
         match divisor {
-            // A free variable may stand for any object.
+            // A free variable can have any object as its value.
             Expression::Fluent(atom) if !is_bound(atom, binding) => {
                 let name = &atom.predicate.name;
                 self.values.iter().any(|((function, _), value)| function == name && value.is_zero())

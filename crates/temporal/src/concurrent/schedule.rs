@@ -81,7 +81,7 @@ fn bounds<T: TimeNumber>(
     times: &mut Vec<T>,
 ) -> Vec<Bound<T>> {
     let mut bounds = Vec::new();
-    // Node of the latest access of each kind so far.
+    // Node of the latest access of each kind up to this happening.
     let mut latest: FxHashMap<Key, usize> = FxHashMap::default();
     // Runs of an instance end in the order of their starts.
     let mut open_starts: FxHashMap<u32, VecDeque<usize>> = FxHashMap::default();

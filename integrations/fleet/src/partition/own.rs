@@ -297,7 +297,7 @@ impl<S: Store> Partition<S> {
         let is_pending = robot.map_or(slot.is_pending, |robot| robot.is_pending());
         let plan = robot.filter(|_| is_decided).map(|robot| robot.event);
         if task.is_restored {
-            // Plans for the problems of the former loop cannot be told from those for the problems of this one.
+            // Plans for the problems of the former loop cannot be distinguished from those for the problems of this one.
             slot.thoughts = None;
             slot.search.update(None);
         } else if let Some(robot) = robot {

@@ -28,7 +28,7 @@ pub(super) struct Task {
     /// Subject of the robot's messages.
     pub(super) subject: String,
     pub(super) loaded: Option<Loaded>,
-    /// `true` if the robot was loaded from its last decision. Its loop then counts the planning problems anew.
+    /// `true` if the robot was loaded from its last decision. Its loop then counts the planning problems from 0.
     pub(super) is_restored: bool,
     /// Estimated duration of the robot's next search, if it has searched before.
     pub(super) estimate: Option<Duration>,

@@ -35,7 +35,7 @@ struct Action {
     begun: bool,
     /// `true` for an action of the previous run until it is performed again.
     is_lost: bool,
-    /// `true` once the performer was asked to end the action because the loop has suspended it.
+    /// `true` once a request to end the action was sent to the performer because the loop has suspended it.
     is_stopped: bool,
 }
 
