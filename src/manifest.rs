@@ -272,7 +272,8 @@ mod tests {
     #[test]
     fn a_limited_number_of_faults_is_looked_for() {
         for (keys, expected) in [(3, 3), (200, MAX_FAULTS)] {
-            let text: String = (0..keys).map(|number| format!("key{number} = 1\n")).collect();
+            let text: Vec<String> = (0..keys).map(|number| format!("key{number} = 1\n")).collect();
+            let text = text.concat();
             let error = toml::from_str::<Empty>(&text).expect_err("unknown keys");
             assert_eq!(mistakes::<Empty>(&text, error, "m.toml").len(), expected);
         }

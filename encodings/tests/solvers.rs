@@ -225,7 +225,9 @@ fn limits_interrupt_every_back_end() {
     let clauses: Vec<Vec<Lit>> = pigeons(13).iter().map(|clause| literals(clause)).collect();
     let stopped = |limits: &Limits, budget: u64, backend: &Backend| {
         let mut solver = backend.start(limits, budget);
-        clauses.iter().for_each(|clause| solver.add_clause(clause));
+        for clause in &clauses {
+            solver.add_clause(clause);
+        }
         assert_eq!(solver.solve(&[]), Answer::Interrupted, "{backend:?}, budget {budget}");
         assert!(solver.failure().is_none(), "{backend:?}: {:?}", solver.failure());
         // The limit stays exceeded, so further calls are interrupted as well.

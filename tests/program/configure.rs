@@ -1,5 +1,7 @@
 //! Tests of `metaplan configure` and `metaplan run --configure`, and of rejected arguments.
 
+use std::fmt::Write as _;
+
 use test_resources::data;
 
 use crate::common::{metaplan, metaplan_in, root};
@@ -131,7 +133,8 @@ fn failed_changes_restore_the_design_that_the_robot_has() {
 :f_move a owl:NamedIndividual , t:Function .\n"
         .to_owned();
     for number in 1..=3 {
-        knowledge += &format!(
+        let _ = write!(
+            knowledge,
             ":c_{number} a owl:NamedIndividual , t:Component .\n:fd_{number} a owl:NamedIndividual , \
              t:FunctionDesign ; t:solvesF :f_move ; t:requiresC :c_{number} .\n"
         );

@@ -1,6 +1,7 @@
 //! Tests of `metaplan report`, of pictures of plans and of behaviour trees: they contain the whole answer, and
 //! hostile names are escaped.
 
+use std::fmt::Write as _;
 use std::time::Instant;
 
 use roxmltree::Document;
@@ -101,12 +102,13 @@ fn both_plans_are_shown_at_the_time_limit() {
     let (mut init, mut goal) = ("(= (c) 0) (at t0 l0) (at t1 l5)".to_owned(), String::new());
     for a in 0..12 {
         for b in 0..12 {
-            init += &format!(" (= (w l{a} l{b}) {})", 2 + (a * 7 + b * 5 + a * b) % 19);
+            let _ = write!(init, " (= (w l{a} l{b}) {})", 2 + (a * 7 + b * 5 + a * b) % 19);
         }
-        init += &format!(" (pat p{a} l{})", a * 5 % 12);
-        goal += &format!(" (pat p{a} l{})", (a * 7 + 3) % 12);
+        let _ = write!(init, " (pat p{a} l{})", a * 5 % 12);
+        let _ = write!(goal, " (pat p{a} l{})", (a * 7 + 3) % 12);
     }
-    let names = |letter: &str| (0..12).map(|number| format!("{letter}{number} ")).collect::<String>();
+    let names =
+        |letter: &str| (0..12).map(|number| format!("{letter}{number} ")).collect::<Vec<_>>().concat();
     let objects = format!("{}- loc {}- pkg t0 t1 - trk", names("l"), names("p"));
     let problem = format!(
         "(define (problem p) (:domain d) (:objects {objects}) (:init {init}) (:goal (and {goal}))

@@ -199,7 +199,7 @@ fn state_dependent_costs_within_a_horizon_are_as_low_as_by_brute_force() {
             let cheapest = market.cheapest().expect("there is a plan");
             let is_proved = solution.status == Status::Optimal;
             assert!(!is_proved || cheapest == expected, "{}", context());
-            let bound = solution.lower_bound.as_ref().map(|bound| bound.to_rational());
+            let bound = solution.lower_bound.as_ref().map(Exact::to_rational);
             let cost = BigRational::from_integer(cheapest.into());
             assert!(bound.is_none_or(|bound| bound <= cost), "{}", context());
             assert!(solution.plan.as_ref().is_some_and(|plan| plan.steps.len() <= horizon));

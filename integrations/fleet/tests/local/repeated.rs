@@ -46,7 +46,8 @@ async fn an_event_is_decided_once_though_the_log_has_forgotten_its_id() {
     work(&store, "five", Settings::default(), number + 2).await;
     let made = &decisions(&store).await["r"];
     assert_eq!(made.last().map(|decided| decided.event), again.last().copied());
-    for _ in 0..2 + 17 + 1 {
+    let refusals = 2 + 17 + 1;
+    for _ in 0..refusals {
         let reason = heard(&mut notices).await;
         assert!(reason.contains("decided before"), "{reason}");
     }

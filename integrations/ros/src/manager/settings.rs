@@ -6,7 +6,6 @@ use std::path::Path;
 use metaplan::message::{Errors, Message, did_you_mean};
 use metaplan::mission::Mission;
 use serde::Deserialize;
-use serde::de::IgnoredAny;
 use toml::Spanned;
 
 use crate::diagnostic_rules::DiagnosticRule;
@@ -65,7 +64,7 @@ struct Located {
     #[serde(default)]
     tasks: BTreeMap<String, LocatedTask>,
     #[serde(default)]
-    actions: BTreeMap<Spanned<String>, IgnoredAny>,
+    actions: BTreeMap<Spanned<String>, toml::Value>,
 }
 
 #[derive(Debug, Deserialize)]
