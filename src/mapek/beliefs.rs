@@ -70,7 +70,7 @@ pub(super) struct Running {
     pub(super) step: PlannedStep,
     /// Completed share of the action, from 0 to 1.
     pub(super) progress: BigRational,
-    /// Increases of functions by the progress so far (negative for decreases), by the text of the function.
+    /// Increases of functions by the present progress (negative for decreases), by the text of the function.
     pub(super) applied: BTreeMap<String, BigRational>,
     pub(super) cancelling: bool,
     pub(super) suspended: bool,

@@ -27,8 +27,8 @@ impl Refusal {
 /// Returns the first repeated key of an object. Nested objects are not checked.
 pub(super) fn doubled_key(text: &str) -> Option<String> {
     let Keys(keys) = serde_json::from_str(text).ok()?;
-    let mut seen = HashSet::new();
-    keys.iter().find(|key| !seen.insert(*key)).cloned()
+    let mut distinct = HashSet::new();
+    keys.iter().find(|key| !distinct.insert(*key)).cloned()
 }
 
 struct Keys(Vec<String>);

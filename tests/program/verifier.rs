@@ -20,13 +20,15 @@ fn both_programs_give_the_same_refusals() {
         (&[nowhere, "--smt", file], 3),
         (&[nowhere, "--smt", file, "--format", "json"], 3),
         (&[target, "--smt", unwritable], 3),
-        (&[target, "--time-limit", "0", "--format", "json"], 30),
         (&[target, "--format", "json"], 0),
         (&["/dev/null"], 30),
     ] {
         let outcome = verify_in(&root(), arguments);
         assert_eq!(outcome.status, status, "{arguments:?}: {outcome:#?}");
     }
+    // The speed of the machine decides which parts are reported, so the programs are not compared.
+    let outcome = metaplan(&["verify", target, "--time-limit", "0", "--format", "json"]);
+    assert_eq!(outcome.status, 30, "{outcome:#?}");
 }
 
 /// The knowledge files can be removed from the manifest of a certificate. The certificate then covers only

@@ -132,13 +132,13 @@ impl<N: Number> Mdp<N> {
     pub fn push_transition(&mut self, target: u32, probability: N) {
         let first = self.first_transition[self.actions.len()] as usize;
         let is_wide = !self.positions.is_empty();
-        let known = if is_wide {
+        let position = if is_wide {
             self.positions.get(&target).copied()
         } else {
             let at = self.targets[first..].iter().position(|existing| *existing == target);
             at.map(|at| first + at)
         };
-        if let Some(at) = known {
+        if let Some(at) = position {
             self.probabilities[at] = self.probabilities[at].plus(&probability);
             return;
         }

@@ -215,13 +215,8 @@ pub(crate) fn conclusions(
             let forbidden = cross(&edge, &condition(context, filler, y, variables));
             forbidden.into_iter().map(|body| (body, Vec::new())).collect()
         }
-        C::Cardinality(Bound::Max, 1, ..) if context.equality == Equality::UniqueNames => Vec::new(),
         C::Cardinality(Bound::Max, 1, property, filler) => {
-            let (y, z) = (variables.fresh("y"), variables.fresh("z"));
-            let edges = vec![vec![context.property(property, x, y), context.property(property, x, z)]];
-            let bodies = cross(&edges, &brief_condition(context, filler, y, variables));
-            let bodies = cross(&bodies, &brief_condition(context, filler, z, variables));
-            bodies.into_iter().map(|body| (body, vec![Atom::Same(y, z)])).collect()
+            at_most_one(context, property, filler, x, variables)
         }
         C::DataCardinality(Bound::Max, limit @ (0 | 1), property, range) => {
             at_most(context, *limit, property, range, x, variables)
@@ -262,6 +257,24 @@ pub(crate) fn conclusions(
             only_included(context, class, x, "a cardinality as a conclusion")
         }
     }
+}
+
+fn at_most_one(
+    context: &mut Context,
+    property: &ObjectPropertyExpression,
+    filler: &ClassExpression,
+    x: Term,
+    variables: &mut Variables,
+) -> Conclusions {
+    // As for functional properties, different names are not concluded to be equal.
+    if context.equality == Equality::UniqueNames {
+        return Vec::new();
+    }
+    let (y, z) = (variables.fresh("y"), variables.fresh("z"));
+    let edges = vec![vec![context.property(property, x, y), context.property(property, x, z)]];
+    let bodies = cross(&edges, &brief_condition(context, filler, y, variables));
+    let bodies = cross(&bodies, &brief_condition(context, filler, z, variables));
+    bodies.into_iter().map(|body| (body, vec![Atom::Same(y, z)])).collect()
 }
 
 fn all_values(

@@ -118,7 +118,7 @@ struct Follower<'e, 'p> {
 }
 
 impl<'e, 'p> Follower<'e, 'p> {
-    /// Starts a step at the time `stated` or, if there is none, at the time of the last end of an action.
+    /// Starts a step at the time `stated`, or without a stated time at the last end of an action.
     /// Returns `None` if the action takes no time and has already ended.
     fn start(
         &mut self,

@@ -131,8 +131,8 @@ pub(super) fn only_over_all(domain: &Domain, predicates: &[Name]) -> Vec<bool> {
     let of = |action: &Action| {
         let ActionBody::Durative { conditions, .. } = &action.body else { return false };
         let keys = |over_all: bool| -> FxHashSet<String> {
-            let own = conditions.iter().filter(|(time, _)| (*time == ConditionTime::OverAll) == over_all);
-            let atoms = own.flat_map(|(_, condition)| conjuncts(condition));
+            let timed = conditions.iter().filter(|(time, _)| (*time == ConditionTime::OverAll) == over_all);
+            let atoms = timed.flat_map(|(_, condition)| conjuncts(condition));
             atoms.filter(|atom| predicates.contains(&atom.predicate.name)).map(key).collect()
         };
         !keys(true).is_subset(&keys(false))

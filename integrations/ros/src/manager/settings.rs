@@ -238,12 +238,12 @@ impl Settings {
                 }
             }
         }
-        let known: Vec<String> =
+        let names: Vec<String> =
             mission.domain().actions.iter().map(|action| action.identifier.name.to_string()).collect();
         for action in actions.keys() {
             let name = action.get_ref();
-            if !known.iter().any(|known| known.eq_ignore_ascii_case(name)) {
-                let suggestion = did_you_mean(name, known.iter().map(String::as_str));
+            if !names.iter().any(|known| known.eq_ignore_ascii_case(name)) {
+                let suggestion = did_you_mean(name, names.iter().map(String::as_str));
                 let text = format!("the domain has no action `{name}`{suggestion}");
                 errors.push(
                     self.source
