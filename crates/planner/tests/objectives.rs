@@ -3,8 +3,6 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-#[cfg(unix)]
-use metaplan_planner::{Backend, Engine};
 use metaplan_planner::{Config, GroundConfig, Plan, Status, Task, ground, lexicographic, optimize, pareto};
 use pddl::ast::{Direction, Metric};
 use pddl::{Source, read, read_objective};
@@ -204,67 +202,4 @@ fn ties_are_broken_in_order_and_names_play_no_part() {
         }
     }
     assert!(ties > 50, "only {ties} missions have ties");
-}
-
-/// A SAT solver for tiny formulas in awk. It is honest for `honest` calls, which it counts in `file`.
-#[cfg(unix)]
-const SOLVER: &str = r#"
-function fits(  j, i, l, is_met) {
-  for (j = 1; j <= clauses; j++) {
-    is_met = 0
-    for (i = 1; i <= size[j] && !is_met; i++) { l = clause[j, i]; is_met = value[l < 0 ? -l : l] * l >= 0 }
-    if (!is_met) return 0
-  }
-  return 1
-}
-function search(v,  s) {
-  if (v > variables) return 1
-  for (s = 1; s >= -1; s -= 2) { value[v] = s; if (fits() && search(v + 1)) return 1 }
-  value[v] = 0
-  return 0
-}
-/^p/ { variables = $3; next }
-/^[0-9-]/ { clauses++; size[clauses] = NF - 1; for (i = 1; i < NF; i++) clause[clauses, i] = $i }
-END {
-  getline calls < file; close(file); print calls + 1 > file
-  if (calls >= honest || !search(1)) { print "s UNSATISFIABLE"; exit 20 }
-  print "s SATISFIABLE"; printf "v"
-  for (v = 1; v <= variables; v++) printf " %d", v * value[v]
-  print " 0"; exit 10
-}"#;
-
-/// Whichever objective an external solver lies about, the result names the solver.
-#[test]
-#[cfg(unix)]
-fn unchecked_claims_about_later_objectives_are_named() {
-    let domain = "(define (domain d) (:predicates (done) (todo)) (:functions (time) (energy) (e ?x))
-      (:action a :parameters (?x) :precondition (todo)
-        :effect (and (not (todo)) (done) (increase (time) 1) (increase (energy) (e ?x)))))";
-    let problem = "(define (problem p) (:domain d) (:objects o1 o2 o3)
-      (:init (todo) (= (time) 0) (= (energy) 0) (= (e o1) 9) (= (e o2) 8) (= (e o3) 1)) (:goal (done)))";
-    let (domain, problem, _) = read(&Source::new("d", domain), &Source::new("p", problem)).expect("PDDL");
-    let objectives = ["(time)", "(energy)"].map(|text| {
-        let source = Source::new("objective", text);
-        read_objective(Direction::Minimize, &source, &domain, &problem).expect("an objective")
-    });
-    let config = GroundConfig::default().with_objectives(objectives.to_vec());
-    let task = ground(&domain, &problem, &config).expect("a task");
-    let calls = std::env::temp_dir().join(format!("metaplan-calls-{}", std::process::id()));
-    let mut lies = 0;
-    for honest in 0..10 {
-        let variables = [format!("honest={honest}"), format!("file={}", calls.display())];
-        let arguments = variables.into_iter().flat_map(|variable| ["-v".to_owned(), variable]);
-        let arguments = arguments.chain([SOLVER.to_owned()]).collect();
-        let _ = std::fs::remove_file(&calls);
-        let backend = Backend::Program { command: "awk".to_owned(), arguments };
-        let config = Config::default().with_engine(Engine::Sat).with_backend(backend);
-        let point = lexicographic(&task, &config, &mut |_| {});
-        let is_best = point.values.get(1).is_some_and(|energy| energy.to_string() == "1");
-        if point.solution.status == Status::Optimal && !is_best {
-            assert!(point.solution.statistics.unchecked.is_some(), "{honest}: {point:?}");
-            lies += 1;
-        }
-    }
-    let _ = std::fs::remove_file(&calls);
-    assert!(lies > 0, "no lie was believed");
 }

@@ -24,7 +24,8 @@ DISTANCES = {("dock", "gate"): 4, ("gate", "shelf_1"): 3, ("shelf_1", "shelf_2")
 
 def say(text: str) -> None:
     """Prints a line at once."""
-    print(text, flush=True)
+    # In one piece: nodes print from several threads.
+    print(f"{text}\n", end="", flush=True)
 
 
 class Localization(LifecycleNode):
