@@ -221,9 +221,9 @@ mod tests {
 
     #[test]
     fn a_design_of_two_functions_is_replaced_for_one() {
-        let both = step(&["a", "d", "d"], &[("f", "d"), ("g", "d")]);
-        assert_eq!(both.with_design("f", "e"), step(&["a", "e", "d"], &[("f", "e"), ("g", "d")]));
-        assert_eq!(both.with_design("g", "e"), step(&["a", "d", "e"], &[("f", "d"), ("g", "e")]));
+        let shared = step(&["a", "d", "d"], &[("f", "d"), ("g", "d")]);
+        assert_eq!(shared.with_design("f", "e"), step(&["a", "e", "d"], &[("f", "e"), ("g", "d")]));
+        assert_eq!(shared.with_design("g", "e"), step(&["a", "d", "e"], &[("f", "d"), ("g", "e")]));
         let once = step(&["a", "d"], &[("f", "d"), ("g", "d")]);
         assert_eq!(once.with_design("g", "e"), step(&["a", "e"], &[("f", "d"), ("g", "e")]));
     }
