@@ -4,8 +4,8 @@
 //! [`Stated`] keeps the stated axioms and rules. [`lower_together`], which also translates a new
 //! knowledge base, translates them to facts and rules before and after the change. The engine receives
 //! the differences between the two results. A change that consists of assertions about named classes and
-//! properties skips these translations, unless rules depend on the set of stated names. Entities that only the change
-//! declares are not considered in this test.
+//! properties skips these translations, unless rules depend on the set of stated names, or the change declares a class
+//! or property and names can be equal.
 //!
 //! Axioms form a set: an axiom of two documents is stated once, and one retraction removes it. Declarations are
 //! never retracted, because many documents repeat them.
@@ -252,7 +252,7 @@ impl Stated {
     /// Returns `true` if the change can be computed without a translation of the whole ontology. Then
     /// `axioms` are only assertions about individuals by named classes and properties, and no rule of
     /// `program` derives members of `owl:Thing`. The names must not belong to OWL's own vocabulary, and no
-    /// individual may also be declared as something else by a document stated before.
+    /// individual may also be declared as something else. [`Stated::declares`] covers declarations of the change itself.
     fn is_plain(&self, axioms: &[AnnotatedAxiom], program: &Program, symbols: &Symbols) -> bool {
         // The rules and facts of `owl:Thing` depend on all names that are stated.
         let thing = symbols.find_name(owl::THING);

@@ -389,7 +389,7 @@ fn unusable_rules_are_reported_and_the_others_kept() {
     }
 }
 
-/// An axiom has the same condition as a rule that is left out, and keeps its conclusions.
+/// An axiom has the same condition as an unusable rule, and keeps its conclusions.
 #[test]
 fn unusable_rules_do_not_take_conclusions_of_axioms_with_them() {
     let some = "[ a owl:Restriction ; owl:onProperty :p ; owl:someValuesFrom :C ]";

@@ -113,8 +113,7 @@ impl Context<'_> {
 
     /// Removes the rules that the engine rejects, each with a warning. One such rule would make the engine
     /// reject the whole program. Omits the test for a rule lowered from an axiom if its body has a relation
-    /// atom, or an equality with a constant: lowering then binds all variables. The test also evaluates the remaining
-    /// rules without facts, under the default limits.
+    /// atom, or an equality with a constant: lowering then binds all variables.
     fn drop_unusable(&mut self) {
         let binds = |atom: &Atom| match atom {
             Atom::Relation { .. } => true,

@@ -1,7 +1,7 @@
 //! Regular expressions of `XPath`: matching, replacement and tokenisation. Patterns are translated to the
-//! syntax of the `regex` crate, which supports neither back references nor names of Unicode blocks. With flag `x`, `#`
-//! begins a comment, unlike in `XPath`. An invalid constant pattern is an error of its rule (R210). An invalid pattern
-//! in a variable makes the built-in false.
+//! syntax of the `regex` crate, which supports neither back references nor names of Unicode blocks. An
+//! invalid constant pattern is an error of its rule (R210). An invalid pattern in a variable makes the
+//! built-in false.
 //!
 //! [2] W3C `XQuery` 1.0 and `XPath` 2.0 Functions and Operators, 2007.
 

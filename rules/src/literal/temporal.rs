@@ -442,8 +442,8 @@ fn split_day(seconds: &Decimal) -> (i64, String) {
     split_seconds(seconds).unwrap_or_default()
 }
 
-/// Splits seconds like [`split_day`]. Returns `None` if the whole seconds exceed `i64`. No parsed moment has so many
-/// seconds, but the sum of a moment and a duration can have them in UTC.
+/// Splits seconds like [`split_day`]. Returns `None` if the whole seconds exceed `i64`, which is
+/// possible only for the sum of a moment and a duration.
 fn split_seconds(seconds: &Decimal) -> Option<(i64, String)> {
     let (unscaled, scale) = seconds.parts();
     let unit = ten_to(scale);

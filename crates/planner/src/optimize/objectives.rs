@@ -24,7 +24,8 @@ use crate::optimize::config::Config;
 #[derive(Debug, Clone)]
 pub struct Point {
     /// The solution with its plan. The cost of the plan is its cost under the first objective. Lower bound, proof and
-    /// statistics are those of the search for the first objective.
+    /// statistics are those of the search for the first objective, except that an unchecked claim or a contradiction of a
+    /// later search is included.
     pub solution: Solution,
     /// Value of the plan under each objective; empty if there is no plan.
     pub values: Vec<Exact>,

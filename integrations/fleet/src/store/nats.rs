@@ -142,7 +142,7 @@ impl Nats {
     /// # Errors
     /// The name of the fleet is invalid, a file of `access` cannot be read, the servers refuse access, or a stream of
     /// this name does not belong to a fleet. After `patience`: no server can be reached, it has no JetStream, or it
-    /// cannot create the streams, for example with so many replicas.
+    /// cannot create the streams, for example because it has fewer servers than replicas.
     pub async fn open(access: &Access, layout: &Layout, patience: Duration) -> Result<Self, Diagnostic> {
         let wrong =
             |error: &dyn std::fmt::Display| Diagnostic::error("N311", format!("{}: {error}", access.url));
