@@ -164,7 +164,7 @@ fn judge_task(seed: u64, task: &Task, tally: &mut Tally) {
 
 /// Runs the seeds of one parity (`first` is 0 or 1), so that two test threads share the work.
 fn judge_seeds(first: u64) {
-    let (from, tasks) = (setting("ORACLE_FROM", 0), setting("ORACLE_TASKS", 300));
+    let (from, tasks) = (setting("ORACLE_FROM", 0), setting("ORACLE_TASKS", 160));
     let mut tally = Tally::default();
     for seed in (from + first..from + tasks).step_by(2) {
         judge_seed(seed, &mut tally);

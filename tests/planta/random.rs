@@ -190,7 +190,7 @@ fn compare_many(seed: u64, tasks: usize) {
 
 #[test]
 fn random_tasks_have_the_states_of_their_export() {
-    compare_many(0, 600);
+    compare_many(0, 250);
 }
 
 #[test]

@@ -119,18 +119,18 @@ fn case_up_to(cap: usize, name: String, task: Task, unit: Option<Q>) -> Case {
 
 #[test]
 fn actions_one_after_another() {
-    run(500, |seed| vec![case("temporal", seed, None)]).finish();
+    run(250, |seed| vec![case("temporal", seed, None)]).finish();
 }
 
 #[test]
 fn actions_with_designs() {
     let case = |seed| vec![case_of(format!("designs-{seed}"), Maker::with_designs(seed), None)];
-    run(250, case).finish();
+    run(120, case).finish();
 }
 
 #[test]
 fn overlapping_actions() {
-    run(200, |seed| vec![case("overlap", seed, Some(concurrent_unit(seed)))]).finish();
+    run(100, |seed| vec![case("overlap", seed, Some(concurrent_unit(seed)))]).finish();
 }
 
 #[test]
@@ -140,7 +140,7 @@ fn batteries_that_are_charged() {
         let (task, cap) = battery::make(seed, unit);
         vec![case_up_to(cap, format!("battery-{seed}"), task, Some(unit))]
     };
-    run(100, case).finish();
+    run(60, case).finish();
 }
 
 fn kinds(task: &Task, unit: Option<Q>) -> (Vec<&'static str>, String) {
